@@ -6,6 +6,7 @@ from hero_client.robots.robot_base import BaseRobot
 from hero_client.robots.swarm_base import BaseSwarm
 from hero_client.values.background_motion import BackgroundMotion
 from hero_client.values.errors import StaleDataError
+from hero_client.values.robot_constants import HERO
 from hero_node.clock import Clock
 from hero_node.errors import HeroError
 from hero_node.geometry import Pose, Velocity, wrap_angle
@@ -87,7 +88,7 @@ class FakeLink:
         self.odometries = []
         self.is_stopped, self.connected, self.closed = False, True, 0
         self.ready_s = clock.now_s
-        self.localized = None
+        self.localized, self.model = None, HERO
         self.origin = Pose(0.0, 0.0, 0.0)
         clock.joined.append(self)
 

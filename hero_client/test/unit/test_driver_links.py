@@ -79,12 +79,12 @@ class Ros:
         self.drivers._ask()
         return waits[0]
 
-    def report(self, name, *robots, stopped=False, sender=None):
+    def report(self, name, *robots, stopped=False, sender=None, model=""):
         """Let a driver report robots: (number, state), perhaps with a stop_state or an error."""
         message = RobotArray(stopped=stopped)
         for number, state, *more in robots:
             stop_state = more[0] if more else Robot.AT_REST
-            message.robots.append(Robot(namespace="/hero_%d" % number, state=state, stop_state=stop_state))
+            message.robots.append(Robot(namespace="/hero_%d" % number, state=state, stop_state=stop_state, model=model))
         message._connection_header = {"callerid": sender or name}
         self.subscribers[name](message)
 
@@ -182,6 +182,15 @@ def test_a_robot_is_stopped_with_its_driver_while_it_is_connected(ros):
         False,
         False,
     ]
+
+
+def test_the_model_of_a_robot_is_what_the_driver_that_knows_it_reports(ros):
+    ros.known = [A, B]
+    ros.look()
+    ros.report(A, (0, Robot.READY))
+    assert ros.drivers.find_model("/hero_0") == ros.drivers.find_model("/hero_1") == ""
+    ros.report(B, (0, Robot.READY), model="hero_plus")
+    assert ros.drivers.find_model("/hero_0") == "hero_plus"
 
 
 def test_the_driver_of_a_robot_is_that_where_it_is_now(ros):

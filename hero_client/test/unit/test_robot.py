@@ -9,7 +9,7 @@ from hero_client.robots.group import READY_TIMEOUT_S
 from hero_client.robots.robot_base import STOPPED_WARNING_PERIOD_S
 from hero_client.values.errors import GoalError, RobotNotReadyError, StaleDataError, StoppedError
 from hero_client.values.readings import FRESH_S
-from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, MODELS
 from hero_node.geometry import Pose, Velocity
 
 
@@ -33,10 +33,11 @@ def test_data_count_until_they_are_a_second_old():
     assert all(map(math.isnan, robot.fresh_proximity())) and len(robot.fresh_proximity()) == 8
 
 
-def test_speeds_of_the_wheels_are_those_of_the_rim():
+@pytest.mark.parametrize("model, separation_m", [("hero", 0.063), ("hero_plus", 0.065)])
+def test_speeds_of_the_wheels_are_those_of_the_rim(model, separation_m):
     robot, link = make_robot()
-    link.velocity = Velocity(0.1, 2.0)
-    assert robot.wheel_speeds == pytest.approx((0.1 - 0.063, 0.1 + 0.063))
+    link.velocity, link.model = Velocity(0.1, 2.0), MODELS[model]
+    assert robot.wheel_speeds == pytest.approx((0.1 - separation_m, 0.1 + separation_m))
 
 
 def test_the_nearest_obstacle_is_told_in_the_body_frame():

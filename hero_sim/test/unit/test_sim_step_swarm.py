@@ -141,6 +141,19 @@ def test_hero_plus_beside_a_stock_robot_drives_and_measures_ahead(wifi):
         swarm[0].distance  # noqa: B018
 
 
+def test_wheel_speeds_of_hero_plus_are_those_of_its_rims():
+    swarm = StepSwarm(2, perfect=True, error=["slip=0"], model="hero_plus,robot=1")
+    swarm.drive(0.0, 2.0, duration_s=1.0)
+    measured_m_s, start_m, start_s = [], swarm.rows.world.travels_m.copy(), swarm.now_s
+    for _ in range(300):
+        swarm.drive(0.0, 2.0)
+        swarm.sleep(0.034)
+        measured_m_s.append([robot.wheel_speeds for robot in swarm])
+    rolled_m = (swarm.rows.world.travels_m - start_m) * swarm.rows.world.errors.wheel_scale
+    true_m_s = rolled_m / (swarm.now_s - start_s)
+    assert np.mean(measured_m_s, axis=0) == pytest.approx(true_m_s, rel=0.01)
+
+
 def test_proximity_begins_ahead_and_goes_round_to_the_left():
     swarm = StepSwarm(6, arena=CORNER_ARENA)
     robot = swarm[CORNERED]

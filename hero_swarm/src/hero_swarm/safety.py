@@ -7,7 +7,7 @@ collisions-free multirobot systems, IEEE T-RO 2017). Each of two robots takes ha
 other.
 """
 
-from typing import Optional, Tuple
+from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class SafetyFilter:
         neighbors: so many of the nearest robots are looked at: more do not fit around one.
         sidestep: share of what is taken from a velocity that goes to its right, so that robots that meet pass.
         max_speed_m_s, max_angular_rad_s: limits of the commands.
+        radii_m: of the robots' bodies (N,), or one for all.
     """
 
     lookahead_m = 0.03
@@ -49,6 +50,7 @@ class SafetyFilter:
         if mode not in MODES:
             raise ValueError("safety %r: must be one of %s" % (mode, ", ".join(MODES)))
         self.mode = mode
+        self.radii_m: Union[float, Sequence[float]] = BODY_RADIUS_M
         self._fence_m = fence_m
         self._last: Optional[np.ndarray] = None
 
@@ -98,7 +100,7 @@ class SafetyFilter:
 
     def _list_half_planes(self, points_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return normals (W, N, K, 2) and bounds (W, N, K) for the steered points (W, N, 2)."""
-        radius_m = BODY_RADIUS_M + self.lookahead_m + self.margin_m
+        radii_m = np.broadcast_to(self.radii_m, points_m.shape[1]) + self.lookahead_m + self.margin_m
         normals, bounds = [np.empty((*points_m.shape[:2], 0, 2))], [np.empty((*points_m.shape[:2], 0))]
         robots = points_m.shape[1]
         count = min(self.neighbors, robots - 1)
@@ -111,9 +113,10 @@ class SafetyFilter:
             distance_m = np.sqrt(np.maximum(np.take_along_axis(square_m2, nearest, axis=2), 1e-12))
             normals.append(away_m / distance_m[..., None])
             # Half of the closing speed that the pair may have.
-            bounds.append(-0.5 * self.gain_1_s * (distance_m - 2.0 * radius_m))
+            bounds.append(-0.5 * self.gain_1_s * (distance_m - radii_m[:, None] - radii_m[nearest]))
         if self._fence_m is not None:
-            gaps_m = np.concatenate((points_m - self._fence_m[:2], self._fence_m[2:] - points_m), axis=-1) - radius_m
+            gaps_m = np.concatenate((points_m - self._fence_m[:2], self._fence_m[2:] - points_m), axis=-1)
+            gaps_m -= radii_m[:, None]
             inward = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
             normals.append(np.broadcast_to(inward, (*points_m.shape[:2], 4, 2)))
             bounds.append(-self.gain_1_s * gaps_m)

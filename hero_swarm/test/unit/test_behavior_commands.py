@@ -254,4 +254,5 @@ def test_metrics_by_name_are_those_of_places_with_their_units():
     touching = np.array(
         [[(0.0, 0.0), (2.0 * BODY_RADIUS_M - 1e-6, 0.0), (0.5, 0.0), (0.5 + 2.0 * BODY_RADIUS_M + 1e-6, 0.0)]]
     )
-    assert metrics.collisions(touching).tolist() == [1] and metrics.collisions(touching, 0.001).tolist() == [2]
+    assert metrics.collisions(touching).tolist() == [1]
+    assert metrics.collisions(touching, tolerance_m=0.001).tolist() == [2]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import BODY_RADIUS_M, MODELS
 from hero_swarm import metrics
 from hero_swarm.metrics.shapes import ideal_dispersion
 
@@ -72,6 +72,15 @@ def test_collisions_and_the_nearest_neighbor_ignore_the_robot_itself():
     for apart_m, collisions in ((2.0 * BODY_RADIUS_M - 1e-6, 1), (2.0 * BODY_RADIUS_M + 1e-6, 0)):
         assert metrics.collisions(np.array([[(0.0, 0.0), (0.0, apart_m)]])).tolist() == [collisions]
     assert metrics.nearest_neighbor(places_m) == pytest.approx([(0.07 + 0.07 + 0.43) / 3.0])
+
+
+def test_robots_of_another_model_collide_at_their_own_radius():
+    radii_m = [MODELS[name].body_radius_m for name in ("hero", "hero_plus", "hero_plus")]
+    for gap_m, collisions in ((-1e-6, 2), (1e-6, 0)):
+        places_m = np.cumsum([0.0, radii_m[0] + 0.060 + gap_m, 0.120 + gap_m])[:, None] * (1.0, 0.0)
+        assert metrics.collisions(places_m[None], radii_m).tolist() == [collisions]
+        poses = np.column_stack((places_m, np.zeros(3)))[None]
+        assert metrics.METRICS["collisions"](poses, poses, None, radii_m).tolist() == [collisions]
 
 
 def test_coverage_is_the_share_of_the_area_in_range():

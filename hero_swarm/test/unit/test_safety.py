@@ -34,6 +34,21 @@ def test_robots_that_walk_at_random_touch_only_without_the_filter(mode):
     assert (farthest_m > 0.7 - BODY_RADIUS_M) == (mode == OFF)
 
 
+def test_wider_bodies_keep_a_wider_distance_from_robots_and_fence():
+    places_m, radii_m = np.array([(-0.2, 0.0, 0.0), (0.2, 0.0, math.pi)]), np.array([BODY_RADIUS_M, 0.060])
+    safe = SafetyFilter(ROBOTS, np.array((-0.3, -0.3, 0.3, 0.3)))
+    safe.sidestep, safe.radii_m = 0.0, radii_m
+    for way in (1.0, -1.0):
+        poses = places_m.copy()
+        for _ in range(200):
+            poses[:, 0] += 0.05 * safe(poses[None], np.full(2, 0.1 * way), np.zeros(2))[0][0] * np.cos(poses[:, 2])
+        if way > 0.0:
+            gap_m = 2.0 * (2.0 * safe.lookahead_m + safe.margin_m)
+            assert np.diff(poses[:, 0]) - radii_m.sum() == pytest.approx([gap_m])
+        else:
+            assert 0.3 - np.abs(poses[:, 0]) - radii_m == pytest.approx(np.full(2, safe.margin_m))
+
+
 def test_far_from_everything_commands_stay_as_they_are():
     poses = np.array([[(0.0, 0.0, 0.5), (3.0, 0.0, 2.0)]])
     linear_m_s, angular_rad_s = np.array([[0.1, 0.05]]), np.array([[0.4, -1.0]])

@@ -19,7 +19,7 @@ from ..values.background_motion import BackgroundMotion, Sleep, Steps
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
 from ..values.readings import FRESH_S, Obstacle, find_nearest
-from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, WHEEL_SEPARATION_M
+from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, RobotModel
 from ..values.sensing import Neighbor
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
@@ -145,7 +145,7 @@ class BaseRobot(Group):
     def wheel_speeds(self) -> Tuple[float, float]:
         """Speeds of the left and right wheel at the rim, m/s, by the odometry. Raises: StaleDataError as `pose`."""
         linear_m_s, angular_rad_s = self.velocity
-        turning_m_s = angular_rad_s * WHEEL_SEPARATION_M / 2.0
+        turning_m_s = angular_rad_s * self.model.wheel_separation_m / 2.0
         return linear_m_s - turning_m_s, linear_m_s + turning_m_s
 
     @property
@@ -161,7 +161,7 @@ class BaseRobot(Group):
     def distance(self) -> float:
         """What HeRo+'s sensor measures ahead, in m from the robot's center; it sees 0.04 to 2.9 m.
 
-        The first use waits up to 5 s. Raises: StaleDataError if it is older than 1 s, as on a robot without the sensor.
+        The first use waits up to 5 s. Raises: StaleDataError as `pose`, also on a robot without the sensor.
         """
         self._check_asked("distance")
         return self._link.read_distance()
@@ -200,10 +200,7 @@ class BaseRobot(Group):
         return self._link.read_ranges() if self._link.age_s("proximity") <= FRESH_S else [math.nan] * 8
 
     def nearest(self) -> Optional[Obstacle]:
-        """Return range (m, from the robot's center) and bearing (rad) of the nearest obstacle; None if none is seen.
-
-        Raises: StaleDataError as `proximity`.
-        """
+        """Return range (m, from the center) and bearing (rad) of the nearest obstacle; None: none. Raises: as `pose`."""
         ranges = self.proximity
         return find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
 
@@ -213,6 +210,11 @@ class BaseRobot(Group):
     def connected(self) -> bool:
         """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
         return self._link.connected
+
+    @property
+    def model(self) -> RobotModel:
+        """Dimensions, such as model.body_radius_m; the stock robot's until the driver has reported. Never waits."""
+        return self._link.model
 
     @property
     def is_stopped(self) -> bool:
@@ -349,8 +351,6 @@ class BaseRobot(Group):
         robot starts in its middle and reaches 0.7 m to each side.
 
         on_step: called after each command.
-
-        What the sensors do not see (black, low or thin things) ends no motion: wheels that slip are counted as driven.
 
         Raises: GoalError with the reason if the goal is not reached: an obstacle in the way and where it is, wheels
         that do not turn, no pose for 2 s, or timeout_s. RobotNotReadyError if the robot is not there within 2 s.

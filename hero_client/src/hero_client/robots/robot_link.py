@@ -6,6 +6,7 @@ from hero_node.clock import Clock
 from hero_node.geometry import Pose, Velocity
 
 from ..values.background_motion import BackgroundMotion, Steps
+from ..values.robot_constants import RobotModel
 from ..values.sensing import Neighbor
 
 __all__ = ["MAP", "RobotLink"]
@@ -24,6 +25,10 @@ class RobotLink(Protocol):
     @property
     def connected(self) -> bool:
         """Whether something takes the robot's commands."""
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot's model, as far as is known now; the stock robot's until then."""
 
     def missing(self) -> Optional[str]:
         """Return why the robot cannot be driven now, as text for users; None if it can."""

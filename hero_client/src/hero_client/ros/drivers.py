@@ -119,6 +119,7 @@ class _DriverLink:
         self.report: Optional[RobotArray] = None
         self.arrival_s = -math.inf
         self.stopped_robots: FrozenSet[str] = frozenset()
+        self.models: Dict[str, str] = {}
         self._lock = threading.Lock()
         self._is_closed = False
         # Not latched: a driver that starts later must not find an old request.
@@ -130,6 +131,7 @@ class _DriverLink:
             clean(report)
             stopped = [robot.namespace for robot in report.robots if robot.state in (Robot.READY, Robot.JOINING)]
             self.stopped_robots = frozenset(stopped if report.stopped else ())
+            self.models = {robot.namespace: robot.model for robot in report.robots if robot.model}
             with self._lock:
                 self.report, self.arrival_s = report, time.monotonic()
                 self.count += 1
@@ -314,6 +316,10 @@ class Drivers:
         links = self._links.values()
         limit_s = max((link.arrival_s for link in links), default=0.0) - FORGET_S
         return any(namespace in link.stopped_robots and link.arrival_s > limit_s for link in links)
+
+    def find_model(self, namespace: str) -> str:
+        """Return the name of a robot's model; "" while it is not known."""
+        return next((link.models[namespace] for link in self._links.values() if namespace in link.models), "")
 
     def explain_absence(self, namespace: str) -> str:
         """Return why a robot takes no commands, as far as the drivers tell, for users."""

@@ -20,6 +20,7 @@ from hero_node.texts import one_line
 from ..values.background_motion import BackgroundMotion, Steps, run_steps
 from ..values.errors import RobotError, StaleDataError
 from ..values.readings import FRESH_S, front_first
+from ..values.robot_constants import HERO, MODELS, RobotModel
 from ..values.sensing import Neighbor
 from .drivers import share_drivers
 from .frames import share_frames
@@ -105,6 +106,11 @@ class RosLink:
     def connected(self) -> bool:
         """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
         return self._cmd_vel.connected
+
+    @property
+    def model(self) -> RobotModel:
+        """See RobotLink."""
+        return MODELS.get(self._drivers.find_model(self._namespace), HERO)
 
     def missing(self) -> Optional[str]:
         """See RobotLink."""

@@ -1,6 +1,11 @@
-"""Constants of every HeRo robot; source: the firmware's config.h and RangeSensor.ino."""
+"""Constants of every HeRo robot, and those of its models; source: the firmware's config.h and RangeSensor.ino."""
 
-__all__ = ["BODY_RADIUS_M", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S", "MIN_RANGE_M", "WHEEL_SEPARATION_M"]
+from typing import NamedTuple
+
+__all__ = [
+    "BODY_RADIUS_M", "HERO", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S", "MIN_RANGE_M", "MODELS", "WHEEL_SEPARATION_M",
+    "RobotModel",
+]  # fmt: skip
 
 BODY_RADIUS_M = 0.036835
 """The firmware adds it to what its infrared sensors measure, so ranges count from the robot's center."""
@@ -15,3 +20,15 @@ MAX_ANGULAR_RAD_S = 8.0
 """The firmware clamps angular.z to this."""
 
 WHEEL_SEPARATION_M = 0.063
+
+
+class RobotModel(NamedTuple):
+    """Dimensions of a model of robots."""
+
+    body_radius_m: float
+    wheel_separation_m: float
+
+
+HERO = RobotModel(BODY_RADIUS_M, WHEEL_SEPARATION_M)
+MODELS = {"hero": HERO, "hero_plus": RobotModel(body_radius_m=0.060, wheel_separation_m=0.065)}
+"""By the names that drivers report. HeRo+ (github.com/varunraveendra/hero_plus) has a bump shield around its body."""

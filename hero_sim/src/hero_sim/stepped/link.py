@@ -10,6 +10,7 @@ from hero_client.robots.robot_link import MAP
 from hero_client.values.background_motion import BackgroundMotion, Steps
 from hero_client.values.errors import FrameError, StaleDataError
 from hero_client.values.readings import FRESH_S
+from hero_client.values.robot_constants import RobotModel
 from hero_client.values.sensing import Neighbor, Neighbors, list_neighbors, sense_neighbors
 from hero_node.command_line import say
 from hero_node.geometry import Pose, Velocity, find_frame
@@ -53,6 +54,12 @@ class StepLink:
     def true_pose(self) -> Pose:
         """Where the robot is in the world."""
         return Pose(*self._rows.world.poses[self.row].tolist())
+
+    @property
+    def model(self) -> RobotModel:
+        """See RobotLink."""
+        model = self._rows.models[self.row]
+        return RobotModel(model.radius_m, model.wheel_separation_m)
 
     def missing(self) -> Optional[str]:
         """See RobotLink."""

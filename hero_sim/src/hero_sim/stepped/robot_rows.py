@@ -65,6 +65,7 @@ class RobotRows:
     Attributes:
         now_ms: how far everything has been advanced.
         world: ground truth.
+        models: of each robot.
         ticks: of both wheels since the odometry was last set (R, 2), whole numbers, read every 34 ms.
         odometry_ms: when the program received these (R,).
         scan_ms: when the program received these (R,), every 205 ms.
@@ -81,7 +82,7 @@ class RobotRows:
         bodies are in the world already; without, all are stock robots.
         """
         rows = len(world.poses)
-        models = models or [HERO] * rows
+        self.models = models = models or [HERO] * rows
         self.world = world
         self.now_ms = now_ms = world.time_ms
         self._radios = RadioRows(radios)

@@ -83,7 +83,8 @@ class RobotTrial:
             velocities = (poses - self._last[1]) / max(time_s - self._last[0], 1e-3)
         self._last = (time_s, poses.copy())
         names, until = list_sources(self._experiment), self._experiment.until
-        values = [float(METRICS[name](poses[None], velocities[None], things.poses)[0]) for name in names]
+        seen = poses[None], velocities[None], things.poses, self._filter.radii_m
+        values = [float(METRICS[name](*seen)[0]) for name in names]
         self._samples.append(values)
         self._reached = until is not None and bool(until.holds(values[names.index(until.metric)]))
 

@@ -4,6 +4,8 @@ from typing import Callable, Dict
 
 import numpy as np
 
+from hero_client.values.robot_constants import BODY_RADIUS_M
+
 from .graphs import algebraic_connectivity, cluster_fraction, collisions, nearest_neighbor
 from .motion import consensus_error, order, rotation
 from .objects import object_cluster_fraction, object_distance
@@ -17,23 +19,25 @@ __all__ = [
 ]  # fmt: skip
 
 Metric = Callable[..., np.ndarray]
-"""Of poses and velocities (W, N, 3), both in the common frame, and of the poses of objects (W, M, 3), which may be left
-out where none count; returns one number for each world (W,)."""
+"""Of poses and velocities (W, N, 3), both in the common frame, of the poses of objects (W, M, 3), and of the bodies'
+radii (N,); the last two may be left out where they do not count. Returns one number for each world (W,)."""
 
 METRICS: Dict[str, Metric] = {
-    "algebraic_connectivity": lambda poses, velocities, objects=None: algebraic_connectivity(poses[..., :2], 0.5),
-    "cluster_fraction": lambda poses, velocities, objects=None: cluster_fraction(poses[..., :2]),
-    "collisions": lambda poses, velocities, objects=None: collisions(poses[..., :2]).astype(float),
-    "consensus_error": lambda poses, velocities, objects=None: consensus_error(poses[..., :2]),
-    "dispersion": lambda poses, velocities, objects=None: dispersion(poses[..., :2]),
-    "dispersion_ratio": lambda poses, velocities, objects=None: dispersion_ratio(poses[..., :2]),
-    "fatness": lambda poses, velocities, objects=None: fatness(poses[..., :2]),
-    "hull_area": lambda poses, velocities, objects=None: hull_area(poses[..., :2]),
-    "nearest_neighbor": lambda poses, velocities, objects=None: nearest_neighbor(poses[..., :2]),
-    "object_cluster_fraction": lambda poses, velocities, objects: object_cluster_fraction(objects[..., :2]),
-    "object_distance": lambda poses, velocities, objects: object_distance(objects[..., :2]),
-    "order": lambda poses, velocities, objects=None: order(poses[..., 2]),
-    "rotation": lambda poses, velocities, objects=None: rotation(poses[..., :2], velocities[..., :2]),
+    "algebraic_connectivity": lambda poses, *_: algebraic_connectivity(poses[..., :2], 0.5),
+    "cluster_fraction": lambda poses, *_: cluster_fraction(poses[..., :2]),
+    "collisions": lambda poses, velocities, objects=None, radii_m=BODY_RADIUS_M: (
+        collisions(poses[..., :2], radii_m).astype(float)
+    ),
+    "consensus_error": lambda poses, *_: consensus_error(poses[..., :2]),
+    "dispersion": lambda poses, *_: dispersion(poses[..., :2]),
+    "dispersion_ratio": lambda poses, *_: dispersion_ratio(poses[..., :2]),
+    "fatness": lambda poses, *_: fatness(poses[..., :2]),
+    "hull_area": lambda poses, *_: hull_area(poses[..., :2]),
+    "nearest_neighbor": lambda poses, *_: nearest_neighbor(poses[..., :2]),
+    "object_cluster_fraction": lambda poses, velocities, objects, *_: object_cluster_fraction(objects[..., :2]),
+    "object_distance": lambda poses, velocities, objects, *_: object_distance(objects[..., :2]),
+    "order": lambda poses, *_: order(poses[..., 2]),
+    "rotation": lambda poses, velocities, *_: rotation(poses[..., :2], velocities[..., :2]),
 }
 """Those that need poses and velocities alone, by name."""
 

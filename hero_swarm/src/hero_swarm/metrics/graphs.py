@@ -1,5 +1,7 @@
 """Metrics of who is near whom. Pure: places (W, N, 2) in m; results (W,)."""
 
+from typing import Union
+
 import numpy as np
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
@@ -48,7 +50,11 @@ def algebraic_connectivity(places_m: np.ndarray, reach_m: float) -> np.ndarray:
     return np.where(values < 1e-9, 0.0, values)
 
 
-def collisions(places_m: np.ndarray, tolerance_m: float = 0.0) -> np.ndarray:
-    """Return how many pairs of robots touch, or are less than tolerance_m apart."""
-    counts: np.ndarray = (measure_distances(places_m) < 2.0 * BODY_RADIUS_M + tolerance_m).sum(axis=(1, 2)) // 2
+def collisions(
+    places_m: np.ndarray, radii_m: Union[float, np.ndarray] = BODY_RADIUS_M, tolerance_m: float = 0.0
+) -> np.ndarray:
+    """Return how many pairs of robots touch, or are less than tolerance_m apart; radii_m: of the bodies (N,)."""
+    radii_m = np.broadcast_to(radii_m, places_m.shape[1])
+    touching_m = radii_m[:, None] + radii_m + tolerance_m
+    counts: np.ndarray = (measure_distances(places_m) < touching_m).sum(axis=(1, 2)) // 2
     return counts

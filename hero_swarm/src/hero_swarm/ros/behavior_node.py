@@ -87,6 +87,7 @@ class BehaviorNode:
         now_s = rospy.get_time()
         sensed = sense(self._behavior, now_s - self._start_s, poses[None], self._random, things)
         linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
+        self._filter.radii_m = [robot.model.body_radius_m for robot in self._swarm]
         speeds = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         known = sensed.is_known
         self._commands.send(speeds[0][0], speeds[1][0], known & np.isfinite(speeds).all(axis=(0, 1)))

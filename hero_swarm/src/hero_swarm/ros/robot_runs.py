@@ -68,7 +68,9 @@ def run_on_robots(
                 answer = _ask(program, swarm, starts, source, label)
             if answer == END:
                 break
-            trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], SafetyFilter(ROBOTS))
+            safety = SafetyFilter(ROBOTS)
+            safety.radii_m = [robot.model.body_radius_m for robot in swarm]
+            trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], safety)
             commands = WheelCommands(swarm, trial.drive, options.calibration)
             name = "cell_%d_seed_%d" % (cell_index + 1, seed)
             with _record(program, folder.path, name, ids, experiment.time_s):

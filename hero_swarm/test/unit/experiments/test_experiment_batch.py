@@ -61,7 +61,7 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
 
 
 def test_metrics_get_speeds_in_meters_per_second(tmp_path, monkeypatch):
-    monkeypatch.setitem(metrics.METRICS, "dispersion", lambda poses, velocities, objects: velocities[:, 0, 0])
+    monkeypatch.setitem(metrics.METRICS, "dispersion", lambda poses, velocities, *_: velocities[:, 0, 0])
     compute_batch(FILE.replace("hz: 2", "hz: 20"), 0, [11], str(tmp_path / "a"), True)
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
     moved_m = float(poses[40, 0, 0, 0] - poses[39, 0, 0, 0])  # in the last cycle before 2 s
