@@ -5,7 +5,7 @@ Public names are imported on first use (PEP 562), so that pure modules of this p
 
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, List
 
 if TYPE_CHECKING:  # for editors and mypy
     from hero_node.clock import Clock
@@ -111,3 +111,8 @@ def __getattr__(name: str) -> Any:
         text = "hero_client.%s needs ROS; without it run the script on simulated robots: python3 -m hero_sim.in_process"
         raise ModuleNotFoundError(text % name, name=error.name) from None
     return getattr(module, name)
+
+
+def __dir__() -> List[str]:
+    """Return the names that an interactive shell completes."""
+    return __all__

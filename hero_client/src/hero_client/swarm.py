@@ -13,7 +13,7 @@ from hero_node.ros.script import start_node
 from .robot import Robot
 from .robots.group import check_robot_id
 from .robots.swarm_base import REPORT_PERIOD_S, BaseSwarm
-from .ros.drivers import USUAL_TOPIC, share_drivers
+from .ros.drivers import USUAL_TOPIC, Drivers, share_drivers
 from .ros.stop_status import StopStatus
 from .values.background_motion import Sleep
 from .values.errors import RobotNotReadyError
@@ -47,7 +47,7 @@ class Swarm(BaseSwarm[Robot]):
                 raise ValueError("robot %d is named more than once" % number)
         start_node()
         super().__init__([Robot(number, odom, proximity) for number in numbers], ROS_CLOCK)
-        self.drivers = share_drivers()
+        self.drivers: Drivers = share_drivers()
 
     @classmethod
     def discover(

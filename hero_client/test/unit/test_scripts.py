@@ -30,3 +30,7 @@ def test_every_public_name_is_imported_for_editors_and_on_first_use():
     assert names == set(hero_client.__all__) == set(hero_client._MODULES)
     for name in hero_client.__all__:
         assert getattr(hero_client, name) is not None
+
+
+def test_a_shell_completes_the_public_names_and_nothing_else():
+    assert dir(hero_client) == sorted(hero_client.__all__)

@@ -59,18 +59,20 @@ class WheelMotion:
 
     def read_ticks(self, left_ticks: float, right_ticks: float) -> None:
         """Take a reading of the wheels' counters; one that is not finite shows no turn."""
-        if not math.isfinite(left_ticks + right_ticks):
-            return
-        self.readings += 1
         tolerance_ticks = self._tolerance_ticks
+        # Comparisons with what is not finite fail.
         if (
             -tolerance_ticks <= left_ticks - self._left_ticks <= tolerance_ticks
             and -tolerance_ticks <= right_ticks - self._right_ticks <= tolerance_ticks
             and self._has_anchor
         ):
+            self.readings += 1
             self.still_readings += 1
             self._moves.append(0.0)
             return
+        if not math.isfinite(left_ticks + right_ticks):
+            return
+        self.readings += 1
         # The first reading has none before it to compare with.
         if self._has_anchor:
             self.still_readings = 0
