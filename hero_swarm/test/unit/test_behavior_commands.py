@@ -9,8 +9,8 @@ from hero_client.values.object_sensing import NO_OBJECTS, Things
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_client.values.sensing import Neighbors
 from hero_swarm import metrics
-from hero_swarm.behavior import Random, derive_seed, sense
-from hero_swarm.behaviors import find_behavior
+from hero_swarm.behavior import PULSES, Random, derive_seed, sense
+from hero_swarm.behaviors import find_behavior, list_names
 from hero_swarm.steering import steer
 
 SEPARATION_M = 0.063
@@ -63,6 +63,15 @@ def test_wheels_of_one_bit_behaviors_turn_as_published():
             (0.12 * (left + right) / 2.0, 0.12 * (right - left) / SEPARATION_M) for left, right in (robot, nothing)
         ]
         assert act(name, *pair)[0] == close_to(*expected), name
+
+
+def test_behaviors_step_as_often_as_they_were_tuned_for():
+    rates_hz = {name: find_behavior(name)().rate_hz for name in list_names()}
+    evolved = dict.fromkeys(("evolved_aggregation", "cyclic_pursuit", "dispersal", "milling"), 1e3 / 60.0)
+    slow = {"coverage": 5.0, "voter": 10.0, "majority": 10.0}
+    assert rates_hz == {**dict.fromkeys(list_names(), 20.0), **evolved, **slow}
+    pulses = {name for name in list_names() if find_behavior(name)().drive == PULSES}
+    assert pulses == {"aggregation", *evolved}, "a slight turn along a wall needs wheels of equal speed"
 
 
 def test_a_point_before_the_axle_is_slowed_down_in_its_direction():
@@ -164,7 +173,7 @@ def test_opinions_are_taken_over_now_and_then_from_those_in_sight():
         assert after.tolist() == decided
     tie, _ = act("majority", (0, 0, 0), (0.3, 0, 0), memory=np.array([0, 1]), chance=Fixed(0.0))[::-1]
     assert tie.tolist() == [0, 1]
-    for ahead_m, expected in ((0.11, (0.0, 1.5)), (0.13, (0.1, 0.75)), (-0.11, (0.1, 0.75))):
+    for ahead_m, expected in ((0.11, (0.0, 1.5)), (0.13, (0.1, 0.75)), (0.12, (0.1, 0.75)), (-0.11, (0.1, 0.75))):
         commands, _ = act("voter", (0, 0, 0), (ahead_m, 0, 0), chance=Fixed(normal=0.5))
         assert commands[0] == pytest.approx(expected)
     assert find_behavior("voter")().colors(np.array([0, 1])).tolist() == [[1, 0, 0], [0, 0, 1]]

@@ -1,5 +1,6 @@
 """The program behavior on stepped robots, in their time: what it sends to robots, and what it says and shows."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,15 +9,19 @@ import pytest
 pytest.importorskip("rospy", reason="the program needs ROS")
 import rospy
 from nav_msgs.msg import Odometry
+from visualization_msgs.msg import Marker
 
 from hero_client import ProgramError
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.parameters import check_parameters
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
 from hero_sim.stepped.swarm import StepSwarm
+from hero_swarm.behavior import Behavior, Binary, Neighbors, Sight, sense
 from hero_swarm.metrics import consensus_error
 from hero_swarm.ros import behavior_node
-from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode
+from hero_swarm.ros.behavior_markers import BehaviorMarkers
+from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode, _parse_fence
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
 
 DEAD_ZONE_US = [1470.0, 1530.0, 1480.0, 1540.0]
@@ -176,3 +181,95 @@ def test_speeds_that_are_no_numbers_stop_their_robot_alone(stage, tmp_path):
     stage.run(1.0)
     moved_m = np.hypot(*np.moveaxis(stage.places_m - before_m, -1, 0))[0]
     assert moved_m[1] == 0.0 and np.delete(moved_m, 1).min() > 0.02
+
+
+def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):
+    stage.start("milling")
+    stage.run(1.02)
+    assert len(stage.sent["~metric"]) == 9, "every second step of 0.06 s"
+    stage.silent = set(range(6))
+    stage.warnings.clear()
+    told_s = []
+    for _ in range(240):
+        stage.run(0.06)
+        if len(stage.warnings) > len(told_s):
+            told_s.append(stage.swarm.now_s)
+    assert told_s == pytest.approx([3.0, 8.0, 13.0], abs=0.2) and "hero_0" in stage.warnings[0]
+
+
+@pytest.mark.parametrize(("count", "words"), [(8, "hero_6, hero_7 are not"), (9, "hero_6, hero_7, ... are not")])
+def test_of_many_robots_without_calibration_eight_are_named(monkeypatch, count, words):
+    stage = Stage(monkeypatch, count)
+    stage.start("milling")
+    assert words in stage.warnings[0] and "hero_8" not in stage.warnings[0]
+
+
+def test_a_fence_has_a_width_and_a_height():
+    assert _parse_fence(" ") is None
+    assert _parse_fence("-1 0 1 0.5").tolist() == [-1.0, 0.0, 1.0, 0.5]
+    for text in ("0 0 0 1", "0 0 1 0", "0 0 1 -1", "0 0 nan 1"):
+        with pytest.raises(ProgramError, match="~fence is"):
+            _parse_fence(text)
+
+
+class Seeing(Behavior):
+    metric = "order"
+    beam = Binary(range_m=0.5)
+    endless = Sight()
+    near = Neighbors(range_m=0.5)
+
+    def step(self, sensed, memory, random):
+        return 0.0, 0.0, memory
+
+
+def test_beams_end_where_sensors_do_and_the_metric_scales_itself(monkeypatch):
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(5))
+    behavior, drawing = Seeing(), BehaviorMarkers(Seeing(), "map", "/node")
+    poses = np.array([(0.0, 0.0, math.pi / 2.0), (1.0, 0.0, 0.0), (0.8, 0.3, 1.0), (math.nan,) * 3])
+
+    def draw(time_s, value, shift_m=(0.0, 0.0)):
+        moved = poses + (*shift_m, 0.0)
+        markers = drawing.draw(moved, sense(behavior, time_s, moved[None], None), value)
+        assert {(one.header.frame_id, one.action) for one in markers} == {("map", Marker.ADD)}
+        assert len({one.ns for one in markers}) == len(markers)
+        return {one.ns: one for one in markers}
+
+    def list_lines(marker):
+        points = [(point.x, point.y) for point in marker.points]
+        assert len(marker.colors) == len(points)
+        return [(*start, *end) for start, end in zip(points[::2], points[1::2])]
+
+    def place(marker):
+        return [(round(point.x, 6), round(point.y, 6)) for point in marker.points]
+
+    first = draw(0.0, 1.0)
+    assert set(first) == {"/node/beam", "/node/endless", "/node/near", "/node/metric_axes", "/node/metric"}
+    reach_m = BODY_RADIUS_M + 0.5
+    beams = list_lines(first["/node/beam"])
+    assert len(beams) == 3 and beams[0] == pytest.approx((0.0, 0.0, 0.0, reach_m))
+    assert beams[1] == pytest.approx((1.0, 0.0, 1.0 + reach_m, 0.0))
+    assert list_lines(first["/node/endless"])[0] == pytest.approx((0.0, 0.0, 0.0, BODY_RADIUS_M + 3.0))
+    assert list_lines(first["/node/near"]) == [pytest.approx((1.0, 0.0, 0.8, 0.3)), pytest.approx((0.8, 0.3, 1.0, 0.0))]
+    draw(0.4, 9.0)
+    second = draw(0.5, 3.0, (0.1, 0.2))
+    # The corner stays where the middle of all robots was; it goes up with the robots.
+    left_m, low_m = 0.6 - 0.4, 0.3 + 0.2 + 0.12
+    assert place(second["/node/metric_axes"]) == [
+        pytest.approx((left_m, low_m + 0.12)), pytest.approx((left_m, low_m)), pytest.approx((left_m + 0.8, low_m))
+    ]  # fmt: skip
+    assert second["/node/metric"].text == "order 3.00 (1.00 to 3.00 in 120 s)"
+    assert second["/node/metric"].pose.position.x == pytest.approx(left_m + 0.4)
+    third = draw(120.4, 2.0)
+    assert place(third["/node/metric_line"]) == [
+        pytest.approx((left_m + 0.8 * 0.1 / 120.0, low_m + 0.12), abs=1e-6), pytest.approx((left_m + 0.8, low_m))
+    ], "what is 120 s old is gone, and a value between two points was not kept"  # fmt: skip
+    assert draw(121.0, 2.5)["/node/metric"].text == "order 2.50 (2.00 to 2.50 in 120 s)"
+
+
+def test_a_beam_that_sees_has_another_color(monkeypatch):
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(5))
+    poses = np.array([[(0.0, 0.0, 0.0), (0.4, 0.0, 0.0)]])
+    sensed = sense(Seeing(), 0.0, poses, None)
+    beams = BehaviorMarkers(Seeing(), "map", "/node")._draw_sensor("beam", poses[0], sensed)
+    sees, free = beams.colors[0], beams.colors[2]
+    assert beams.colors == [sees, sees, free, free] and sees.r > 0.9 > free.r

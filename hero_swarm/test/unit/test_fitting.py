@@ -1,17 +1,22 @@
 """Fitting the simulator to simulated robots with hidden errors, and the file of what was found."""
 
+import math
+
 import numpy as np
 import pytest
 
+from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 from hero_sim.errors import OptionError
 from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.robot_errors import draw_errors, read_known, set_known
+from hero_sim.world.robot_errors import KINDS, draw_errors, read_known, set_known
 from hero_sim.world.world import World
 from hero_swarm.experiments.batch import build_trial, load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
-from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording
+from hero_swarm.fitting.body_fit import _list_stretches, fit_body, follow_wheels
+from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, build_errors, predict_ends
+from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, measure_wheels, sample_times
 from hero_swarm.fitting.robot_fit import describe_fit, fit_robot
 from hero_swarm.metrics import METRICS
 from hero_swarm.trial import OPEN
@@ -115,3 +120,74 @@ def test_wrong_error_files_are_refused_with_the_line(tmp_path):
             load_checked(parse_experiment(EXPERIMENT % name, "e.yaml", METRICS))
     with pytest.raises(OptionError, match="cannot be read"):
         read_known(str(tmp_path), range(2))
+
+
+def test_a_fit_starts_from_the_drawing_within_the_limits_of_errors():
+    values = {name: start for name, (start, *_) in _PARAMETERS.items() if name != DELAY}
+    fitted, drawn = build_errors([values]), build_errors([{}])
+    for name in values:
+        _, step, least, most = _PARAMETERS[name]
+        kind = KINDS[name]
+        array = kind.array
+        assert np.array_equal(getattr(fitted, array), getattr(drawn, array)), name
+        assert kind.least <= least < most <= kind.most and 0.0 < step < 0.1 * (most - least), name
+
+
+def make_recording(duration_s, yaw_rad=0.0, turn_rad_s=0.0, speed_m_s=0.1, period_s=0.05):
+    """A recording without a command of a robot that drives an arc, whose poses lie elsewhere than its odometry."""
+    times_s = np.arange(0.0, duration_s + 1e-9, period_s)
+    turned_rad = turn_rad_s * times_s
+    forward_m = speed_m_s * np.array([math.sin(turn) / turn_rad_s if turn_rad_s else time_s * 1.0
+                                      for turn, time_s in zip(turned_rad, times_s)])
+    left_m = speed_m_s * np.array([(1.0 - math.cos(turn)) / turn_rad_s if turn_rad_s else 0.0 for turn in turned_rad])
+    wrapped_rad = np.remainder(turned_rad + math.pi, math.tau) - math.pi
+    odometry = np.column_stack((times_s, forward_m, left_m, wrapped_rad))
+    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
+    places_m = (2.0 + cosine * forward_m - sine * left_m, 1.0 + sine * forward_m + cosine * left_m)
+    yaws_rad = np.remainder(turned_rad + yaw_rad + math.pi, math.tau) - math.pi
+    return Recording("hero_4", np.empty((0, 4)), odometry, np.column_stack((times_s, *places_m, yaws_rad)))
+
+
+def test_wheels_roll_as_far_as_their_arcs():
+    for turn_rad_s in (0.0, 0.5, -2.0):
+        recording = make_recording(10.0, turn_rad_s=turn_rad_s)
+        rolled_m = measure_wheels(recording, np.array([0.0, 2.5, 10.0]))
+        aside_m_s = turn_rad_s * WHEEL_SEPARATION_M / 2.0
+        speeds_m_s = np.array((0.1 - aside_m_s, 0.1 + aside_m_s))
+        assert rolled_m == pytest.approx(np.outer((0.0, 2.5, 10.0), speeds_m_s), rel=2e-3)
+        path = follow_wheels(rolled_m, np.array((1.1, 1.1, 1.1)))
+        assert path[:, 2] == pytest.approx(turn_rad_s * np.array((0.0, 2.5, 10.0)), rel=2e-3)
+    straight = follow_wheels(np.array([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]), np.array((1.1, 0.9, 2.0)))
+    step_rad = -0.2 / (2.0 * WHEEL_SEPARATION_M)
+    assert straight[:, 2] == pytest.approx([0.0, step_rad, 2.0 * step_rad])
+    assert straight[1, :2] == pytest.approx((math.cos(step_rad / 2.0), math.sin(step_rad / 2.0)))
+
+
+def test_poses_are_cut_at_both_ends_and_samples_lie_within_the_odometry():
+    recording = make_recording(2.0)
+    assert recording.cut(0.5, 1.0).poses[:, 0] == pytest.approx(np.arange(0.5, 1.01, 0.05))
+    assert len(recording.cut(0.5, 1.0).odometry) == len(recording.odometry)
+    assert recording.time_s == pytest.approx(2.0)
+    assert sample_times(recording) == pytest.approx(np.arange(1, 40) * 0.05)
+
+
+def test_a_body_is_fitted_to_stretches_that_have_poses_throughout():
+    recording = make_recording(40.0, yaw_rad=2.5, turn_rad_s=0.4)
+    assert fit_body([recording]) == pytest.approx(np.ones(3), abs=2e-3)
+    stretches = list(_list_stretches(recording))
+    assert [len(poses) for _, poses in stretches] == [80] * 4
+    poses = recording.poses
+    holed = recording._replace(poses=poses[(poses[:, 0] < 10.0) | (poses[:, 0] > 11.1)])
+    assert [round(poses[0, 0], 2) for _, poses in _list_stretches(holed)] == pytest.approx(
+        [round(stretches[index][1][0, 0], 2) for index in (0, 2, 3)]
+    ), "a second without poses leaves a stretch out"
+    assert not list(_list_stretches(recording._replace(poses=np.empty((0, 4)))))
+    with pytest.raises(ValueError, match="turned by 5.8 rad only; 6 are needed"):
+        fit_body([make_recording(32.1, turn_rad_s=0.184)])
+
+
+def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
+    recording = make_recording(13.0, yaw_rad=1.0)
+    for start_share, paths in ((0.5, 3), (0.0, 6), (0.9, 0)):
+        ends_m = predict_ends(recording, [({}, 0.0), ({"lag_s": 0.2}, 0.1)], start_share, 2.0)
+        assert ends_m == pytest.approx(np.full((2, paths), 0.2), abs=1e-6)

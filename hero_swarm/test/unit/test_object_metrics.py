@@ -14,6 +14,8 @@ def test_metrics_of_objects_count_clusters_and_distances():
     none = np.empty((1, 1, 3))
     assert metrics.METRICS["object_cluster_fraction"](none, none, objects) == [0.5]
     assert metrics.METRICS["object_distance"](none, none, objects) == pytest.approx(2.19 / 4.0)
+    for name in ("object_cluster_fraction", "object_distance"):
+        assert np.isnan(metrics.METRICS[name](none, none, objects[:, :0])).tolist() == [True]
 
 
 def test_scattered_objects_differ_by_seed_and_overlap_nothing():

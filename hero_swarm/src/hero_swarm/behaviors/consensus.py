@@ -68,8 +68,8 @@ class Formation(Behavior):
         near, count = sensed.near, sensed.count
         radius_m = self.side_m / (2.0 * np.sin(np.pi / count))
         steps = sensed.numbers[:, None] - np.arange(count)
-        wanted_m = 2.0 * radius_m * np.abs(np.sin(np.pi * steps / count))
-        off_m2 = (near.forward_m**2 + near.left_m**2 - wanted_m**2) * near.seen
+        wanted_m2 = (2.0 * radius_m * np.sin(np.pi * steps / count)) ** 2
+        off_m2 = (near.forward_m**2 + near.left_m**2 - wanted_m2) * near.seen
         forward_m_s = self.gain_1_m2s * (off_m2 * near.forward_m).sum(axis=1)
         left_m_s = self.gain_1_m2s * (off_m2 * near.left_m).sum(axis=1)
         return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), memory)

@@ -137,6 +137,56 @@ def test_a_bound_says_from_which_side_it_is_reached(text, bound):
     assert bound.holds(bound.value) and bound.holds(bound.value - 1.0) is bound.falls
 
 
+@pytest.mark.parametrize("text", ['"< 1"', '"= 1"', '">= x"', '">= .inf"', '">= inf"', '"<= nan"', '">=1"'])
+def test_a_bound_that_is_none_is_refused(text):
+    with pytest.raises(ExperimentError, match='line 6: .* must be a number, or a text such as "<= 1.15"'):
+        parse(FILE.replace("1.15", text))
+
+
+@pytest.mark.parametrize(
+    ("pattern", "low", "below", "high", "above"),
+    [
+        ("robots: 5", 1, 0, 1000, 1001),
+        ("delay_s: 5", 0, -0.1, 10, 10.1),
+        ("time_s: 5", 0.1, 0.09, 86400, 86401),
+        ("parameters: {a: 5}", -1e6, -1000001, 1e6, 1000001),
+        ("start: {kind: uniform, cover: 5}", 1e-4, 9e-5, 0.5, 0.51),
+        ("start: {kind: grid, gap_m: 5}", 0, -0.1, 10, 10.1),
+        ("seeds: {count: 5}", 1, 0, 1000000, 1000001),
+        ("seeds: {count: 2, from: 5}", 0, -1, 2**31 - 1, 2**31),
+        ("metrics: [{mean_of_last_s: {dispersion: 5}}]", 1, 0.9, 86400, 86401),
+        ("record: {hz: 5}", 0.01, 0.009, 20, 21),
+    ],
+)
+def test_numbers_are_taken_up_to_their_limits(pattern, low, below, high, above):
+    rest = {
+        "behavior": "behavior: a.B",
+        "robots": "robots: 5",
+        "time_s": "time_s: 9",
+        "seeds": "seeds: {count: 1}",
+        "metrics": "metrics: [dispersion]",
+    }
+    head, number, tail = pattern.rpartition("5")
+
+    def parse_number(value):
+        written = "%.8f" % value if isinstance(value, float) else str(value)
+        lines = {**rest, pattern.partition(":")[0]: head + written + tail}
+        return parse("\n".join(lines.values()) + "\n")
+
+    assert parse_number(low) and parse_number(high)
+    for wrong in (below, above):
+        with pytest.raises(ExperimentError, match="must be a (whole )?number from"):
+            parse_number(wrong)
+
+
+def test_without_a_start_robots_begin_as_in_the_arena_and_seeds_at_1():
+    experiment = parse("behavior: a.B\nrobots: 5\ntime_s: 1\nseeds: {count: 2}\nmetrics: [dispersion]\n")
+    assert experiment.start == Start("arena", 0.0, 0.0, None) and list(experiment.seeds) == [1, 2]
+    assert (experiment.record_hz, experiment.until, experiment.compare) == (0.0, None, None)
+    whole = parse("behavior: a.B\nrobots: 5\ntime_s: 1\nseeds: {count: 1000000}\nmetrics: [dispersion]\n")
+    assert len(whole.seeds) == 1_000_000
+
+
 def test_metrics_that_rise_are_reached_from_below():
     (metric,) = parse(FILE.replace("{dispersion: 1.15}", "{cluster_fraction: 0.9}")).metrics[1:]
     assert not metric.bound.falls

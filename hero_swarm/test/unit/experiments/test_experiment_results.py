@@ -4,8 +4,11 @@ import json
 import math
 import os
 
+import numpy as np
 import pytest
 
+from hero_swarm.experiments import report
+from hero_swarm.experiments.batch import METRICS_ENDING
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.summary import build_report
@@ -173,6 +176,33 @@ def test_the_folder_says_what_made_it(tmp_path):
     assert json.loads((tmp_path / "about.json").read_text()) == {"code": "c0de", "numpy": "1"}
 
 
+def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, capsys):
+    pages = []
+    monkeypatch.setattr(report, "draw_page", lambda *arguments: pages.append(arguments) or "<html>")
+    path = tmp_path / "both"
+    folder, _ = open_folder(path)
+    folder.write_batch(RUNS[:4])
+    folder.write_batch([Run(0, 5, (7.0, 1.0), REAL)])
+    np.save(folder.name_series(0, [5, 6, 7, 8]) + METRICS_ENDING, np.arange(12.0).reshape(3, 4, 1))
+    report.write_report(str(path))
+    for name, median in (("summary.csv", 0.65), ("summary_robots.csv", 7.0)):
+        first = (path / name).read_text().splitlines()[1].split(",")
+        assert first[:2] == ["2", "dispersion"] and float(first[3]) == pytest.approx(median)
+    assert {"report.html", "report_robots.html", "runs.csv"} <= set(os.listdir(str(path)))
+    (_, _, over_time, text, about), (_, _, no_time, _, _) = pages
+    times_s, values = over_time["dispersion"]
+    assert times_s.tolist() == [0.0, 1.0, 2.0] and values[0][:, 1].tolist() == [1.0, 5.0, 9.0]
+    assert text == FILE and about["code"] == "c0de" and no_time == {}
+    assert "report_robots.html" in capsys.readouterr().out
+    only = tmp_path / "robots"
+    open_folder(only)[0].write_batch([Run(0, 5, (7.0, 1.0), REAL)])
+    report.write_report(str(only))
+    assert not (only / "summary.csv").exists() and (only / "summary_robots.csv").exists()
+    with pytest.raises(ExperimentError, match="there is no run to report"):
+        open_folder(tmp_path / "none")
+        report.write_report(str(tmp_path / "none"))
+
+
 def test_a_report_compares_runs_of_one_seed_and_says_what_is_missing():
     experiment = parse(FILE + "compare: {metric: dispersion, between: robots}\n")
     runs = [
@@ -183,11 +213,11 @@ def test_a_report_compares_runs_of_one_seed_and_says_what_is_missing():
         Run(1, 6, (6.0, 1.0), kind=REAL),
         Run(1, 7, (9.0, 1.0)),
     ]
-    report = build_report(experiment, runs)
-    (compared,) = report.compared
+    found = build_report(experiment, runs)
+    (compared,) = found.compared
     assert (compared.first, compared.second, compared.comparison.pairs) == (0, 1, 1)
     assert compared.comparison.difference.median == 2.0 and compared.comparison.delta == 1.0
-    assert [summary.values for summary in report.summaries][:2] == [(1.0, 1.0), (3.0, 6.0, 9.0)]
-    remarks = "\n".join(report.remarks)
+    assert [summary.values for summary in found.summaries][:2] == [(1.0, 1.0), (3.0, 6.0, 9.0)]
+    remarks = "\n".join(found.remarks)
     for words in ("2 of 8 runs are still missing", "4 seeds: ", "1 runs are left out", "not reached in 1 runs"):
         assert words in remarks

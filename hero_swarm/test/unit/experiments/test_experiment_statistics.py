@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.reporting import statistics
+from hero_swarm.experiments.reporting.figures import draw_over_time, draw_runs
+from hero_swarm.experiments.reporting.statistics import Interval
 
 
 def test_equal_values_give_equal_bounds():
@@ -87,3 +90,42 @@ def test_samples_that_cannot_be_paired_are_refused():
 def test_holm_corrects_each_p_by_its_rank_and_never_below_a_smaller_one():
     assert statistics.correct_by_holm([0.04, 0.01, 0.03]) == pytest.approx((0.06, 0.03, 0.06))
     assert statistics.correct_by_holm([0.9, 0.8]) == (1.0, 1.0)
+
+
+def test_runs_are_drawn_beside_their_interval_or_counted_as_not_reached():
+    values = [(1.0, 3.0, 2.0), (2.0, math.inf, 4.0), (math.inf, math.inf)]
+    intervals = [Interval(2.0, 1.0, 3.0), Interval(4.0, 2.0, math.inf), Interval(math.inf, math.inf, math.inf)]
+    (axes,) = draw_runs("s", ["a", "b", "c"], values, intervals).axes
+    lines = {".": [], "|": [], "o": []}
+    for line in axes.lines:
+        lines[line.get_marker()].append(line.get_xydata().tolist())
+    assert lines["."] == [
+        [pytest.approx(point) for point in points]
+        for points in ([(1.0, 0.12), (3.0, 0.18), (2.0, 0.24)], [(2.0, 1.12), (4.0, 1.24)], [])
+    ]
+    assert lines["|"] == [[[1.0, 0.0], [3.0, 0.0]], [[2.0, 1.0], [4.0, 1.0]], [[0.0, 2.0], [0.0, 2.0]]]
+    assert lines["o"] == [[[2.0, 0.0]], [[4.0, 1.0]]], "an infinite median is not drawn"
+    assert [(text.get_text(), text.xy) for text in axes.texts] == [
+        ("not reached in 1 of 3", (1.0, 0.75)),
+        ("not reached in 2 of 2", (1.0, 1.75)),
+    ]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["a", "b", "c"]
+    assert axes.get_ylim() == (2.6, -0.6) and axes.get_yticks().tolist() == [0, 1, 2] and axes.get_xlabel() == "s"
+    of_rows = [{to_hex(line.get_color()) for line in axes.lines if row in line.get_ydata() // 1} for row in (0, 1)]
+    assert len(of_rows[0]) == len(of_rows[1]) == 1 and of_rows[0] != of_rows[1]
+
+
+def test_medians_over_time_lie_in_the_middle_half_up_to_the_last_run():
+    times_s, ended = np.arange(4.0), math.nan
+    first = np.array([(1.0, 2.0, 3.0, 4.0, 5.0), (2.0, 4.0, 6.0, 8.0, 10.0), (1.0, 1.0, 1.0, 3.0, ended), (ended,) * 5])
+    (axes,) = draw_over_time("order", "m", ["a", "b"], times_s, [first, np.full((4, 2), 0.5)]).axes
+    assert [line.get_xydata().tolist() for line in axes.lines] == [
+        [[0.0, 3.0], [1.0, 6.0], [2.0, 1.0]],
+        [[0.0, 0.5], [1.0, 0.5], [2.0, 0.5], [3.0, 0.5]],
+    ]
+    middle_half = {tuple(point) for point in axes.collections[0].get_paths()[0].vertices.tolist()}
+    assert {(0.0, 2.0), (0.0, 4.0), (1.0, 4.0), (1.0, 8.0), (2.0, 1.0), (2.0, 1.5)} == middle_half
+    assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_ylim()[0]) == ("time (s)", "order (m)", 0.0)
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["a", "b"]
+    (below,) = draw_over_time("order", "", ["a"], times_s, [first - 5.0]).axes
+    assert below.get_ylabel() == "order" and below.get_ylim()[0] < -4.0

@@ -95,3 +95,29 @@ def test_robots_that_change_places_drive_around_each_other_and_turn():
 def test_robots_wait_for_a_pose_that_is_lost_on_the_way():
     usual_s, later_s = drive_to(STARTS[[1, 2, 0]])[1], drive_to(STARTS[[1, 2, 0]], (3.0, 13.0))[1]
     assert 8.0 < later_s - usual_s < 14.0
+
+
+def test_robots_have_arrived_when_all_were_there_for_half_a_second():
+    drive, moving = StartDrive(STARTS), STARTS + (0.1, 0.0, 0.0)
+    lost = STARTS.copy()
+    lost[2, 2] = math.nan
+    for poses, steps in ((STARTS, 9), (moving, 1), (STARTS, 9), (lost, 1), (STARTS, 9)):
+        for _ in range(steps):
+            speeds = drive.step(poses)
+            assert speeds.shape == (2, 3) and not drive.done
+            assert speeds.any() == (poses is moving)
+    drive.step(STARTS)
+    assert drive.done and 10 * PERIOD_S == 0.5
+
+
+def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
+    monkeypatch.setitem(METRICS, "consensus_error", lambda poses, velocities, objects: velocities[:, 0, 0])
+    experiment = parse_experiment(FILE, "e.yaml", METRICS)
+    trial = RobotTrial(experiment, experiment.cells[0], 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
+    for time_s in (0.0, 0.9, 1.05, 2.1, 2.1, 2.9):
+        trial.step(time_s, STARTS + (0.2 * time_s, 0.0, 0.0), np.zeros(3))
+    assert [values[0] for values in trial._samples] == pytest.approx([0.0, 0.2, 0.2])
+    late = RobotTrial(experiment, experiment.cells[0], 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
+    for _ in range(2):
+        late.step(5.0, STARTS, np.zeros(3))
+    assert [values[0] for values in late._samples] == [0.0, 0.0], "also where no time has passed"

@@ -34,7 +34,7 @@ _SEED = 20261123
 """The resampling is the same for each report of the same runs."""
 
 _BLOCK_VALUES = 2_000_000
-"""Values that are resampled at once, which bounds the memory."""
+"""Values that are resampled at once, which bounds the memory; more than an experiment may have (MAX_RUNS)."""
 
 
 class Interval(NamedTuple):
@@ -72,7 +72,7 @@ def bootstrap_median(values: Sequence[float]) -> Interval:
             "no median of %d values%s" % (len(sample), ", one of which is nan" if len(sample) else "")
         )
     rng = np.random.RandomState(_SEED)
-    block = max(1, _BLOCK_VALUES // len(sample))
+    block = _BLOCK_VALUES // len(sample)
     medians: List[np.ndarray] = []
     for start in range(0, RESAMPLES, block):
         chosen = rng.randint(len(sample), size=(min(block, RESAMPLES - start), len(sample)))
