@@ -28,9 +28,26 @@ NO_COMMANDS = "no commands recorded:\nnothing on /hero_N/velocity_controller/cmd
 
 DELAY_TICKS_MS = (-50, 0, 50, 100, 300, 1000, 3000, 10000)
 
+STYLE = {
+    "font.size": 8.0,
+    "figure.titlesize": 12.0,
+    "figure.titleweight": "bold",
+    "lines.linewidth": 0.9,
+    "lines.markersize": 4.0,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.5,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+}
+"""What all figures share: draw within rc_context(STYLE)."""
+
 _GRAY = "0.45"
 _OBSTACLES = {"edgecolor": "black", "linewidth": 1.5}
 """Walls and round obstacles alike."""
+
+_TRUTH = {"linewidth": 2.2, "alpha": 0.4}
+_BEGIN = {"marker": "o", "markerfacecolor": "white", "linestyle": ""}
+_END = {"marker": "o", "markersize": 9.0, "linestyle": ""}
 
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
 _FEW = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -74,9 +91,8 @@ class Figures:
     ) -> Tuple[Figure, Any]:
         figure = Figure(figsize=(WIDTH_IN, height_in), constrained_layout=True)
         axes = figure.subplots(rows, columns, squeeze=False, **options)
-        figure.suptitle(text + "\n", fontsize=12, fontweight="bold")
-        title = {"ha": "center", "va": "top", "fontsize": 8, "color": _GRAY, "linespacing": 2.2}
-        figure.text(0.5, 0.995, "\n" + self._title, **title)
+        figure.suptitle(text + "\n")
+        figure.text(0.5, 0.995, "\n" + self._title, ha="center", va="top", color=_GRAY, linespacing=2.2)
         return figure, axes
 
     def _add_legend(self, axes: Axes, others: Sequence[Any] = (), with_robots: bool = True) -> None:
@@ -85,7 +101,7 @@ class Figures:
             robots = [Line2D([], [], color=color, label="hero_%d" % key) for key, color in self._colors.items()]
             handles = robots + handles
         if handles:
-            axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8, frameon=False)
+            axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
     def _since_start(self, times_s: Any) -> Any:
         return times_s - self._start_s
@@ -94,11 +110,11 @@ class Figures:
         """Give each robot a row, the first one on top."""
         axes.set_ylim(len(self._robots) - 0.4, -0.6)
         axes.set_yticks(range(len(self._robots)))
-        axes.set_yticklabels(["hero_%d" % key for key in self._robots], fontsize=8 if len(self._robots) <= 20 else 6)
+        axes.set_yticklabels(["hero_%d" % key for key in self._robots])
 
     def _set_time_axis(self, axes: Axes) -> None:
         axes.set_xlim(0.0, self._duration_s)
-        axes.grid(color="0.9", linewidth=0.5)
+        axes.grid()
 
     # -- paths ---------------------------------------------------------------------------------------------
 
@@ -118,32 +134,26 @@ class Figures:
         axes.add_collection(LineCollection(walls, **_OBSTACLES))
         for x_m, y_m, radius_m in self._seen.circles_m:
             axes.add_patch(patches.Circle((x_m, y_m), radius_m, fill=False, **_OBSTACLES))
-        begin = {"marker": "o", "markerfacecolor": "white", "markersize": 4, "linestyle": ""}
-        legend = [
-            Line2D([], [], color=_GRAY, label="start", **begin),
-            Line2D([], [], color=_GRAY, marker="o", markersize=9, linestyle="", label="end"),
-        ]
+        legend = [Line2D([], [], color=_GRAY, label=label, **style) for label, style in (("start", _BEGIN), ("end", _END))]
         if any(map(_has_comparable_truth, drawn.values())):
-            legend.append(Line2D([], [], color=_GRAY, linewidth=2.2, alpha=0.4, label="ground truth"))
+            legend.append(Line2D([], [], color=_GRAY, label="ground truth", **_TRUTH))
         if self._seen.walls_m or self._seen.circles_m:
-            legend.append(Line2D([], [], color="black", linewidth=1.5, label="walls, obstacles"))
+            legend.append(patches.Patch(facecolor="none", label="walls, obstacles", **_OBSTACLES))
         for robot_id, robot in drawn.items():
             color = self._colors[robot_id]
             if _has_comparable_truth(robot):
                 true_path = analysis.read_ground_truth(robot)
-                axes.plot(true_path.x_m, true_path.y_m, color=color, linewidth=2.2, alpha=0.3, zorder=2)
+                axes.plot(true_path.x_m, true_path.y_m, color=color, **_TRUTH)
             path = analysis.read_localized_path(robot) if len(robot.poses) else analysis.read_path(robot)
             if len(path.x_m):
-                axes.plot(path.x_m, path.y_m, color=color, linewidth=0.9, zorder=3)
-                axes.plot(path.x_m[0], path.y_m[0], color=color, zorder=4, **begin)
+                axes.plot(path.x_m, path.y_m, color=color)
+                axes.plot(path.x_m[0], path.y_m[0], color=color, **_BEGIN)
                 self._draw_robot(axes, robot_id, path)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.margins(0.05)
         axes.set_xlabel("x (m)")
         axes.set_ylabel("y (m)")
-        axes.grid(color="0.9", linewidth=0.5)
-        axes.set_axisbelow(True)
-        axes.set_title(self._describe_frames(drawn), fontsize=9)
+        axes.grid()
+        axes.set_title(self._describe_frames(drawn))
         self._add_legend(axes, legend)
         return figure
 
@@ -165,13 +175,13 @@ class Figures:
     def _draw_robot(self, axes: Axes, robot_id: int, path: analysis.Path) -> None:
         """Draw a robot at the end of its path with a line to its front, and its id if there is no legend."""
         x_m, y_m, yaw_rad = path.x_m[-1], path.y_m[-1], path.yaw_rad[-1]
-        axes.add_patch(patches.Circle((x_m, y_m), BODY_RADIUS_M, color=self._colors[robot_id], zorder=5))
+        above = Line2D.zorder  # its own front is drawn over it, paths of earlier robots are not
+        axes.add_patch(patches.Circle((x_m, y_m), BODY_RADIUS_M, color=self._colors[robot_id], zorder=above))
         front = (x_m + BODY_RADIUS_M * np.cos(yaw_rad), y_m + BODY_RADIUS_M * np.sin(yaw_rad))
-        axes.plot([x_m, front[0]], [y_m, front[1]], color="white", linewidth=1.2, zorder=6)
+        axes.plot([x_m, front[0]], [y_m, front[1]], color="white")
         if not self._has_legend:
             box = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.7}
-            place = {"textcoords": "offset points", "xytext": (6, 6)}
-            axes.annotate(str(robot_id), (x_m, y_m), fontsize=7, zorder=7, bbox=box, **place)
+            axes.annotate(str(robot_id), (x_m, y_m), textcoords="offset points", xytext=(6, 6), bbox=box)
 
     # -- speeds --------------------------------------------------------------------------------------------
 
@@ -187,21 +197,21 @@ class Figures:
             arrival_s, _, _, _, _, *speeds = robot.odometry.columns()
             command_s, *commands = analysis.end_commands(*robot.commands.columns())
             for axes, measured, commanded in zip(row, speeds, commands):
-                axes.step(self._since_start(command_s), commanded, where="post", color=_GRAY, linewidth=0.8)
+                axes.step(self._since_start(command_s), commanded, where="post", color=_GRAY)
                 times_s, values = analysis.break_at_gaps(arrival_s, measured)
-                axes.plot(self._since_start(times_s), values, color=self._colors[robot_id], linewidth=0.8)
+                axes.plot(self._since_start(times_s), values, color=self._colors[robot_id])
                 self._set_time_axis(axes)
             row[0].set_ylabel("hero_%d" % robot_id, fontweight="bold")
         for axes, text in zip(grid[0], ("linear (m/s)", "angular (rad/s)")):
-            axes.set_title(text, fontsize=9)
+            axes.set_title(text)
         for axes in grid[-1]:
             axes.set_xlabel("time (s)")
         is_commanded = any(len(robot.commands) for robot in drawn.values())
         handles = [
-            Line2D([], [], color="black", linewidth=0.8, label="odometry"),
-            Line2D([], [], color=_GRAY, linewidth=0.8, label="commanded" if is_commanded else NO_COMMANDS),
+            Line2D([], [], color="black", label="odometry"),
+            Line2D([], [], color=_GRAY, label="commanded" if is_commanded else NO_COMMANDS),
         ]
-        figure.legend(handles=handles, loc="upper right", fontsize=8, frameon=False, ncol=2)
+        figure.legend(handles=handles, loc="upper right", ncol=2)
         return figure
 
     # -- delays and connections ----------------------------------------------------------------------------
@@ -221,14 +231,14 @@ class Figures:
                     boxprops={"color": color}, whiskerprops={"color": color}, capprops={"color": color},
                     medianprops={"color": "black"}, manage_ticks=False,
                 )  # fmt: skip
-                message_axes.plot(messages[robot_id].max(), row, "x", color=color, markersize=4)
+                message_axes.plot(messages[robot_id].max(), row, "x", color=color)
             motions = analysis.compute_motion_delays(robot) * 1e3
             if len(motions):
-                motion_axes.plot(motions, np.full(len(motions), row), "o", color=color, markersize=3, alpha=0.5)
-                motion_axes.plot(np.median(motions), row, "|", color="black", markersize=9)
+                motion_axes.plot(motions, np.full(len(motions), row), "o", color=color, alpha=0.5)
+                motion_axes.plot(np.median(motions), row, "|", color="black", markersize=_END["markersize"])
         self._label_rows(message_axes)
         message_axes.set_xlabel("message delay: arrival of odom minus its stamp (ms)")
-        message_axes.set_title("box 25 to 75 %, whiskers 1 to 99 %, cross: maximum", fontsize=8)
+        message_axes.set_title("box 25 to 75 %, whiskers 1 to 99 %, cross: maximum")
         # Most delays are some ms, the longest may be a second: the scale is linear up to 100 ms, then logarithmic.
         message_axes.set_xscale("symlog", linthresh=100.0, linscale=2.0)
         every = np.concatenate(list(messages.values()))
@@ -239,17 +249,15 @@ class Figures:
         message_axes.set_xticklabels(["%d" % tick for tick in ticks])
         message_axes.minorticks_off()
         motion_axes.set_xlabel("command to motion of a robot at rest (ms)")
-        motion_axes.set_title("each dot is one start, bar: median", fontsize=8)
+        motion_axes.set_title("each dot is one start, bar: median")
         if motion_axes.lines:
             motion_axes.set_xlim(0.0, None)
         else:
             motion_axes.set_xticks([])
             text = self._explain_no_motion()
-            motion_axes.text(0.5, 0.5, text, transform=motion_axes.transAxes, ha="center", fontsize=8)
+            motion_axes.text(0.5, 0.5, text, transform=motion_axes.transAxes, ha="center")
         for axes in grid[0]:
-            axes.grid(axis="x", color="0.9", linewidth=0.5)
-            axes.set_axisbelow(True)
-            axes.xaxis.label.set_fontsize(8)
+            axes.grid(axis="x")
         return figure
 
     def _explain_no_motion(self) -> str:
@@ -278,7 +286,7 @@ class Figures:
             for start_s, end_s in analysis.find_gaps(times_s):
                 axes.hlines(row, start_s, end_s, color="white", linewidth=2.5)
             if not robot.states and len(times_s):
-                axes.hlines(row, times_s[0], times_s[-1], color=_GRAY, linewidth=0.8)
+                axes.hlines(row, times_s[0], times_s[-1], color=_GRAY)
         self._label_rows(axes)
         axes.set_xlim(0.0, self._duration_s)
         axes.set_xlabel("time (s)")
@@ -288,7 +296,7 @@ class Figures:
         handles.append(patches.Patch(facecolor="white", edgecolor=_GRAY, label=gap))
         if not seen:
             text = "the driver's reports (/hero_driver/robots) were not recorded: lines show odometry"
-            axes.set_title(text, fontsize=8)
+            axes.set_title(text)
         self._add_legend(axes, handles, with_robots=False)
         return figure
 
@@ -312,10 +320,10 @@ class Figures:
             yaws_deg = {key: np.degrees(error.yaw_rad) for key, error in errors.items()}
             self._draw_error_curves(position_axes, times_s, positions_mm)
             self._draw_error_curves(yaw_axes, times_s, yaws_deg)
-            position_axes.set_title(name, fontsize=8)
+            position_axes.set_title(name)
             position_axes.set_ylim(0.0, None)
             yaw_axes.set_xlabel("time (s)")
-            yaw_axes.axhline(0.0, color=_GRAY, linewidth=0.5)
+            yaw_axes.axhline(0.0, color=_GRAY)
         grid[0, 0].set_ylabel("position error (mm)")
         grid[1, 0].set_ylabel("heading error (degrees),\npositive: counter-clockwise")
         self._add_legend(grid[0, -1])
@@ -325,10 +333,9 @@ class Figures:
         """Draw a curve for each robot; without a legend, with the ids of the largest at their ends."""
         ranked = sorted(values, key=lambda key: abs(float(values[key][-1])))
         for key in [] if self._has_legend else ranked[-LABELED:]:
-            end, place = (self._since_start(times_s[key][-1]), values[key][-1]), {"textcoords": "offset points"}
-            axes.annotate(str(key), end, xytext=(3, -2), fontsize=7, annotation_clip=False, **place)
+            end = (self._since_start(times_s[key][-1]), values[key][-1])
+            axes.annotate(str(key), end, textcoords="offset points", xytext=(3, -2), annotation_clip=False)
         for key, curve in values.items():
             curve_s, curve = analysis.break_at_gaps(times_s[key], curve)
-            width = 1.0 if self._has_legend else 0.6
-            axes.plot(self._since_start(curve_s), curve, color=self._colors[key], linewidth=width)
+            axes.plot(self._since_start(curve_s), curve, color=self._colors[key])
         self._set_time_axis(axes)

@@ -57,7 +57,9 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
 
 def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) -> List[str]:
     """Write the figures; return the path of each, or why it is missing. Raises: RecordingError, also if all are."""
-    from .figures import Figures
+    from matplotlib import rc_context
+
+    from .figures import STYLE, Figures
 
     names = os.path.basename(bags.paths[0])
     if len(bags.paths) > 1:
@@ -67,7 +69,8 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
     paths, missing = [], []
     for name in options.figures:
         path = "%s_%s.%s" % (prefix, name, options.format)
-        figure = getattr(drawing, "draw_" + name)()
+        with rc_context(STYLE):
+            figure = getattr(drawing, "draw_" + name)()
         if figure is None:
             missing.append("no figure of %s: nothing of %s in the recording" % (name, FIGURES[name]))
             continue

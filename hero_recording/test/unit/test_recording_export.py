@@ -93,7 +93,8 @@ def test_an_interrupted_export_leaves_nothing_behind(bag, tmp_path, capsys, monk
 
 def test_all_buffered_rows_are_written(bag, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("hero_recording.formats.table_files.BATCH_ROWS", 10)
-    run_export(capsys, bag, "--out", tmp_path / "out", "--tables", "odometry")
+    output = run_export(capsys, bag, "--out", tmp_path / "out", "--tables", "odometry")
+    assert output.endswith("2 robots, 2 tables, 234 rows\n")
     assert len(read_csv(tmp_path / "out" / "hero_0" / "odometry.csv")) == 117
 
 

@@ -1,11 +1,17 @@
 """Figures show the numbers of the recording: delays, states, gaps and errors at their robot, time and size."""
 
+import math
+
 import numpy as np
 import pytest
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
 from synthetic_bag import START_S
 
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_recording import analysis
-from hero_recording.figures import STATE_COLORS, Figures
+from hero_recording.figures import STATE_COLORS, STYLE, Figures
 from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
 
 PERIOD_S = 0.1
@@ -101,3 +107,205 @@ def test_an_error_is_known_only_near_a_reading_of_the_ground_truth():
     late_s = START_S + 4.0 + 2.0 * analysis.SAME_TIME_S
     robot.odometry.add(late_s, late_s, 0.4, 0.0, 0.0, 0.1, 0.0)
     assert len(analysis.compute_odometry_errors(robot).times_s) == 40
+
+
+def make_driven(count):
+    """Return robots with all that figures show, side by side."""
+    robots = [RobotObservations() for _ in range(count)]
+    for number, robot in enumerate(robots):
+        add_odometry(robot, np.arange(0.0, 4.0, PERIOD_S), 0.01 * number)
+        add_start(robot, 4.0, 0.1, 3, 3)
+        robot.poses.add(START_S + 1.0, START_S + 1.0, 0.1, 0.025 + number, 0.1)
+        robot.poses.add(START_S + 2.0, START_S + 2.0, 0.2, 0.025 + number, math.pi / 3.0)
+        robot.states.append(StateReport(START_S, "ready", 0))
+    return robots
+
+
+FIGURES = ("paths", "speeds", "delays", "connections", "errors")
+
+
+def draw_page(name, robots, duration_s=END_S):
+    seen = Observations()
+    seen.robots.update(enumerate(robots))
+    seen.walls_m, seen.pose_frame, seen.true_frame = [(-1.0, 0.0, 1.0, 0.5)], "map", "map"
+    with rc_context(STYLE):
+        return getattr(Figures(seen, START_S, START_S + duration_s, "test.bag"), "draw_" + name)()
+
+
+def test_a_page_grows_with_its_robots():
+    for name, count, height_in in (
+        ("paths", 9, 8.0), ("errors", 9, 6.0), ("speeds", 3, 5.7), ("speeds", 9, 13.2),
+        ("delays", 1, 2.5), ("delays", 3, 2.5), ("delays", 4, 2.8), ("delays", 20, 7.6), ("connections", 21, 4.96),
+    ):  # fmt: skip
+        robots = make_driven(1) + [RobotObservations() for _ in range(count - 1)]
+        for robot in robots if name == "speeds" else ():
+            robot.odometry.add(START_S, START_S, 0.0, 0.0, 0.0, 0.0, 0.0)
+        assert draw_page(name, robots).get_size_inches() == pytest.approx((9.0, height_in)), (name, count)
+
+
+@pytest.mark.parametrize(
+    ("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2), ("delays", 21), ("connections", 21)]
+)
+def test_texts_of_a_page_lie_on_it_and_apart(name, count):
+    figure = draw_page(name, make_driven(count))
+    FigureCanvasAgg(figure).draw()
+    renderer, page = figure.canvas.get_renderer(), figure.bbox
+    legends = [*figure.legends, *(axes.get_legend() for axes in figure.axes if axes.get_legend())]
+    title, subtitle = figure._suptitle, next(text for text in figure.texts if "test.bag" in text.get_text())
+    assert title.get_fontsize() == 12.0 and title.get_fontweight() == "bold"
+    labels = [label for axes in figure.axes for label in (axes.title, axes.xaxis.label, axes.yaxis.label)]
+    for part in (*legends, title, subtitle, *(label for label in labels if label.get_text())):
+        extent = part.get_window_extent(renderer)
+        assert page.x0 <= extent.x0 and extent.x1 <= page.x1 + 1 and page.y0 <= extent.y0 and extent.y1 <= page.y1 + 1
+    tops = [axes.title.get_window_extent(renderer).y1 for axes in figure.axes]
+    assert subtitle.get_window_extent(renderer).y0 >= max(tops) - 1
+    assert {text.get_fontsize() for text in (subtitle, *(text for one in legends for text in one.get_texts()))} == {8.0}
+    if name in ("delays", "connections"):
+        (ticks,) = [axes.get_yticklabels() for axes in figure.axes[:1]]
+        assert [tick.get_text() for tick in ticks] == ["hero_%d" % number for number in range(count)]
+        middles = [tick.get_window_extent(renderer).y0 for tick in ticks]
+        assert middles == sorted(middles, reverse=True) and min(-np.diff(middles)) > 0.14 * figure.dpi
+    for legend in legends:
+        names = [text.get_text() for text in legend.get_texts()]
+        assert ("hero_1" in names) == (count == 2 and name in ("paths", "errors"))
+
+
+def test_every_figure_says_what_its_axes_are():
+    labels = {}
+    for name in FIGURES:
+        figure = draw_page(name, make_driven(2))
+        labels[name] = [(axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+    assert labels["paths"] == [("frame map", "x (m)", "y (m)")]
+    assert labels["speeds"] == [
+        ("linear (m/s)", "", "hero_0"), ("angular (rad/s)", "", ""), ("", "time (s)", "hero_1"), ("", "time (s)", "")
+    ]  # fmt: skip
+    (messages, motions) = labels["delays"]
+    assert messages[:2] == (
+        "box 25 to 75 %, whiskers 1 to 99 %, cross: maximum", "message delay: arrival of odom minus its stamp (ms)"
+    )  # fmt: skip
+    assert motions[:2] == ("each dot is one start, bar: median", "command to motion of a robot at rest (ms)")
+    assert labels["connections"] == [("", "time (s)", "")]
+    heading = "heading error (degrees),\npositive: counter-clockwise"
+    assert labels["errors"] == [
+        ("odometry", "", "position error (mm)"), ("localization", "", ""),
+        ("", "time (s)", heading), ("", "time (s)", ""),
+    ]  # fmt: skip
+    silent = make_driven(1)
+    silent[0].states.clear()
+    assert "were not recorded: lines show odometry" in draw_page("connections", silent).axes[0].get_title()
+    for name in ("speeds", "errors", "connections"):
+        for axes in draw_page(name, make_driven(2)).axes:
+            assert axes.get_xlim() == (0.0, END_S)
+        assert draw_page(name, make_driven(1), duration_s=0.0).axes[0].get_xlim() == (0.0, 1e-3), "one message alone"
+
+
+def test_a_path_begins_white_and_ends_with_the_robot_and_its_front():
+    figure = draw_page("paths", make_driven(2))
+    (axes,) = figure.axes
+    (walls,) = axes.collections
+    assert [segment.tolist() for segment in walls.get_segments()] == [[[-1.0, 0.0], [1.0, 0.5]]]
+    starts = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+    assert np.allclose(starts, [[(0.1, 0.025)], [(0.1, 1.025)]])
+    assert {line.get_markerfacecolor() for line in axes.lines if line.get_marker() == "o"} == {"white"}
+    bodies = [(patch.center, patch.radius) for patch in axes.patches]
+    assert bodies == [(pytest.approx((0.2, 0.025 + number)), BODY_RADIUS_M) for number in range(2)]
+    fronts = [line.get_xydata()[1] for line in axes.lines if line.get_color() == "white"]
+    front_m = np.array((0.2 + BODY_RADIUS_M / 2.0, 0.025 + BODY_RADIUS_M * math.sqrt(0.75)))
+    assert np.allclose(fronts, [front_m, front_m + (0.0, 1.0)], atol=1e-6)
+    truths = [line.get_xydata() for line in axes.lines if line.get_alpha() and len(line.get_xydata()) > 2]
+    assert len(truths) == 2 and np.allclose(truths[0][:, 1], 0.02)
+    assert axes.get_aspect() in ("equal", 1.0) and not axes.texts
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        "hero_0", "hero_1", "start", "end", "ground truth", "walls, obstacles"
+    ]  # fmt: skip
+    untrue = make_driven(1)
+    untrue[0].ground_truth = type(untrue[0].ground_truth)(2, 5)
+    alone = draw_page("paths", untrue).axes[0]
+    assert [text.get_text() for text in alone.get_legend().get_texts()] == ["start", "end", "walls, obstacles"]
+    many = draw_page("paths", make_driven(8)).axes[0]
+    assert [(text.get_text(), text.xy) for text in many.texts] == [
+        (str(number), pytest.approx((0.2, 0.025 + number))) for number in range(8)
+    ]
+
+
+def test_frames_are_told_where_robots_are_not_all_in_one():
+    def describe(*robots):
+        seen = Observations()
+        seen.robots.update(enumerate(robots))
+        seen.shared_frame, seen.pose_frame, seen.true_frame = "world", "map", "lab"
+        return Figures(seen, START_S, START_S + END_S, "test.bag").draw_paths().axes[0].get_title()
+
+    def make(with_origin, with_pose=False, with_truth=False):
+        robot = RobotObservations()
+        robot.odometry.add(START_S, START_S, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if with_origin:
+            robot.origins.append(Origin(0.0, 0.0, 0.0, 0.0))
+        if with_pose:
+            robot.poses.add(START_S, START_S, 0.0, 0.0, 0.0)
+        if with_truth:
+            robot.ground_truth.add(START_S, START_S, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return robot
+
+    assert describe(make(False)) == ""
+    assert describe(make(False), make(False)) == "each robot in its own odom frame: no transforms on /tf_static"
+    assert describe(make(True), make(True)) == "frame world"
+    assert describe(make(False), make(False), make(True)) == "frame world; hero_0, hero_1: own odom frame"
+    assert describe(make(True), make(True, True), make(True, True)) == "frame map; hero_0: frame world"
+    assert describe(make(True, with_truth=True)) == "frame world; ground truth: frame lab"
+    assert describe(make(True), make(False, with_truth=True)) == "frame world; hero_1: own odom frame"
+
+
+def test_speeds_are_drawn_beside_commands_up_to_eight_robots():
+    robots = make_driven(9)
+    robots[1].odometry = type(robots[1].odometry)(2, 5)
+    figure = draw_page("speeds", robots)
+    rows = [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()]
+    assert rows == ["hero_%d" % number for number in range(9) if number != 1]
+    assert figure._suptitle.get_text() == "Speeds\n"
+    linear, angular = figure.axes[:2]
+    commanded, measured = linear.lines
+    assert commanded.get_xydata().tolist() == [[4.0, 0.1], [6.0, 0.0]] and commanded.get_drawstyle() == "steps-post"
+    assert measured.get_xdata()[:2] == pytest.approx([0.0, PERIOD_S]) and set(measured.get_ydata()) == {0.1}
+    assert set(angular.lines[1].get_ydata()) == {0.0} and to_hex(commanded.get_color()) != to_hex(measured.get_color())
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["odometry", "commanded"]
+    many = draw_page("speeds", make_driven(9))
+    assert many._suptitle.get_text() == "Speeds of the first 8 robots\n" and len(many.axes) == 16
+    untold = make_driven(1)
+    untold[0].commands = type(untold[0].commands)(1, 2)
+    assert "no commands recorded" in draw_page("speeds", untold).legends[0].get_texts()[1].get_text()
+    assert draw_page("speeds", [RobotObservations()]) is None is draw_page("paths", [RobotObservations()])
+
+
+@pytest.mark.parametrize(
+    ("delays_s", "limits_ms", "ticks_ms"),
+    [
+        ((0.01, 0.02), (-5.0, 60.0), [0, 50]),
+        ((-0.1, 0.9), (-110.0, 1170.0), [-50, 0, 50, 100, 300, 1000]),
+        ((0.0, 9.0), (-5.0, 11700.0), [0, 50, 100, 300, 1000, 3000, 10000]),
+    ],
+)
+def test_the_scale_of_delays_holds_all_and_is_fine_below_a_tenth(delays_s, limits_ms, ticks_ms):
+    robot = RobotObservations()
+    for number, delay_s in enumerate(delays_s):
+        robot.odometry.add(START_S + number + delay_s, START_S + number, 0.0, 0.0, 0.0, 0.0, 0.0)
+    messages, motions = draw_page("delays", [robot]).axes
+    assert messages.get_xlim() == pytest.approx(limits_ms, abs=0.01)
+    assert messages.get_xticks().tolist() == ticks_ms and len(messages.xaxis.get_minorticklocs()) == 0
+    assert [label.get_text() for label in messages.get_xticklabels()] == [str(tick) for tick in ticks_ms]
+    scale = messages.xaxis.get_transform()
+    places = scale.transform(np.array([0.0, 50.0, 100.0, 1000.0]))
+    assert places[2] == pytest.approx(2.0 * places[1]) and places[3] - places[2] < places[2], "linear up to 100 ms"
+    (text,) = motions.texts
+    assert text.get_position() == (0.5, 0.5) and not len(motions.get_xticks())
+
+
+def test_a_box_of_delays_holds_the_middle_half():
+    robot = RobotObservations()
+    for number in range(101):
+        stamp_s = START_S + 0.01 * number
+        robot.odometry.add(stamp_s + 1e-3 * number, stamp_s, 0.0, 0.0, 0.0, 0.0, 0.0)
+    axes = draw_page("delays", [RobotObservations(), robot]).axes[0]
+    places = {tuple(np.round(line.get_xdata(), 1)) for line in axes.lines}
+    assert {(25.0, 1.0), (75.0, 99.0), (50.0, 50.0), (100.0,)} <= places
+    rows = [line.get_ydata() for line in axes.lines]
+    assert min(map(min, rows)) == pytest.approx(0.7) and max(map(max, rows)) == pytest.approx(1.3)

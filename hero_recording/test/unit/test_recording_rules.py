@@ -13,14 +13,18 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_msgs.msg import Encoder, Motor, Robot, RobotArray
-from hero_recording import analysis, disk_guard, plot, record
+from hero_recording import analysis, disk_guard, plot, record, step_recorder
 from hero_recording.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, REPORT_GAP_S, SAME_TIME_S, STANDSTILL_S
 from hero_recording.errors import RecordingError
 from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
+from hero_recording.readers import plain_reader
 from hero_recording.record import CHECK_PERIOD_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
 from hero_recording.series import MAX_VALUE
+from hero_recording.step_recorder import StepRecorder
 from hero_recording.tables import BEAMS, TABLES, read_rows
 from hero_recording.topics import Message
+from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.stepped.topics import LATCHED
 
 PERIOD_S = 0.034
 
@@ -61,7 +65,7 @@ def turn_wheels(moves_at_s, moves=True, moved=2.0, length_s=12.0):
     for reading in range(int(length_s / PERIOD_S)):
         time_s = reading * PERIOD_S
         ticks = 0.0 if time_s < moves_at_s else moved / 2.0 + (time_s - moves_at_s) * 100.0 * moves
-        robot.encoder.add(time_s, ticks, ticks)
+        robot.encoder.add(time_s, 700.0 + ticks, ticks - 300.0)
     return robot
 
 
@@ -87,7 +91,7 @@ def test_the_delay_of_a_motion_counts_from_the_first_command_at_rest():
     rested = turn_wheels(5.0 - STANDSTILL_S - 0.1, moves=False)
     rested.commands.add(5.0, 0.1, 0.0)
     assert len(analysis.compute_motion_delays(rested)) == 0
-    assert rested.encoder.columns()[1].max() == 1.0
+    assert rested.encoder.columns()[1].max() == 701.0
 
 
 def test_gaps_begin_beyond_their_limits():
@@ -300,3 +304,95 @@ def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
     assert ("--min-space", "100k") in list(zip(recording.commands[1], recording.commands[1][1:]))
     assert "--lz4" in recording.commands[1] and "--max-splits" not in recording.commands[1]
     assert record.format_size(999_900_000) == "999.9 MB" and record.format_size(1e9) == "1.0 GB"
+
+
+def test_the_recorder_ends_when_its_program_is_killed(monkeypatch):
+    told = []
+    library = SimpleNamespace(prctl=lambda *arguments: told.append(arguments))
+    monkeypatch.setattr(record.ctypes, "CDLL", lambda name: library)
+    record._end_with_parent()
+    assert told == [(1, signal.SIGINT)], "PR_SET_PDEATHSIG of linux/prctl.h"
+
+
+def test_a_reader_without_ros_names_types_and_times_as_ros_does(monkeypatch):
+    def connect(number, topic, kind, count, definition, **ext):
+        ext = SimpleNamespace(**{"callerid": None, "latching": None, **ext})
+        return SimpleNamespace(
+            id=number, topic=topic, msgtype=kind, msgcount=count, digest="md5", msgdef=definition, ext=ext
+        )
+
+    light = "std_msgs/msg/ColorRGBA"
+    bag = SimpleNamespace(
+        connections=[
+            connect(0, "/hero_0/led", light, 2, "float32 r", callerid="/a"),
+            connect(1, "/hero_0/led", light, 3, SimpleNamespace(data="float32 r"), latching=1),
+            connect(2, "/tf", "tf2_msgs/msg/TFMessage", 1, ""),
+        ],
+        start_time=1_500_000_000,
+        end_time=9_000_000_001,  # behind the last message
+        messages=lambda chosen: ((each, 2_500_000_000, bytearray(b"abc")) for each in chosen),
+        deserialize=lambda content, kind: (kind, bytes(content)),
+        open=lambda: None,
+        close=lambda: None,
+    )
+    library = SimpleNamespace(AnyReader=lambda paths: bag)
+    monkeypatch.setattr(plain_reader, "import_optional", lambda module, requirement: library)
+    with plain_reader.Reader("a.bag") as reader:
+        assert reader.list_topics() == {"/hero_0/led": ("std_msgs/ColorRGBA", 5), "/tf": ("tf2_msgs/TFMessage", 1)}
+        assert reader.find_span() == (1.5, 9.0)
+        content = (light, b"abc")
+        assert list(reader.read(["/hero_0/led"])) == [("/hero_0/led", "std_msgs/ColorRGBA", content, 2.5)] * 2
+        header = {"type": "std_msgs/ColorRGBA", "md5sum": "md5", "message_definition": "float32 r"}
+        assert list(reader.read_raw(["/hero_0/led"])) == [
+            ("/hero_0/led", {**header, "callerid": "/a"}, b"abc", 2_500_000_000),
+            ("/hero_0/led", {**header, "latching": "1"}, b"abc", 2_500_000_000),
+        ]
+
+
+class WriterError(Exception):
+    pass
+
+
+class FakeWriter:
+    """What rosbags has, without a file."""
+
+    def __init__(self, path):
+        if path == "taken.bag":
+            raise WriterError("exists already")
+        self.connections, self.written, self.calls = {}, [], []
+        FakeWriter.made = self
+
+    def open(self):
+        self.calls.append("open")
+
+    def close(self):
+        self.calls.append("close")
+
+    def add_connection(self, topic, kind, **options):
+        assert topic not in self.connections
+        self.connections[topic] = (kind, options)
+        return topic
+
+    def write(self, connection, time_ns, content):
+        self.written.append((connection, time_ns, content))
+
+
+def test_stepped_robots_are_recorded_from_beginning_to_end(monkeypatch):
+    library = SimpleNamespace(Writer=FakeWriter, WriterError=WriterError)
+    monkeypatch.setattr(step_recorder, "import_optional", lambda module, requirement: library)
+    with StepSwarm(2, arena="maze") as swarm:
+        with StepRecorder(swarm.rows, range(2), "run.bag") as recorder:
+            writer = FakeWriter.made
+            swarm.sleep(0.5)
+            count = len(writer.written)
+            assert count > 20 and writer.calls == ["open"]
+            recorder.close()
+            swarm.sleep(0.5)
+        assert len(writer.written) == count and writer.calls == ["open", "close"]
+        with pytest.raises(RecordingError, match="taken.bag: exists already; move it away or choose another name"):
+            StepRecorder(swarm.rows, range(2), "taken.bag")
+    assert {topic for topic, _, _ in writer.written} == set(writer.connections) >= {"/hero_1/odom", "/hero_sim/arena"}
+    kind, options = writer.connections["/hero_1/odom"]
+    assert kind == "nav_msgs/msg/Odometry" and options["md5sum"] == "cd5e73d190d741a2f92e81eda573aca7"
+    latched = {topic for topic, (_, options) in writer.connections.items() if options["latching"]}
+    assert latched == set(writer.connections) & set(LATCHED) != set()
