@@ -31,7 +31,7 @@ FRAMES = {"orbit": "world", "close": "world", "above": "world", "map": "map"}
 
 def color_of(robot_id: int) -> Tuple[float, float, float]:
     """Return a robot's own color, red, green, blue, each 0..1; hues are a golden angle apart, as in hero_monitor."""
-    return hls_to_rgb((robot_id * 137.508 + 24.0) % 360.0 / 360.0, 0.42, 0.7)
+    return hls_to_rgb((robot_id * 137.508 + 24.0) / 360.0, 0.42, 0.7)
 
 
 def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:

@@ -1,5 +1,6 @@
 """What the configuration of RViz displays, and which robots it takes."""
 
+import math
 import re
 from colorsys import hls_to_rgb
 from pathlib import Path
@@ -135,6 +136,52 @@ def test_other_views_look_down_on_the_middle_of_the_world(view):
     assert camera["Class"] == "rviz/Orbit"
     assert (camera["Focal Point"]["X"], camera["Focal Point"]["Y"]) == (0.0, 0.0)
     assert 0.3 < camera["Pitch"] < 1.2
+    # RViz shows 45 degrees from top to bottom.
+    shown_m = 2.0 * camera["Distance"] * math.tan(math.pi / 8.0)
+    low_m, high_m = {"orbit": (2.0, 2.2), "close": (0.2, 0.25)}[view]
+    assert low_m < shown_m < high_m, "an arena of 2 m, or one robot"
+    turned_rad = camera["Yaw"] - {"orbit": 1.5 * math.pi, "close": 0.0}[view]
+    assert abs(turned_rad) < 0.01 if view == "orbit" else 0.5 < turned_rad < 0.7, "x to the right, or its front"
+    hat_m, ground_m = 0.051, -0.00912
+    middle_m = {"orbit": 0.0, "close": (hat_m + ground_m) / 2.0}[view]
+    assert camera["Focal Point"]["Z"] == pytest.approx(middle_m, abs=2e-3)
+
+
+def test_views_from_above_hold_their_arena_in_the_window():
+    for view, side_m, rest_px in (("map", 2.2, 140), ("above", 2.0, 0)):
+        config = yaml.safe_load(make_config(["hero_0"], view=view))
+        scale = config["Visualization Manager"]["Views"]["Current"]["Scale"]
+        assert config["Window Geometry"]["Height"] - side_m * scale == pytest.approx(rest_px)
+        assert config["Window Geometry"] == {"X": 0, "Y": 0, "Width": 1200, "Height": 800}
+
+
+def test_the_configuration_is_written_as_rviz_writes_it():
+    text = make_config(["hero_0"], "lab")
+    assert text.startswith("Panels:\n- Class: rviz/Displays\n  Name: Displays\n")
+    assert "\n    Fixed Frame: lab\n" in text and "{" not in text
+
+
+def test_only_errors_of_localized_places_are_drawn_around_robots():
+    manager = yaml.safe_load(make_config(["hero_0"], view="map"))["Visualization Manager"]
+    covariances = {}
+
+    def collect(displays):
+        for display in displays:
+            if "Covariance" in display:
+                covariances[display["Name"]] = display["Covariance"]
+            collect(display.get("Displays", []))
+
+    collect(manager["Displays"])
+    position = {"Value": True, "Scale": 3}
+    assert covariances == {
+        "hero_0 path": {"Value": False},
+        "hero_0 ground truth": {"Value": False},
+        "hero_0 pose": {"Value": True, "Orientation": {"Value": False}, "Position": position},
+    }
+    (path,) = [display for display in manager["Displays"] if display["Name"] == "hero_0 path"]
+    assert path["Unreliable"] is False and path["Keep"] > 100 > path["Position Tolerance"] > 0
+    (click,) = [tool for tool in manager["Tools"] if tool["Class"] == "rviz/PublishPoint"]
+    assert click["Single click"] is True
 
 
 @pytest.mark.parametrize("value", ["all", "1 x", "", "3-1"])
