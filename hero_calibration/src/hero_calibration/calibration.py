@@ -90,7 +90,7 @@ class Calibration:
         values = {key: numbers for result in results for key, numbers in result.to_file().items()}
         date = time.strftime("%Y-%m-%d %H:%M:%S")
         try:
-            store.save(path, store.KeptCalibration(probe.robot_id, date, values))
+            store.save(path, store.KeptCalibration(probe.robot_id, date, values, {"model": probe.model}))
             self._files[probe.robot_id] = [path]
             if importlib.util.find_spec("matplotlib") is not None:
                 from .figures import draw_robot

@@ -38,13 +38,17 @@ RESULTS: Dict[str, Range] = {
 }
 """The same for what the user may want to look up; a number may be .nan: unknown."""
 
+OTHERS = ("model", "ticks_per_turn")
+"""Keys that the driver reads and checks, too: the model of the robot, and ticks that were entered by hand."""
+
 
 class KeptCalibration(NamedTuple):
-    """The file of one robot: N of hero_N, date as text, and numbers by key of SETTINGS and RESULTS."""
+    """The file of one robot: N of hero_N, date as text, numbers by key of SETTINGS and RESULTS, values of OTHERS."""
 
     robot_id: int
     date: str
     values: Dict[str, List[float]]
+    others: Dict[str, Any] = {}
 
 
 def name_file(folder: str, robot_id: int) -> str:
@@ -69,12 +73,12 @@ def list_files(folder: str) -> List[str]:
 def save(path: str, calibration: KeptCalibration) -> None:
     """Write a file; the previous one is kept beside it. Its comments and values that were not measured again stay.
 
-    A damaged previous file, or one of another robot, does not prevent the new one.
+    A damaged previous file, or one of another robot or model, does not prevent the new one.
 
     Raises: CalibrationError.
     """
     base, suffix = os.path.splitext(path)
-    values, text = calibration.values, ""
+    values, others, text = calibration.values, calibration.others, ""
     try:
         with lock_file(path):
             if os.path.exists(path):
@@ -82,9 +86,10 @@ def save(path: str, calibration: KeptCalibration) -> None:
                     write_file(base + PREVIOUS + suffix, file.read())
                 with suppress(CalibrationError):
                     old = load(path)
-                    if old.robot_id == calibration.robot_id:
-                        values, text = {**old.values, **values}, read_text(path)
-            content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **values}
+                    is_same_model = {**others, **old.others}.get("model") == others.get("model")
+                    if old.robot_id == calibration.robot_id and is_same_model:
+                        values, others, text = {**old.values, **values}, {**old.others, **others}, read_text(path)
+            content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **others, **values}
             write_file(path, replace_values(text, content).encode())
     except OSError as error:
         raise CalibrationError("%s cannot be written: %s" % (path, error.strerror)) from error
@@ -102,13 +107,15 @@ def load(path: str) -> KeptCalibration:
         raise _refuse(path, "is no calibration: it needs a line robot: hero_N")
     known = {**SETTINGS, **RESULTS}
     for key in content:
-        if key not in ("robot", "date", *known):
-            raise _refuse(path, "unknown key %s; known are %s" % (_shorten(key), ", ".join(("robot", "date", *known))))
+        if key not in ("robot", "date", *OTHERS, *known):
+            names = ", ".join(("robot", "date", *OTHERS, *known))
+            raise _refuse(path, "unknown key %s; known are %s" % (_shorten(key), names))
     match = re.fullmatch(r"hero_([0-9]{1,9})", str(content["robot"]))
     if match is None:
         raise _refuse(path, "robot must be hero_N, not %s" % _shorten(content["robot"]))
     values = {key: _read_numbers(path, key, content[key], allowed) for key, allowed in known.items() if key in content}
-    return KeptCalibration(int(match.group(1)), make_printable(str(content.get("date", ""))), values)
+    others = {key: content[key] for key in OTHERS if key in content}
+    return KeptCalibration(int(match.group(1)), make_printable(str(content.get("date", ""))), values, others)
 
 
 def _read_numbers(path: str, key: str, found: Any, allowed: Range) -> List[float]:

@@ -63,6 +63,16 @@ def test_comments_stay_when_a_robot_is_calibrated_again(tmp_path):
         assert file.read() == text.replace("[1500.0", "[1505.0").replace("11-01", "11-02")
 
 
+def test_results_of_another_model_are_not_kept_but_ticks_by_hand_are(tmp_path):
+    path = tmp_path / "hero_3.yaml"
+    path.write_text("robot: hero_3\nwheels_m: [0.05, 0.05, 0.065]\nticks_per_turn: 100\n")
+    for model, wheels_m in (("hero_plus", [0.05, 0.05, 0.065]), ("hero_plus", [0.05, 0.05, 0.065]), ("hero", None)):
+        store.save(str(path), store.KeptCalibration(3, "today", {"motor_centers_us": [1500, 1500]}, {"model": model}))
+        kept = store.load(str(path))
+        assert kept.values.get("wheels_m") == wheels_m
+        assert kept.others == {"model": model, **({"ticks_per_turn": 100} if wheels_m else {})}
+
+
 @pytest.mark.parametrize(
     "content",
     [b"", b"\xff\x00\x01", b"[" * 600, b"robot: hero_3\nvelocity_gains: 2020-13-45\n", b"robot: hero_4"],

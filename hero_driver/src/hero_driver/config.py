@@ -300,8 +300,11 @@ def _convert_wheels(lengths: Any, content: Dict[str, Any]) -> OwnWheels:
     ticks_per_turn: Optional[float] = content.get("ticks_per_turn")
     if ticks_per_turn is not None and not float(ticks_per_turn) >= 1.0:
         raise ValueError("ticks_per_turn must be 1 or more")
+    model = content.get("model", "")
+    if model not in ("", STOCK, HERO_PLUS):
+        raise ValueError("model must be %s or %s, not %r" % (STOCK, HERO_PLUS, model))
     diameter_m, ratio = (left_m + right_m) / 2.0, right_m / left_m
-    return OwnWheels(diameter_m, separation_m, ratio, ticks_per_turn and float(ticks_per_turn))
+    return OwnWheels(diameter_m, separation_m, ratio, ticks_per_turn and float(ticks_per_turn), model)
 
 
 PARAMETERS: Dict[str, Parameter] = {

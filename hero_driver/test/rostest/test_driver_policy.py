@@ -94,17 +94,18 @@ class TestDriverPolicy(OwnDriverCase):
         driver = self.share()
         robot = self.dial(driver, 4, declarations=changed)
         line = driver.wait_line("hero_4: topic /hero_4/encoder refused")
-        for part in (WRONG_MD5, Encoder._md5sum, "package hero_msgs"):
+        for part in (WRONG_MD5, Encoder._md5sum, "flash firmware", "odom is the robot's own estimate"):
             self.assertIn(part, line)
         driver.wait_line("hero_4: topic /hero_4/led refused: .*%s.*std_msgs" % WRONG_MD5)
         driver.wait_line("hero_4: service /hero_4/set_odom refused: .*%s" % WRONG_MD5)
         driver.wait_line("hero_4: topic /hero_4/battery refused: type hero_msgs/Battery .*hero_msgs")
         driver.wait_line("hero_4: topic /hero_4/alien refused: type alien_msgs/Saucer .*alien_msgs")
-        raw = Recorder("/hero_4/odom_raw", rospy.AnyMsg)
+        raw, odom = (Recorder("/hero_4/" + name, rospy.AnyMsg) for name in ("odom_raw", "odom"))
         robot.declare()  # again, and no second warning
         robot.send("encoder", stock_messages.make_encoder("hero_4", rospy.Time.now(), 1.0, 1.0))
         robot.send("odom", stock_messages.make_odom("hero_4", rospy.Time.now()))
         raw.wait_count(1)
+        odom.wait_count(1)
         self.assertEqual(list_publishers("/hero_4/encoder"), [])
         for name in (
             "topic /hero_4/encoder",

@@ -12,10 +12,6 @@ from .ros_probe import RosProbe
 
 TIMEOUT_S = 10.0
 
-HERO_PLUS = "hero_plus"
-PLUS_TICKS = 288.0 / 96.0
-"""Ticks of the stock robot in one of HeRo+ (docs/robot_interface.md); their wheels differ by less than 4 %."""
-
 
 def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[RosProbe]:
     """Return the robots with these ids, None: all that are ready; those that are not connected have failed.
@@ -34,8 +30,7 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Ro
             raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
     if not ready.intersection(wanted):
         raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
-    plus = {robot_id for robot_id, robot in robots.items() if robot.model == HERO_PLUS}
-    probes = [RosProbe(robot_id, PLUS_TICKS if robot_id in plus else 1.0) for robot_id in wanted]
+    probes = [RosProbe(robot_id, robots[robot_id].model if robot_id in robots else "") for robot_id in wanted]
     for probe in probes:
         probe.failure = None if probe.robot_id in ready else "is not connected to the driver: is it on?"
     return probes

@@ -31,13 +31,15 @@ class Probe(ABC):
 
     Attributes:
         robot_id, name: 3, "hero_3".
+        model: as its driver reports it.
         failure: why it takes no further part, as text; None while it does.
         pose: the newest one by odometry.
     """
 
-    def __init__(self, robot_id: int) -> None:
+    def __init__(self, robot_id: int, model: str = "hero") -> None:
         """Start without data of /hero_{robot_id}."""
         self.robot_id = robot_id
+        self.model = model
         self.name = "hero_%d" % robot_id
         self.failure: Optional[str] = None
         self.pose = Pose(0.0, 0.0, 0.0)

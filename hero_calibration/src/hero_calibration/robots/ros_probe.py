@@ -25,14 +25,17 @@ SERVICES: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
 }
 """Service that writes each of store.SETTINGS, and the type of its numbers."""
 
+STOCK_TICKS = {"hero_plus": 288.0 / 96.0}
+"""Ticks of the stock robot in one of another model (docs/robot_interface.md); their wheels differ by less than 4 %."""
+
 
 class RosProbe(Probe):
     """One robot; times are ROS time."""
 
-    def __init__(self, robot_id: int, stock_ticks: float = 1.0) -> None:
-        """Connect to the topics of /hero_{robot_id}; stock_ticks: ticks of the stock robot in one of this robot's."""
-        super().__init__(robot_id)
-        self._stock_ticks = stock_ticks
+    def __init__(self, robot_id: int, model: str) -> None:
+        """Connect to the topics of /hero_{robot_id}."""
+        super().__init__(robot_id, model)
+        self._stock_ticks = STOCK_TICKS.get(model, 1.0)
         self._velocity = self._advertise("velocity_controller/cmd_vel", Twist)
         self._position = self._advertise("position_controller/cmd_vel", Twist)
         self._motors = self._advertise("cmd_motor", Motor)

@@ -21,6 +21,7 @@ from typing import (
     Optional,
     Protocol,
     Sequence,
+    Set,
     Tuple,
 )
 
@@ -28,7 +29,7 @@ from hero_node.geometry import Pose
 
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
-from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, STOCK
+from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, STOCK, describe_conflict
 from .stamps import NS_PER_S, StampFilter
 from .tick_odometry import TickOdometry, WheelGeometry
 from .transforms import AddTransform, TransformCorrector
@@ -86,6 +87,8 @@ class OwnWheels(NamedTuple):
     diameter_ratio: float
     ticks_per_turn: Optional[float] = None
     """None: as all of its model."""
+    model: str = ""
+    """Of the robot that was calibrated; empty: not known."""
 
 
 @dataclass(frozen=True)
@@ -113,10 +116,10 @@ class CorrectionSettings:
     def find_geometry(self, namespace: str, model: str) -> WheelGeometry:
         """Return the wheels of the robot in namespace, which is of this model."""
         geometry, own = self.geometries[model], self.own_wheels.get(namespace.strip("/"))
-        if own is None:
+        if own is None or own.model not in ("", model):
             return geometry
-        diameter_m, separation_m, ratio, ticks_per_turn = own
-        return WheelGeometry(diameter_m, separation_m, ticks_per_turn or geometry.ticks_per_turn, ratio)
+        ticks_per_turn = own.ticks_per_turn or geometry.ticks_per_turn
+        return WheelGeometry(own.diameter_m, own.separation_m, ticks_per_turn, own.diameter_ratio)
 
 
 class RobotCorrections:
@@ -141,6 +144,9 @@ class RobotCorrections:
         self.wheels = WheelMotion()
         self._settings = settings
         self.model = settings.find_model(namespace, "")
+        self._models: Deque[str] = collections.deque(maxlen=2)  # by the newest Encoder declarations
+        self._encoder_md5 = ""
+        self._declared: Set[str] = set()
         self.odometry = TickOdometry(settings.find_geometry(namespace, self.model))
         self.transforms = TransformCorrector(
             namespace, self._stamps, add_transform, self._take_odom_transform
@@ -169,6 +175,8 @@ class RobotCorrections:
         """
         self.wheels = wheels
         self._has_encoder = self._uses_estimate = self._hears_encoder = False
+        self._encoder_md5 = ""
+        self._declared.clear()
         self._is_first_reading = True
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
         self._encoder_follows = True
@@ -208,9 +216,21 @@ class RobotCorrections:
     def note_encoder(self, md5sum: str) -> None:
         """The robot declares an Encoder message of this md5, which tells its model."""
         model = self._settings.find_model(self._namespace, md5sum)
+        self._models.append(model)
+        self._encoder_md5 = md5sum
         if model != self.model:
             self.model = model
             self.odometry.change_wheels(self._settings.find_geometry(self._namespace, model))
+
+    def find_conflict(self, name: str) -> str:
+        """The robot declares the topic called name; return what contradicts its model, for users; empty: nothing."""
+        self._declared.add(name[len(self._namespace) :])
+        if not self._encoder_md5:
+            return ""
+        own = self._settings.own_wheels.get(self._namespace.strip("/"))
+        is_listed = self.model == HERO_PLUS and self._encoder_md5 != PLUS_ENCODER_MD5
+        calibrated_model = "" if own is None else own.model
+        return describe_conflict(self.model, self._models[0], calibrated_model, is_listed, self._declared)
 
     def derive_topics(self, name: str, message_type: str) -> Dict[str, str]:
         """Return the topics, with types, that exist besides the one called name."""

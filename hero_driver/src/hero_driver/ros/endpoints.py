@@ -66,7 +66,7 @@ class Endpoints:
         for publisher in replaced:
             for call in publisher.release():
                 call()
-        message_class = self._find_class("topic", name, layout)
+        message_class = self._find_class("topic", name, layout) if publishers else None
         if message_class is None:
             return
         for publisher_name, message_type, publisher in publishers:

@@ -127,6 +127,9 @@ class RobotBridge:
         if kind is TopicKind.PUBLISHER:
             if ros_type == ENCODER_TYPE:
                 self.corrections.note_encoder(info.md5sum)
+            conflict = self.corrections.find_conflict(name)
+            if conflict:
+                self._endpoints.report_error("model", conflict)
             replaced = self._replace_publisher(name, layout)
             publishers = self._choose_publishers(topic, name, layout)
             if convert:
@@ -186,7 +189,12 @@ class RobotBridge:
         """Set up the way of a topic's messages; return the topics that they become, types and publishers."""
         ros_type = layout.message_type
         if not _has_known_layout(layout):
-            # The registrar will refuse it with both md5s.
+            text = "topic %s refused: its %s has md5 %s, but only %s can be read: flash firmware with that message"
+            if ros_type == ENCODER_TYPE:
+                text += "; odom is the robot's own estimate until then, which loses distance"
+            known = [md5 for message_type, md5 in message_layouts.CONVERSIONS if message_type == ros_type]
+            md5sums = " or ".join([message_layouts.MD5SUMS[ros_type], *known])
+            self._endpoints.report_error(name, text % (name, topic.info.message_type, layout.md5sums[0], md5sums))
             return []
         if name == TRANSFORMS:
             if ros_type != TRANSFORM_TYPE:

@@ -1,0 +1,78 @@
+"""What contradicts a robot's model: each said once with a remedy, and odometry goes on."""
+
+import math
+import re
+
+import pytest
+from corrected_robot import CorrectedRobot
+from robot_messages import MS, NOW_NS
+
+from hero_driver.corrections.robot_corrections import OwnWheels
+from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5
+
+STOCK_ENCODER_MD5 = "b5586cdbae9b740afc6a1f403a2d7dde"
+
+
+def declare(robot, md5sum, *topics):
+    """Let the robot declare topics and, between them, its encoder; return the conflicts that are found."""
+    found = [robot.corrections.find_conflict("/hero_0" + topic) for topic in topics]
+    robot.corrections.note_encoder(md5sum)
+    found += [robot.corrections.find_conflict("/hero_0" + topic) for topic in ("/encoder", "/odom")]
+    return sorted(set(found) - {""})
+
+
+def drive(robot):
+    """Let both wheels count 20 ticks; return how far that is by odometry."""
+    before_m = robot.corrections.odometry.x_m
+    robot.receive_burst(NOW_NS, (0.0, 0.0))
+    robot.receive_burst(NOW_NS + 34 * MS, (20.0, 20.0))
+    return robot.corrections.odometry.x_m - before_m
+
+
+@pytest.mark.parametrize(
+    "md5sum, given_plus, topic",
+    [
+        (STOCK_ENCODER_MD5, "", "/imu"),
+        (PLUS_ENCODER_MD5, "", "/distance"),
+        (PLUS_ENCODER_MD5, "hero_0", "/distance"),
+        (STOCK_ENCODER_MD5, "hero_0", "/distance"),
+    ],
+)
+def test_of_a_robot_that_looks_like_its_model_nothing_is_said(md5sum, given_plus, topic):
+    assert declare(CorrectedRobot(given_plus={given_plus}), md5sum, topic) == []
+
+
+@pytest.mark.parametrize(
+    "given_plus, topic, conflict",
+    [
+        ("hero_0", "/imu", "~hero_plus lists it, but it declares an IMU.* take it off the list"),
+        ("", "/distance", "the distance sensor of HeRo.* list it in ~hero_plus"),
+    ],
+)
+def test_a_wrongly_listed_robot_is_told_of_with_the_remedy(given_plus, topic, conflict):
+    robot = CorrectedRobot(given_plus={given_plus})
+    (found,) = declare(robot, STOCK_ENCODER_MD5, topic)
+    assert re.search(conflict, found)
+    robot.reconnect(rebooted=True)
+    assert declare(robot, STOCK_ENCODER_MD5) == [], "a new connection declares anew"
+
+
+def test_an_id_whose_model_changes_is_told_of_and_goes_on_from_where_it_is():
+    robot = CorrectedRobot()
+    assert declare(robot, STOCK_ENCODER_MD5, "/imu") == []
+    assert drive(robot) == pytest.approx(20 * math.pi * 0.0492 / 288)
+    robot.reconnect(rebooted=True)
+    (conflict,) = declare(robot, PLUS_ENCODER_MD5, "/distance")
+    assert "it was a hero and is a hero_plus now" in conflict and "two ids" in conflict
+    assert drive(robot) == pytest.approx(20 * math.pi * 0.050 / 96)
+    robot.reconnect(rebooted=True)
+    assert declare(robot, PLUS_ENCODER_MD5, "/distance") == []
+
+
+@pytest.mark.parametrize("model, diameter_m", [("hero", 0.050), ("hero_plus", 0.048), ("", 0.048)])
+def test_calibrated_wheels_of_another_model_are_told_of_and_not_used(model, diameter_m):
+    robot = CorrectedRobot(own_wheels={"hero_0": OwnWheels(0.048, 0.06, 1.0, model=model)})
+    conflicts = declare(robot, PLUS_ENCODER_MD5)
+    assert bool(conflicts) == (model == "hero")
+    assert all("it is a hero_plus, but its calibration file says hero" in text for text in conflicts)
+    assert drive(robot) == pytest.approx(20 * math.pi * diameter_m / 96)
