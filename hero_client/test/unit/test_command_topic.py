@@ -48,10 +48,30 @@ def test_the_newest_early_command_is_sent_with_the_subscription(ros):
 
 def test_a_stop_takes_the_place_of_an_early_command(ros):
     ros.topic.publish("fast")
-    ros.topic.publish_if_connected("stop")
+    for _ in range(2):
+        ros.topic.publish_stop("stop")
+    assert ros.sent == [] and len(ros.warned) == 1
     subscribe(ros)
-    assert ros.sent == ["stop"]  # which rospy drops without a subscriber
-    assert len(ros.warned) == 1
+    assert ros.sent == ["stop"] and len(ros.warned) == 1
+
+
+def test_an_early_stop_waits_and_is_not_warned_about(ros):
+    ros.topic.publish_stop("stop")
+    assert ros.sent == []
+    subscribe(ros)
+    assert ros.sent == ["stop"]
+    ros.subscribers = 0
+    ros.now_s += CONNECT_S + 0.1
+    ros.topic.publish_stop("stop")
+    assert ros.sent == ["stop"] * 2 and ros.warned == []  # rospy drops it without a subscriber
+
+
+def test_a_command_that_follows_an_early_stop_is_warned_about_in_time(ros):
+    ros.topic.publish_stop("stop")
+    ros.topic.publish("fast")
+    ros.now_s += CONNECT_S
+    ros.timers[0]()
+    assert ros.sent == [] and len(ros.warned) == 1
 
 
 def test_a_command_without_subscribers_is_warned_about_once(ros):

@@ -160,7 +160,7 @@ def test_only_a_stop_is_sent_without_a_warning():
     link, sent = RosLink.__new__(RosLink), []
     link._cmd_vel = SimpleNamespace(
         publish=lambda twist: sent.append(("move", twist.linear.x, twist.angular.z)),
-        publish_if_connected=lambda twist: sent.append(("stop", twist.linear.x, twist.angular.z)),
+        publish_stop=lambda twist: sent.append(("stop", twist.linear.x, twist.angular.z)),
     )
     for velocity in ((0.1, 0.0), (0.0, -0.5), (0.0, 0.0)):
         link.send_velocity(*velocity)

@@ -183,8 +183,9 @@ class KeyboardTeleop:
             else:
                 names = ", ".join(robot.name for robot in self._swarm)
                 show_text("hero_%s is not among the robots of this teleop: %s\n" % (key, names))
-        else:
-            self._drive.press(key, now_s)
+        elif self._drive.press(key, now_s) and key in STOP_KEYS:
+            self._output.demand_stop()  # also where another program drives the robot
+            self._next_send_s = now_s
 
     def _choose(self, robots: List[Robot]) -> None:
         """Drive these robots from now on; those that were driven stop."""

@@ -15,6 +15,10 @@ class TeleopOutput:
         """Start silent."""
         self._is_moving = False
 
+    def demand_stop(self) -> None:
+        """Let the next stop pass, also without a motion before it."""
+        self._is_moving = True
+
     def passes(self, command: Velocity) -> bool:
         """Return whether to send a command, for which this is called each time that one is due."""
         was_moving, self._is_moving = self._is_moving, command != STOP

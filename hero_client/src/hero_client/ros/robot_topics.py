@@ -86,6 +86,7 @@ class CommandTopic(rospy.SubscribeListener):
         self._has_warned = False
         self._turn = threading.Lock()
         self._waiting: Optional[Any] = None
+        self._timer: Optional[threading.Timer] = None
         self._publisher = rospy.Publisher(name, message_class, subscriber_listener=self, queue_size=1)
 
     @property
@@ -98,20 +99,32 @@ class CommandTopic(rospy.SubscribeListener):
 
         In the first CONNECT_S after the start the newest command waits for the driver's subscription instead.
         """
-        left_s = self._connect_deadline_s - time.monotonic()
         with self._turn:
-            if not self.connected and left_s > 0.0:
-                if self._waiting is None:
-                    timer = threading.Timer(left_s, self._give_up)
-                    timer.daemon = True
-                    timer.start()
-                self._waiting = message
-                return
+            waits = self._put(message)
+            if waits and self._timer is None:
+                self._timer = threading.Timer(self._connect_deadline_s - time.monotonic(), self._give_up)
+                self._timer.daemon = True
+                self._timer.start()
         if self.connected:
             self._has_warned = False
-        else:
+        elif not waits:
             self._warn()
-        self.publish_if_connected(message)
+
+    def publish_stop(self, message: Any) -> None:
+        """Send a stop, as publish() does, without a warning: an absent robot does not need it."""
+        with self._turn:
+            waiting = self._waiting
+            is_lost = self._put(message) and waiting not in (None, message)
+        if is_lost:
+            self._warn()
+
+    def _put(self, message: Any) -> bool:
+        """Send a message, or have it wait in place of an earlier one; return whether it waits."""
+        waits = not self.connected and time.monotonic() < self._connect_deadline_s
+        self._waiting = message if waits else None
+        if not (waits or rospy.is_shutdown()):
+            self._publisher.publish(message)
+        return waits
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
         """Send the command that waited for this subscription; rospy calls it on its own thread."""
@@ -135,15 +148,6 @@ class CommandTopic(rospy.SubscribeListener):
         """Wait for the driver's subscription, in the first CONNECT_S after the start."""
         while not self.connected and time.monotonic() < self._connect_deadline_s and not rospy.is_shutdown():
             time.sleep(POLL_PERIOD_S)
-
-    def publish_if_connected(self, message: Any) -> None:
-        """Send a command without warning, in place of one that waits: a stop, which an absent robot does not need."""
-        with self._turn:  # no command that waited may follow this one
-            is_lost, self._waiting = self._waiting is not None and not self.connected, None
-            if not rospy.is_shutdown():
-                self._publisher.publish(message)
-        if is_lost:
-            self._warn()
 
     def describe_absence(self) -> str:
         """Return why there is no subscriber, for users."""

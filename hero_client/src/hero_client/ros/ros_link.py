@@ -183,7 +183,7 @@ class RosLink:
         if linear_m_s or angular_rad_s:
             self._cmd_vel.publish(twist)
         else:
-            self._cmd_vel.publish_if_connected(twist)
+            self._cmd_vel.publish_stop(twist)
 
     def send_color(self, rgb: Tuple[float, float, float]) -> None:
         """See RobotLink."""
