@@ -26,7 +26,7 @@ def write_default(parameter: Parameter) -> str:
     """Return the default as it is written in YAML."""
     default: Any = parameter.default
     value = list(default) if isinstance(default, tuple) else default
-    return str(yaml.safe_dump(value, default_flow_style=True)).split("\n", 1)[0]
+    return str(yaml.safe_dump(value, default_flow_style=True)).split("\n")[0]
 
 
 def _describe(parameter: Parameter) -> str:

@@ -76,7 +76,7 @@ def _edit_mapping(text: str, node: yaml.MappingNode, content: Mapping[Any, Any],
         if isinstance(value, dict) and value and isinstance(value_node, yaml.MappingNode) and not value_node.flow_style:
             _edit_mapping(text, value_node, value, edits)
         else:
-            line = yaml.safe_dump(value, default_flow_style=True, width=10**6).split("\n...", 1)[0].strip()
+            line = yaml.safe_dump(value, default_flow_style=True, width=10**6).split("\n...")[0].strip()
             edits.append(_Edit(key_node.end_mark.index, _end(value_node), ": " + line))
     if added:
         indent = " " * node.start_mark.column

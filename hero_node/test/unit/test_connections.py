@@ -5,6 +5,7 @@ import socket
 import struct
 import threading
 import xmlrpc.client
+from pathlib import Path
 
 import pytest
 from rosgraph.network import decode_ros_handshake_header, encode_ros_handshake_header
@@ -12,6 +13,7 @@ from rospy.impl import tcpros_base
 
 from hero_node.ros import connections
 from hero_node.ros.connections import REASON_LENGTH_MAX, open_tcpros_server
+from hero_node.ros.handshakes import HandshakeReader
 
 DEADLINE_S = 60.0
 
@@ -113,3 +115,22 @@ def test_half_open_calls_take_no_more_threads_than_allowed(monkeypatch):
     server.shutdown()
     serving.join()
     server.server_close()
+
+
+def test_limits_are_those_of_the_document():
+    document = (Path(__file__).resolve().parents[3] / "docs" / "security.md").read_text()
+    reader = HandshakeReader(lambda *arguments: None)
+    assert "closed after %g s; at most %d wait" % (reader._timeout_s, reader._pending._most) in document
+    assert "at most %d per node" % connections.XMLRPC_CONNECTIONS_MAX in document
+
+
+def test_a_call_that_has_ended_is_closed():
+    server = connections.LimitedXmlRpcServer(("127.0.0.1", 0))
+    try:
+        with socket.create_connection(server.server_address[:2], DEADLINE_S) as client:
+            request, address = server.get_request()
+            server._limit.add(request, address)
+            server.shutdown_request(request)
+            assert client.recv(1) == b"" and not server._limit.remove(request)
+    finally:
+        server.server_close()

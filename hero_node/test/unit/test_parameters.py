@@ -159,3 +159,9 @@ def test_what_are_no_poses_is_named_with_the_remedy(text, ids, reason):
         parse_poses("poses", text, ids)
     assert str(raised.value).startswith("~poses %s" % reason)
     assert 'must hold "x y" or "x y heading"' in str(raised.value)
+
+
+def test_a_range_of_ids_holds_a_thousand_at_most():
+    assert len(parse_robot_ids("robots", "1-1000")) == 1000
+    with pytest.raises(ProgramError, match="~robots holds '0-1000'"):
+        parse_robot_ids("robots", "0-1000")

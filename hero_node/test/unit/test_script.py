@@ -1,5 +1,6 @@
 """The frame of a script: one node for all of its threads, and errors with the line that they come from."""
 
+import signal
 import sys
 import threading
 
@@ -49,8 +50,25 @@ def test_errors_of_scripts_are_one_line_and_notebooks_keep_theirs(monkeypatch, i
     assert (sys.excepthook is sys.__excepthook__) == is_notebook
 
 
+def test_nodes_of_scripts_have_names_of_their_own_and_end_by_their_signals(monkeypatch):
+    started, handlers = [], {}
+    monkeypatch.setattr(script, "start_ros_node", lambda name, anonymous: started.append((name, anonymous)))
+    monkeypatch.setattr(script.rospy.core, "is_initialized", lambda: False)
+    monkeypatch.setattr(script.signal, "signal", handlers.__setitem__)
+    monkeypatch.setattr(sys, "ps1", "", raising=False)
+    script.start_node("walk")
+    assert started == [("walk", True)] and set(handlers) == {signal.SIGTERM, signal.SIGHUP}
+    for number, handle in list(handlers.items()):
+        with pytest.raises(SystemExit) as end:
+            handle(number, None)
+        assert end.value.code == 128 + number and handlers[signal.SIGINT] == signal.SIG_IGN
+
+
 def test_an_error_that_ends_a_thread_is_one_line(monkeypatch, capsys):
     monkeypatch.setattr(threading, "excepthook", script._print_thread_exception)
+
+    monkeypatch.setattr(sys.modules["__main__"], "__file__", __file__, raising=False)
+    monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)
 
     def fail():
         raise HeroError("hero_0 did not move")
@@ -58,7 +76,8 @@ def test_an_error_that_ends_a_thread_is_one_line(monkeypatch, capsys):
     thread = threading.Thread(target=fail)
     thread.start()
     thread.join()
-    assert capsys.readouterr().err.count("\n") == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "hero_0 did not move (test_script.py, line " in line
 
 
 def run_lesson(monkeypatch, capsys, tmp_path, *words, arguments=()):

@@ -9,7 +9,7 @@ from hero_client.controllers.half_planes import nearest_allowed_all
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_swarm.behavior import Behavior
 from hero_swarm.metrics.graphs import measure_distances
-from hero_swarm.safety import OFF, ROBOTS, SafetyFilter
+from hero_swarm.safety import OFF, ROBOTS, TOLERANCE_M_S, SafetyFilter
 from hero_swarm.steering import steer
 from hero_swarm.trial import OPEN, Trial
 
@@ -109,3 +109,109 @@ def test_robots_cross_a_ring_untouched_in_little_more_time_than_pushing():
     across_s, nearest_m = cross_ring(ROBOTS)
     assert nearest_m > 2.0 * BODY_RADIUS_M + 0.01
     assert across_s < 1.3 * pushing_s
+
+
+WORLDS, ROBOTS_EACH = 40, 5
+POINT_RADIUS_M = BODY_RADIUS_M + SafetyFilter.lookahead_m + SafetyFilter.margin_m
+
+
+def draw_worlds(seed):
+    """Return poses and wanted speeds of crowded worlds, whose steered points keep their distance and the fence."""
+    random = np.random.RandomState(seed)
+    poses = np.empty((0, ROBOTS_EACH, 3))
+    while len(poses) < WORLDS:
+        drawn = random.uniform((-0.45, -0.3, -math.pi), (0.45, 0.3, math.pi), (4000, ROBOTS_EACH, 3))
+        points_m = find_points(drawn)
+        apart_m = measure_distances(points_m).min(axis=(1, 2))
+        inside = (np.abs(points_m) < (0.5 - POINT_RADIUS_M, 0.35 - POINT_RADIUS_M)).all(axis=(1, 2))
+        poses = np.concatenate((poses, drawn[(apart_m > 2.0 * POINT_RADIUS_M) & inside]))
+    speeds = random.uniform((-0.2, -3.0), (0.2, 3.0), (WORLDS, ROBOTS_EACH, 2))
+    return poses[:WORLDS], speeds[..., 0], speeds[..., 1]
+
+
+def find_points(poses):
+    headings = np.stack((np.cos(poses[..., 2]), np.sin(poses[..., 2])), axis=-1)
+    return poses[..., :2] + SafetyFilter.lookahead_m * headings
+
+
+def find_velocities(poses, linear_m_s, angular_rad_s):
+    """Return the velocities of the steered points."""
+    cosine, sine = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    aside_m_s = SafetyFilter.lookahead_m * angular_rad_s
+    return np.stack((cosine * linear_m_s - sine * aside_m_s, sine * linear_m_s + cosine * aside_m_s), axis=-1)
+
+
+SMALL_FENCE_M = np.array((-0.5, -0.35, 0.5, 0.35))
+
+
+def measure_slack(poses, velocities_m_s, fence_m):
+    """Return how much slower than allowed pairs and fences are closed, at least (W, N)."""
+    points_m = find_points(poses)
+    away_m = points_m[:, :, None] - points_m[:, None]
+    distances_m = measure_distances(points_m)
+    closing_m_s = -(away_m * velocities_m_s[:, :, None]).sum(axis=-1) / distances_m
+    slack = (0.5 * SafetyFilter.gain_1_s * (distances_m - 2.0 * POINT_RADIUS_M) - closing_m_s).min(axis=2)
+    for axis in (0, 1):
+        for sign, edge_m in ((-1.0, fence_m[axis]), (1.0, fence_m[axis + 2])):
+            left_m = sign * (edge_m - points_m[..., axis]) - POINT_RADIUS_M
+            slack = np.minimum(slack, SafetyFilter.gain_1_s * left_m - sign * velocities_m_s[..., axis])
+    return slack
+
+
+@pytest.mark.parametrize("sidestep", [0.0, SafetyFilter.sidestep])
+def test_no_pair_and_no_fence_is_closed_faster_than_allowed(sidestep):
+    poses, linear_m_s, angular_rad_s = draw_worlds(1)
+    safe = SafetyFilter(ROBOTS, SMALL_FENCE_M)
+    safe.sidestep = sidestep
+    found = safe(poses, linear_m_s.ravel(), angular_rad_s.ravel())
+    assert measure_slack(poses, find_velocities(poses, *found), SMALL_FENCE_M).min() > -TOLERANCE_M_S - 1e-9
+    wanted_m_s = find_velocities(poses, linear_m_s, angular_rad_s)
+    assert (measure_slack(poses, wanted_m_s, SMALL_FENCE_M) < -1e-3).any(axis=1).mean() > 0.7, "or nothing was shown"
+    assert np.abs(found[0]).max() <= 0.2 and np.abs(found[1]).max() <= 6.0
+
+
+def test_no_other_allowed_velocity_is_nearer_to_the_wanted_one():
+    poses, linear_m_s, angular_rad_s = draw_worlds(2)
+    safe = SafetyFilter(ROBOTS, SMALL_FENCE_M)
+    safe.sidestep, safe.max_angular_rad_s = 0.0, 100.0
+    found_m_s = find_velocities(poses, *safe(poses, linear_m_s, angular_rad_s))
+    wanted_m_s = find_velocities(poses, linear_m_s, angular_rad_s)
+    off_m_s = np.hypot(*np.moveaxis(found_m_s - wanted_m_s, -1, 0))
+    random = np.random.RandomState(3)
+    for spread_m_s in (0.002, 0.02, 0.2):
+        for _ in range(30):
+            others_m_s = found_m_s + random.normal(0.0, spread_m_s, found_m_s.shape)
+            allowed = measure_slack(poses, others_m_s, SMALL_FENCE_M) >= 0.0
+            allowed &= np.hypot(*np.moveaxis(others_m_s, -1, 0)) <= safe.max_speed_m_s
+            others_off_m_s = np.hypot(*np.moveaxis(others_m_s - wanted_m_s, -1, 0))
+            assert (others_off_m_s >= off_m_s - 2e-3)[allowed].all()
+
+
+def test_commands_depend_on_where_robots_are_to_each_other_alone():
+    poses, linear_m_s, angular_rad_s = draw_worlds(4)
+    expected = SafetyFilter(ROBOTS)(poses, linear_m_s, angular_rad_s)
+    turn_rad, order = 2.0, [3, 0, 4, 1, 2]
+    cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
+    x_m, y_m, yaw_rad = np.moveaxis(poses, -1, 0)
+    turned = np.stack((cosine * x_m - sine * y_m + 7.0, sine * x_m + cosine * y_m - 3.0, yaw_rad + turn_rad), axis=-1)
+    assert np.allclose(SafetyFilter(ROBOTS)(turned, linear_m_s, angular_rad_s), expected, atol=1e-6)
+    ordered = SafetyFilter(ROBOTS)(poses[:, order], linear_m_s[:, order], angular_rad_s[:, order])
+    assert np.allclose(ordered, np.array(expected)[..., order], atol=1e-6)
+    mirrored, plain = SafetyFilter(ROBOTS), SafetyFilter(ROBOTS)
+    mirrored.sidestep = plain.sidestep = 0.0
+    linear_found, angular_found = plain(poses, linear_m_s, angular_rad_s)
+    found = mirrored(np.stack((x_m, -y_m, -yaw_rad), axis=-1), linear_m_s, -angular_rad_s)
+    assert np.allclose(found, (linear_found, -angular_found), atol=1e-6), "left as right"
+
+
+def test_only_the_nearest_robots_are_looked_at():
+    poses, linear_m_s, angular_rad_s = draw_worlds(5)
+    safe = SafetyFilter(ROBOTS)
+    safe.neighbors = 2
+    found = np.array(safe(poses, linear_m_s, angular_rad_s))
+    nearest = measure_distances(find_points(poses)).argsort(axis=2)[..., :2]
+    worlds = np.arange(WORLDS)
+    for robot in range(ROBOTS_EACH):
+        rows = np.column_stack((np.full(WORLDS, robot), nearest[:, robot]))
+        three = [values[worlds[:, None], rows] for values in (poses, linear_m_s, angular_rad_s)]
+        assert np.allclose(np.array(SafetyFilter(ROBOTS)(*three))[..., 0], found[..., robot], atol=1e-6)
