@@ -21,45 +21,50 @@ from hero_swarm.fitting.robot_fit import describe_fit, fit_robot
 from hero_swarm.metrics import METRICS
 from hero_swarm.trial import OPEN
 
-PERIOD_S = 0.03
+PERIOD_MS = 30
+START_MS = 1015
+"""Of recordings: at no time at which the firmware begins a cycle."""
 HIDDEN = (
     "left_gain=1.15,right_gain=0.85,dead_zone_us=38,lag_s=0.12,left_wheel=1.05,right_wheel=0.97,"
     "wheel_separation_m=0.067,left_center_us=1522,right_center_us=1485"
 )
 
 
-def record(kind, time_s=60.0, delay_s=0.0, turns=True):
+def record(kind, time_s=60.0, delay_ms=0, turns=True):
     """Return the recording of a robot with hidden errors that drives at random, with poses of a camera's noise."""
     errors = draw_errors([np.random.RandomState(1)])
     set_known(errors, 0, HIDDEN)
     rows = RobotRows(World(OPEN, np.zeros((1, 3)), [np.random.RandomState(2)], errors))
+    rows.advance(START_MS)
     random = np.random.RandomState(3)
-    send, tables = rows.send_pulses if kind == PULSES else rows.send_velocity, ([], [], [])
-    command, next_s, sent = None, 0.0, 0
-    for step in range(round(time_s / PERIOD_S)):
-        now_s = step * PERIOD_S
-        if now_s >= next_s:
+    send, commands, odometry, poses = rows.send_pulses if kind == PULSES else rows.send_velocity, [], [], []
+    command, next_ms, sent = None, 0.0, 0
+    for now_ms in range(0, round(1000.0 * time_s), PERIOD_MS):
+        if now_ms >= next_ms:
             pulses_us = np.rint(1500.0 + random.uniform(-80.0, 80.0, 2))
             speeds = (random.uniform(-0.05, 0.15), random.uniform(-2.5, 2.5) if turns else 0.0)
-            command, next_s = pulses_us if kind == PULSES else speeds, now_s + random.uniform(0.6, 2.0)
-        if step % 3 == 0:
-            tables[0].append((now_s, kind, *command))
-        while sent < len(tables[0]) and tables[0][sent][0] + delay_s <= now_s:
-            send(np.arange(1), *tables[0][sent][2:])
+            command, next_ms = pulses_us if kind == PULSES else speeds, now_ms + random.uniform(600.0, 2000.0)
+        if now_ms % (3 * PERIOD_MS) == 0:
+            commands.append((now_ms, kind, *command))
+        while sent < len(commands) and commands[sent][0] + delay_ms <= now_ms:
+            send(np.arange(1), *commands[sent][2:])
             sent += 1
-        rows.advance(round(1000.0 * (now_s + PERIOD_S)))
-        if not tables[1] or rows.odometry_ms[0] > 1000.0 * tables[1][-1][0]:
-            tables[1].append((rows.odometry_ms[0] / 1000.0, *rows.odometry[0, :3]))
+        rows.advance(START_MS + now_ms + PERIOD_MS)
+        if not odometry or rows.odometry_ms[0] > START_MS + odometry[-1][0]:
+            odometry.append((rows.odometry_ms[0] - START_MS, *rows.odometry[0, :3]))
         noise = random.normal(0.0, (0.001, 0.001, 0.01))
-        tables[2].append((now_s + PERIOD_S, *(rows.world.poses[0] + noise)))
-    return Recording("hero_4", *map(np.array, tables))
+        poses.append((now_ms + PERIOD_MS, *(rows.world.poses[0] + noise)))
+    tables = [np.array(table) for table in (commands, odometry, poses)]
+    for table in tables:
+        table[:, 0] /= 1000.0
+    return Recording("hero_4", *tables)
 
 
 def test_hidden_errors_come_back_and_predict_paths_not_seen():
-    fit = fit_robot([record(PULSES, delay_s=0.09)])
+    fit = fit_robot([record(PULSES, delay_ms=90)])
     for key, hidden in (entry.split("=") for entry in HIDDEN.split(",")):
         assert fit.values[key] == pytest.approx(float(hidden), rel=0.005 if "center" in key else 0.1), key
-    assert 0.06 < fit.delay_s < 0.12
+    assert fit.delay_s == pytest.approx(0.09, rel=0.1)
     assert fit.after_m < fit.before_m / 3.0 and fit.after_m < 0.01
 
 

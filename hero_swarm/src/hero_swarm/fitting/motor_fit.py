@@ -4,15 +4,17 @@ Only servo pulses tell them: after the same velocities, the firmware's controlle
 but for small swings that no two drives share.
 """
 
-from typing import Dict, List, NamedTuple, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from hero_sim.world.robot_errors import KINDS, RobotErrors, draw_errors
+from hero_sim.robot.firmware import SPIN_MS
 
-from .recording import PULSES, SAMPLE_S, Recording, measure_wheels, replay_commands, sample_times
+from .body_fit import follow_wheels
+from .recording import PULSES, SAMPLE_S, Recording, measure_wheels, sample_times
+from .replay import Motors, replay_commands
 
-__all__ = ["SLIP_MEAN", "Fit", "build_errors", "fit_motors", "predict_ends"]
+__all__ = ["fit_motors", "predict_ends"]
 
 DELAY = "delay_s"
 
@@ -33,92 +35,67 @@ _END = 1e-3
 _WINDOW = 4
 """Samples, over which wheel speeds are compared."""
 
-SLIP_MEAN = float(np.sqrt(2.0 / np.pi))
-"""Mean share of travel that is lost, by the sd that `slip` is."""
+_PHASES_S = np.arange(0.0, SPIN_MS, 8.0) / 1000.0
+"""Of the cycle in which the firmware reads commands, that are tried: which one a robot has is not in its messages."""
 
 
-class Fit(NamedTuple):
-    """The differences of one robot.
+def fit_motors(recordings: List[Recording], end_share: float) -> List[Motors]:
+    """Return the motors of one robot in each of its recordings, from the first share of them.
 
-    Attributes:
-        values: by key, as --error takes them.
-        delay_s: how much later than in the simulator commands work.
-        before_m, after_m: median error at the ends of held-out paths, of a robot as on the drawing and of this one.
-    """
-
-    name: str
-    values: Dict[str, float]
-    delay_s: float
-    before_m: float
-    after_m: float
-
-
-def build_errors(candidates: Sequence[Dict[str, float]]) -> RobotErrors:
-    """Return robots as on the drawing, without chance, but for the given values."""
-    errors = draw_errors((np.random.RandomState(0) for _ in candidates), 0.0)
-    for row, values in enumerate(candidates):
-        for key, value in values.items():
-            kind = KINDS[key]
-            getattr(errors, kind.array)[row, kind.columns] = min(max(value, kind.least), kind.most)
-    return errors
-
-
-def _split(values: np.ndarray, names: Sequence[str]) -> Tuple[Dict[str, float], float]:
-    named = dict(zip(names, values.tolist()))
-    delay_s = round(max(named.pop(DELAY), 0.0), 3)
-    return named, delay_s
-
-
-def fit_motors(recordings: List[Recording], end_share: float) -> Tuple[Dict[str, float], float]:
-    """Return values by key and the delay (s), from the first share of each recording of one robot.
-
-    Nothing, and no delay, without servo pulses.
+    Those on the drawing without servo pulses.
     """
     if not any((recording.commands[:, 1] == PULSES).any() for recording in recordings):
-        return {}, 0.0
-    names = list(_PARAMETERS)
-    values, steps, least, most = np.array([_PARAMETERS[name] for name in names]).T
-
-    def compare(candidates: np.ndarray) -> np.ndarray:
-        return np.hstack([_compare(recording, candidates, names, end_share) for recording in recordings])
-
+        return [Motors({}) for _ in recordings]
+    parts = [_cut_odometry(recording, end_share * recording.time_s) for recording in recordings]
+    values, steps, least, most = np.array(list(_PARAMETERS.values())).T
+    phases_s = np.zeros(len(parts))
     for _ in range(_ITERATIONS):
-        differences = compare(np.vstack((values, values + np.diag(steps))))
+        sloped = np.vstack((values, values + np.diag(steps)))
+        differences = np.hstack([
+            _compare(part, [_build_motors(own, phase_s) for own in sloped]) for part, phase_s in zip(parts, phases_s)
+        ])
         slopes = (differences[1:] - differences[0]).T  # by steps
         square, gradient = slopes.T @ slopes, slopes.T @ differences[0]
         scale = np.diag(np.maximum(np.diag(square), 1e-12))
         moves = [np.linalg.solve(square + damping * scale, gradient) for damping in _DAMPINGS]
         candidates = np.clip([values - steps * move for move in moves], least, most)
-        costs = (compare(candidates) ** 2).sum(axis=1)
-        last = float((differences[0] ** 2).sum())
-        if costs.min() < last:
-            values = candidates[int(costs.argmin())]
-        if costs.min() > (1.0 - _END) * last:
+        motors = [_build_motors(own, phase_s) for own in candidates for phase_s in _PHASES_S]
+        squares = np.array([(_compare(part, motors) ** 2).sum(axis=1) for part in parts])
+        squares = squares.reshape(len(parts), len(candidates), len(_PHASES_S))
+        costs = squares.min(axis=2).sum(axis=0)
+        best, last = int(costs.argmin()), float((differences[0] ** 2).sum())
+        if costs[best] < last:
+            values, phases_s = candidates[best], _PHASES_S[squares[:, best].argmin(axis=1)]
+        if costs[best] > (1.0 - _END) * last:
             break
-    return _split(values, names)
+    return [_build_motors(values, phase_s) for phase_s in phases_s]
 
 
-def _compare(recording: Recording, candidates: np.ndarray, names: Sequence[str], end_share: float) -> np.ndarray:
+def _cut_odometry(recording: Recording, end_s: float) -> Recording:
+    return recording._replace(odometry=recording.odometry[recording.odometry[:, 0] <= end_s])
+
+
+def _build_motors(values: np.ndarray, phase_s: float) -> Motors:
+    named = dict(zip(_PARAMETERS, values.tolist()))
+    return Motors(named, named.pop(DELAY), float(phase_s))
+
+
+def _compare(recording: Recording, motors: Sequence[Motors]) -> np.ndarray:
     """Return the differences of wheel speeds (m/s) of each candidate from those recorded (R, M)."""
-    split = [_split(values, names) for values in candidates]
-    end_s = end_share * recording.time_s
-    part = recording._replace(odometry=recording.odometry[recording.odometry[:, 0] <= end_s])
-    travels_m = replay_commands(part, build_errors([named for named, _ in split]), [delay_s for _, delay_s in split])[0]
-    recorded_m = measure_wheels(part, sample_times(part))
-    off_m = travels_m - recorded_m[:, None]
+    off_m = replay_commands(recording, motors) - measure_wheels(recording, sample_times(recording))[:, None]
     speeds_m_s = (off_m[_WINDOW:] - off_m[:-_WINDOW]) / (_WINDOW * SAMPLE_S)
-    return speeds_m_s.transpose(1, 0, 2).reshape(len(candidates), -1)
+    return speeds_m_s.transpose(1, 0, 2).reshape(len(motors), -1)
 
 
 def predict_ends(
-    recording: Recording, robots: Sequence[Tuple[Dict[str, float], float]], start_share: float, path_s: float
+    recording: Recording, robots: Sequence[Tuple[Motors, np.ndarray]], start_share: float, path_s: float
 ) -> np.ndarray:
     """Return how far off (m) the ends of paths of path_s are that start after a share of the recording (R, paths).
 
-    Each path begins where the robot was; the simulated robots, values by key and delay, know the commands alone.
+    Each path begins where the robot was; the simulated robots, motors and body (3,), know the commands alone.
     """
-    errors, delays_s = build_errors([values for values, _ in robots]), [delay_s for _, delay_s in robots]
-    poses = replay_commands(recording, errors, delays_s)[1]
+    wheels_m = replay_commands(recording, [motors for motors, _ in robots])
+    poses = np.stack([follow_wheels(wheels_m[:, row], body) for row, (_, body) in enumerate(robots)], axis=1)
     times_s = sample_times(recording)
     measured = np.column_stack(
         [np.interp(times_s, recording.poses[:, 0], column)

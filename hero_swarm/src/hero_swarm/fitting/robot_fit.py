@@ -1,14 +1,15 @@
 """Fits the simulator to one robot, and tells how much better it predicts paths that the fit has not seen. Pure."""
 
-from typing import List
+from typing import Dict, List, NamedTuple
 
 import numpy as np
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 
 from .body_fit import fit_body
-from .motor_fit import SLIP_MEAN, Fit, fit_motors, predict_ends
+from .motor_fit import fit_motors, predict_ends
 from .recording import Recording
+from .replay import Motors
 
 __all__ = ["describe_fit", "fit_robot"]
 
@@ -21,24 +22,43 @@ SLIP = 0.02
 """Cannot be told from rolling less far: the usual one; what is lost by it, wheels roll farther."""
 
 
+_SLIP_MEAN = float(np.sqrt(2.0 / np.pi))
+"""Mean share of travel that is lost, by the sd that `slip` is."""
+
+
+class Fit(NamedTuple):
+    """The differences of one robot.
+
+    Attributes:
+        values: by key, as --error takes them.
+        delay_s: how much later than in the simulator commands work.
+        before_m, after_m: median error at the ends of held-out paths, of a robot as on the drawing and of this one.
+    """
+
+    name: str
+    values: Dict[str, float]
+    delay_s: float
+    before_m: float
+    after_m: float
+
+
 def fit_robot(recordings: List[Recording]) -> Fit:
     """Return the differences of the robot of these recordings. Raises: ValueError if they tell too little."""
     share = 1.0 - HELD_OUT_SHARE
     body = fit_body([recording.cut(0.0, share * recording.time_s) for recording in recordings])
-    motors, delay_s = fit_motors(recordings, share)
-    rolled = {
-        "left_wheel": float(body[0]),
-        "right_wheel": float(body[1]),
-        "wheel_separation_m": float(body[2]) * WHEEL_SEPARATION_M,
-    }
-    robots = [({}, 0.0), ({**motors, **rolled}, delay_s)]
-    ends_m = np.hstack([predict_ends(recording, robots, share, PATH_S) for recording in recordings])
+    motors = fit_motors(recordings, share)
+    drawn = Motors({}), np.ones(3)
+    ends_m = np.hstack([
+        predict_ends(recording, [drawn, (own, body)], share, PATH_S) for recording, own in zip(recordings, motors)
+    ])
     if not ends_m.size:
         raise ValueError("too short: %.0f s hold no path that the fit has not seen" % recordings[0].time_s)
     before_m, after_m = np.median(ends_m, axis=1).tolist()
-    kept = 1.0 - SLIP * SLIP_MEAN
-    rolled = {**rolled, "left_wheel": rolled["left_wheel"] / kept, "right_wheel": rolled["right_wheel"] / kept}
-    return Fit(recordings[0].name, {**motors, **rolled, "slip": SLIP}, delay_s, before_m, after_m)
+    left_wheel, right_wheel = (body[:2] / (1.0 - SLIP * _SLIP_MEAN)).tolist()
+    rolled = {"left_wheel": left_wheel, "right_wheel": right_wheel, "slip": SLIP}
+    separation = {"wheel_separation_m": float(body[2]) * WHEEL_SEPARATION_M}
+    values = {**motors[0].values, **rolled, **separation}
+    return Fit(recordings[0].name, values, motors[0].delay_s, before_m, after_m)
 
 
 def describe_fit(fit: Fit, robot_id: int) -> List[str]:
