@@ -215,6 +215,62 @@ def test_an_object_is_pushed_where_it_hides_the_goal_and_left_at_the_goal():
     assert lost == STILL
 
 
+def test_the_way_around_an_object_keeps_its_gap():
+    around_m, things = 0.1 + BODY_RADIUS_M + 0.05, make_things(-0.3, 0.0)
+    for off_m, inward in ((0.1, 0.4), (0.3, 1.0), (-0.02, -0.08)):
+        # Beside the object, headed to the goal: backwards, and to the side by what the gap is off.
+        (command,), _ = act("cooperative_transport", (-0.3, -around_m - off_m, 0.0), things=things)
+        excess = max(1.0, 0.08 * inward / 0.06 / 2.5)
+        assert command == pytest.approx((-0.08 / excess, 0.08 * inward / 0.06 / excess)), off_m
+    shade_m = 0.6 * 0.1
+    for aside_m, hides in ((0.99 * shade_m, True), (1.01 * shade_m, False), (-0.99 * shade_m, True)):
+        (command,), _ = act("cooperative_transport", (-0.6, aside_m, 0.0), things=things)
+        assert (command[0] == pytest.approx(0.08 * 0.3 / math.hypot(0.3, aside_m))) == hides
+    before, _ = act("cooperative_transport", (-0.1, 0.0, math.pi), things=things)
+    assert before[0][0] != pytest.approx(0.08), "not from the goal's side"
+
+
+def test_robots_behind_a_box_line_up_from_right_to_left():
+    row_m, things = 0.1 + BODY_RADIUS_M + 0.05, make_things(-1.0, 0.0)
+    places = [(-1.0 - row_m - 0.05, y_m, 0.0) for y_m in (0.1, -0.085, 0.0)]
+    commands, pushes = act("box_pushing", *places, things=things)
+    assert not pushes.any()
+    ahead_m_s, aside_m_s = 1.5 * 0.05, -1.5 * 0.015
+    assert commands == close_to((ahead_m_s, aside_m_s / 0.06), (ahead_m_s, 0.0), (ahead_m_s, 0.0))
+    worlds = np.array([[(-1.0 - row_m, y_m, 0.0) for y_m in (-0.0425, 0.0425 + off_m)] for off_m in (0.0, 0.05)])
+    both = Things(np.repeat(things.poses, 2, axis=0), things.radii_m)
+    behavior = find_behavior("box_pushing")()
+    sensed = sense(behavior, 0.0, worlds, Fixed(), both)
+    assert behavior.step(sensed, None, Fixed())[2].tolist() == [True, True, False, False], "each world by itself"
+
+
+def move_all(poses, turn_rad, shift_m, mirror):
+    x_m, y_m, yaw_rad = np.moveaxis(poses * (1.0, mirror, mirror), -1, 0)
+    cosine, sine = math.cos(turn_rad), math.sin(turn_rad)
+    x_m, y_m = cosine * x_m - sine * y_m + shift_m, sine * x_m + cosine * y_m - shift_m
+    return np.stack((x_m, y_m, yaw_rad + turn_rad), axis=-1)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["rendezvous", "formation", "flocking", "dispersion", "segregation", "cooperative_transport", "box_pushing"],
+)
+@pytest.mark.parametrize(("turn_rad", "shift_m", "mirror"), [(2.0, 0.5, 1.0), (0.0, 0.0, -1.0), (-1.0, -3.0, -1.0)])
+def test_a_behavior_is_the_same_wherever_and_however_its_world_lies(name, turn_rad, shift_m, mirror):
+    random = np.random.RandomState(5)
+    for _ in range(5):
+        poses = random.uniform((-0.4, -0.4, -3.0), (0.4, 0.4, 3.0), (5, 3))
+        things = make_things(*random.uniform(-0.3, 0.3, 2))
+        goal = {"goal_x_m": 0.2, "goal_y_m": -0.3} if "object" in "".join(find_behavior(name)().sensors()) else {}
+        commands, _ = act(name, *poses, things=things, **goal)
+        if goal:
+            goal_x_m, goal_y_m, _ = move_all(np.array((0.2, -0.3, 0.0)), turn_rad, shift_m, mirror)
+            goal = {"goal_x_m": goal_x_m, "goal_y_m": goal_y_m}
+        moved = Things(move_all(things.poses, turn_rad, shift_m, mirror), things.radii_m)
+        found, _ = act(name, *move_all(poses, turn_rad, shift_m, mirror), things=moved, **goal)
+        assert np.allclose(found, np.array(commands) * (1.0, mirror), atol=1e-9)
+
+
 def test_a_box_is_pushed_when_all_are_in_place_and_until_one_is_far_off():
     row_m, things = 0.1 + BODY_RADIUS_M + 0.05, make_things(-1.0, 0.0)
     right, left = (-1.0 - row_m, -0.0425, 0.0), (-1.0 - row_m, 0.0425, 0.0)

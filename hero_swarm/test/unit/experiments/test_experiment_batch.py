@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hero_swarm import metrics
+from hero_swarm.experiments import runner
 from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING, compute_batch, take_values
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
@@ -72,3 +73,44 @@ def test_what_a_behavior_raises_names_the_cell_and_the_seeds(tmp_path, monkeypat
     monkeypatch.setitem(metrics.METRICS, "dispersion", lambda *arguments: 1 // 0)
     with pytest.raises(ExperimentError, match="with seeds 11 to 13: ZeroDivisionError: .*test_experiment_batch"):
         compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"), False)
+
+
+def make_experiment(robots=20, time_s=300, count=100, record="record: {hz: 2}"):
+    text = FILE.replace("[3]", "[%d, 1000]" % robots).replace("time_s: 4", "time_s: %g" % time_s)
+    text = text.replace("count: 3", "count: %d" % count).replace("record: {hz: 2}", record)
+    return parse_experiment(text, "e.yaml", metrics.METRICS)
+
+
+class Folder:
+    def name_series(self, cell, seeds):
+        return "%d:%d-%d" % (cell, seeds[0], seeds[-1])
+
+
+def test_a_batch_is_some_seconds_of_work_and_something_for_each_worker():
+    for robots, time_s, expected in ((20, 300, 40), (20, 301, 40), (20, 299, 41), (3, 1, 1000), (20, 80000, 1)):
+        assert runner.choose_batch(make_experiment(robots, time_s), 0) == expected
+    experiment = make_experiment()
+    missing = [(0, seed) for seed in range(11, 111)] + [(1, seed) for seed in (12, 14)]
+    cases = ((None, 1, [40, 40, 20, 1, 1]), (None, 4, [13] * 7 + [9, 1, 1]), (30, 4, [30] * 3 + [10, 2]))
+    for batch, workers, sizes in cases:
+        tasks = list(runner.list_tasks("text", experiment, missing, batch, workers, Folder()))
+        assert [len(task[2]) for task in tasks] == sizes
+        assert [(task[1], seed) for task in tasks for seed in task[2]] == missing
+        assert tasks[-1][0] == "text" and tasks[0][3] == "0:11-%d" % (10 + sizes[0]) and tasks[0][4]
+    (task, *_) = runner.list_tasks("text", make_experiment(record=""), missing, None, 1, Folder())
+    assert not task[4], "no poses are recorded"
+
+
+def test_options_of_run_have_their_limits(capsys):
+    parse = runner.parse_options
+    assert parse(["e.yaml"]).part == (1, 1) and parse(["e.yaml", "--part", "3/3"]).part == (3, 3)
+    assert parse(["e.yaml", "--jobs", "1024", "--batch", "1000"]).jobs == 1024
+    assert parse(["e.yaml", "--executor", "dask:tcp://a:1"]).executor == "tcp://a:1"
+    assert parse(["e.yaml", "--robots", "0-2"]).robots == [0, 1, 2]
+    for words in (
+        "--part 0/3", "--part 4/3", "--part 3", "--part 1/x", "--jobs 0", "--jobs 1025", "--jobs x", "--batch 0",
+        "--batch 1001", "--executor dask:", "--executor tcp://a:1", "--robots all",
+    ):  # fmt: skip
+        with pytest.raises(SystemExit) as end:
+            parse(["e.yaml", *words.split()])
+        assert end.value.code == 2 and words.split()[0] in capsys.readouterr().err

@@ -1,0 +1,88 @@
+"""Videos of runs: each frame shows robots, objects and walls where they are, and the time."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_sim.world.arena_file import load_arena
+from hero_swarm.behavior import Behavior
+from hero_swarm.experiments import video
+from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.trial import OPEN, Trial
+
+
+class Straight(Behavior):
+    rate_hz = 10.0
+
+    def step(self, sensed, memory, random):
+        return 0.1, 0.0, memory
+
+
+def make_trial(arena=OPEN):
+    starts = np.array([[(-0.5, 0.0, 0.0), (0.5, -0.7, np.pi / 2.0)]])
+    return Trial(Straight(), arena, 2, (1,), starts=starts, errors=0.0)
+
+
+@pytest.fixture(name="written")
+def catch_frames(monkeypatch):
+    """What the writers of files are given: [(path, frames), ...]."""
+    written = []
+    for name in ("_write_gif", "_write_with_ffmpeg"):
+        monkeypatch.setattr(video, name, lambda path, frames, name=name: written.append((name, path, list(frames))))
+    monkeypatch.setattr(video, "_DPI", 10)
+    return written
+
+
+def test_frames_are_a_tenth_of_a_second_of_the_video_apart(written, monkeypatch):
+    shown = []
+    monkeypatch.setattr(video.Film, "show", lambda film, *frame: shown.append(frame))
+    video.write_video(make_trial(), 2.0, 4.0, "run.gif")
+    ((writer, path, frames),) = written
+    assert (writer, path, len(frames)) == ("_write_gif", "run.gif", 5)
+    assert frames[0].ndim == 3 and frames[0].shape[2] == 3 and frames[0].shape[0] == frames[0].shape[1]
+    assert [time_s for time_s, *_ in shown] == pytest.approx([0.0, 0.4, 0.8, 1.2, 1.6])
+    assert shown[0][1][0, 0] == -0.5 and shown[-1][1][0, 0] == pytest.approx(-0.36, abs=0.05)
+    monkeypatch.setattr(video.shutil, "which", lambda name: "/usr/bin/" + name)
+    video.write_video(make_trial(), 0.2, 1.0, "run.MP4")
+    assert written[1][:2] == ("_write_with_ffmpeg", "run.MP4")
+    monkeypatch.setattr(video.shutil, "which", lambda name: None)
+    with pytest.raises(ExperimentError, match="apt install ffmpeg, or write a .gif"):
+        video.write_video(make_trial(), 0.2, 1.0, "run.mp4")
+
+
+def test_a_video_shows_the_arena_or_where_robots_were():
+    trial, box = make_trial(), make_trial(load_arena("box"))
+    frames = [(np.array([(0.0, 1.0, 0.0), (2.0, -1.0, 0.0)]), None, None), (np.array([(-3.0, 0.5, 0.0)]), None, None)]
+    low_m, high_m = video._find_limits(trial, frames)
+    assert low_m.tolist() == [-3.2, -1.2] and high_m.tolist() == [2.2, 1.2]
+    low_m, high_m = video._find_limits(box, frames)
+    bounds_m = box.rows.world.arena.bounds_m
+    assert low_m.tolist() == (bounds_m[:2] - 0.2).tolist() and high_m.tolist() == (bounds_m[2:] + 0.2).tolist()
+
+
+def test_discs_are_circles_and_boxes_outlines_that_are_closed():
+    discs, box = make_trial(load_arena("discs")), make_trial(load_arena("box"))
+    circles_m = video._list_circles(discs)
+    assert len(circles_m) == len(discs.rows.world.arena.circles_m) + len(discs.rows.world.list_objects())
+    first = discs.rows.world.list_objects()[0]
+    assert circles_m[len(discs.rows.world.arena.circles_m)].tolist() == [first.x_m, first.y_m, first.shape.reach_m]
+    assert video._list_edges(discs) == [] and len(video._list_circles(box)) == len(box.rows.world.arena.circles_m)
+    (outline_m,) = video._list_edges(box)
+    assert len(outline_m) == 5 and tuple(outline_m[0]) == tuple(outline_m[-1])
+
+
+def test_each_frame_replaces_the_one_before():
+    axes = Figure(figsize=(6.0, 6.0)).add_axes((0.0, 0.0, 1.0, 1.0))
+    film = video.Film(axes)
+    poses = np.array([(1.0, 2.0, 0.0), (3.0, 4.0, np.pi / 2.0)])
+    for time_s, shift_m in ((0.0, 5.0), (1.25, 0.0)):
+        film.show(time_s, poses + (shift_m, 0.0, 0.0), np.array([(0.0, 0.0, 0.3)]), [[(0.0, 0.0), (1.0, 0.0)]])
+        assert len(axes.collections) == 4 and len(axes.texts) == 1
+    outlines, objects, robots, noses = axes.collections
+    assert outlines.get_segments()[0].tolist() == [[0.0, 0.0], [1.0, 0.0]]
+    assert (2.0 * objects._widths).tolist() == [0.6] and objects.get_offsets().tolist() == [[0.0, 0.0]]
+    assert np.allclose(2.0 * robots._widths, 2.0 * BODY_RADIUS_M) and robots.get_offsets().tolist() == [[1, 2], [3, 4]]
+    tips_m = [segment[1] for segment in noses.get_segments()]
+    assert np.allclose(tips_m, [(1.0 + BODY_RADIUS_M, 2.0), (3.0, 4.0 + BODY_RADIUS_M)])
+    assert axes.texts[0].get_text() == "1.2 s" and axes.texts[0].get_position() == (0.02, 0.97)
