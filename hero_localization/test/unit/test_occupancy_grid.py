@@ -124,3 +124,125 @@ def test_a_robot_beyond_the_map_or_at_its_rim_does_no_harm(pose):
 def test_bounds_without_an_area_are_refused(bounds_m):
     with pytest.raises(ValueError, match="bounds"):
         OccupancyGrid(bounds_m)
+
+
+CENTER = Pose(0.005, 0.005, 0.0)
+"""The center of a cell."""
+
+
+def make_grid(half_m=0.3):
+    return OccupancyGrid((-half_m, -half_m, half_m, half_m))
+
+
+def scan(ranges_m, pose=CENTER, others_m=NONE, grid=None):
+    """Return the grid after a scan of these ranges, by sensor; the others tell nothing."""
+    grid = grid or make_grid()
+    grid.add_scan(pose, [ranges_m.get(beam, math.nan) for beam in range(BEAMS)], np.array(others_m).reshape(-1, 2))
+    return grid
+
+
+def at(grid, x_m, y_m):
+    """Return the log odds of the cell at a place from the center."""
+    column, row = (round((place - low) / grid.cell_m - 0.5) for place, low in zip((x_m, y_m), grid.origin_m))
+    return float(grid.log_odds[row, column])
+
+
+def test_a_range_makes_its_cone_free_and_its_end_occupied():
+    grid = scan({0: 0.105})
+    sd_m, weight = 0.004 + 0.04 * (0.105 - BODY_RADIUS_M), (0.20 - 0.105) / (0.20 - 0.08)
+    for distance_m in np.arange(0.0, 0.2, 0.01):
+        beyond = (distance_m - 0.105) / sd_m
+        free = -0.35 if distance_m < 0.105 - 2.0 * sd_m else 0.0
+        expected = -2.0 if distance_m < BODY_RADIUS_M - 0.01 else free + 1.6 * weight * math.exp(-0.5 * beyond**2)
+        assert at(grid, 0.005 + distance_m, 0.005) == pytest.approx(expected, abs=1e-4), distance_m
+    # 0.19 and 0.24 rad beside the middle; the hit itself is likeliest there.
+    assert at(grid, 0.055, 0.015) == pytest.approx(-0.35) and at(grid, 0.045, 0.015) == pytest.approx(0.0, abs=1e-3)
+    aside = math.exp(-0.5 * (((math.hypot(0.1, 0.01) - 0.105) / sd_m) ** 2 + (math.atan2(0.01, 0.1) / 0.08) ** 2))
+    assert at(grid, 0.105, 0.015) == pytest.approx(1.6 * weight * aside, abs=1e-3)
+
+
+def test_each_sensor_looks_into_its_direction_counter_clockwise():
+    for yaw_rad in (0.0, 0.5, 3.0, -2.0):
+        for beam in range(BEAMS):
+            grid = scan({beam: 0.12}, CENTER._replace(yaw_rad=yaw_rad))
+            bearing_rad = yaw_rad + beam * math.pi / 4.0
+            expected_m = 0.005 + 0.12 * np.array((math.cos(bearing_rad), math.sin(bearing_rad)))
+            row, column = np.unravel_index(grid.log_odds.argmax(), grid.log_odds.shape)
+            found_m = np.array(grid.origin_m) + (np.array((column, row)) + 0.5) * grid.cell_m
+            assert found_m == pytest.approx(expected_m, abs=0.008), (yaw_rad, beam)
+
+
+def test_near_ranges_count_fully_and_those_beyond_the_reach_not():
+    for range_m, weight in ((0.06, 1.0), (0.08, 1.0), (0.14, 0.5), (0.19, 0.15)):
+        x_m = 0.005 + round(range_m, 2)
+        assert at(scan({0: range_m}), x_m, 0.005) == pytest.approx(1.6 * weight, abs=1e-4), range_m
+    for range_m, free_m in ((0.21, 0.2), (math.inf, 0.15)):
+        grid, edge_m = scan({0: range_m}), free_m - 2.0 * (0.004 + 0.04 * (free_m - BODY_RADIUS_M))
+        assert grid.log_odds.max() <= 0.0
+        for distance_m in np.arange(0.04, 0.2, 0.01):
+            assert at(grid, 0.005 + distance_m, 0.005) == pytest.approx(-0.35 if distance_m < edge_m else 0.0)
+
+
+def test_a_cell_is_never_surer_than_the_limit():
+    grid = make_grid()
+    for _ in range(30):
+        scan({0: 0.06}, grid=grid)
+    assert grid.log_odds.max() == 8.0 and grid.log_odds.min() == -8.0
+
+
+def test_a_range_that_ends_at_another_robot_is_that_robot():
+    for off_rad in (-0.21, 0.0, 0.21):
+        for gap_m, is_mapped in ((0.029, False), (0.031, True)):
+            # Beyond the end of the range, seen from the robot; only along this ray is it so near.
+            away_m = 0.12 + BODY_RADIUS_M + gap_m
+            bearing_rad = 0.7 + 3.0 * math.pi / 4.0 + off_rad
+            other_m = (0.005 + away_m * math.cos(bearing_rad), 0.005 + away_m * math.sin(bearing_rad))
+            grid = scan({3: 0.12, 5: 0.12}, CENTER._replace(yaw_rad=0.7), [(0.2, -0.2), other_m])
+            hits_m = grid.centers_of(grid.log_odds > 0.5)
+            assert (hits_m[:, 1] > 0.0).any() == is_mapped, (off_rad, gap_m)
+            assert (hits_m[:, 1] < 0.0).any(), "the obstacle that another sensor sees is none of them"
+            assert grid.log_odds.min() == -2.0 and (grid.log_odds == np.float32(-0.35)).sum() > 15, "free before it"
+
+
+def test_the_rim_of_the_map_cuts_off_only_what_is_beyond():
+    ranges_m = {0: 0.1, 1: 0.15, 2: math.inf, 3: 0.12, 4: 0.2, 5: 0.0, 6: 0.07, 7: 0.18}
+    for x_m, y_m in ((0.0, 0.0), (0.19, -0.13), (-0.2, 0.2), (0.25, 0.0), (-0.1, -0.28), (0.45, 0.45)):
+        large, small = (scan(ranges_m, Pose(x_m, y_m, 0.7), grid=make_grid(half_m)) for half_m in (0.7, 0.2))
+        np.testing.assert_allclose(small.log_odds, large.log_odds[50:90, 50:90], atol=1e-5)
+    assert OccupancyGrid((0.0, 0.0, 0.101, 0.025)).log_odds.shape == (3, 11), "rows by y, the last ones beyond"
+
+
+def paint(*rows):
+    """Return a grid with these log odds."""
+    grid = OccupancyGrid((0.0, 0.0, 0.01 * len(rows[0]), 0.01 * len(rows)))
+    grid.log_odds[:] = rows
+    return grid
+
+
+def test_a_wall_is_occupied_where_it_is_in_reach_of_what_is_free():
+    assert paint((-1.0, 0.0, 1.0, 1.0)).occupied.tolist() == [[False, False, True, False]]
+    assert not paint((-1.0, 0.0, 0.0, 1.0)).occupied.any() and not paint((-1.0, 0.5, 0.5)).occupied.any()
+    assert paint((0.0, 0.0, 0.6), (0.0, 0.0, 0.0), (-0.1, 0.0, 0.0)).occupied[0, 2], "across the corner, too"
+    assert paint((-1.0, 2.0, 2.0)).occupied.tolist() == [[False, True, False]], "nothing is seen through it"
+
+
+def test_cells_are_known_by_their_odds():
+    grid = paint((-math.log(9.0), -0.5, 0.5, 0.0, math.log(3.0), 0.0, 0.0, -0.51))
+    assert grid.free.tolist() == [[True, *[False] * 6, True]]
+    assert grid.known_share == pytest.approx(3.0 / 8.0)
+    assert grid.to_percent().tolist() == [[10, -1, -1, -1, -1, -1, -1, 38]], "a wall far from what is free is not known"
+    assert paint((-1.0, math.log(3.0))).to_percent()[0, 1] == 75
+
+
+def test_frontiers_are_free_cells_beside_unknown_ones_away_from_walls():
+    row = (-1.0, -1.0, -1.0, 0.0, 0.0, 0.0)
+    assert paint(row).frontiers.tolist() == [[False, False, True, False, False, False]]
+    assert not paint((*row[:5], 1.0)).frontiers.any(), "two cells before a wall"
+    assert paint((*row, 0.0, 1.0)).frontiers.any()
+
+
+def test_the_longest_stretch_of_frontier_comes_first_by_its_middle():
+    grid = OccupancyGrid((1.0, 2.0, 1.3, 2.2))
+    grid.log_odds[2, 1:6], grid.log_odds[10, 20:24], grid.log_odds[17, 3:14] = -1.0, -1.0, -1.0
+    np.testing.assert_allclose(grid.find_frontiers(), [(1.085, 2.175), (1.035, 2.025)])
+    assert make_grid().find_frontiers().shape == (0, 2)

@@ -15,6 +15,7 @@ CAMERA_S = 1.0 / 30.0
 DELAY_S = 0.12
 NOISE_M, NOISE_RAD = 0.001, 0.006
 COVARIANCE = np.diag((NOISE_M**2, NOISE_M**2, NOISE_RAD**2))
+ZERO = Pose(0.0, 0.0, 0.0)
 ORIGIN = Pose(0.4, -0.3, 2.0)
 """Of the robot's odometry in map."""
 
@@ -313,3 +314,97 @@ def test_after_a_long_occlusion_a_pose_of_the_last_second_is_used():
             filter_.add_odometry(0.1 * number, Pose(0.0, 0.0, 0.0))
         seen_s = 0.1 * (readings - 1) - 0.9 * REPLAYED_S
         assert filter_.add_measurement(Measurement(seen_s, ORIGIN, COVARIANCE)) is Outcome.USED
+
+
+def start_filter(pose=ZERO, covariance=COVARIANCE, stamp_s=1.0):
+    """Return a filter that was told by odometry and by one measured pose where its robot is."""
+    pose_filter = PoseFilter()
+    pose_filter.add_odometry(stamp_s, Pose(0.0, 0.0, 0.0))
+    assert pose_filter.add_measurement(Measurement(stamp_s, pose, covariance)) is Outcome.FIRST
+    return pose_filter
+
+
+@pytest.mark.parametrize(("off", "outcome"), [(4.03, Outcome.USED), (4.05, Outcome.OUTLIER)])
+def test_one_true_pose_of_a_thousand_is_an_outlier(off, outcome):
+    for axis in range(3):
+        pose_filter = start_filter(Pose(0.5, -0.5, 3.1))
+        pose_filter.add_odometry(1.01, Pose(0.0, 0.0, 0.0))
+        # Of two poses as uncertain as each other.
+        shift = np.zeros(3)
+        shift[axis] = off * math.sqrt(2.0 * COVARIANCE[axis, axis])
+        x_m, y_m, yaw_rad = np.array((0.5, -0.5, 3.1)) + shift
+        measured = Measurement(1.01, Pose(x_m, y_m, wrap_angle(yaw_rad)), COVARIANCE)
+        assert pose_filter.add_measurement(measured) is outcome, axis
+
+
+def test_slip_explains_at_most_six_centimeters_or_34_degrees():
+    for step, end, outcome in (
+        (Pose(0.055, 0.0, 0.0), Pose(0.0, 0.0, 0.0), Outcome.USED),
+        (Pose(0.065, 0.0, 0.0), Pose(0.0, 0.0, 0.0), Outcome.OUTLIER),
+        (Pose(0.0, 0.0, 0.55), Pose(0.0, 0.0, 0.0), Outcome.USED),
+        (Pose(0.0, 0.0, 0.65), Pose(0.0, 0.0, 0.0), Outcome.OUTLIER),
+        (Pose(0.0, 0.0, -0.55), Pose(0.0, 0.0, 0.0), Outcome.USED),
+        (Pose(0.0, 0.0, -0.65), Pose(0.0, 0.0, 0.0), Outcome.OUTLIER),
+        (Pose(0.02, 0.0, 0.0), Pose(0.15, 0.0, 0.0), Outcome.OUTLIER),
+        (Pose(0.02, 0.0, 0.0), Pose(0.25, 0.0, 0.0), Outcome.OUTLIER),
+    ):
+        pose_filter = start_filter()
+        pose_filter.add_odometry(1.1, step)
+        assert pose_filter.add_measurement(Measurement(1.1, end, COVARIANCE)) is outcome, (step, end)
+
+
+def hold(counted_m, came_m, elapsed_s):
+    """Return by how much the robot goes on by odometry after so long a way that the camera did not see."""
+    pose_filter, start = start_filter(stamp_s=0.9), Measurement(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
+    pose_filter.add_odometry(1.0, start.pose)
+    assert pose_filter.add_measurement(start) is Outcome.USED
+    pose_filter.add_odometry(1.0 + elapsed_s, Pose(counted_m, 0.0, 0.0))
+    measured = Measurement(1.0 + elapsed_s, Pose(came_m, 0.0, 0.0), COVARIANCE)
+    assert pose_filter.add_measurement(measured) is Outcome.USED
+    before = pose_filter.pose()
+    pose_filter.add_odometry(1.05 + elapsed_s, Pose(counted_m + 0.01, 0.0, 0.2))
+    assert pose_filter.pose().yaw_rad == pytest.approx(before.yaw_rad + 0.2), "it may turn where it is"
+    return pose_filter.pose().x_m - before.x_m
+
+
+def test_a_robot_is_held_if_it_came_nowhere_though_its_wheels_turned():
+    free_m = pytest.approx(0.01, abs=1e-3)
+    for counted_m, came_m, elapsed_s in ((0.02, 0.0, 0.1), (0.02, 0.0078, 0.1), (0.0052, 0.0, 0.1), (0.02, 0.0, 0.49)):
+        assert hold(counted_m, came_m, elapsed_s) == 0.0, (counted_m, came_m, elapsed_s)
+    assert hold(0.02, 0.0082, 0.1) == free_m, "it came two fifths of the way"
+    assert hold(0.0048, 0.0, 0.1) == free_m, "so little may be slip"
+    assert hold(0.02, 0.0, 0.085) == free_m and hold(0.02, 0.0, 0.51) == free_m, "too short or too long ago to tell"
+
+
+def test_four_outliers_over_a_tenth_of_a_second_that_agree_move_the_robot():
+    def see(times_s, places_m, count=None):
+        pose_filter, outcomes = start_filter(), []
+        for time_s, x_m in zip(times_s, places_m):
+            pose_filter.add_odometry(1.0 + time_s, Pose(0.0, 0.0, 0.0))
+            outcomes.append(pose_filter.add_measurement(Measurement(1.0 + time_s, Pose(x_m, 0.0, 0.0), COVARIANCE)))
+        return outcomes
+
+    out, moved = Outcome.OUTLIER, Outcome.MOVED
+    assert see((0.1, 0.14, 0.17, 0.205), [0.5] * 4) == [out, out, out, moved]
+    assert see((0.1, 0.15, 0.205), [0.5] * 3) == [out, out, out]
+    assert see((0.1, 0.12, 0.15, 0.19), [0.5] * 4) == [out] * 4
+    assert see((0.1, 0.14, 0.17, 0.205), (0.5, 0.8, 0.5, 0.5)) == [out] * 4
+    assert see((0.1, 0.14, 0.17, 0.205, 0.24, 0.28), (0.5, 0.8, 0.5, 0.5, 0.5, 0.5)) == [out] * 5 + [moved]
+    assert see((0.1, 0.14, 0.17, 0.18, 0.205, 0.24), (0.5, 0.5, 0.0, 0.5, 0.5, 0.5)) == [
+        out, out, Outcome.USED, out, out, out,
+    ], "not in a row"  # fmt: skip
+
+
+def test_no_hand_moves_a_robot_by_less_than_a_centimeter_or_six_degrees():
+    for pose, outcome in (
+        (Pose(0.009, 0.0, 0.0), Outcome.USED),
+        (Pose(0.0, 0.011, 0.0), Outcome.MOVED),
+        (Pose(0.0, 0.0, -0.095), Outcome.USED),
+        (Pose(0.0, 0.0, 0.105), Outcome.MOVED),
+    ):
+        pose_filter = start_filter()
+        for index in range(4):
+            pose_filter.add_odometry(1.1 + 0.035 * index, Pose(0.0, 0.0, 0.0))
+            found = pose_filter.add_measurement(Measurement(1.1 + 0.035 * index, pose, COVARIANCE))
+        assert found is outcome, pose
+        assert pose_filter.pose() == pytest.approx(pose, abs=1e-3)

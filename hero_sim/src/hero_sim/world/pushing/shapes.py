@@ -201,11 +201,11 @@ def touch_walls(
                 Contact(*near_m, away_x / distance_m, away_y / distance_m, body.shape.radius_m - distance_m)
             )
         else:
-            contacts += _touch_wall(body, start_m, end_m)
+            contacts += _touch_wall(body, start_m, end_m, margin_m)
     return [contact for contact in contacts if contact.depth_m > -margin_m]
 
 
-def _touch_wall(body: Body, start_m: Point, end_m: Point) -> List[Contact]:
+def _touch_wall(body: Body, start_m: Point, end_m: Point, margin_m: float) -> List[Contact]:
     """Return where a wall is near the corners of a polygon, and where its ends are near the polygon's edges."""
     along_x, along_y = end_m[0] - start_m[0], end_m[1] - start_m[1]
     length_m = math.sqrt(along_x * along_x + along_y * along_y)
@@ -215,11 +215,8 @@ def _touch_wall(body: Body, start_m: Point, end_m: Point) -> List[Contact]:
     contacts = []
     for x_m, y_m in body.corners_m:
         share = ((x_m - start_m[0]) * along_x + (y_m - start_m[1]) * along_y) / (length_m * length_m)
-        if 0.0 <= share <= 1.0:
-            depth_m = (start_m[0] - x_m) * normal_x + (start_m[1] - y_m) * normal_y
+        depth_m = (start_m[0] - x_m) * normal_x + (start_m[1] - y_m) * normal_y
+        # A corner that is deeper went past the wall's end, not through the wall.
+        if 0.0 <= share <= 1.0 and depth_m < margin_m:
             contacts.append(Contact(x_m, y_m, normal_x, normal_y, depth_m))
-    for point_m in (start_m, end_m):
-        edge = _find_edge(point_m, body.corners_m)
-        if edge.depth_m > 0.0:
-            contacts.append(edge.turned())
-    return contacts
+    return contacts + [_find_edge(point_m, body.corners_m).turned() for point_m in (start_m, end_m)]
