@@ -18,6 +18,7 @@ from .simulator import Simulator
 from .swarm import Swarm
 from .world.body import Body
 from .world.robot_errors import SERVO_CENTER_US, RobotErrors
+from .world.shared_readings import SharedReadings
 
 __all__ = ["build_simulator", "build_swarm"]
 
@@ -51,9 +52,10 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
     rngs = Rngs(options)
     world = build_world(options)
     models = parse_models(options.model, options.first_id, options.count)
+    infrared = SharedReadings(world)
     robots: List[Firmware] = []
     for index, address in enumerate(addresses):
-        body, flash = Body(world, index), _build_flash(options, world.errors, index)
+        body, flash = Body(world, index, infrared), _build_flash(options, world.errors, index)
         robot_id = options.first_id + index
         timing = draw_servo_timing(options, robot_id)
         robots.append(

@@ -2,14 +2,17 @@ import math
 
 import numpy as np
 import pytest
+from driver_side import DriverSide
 
-from hero_sim.robot import ranges
+from hero_sim.robot import declarations, ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors
 from hero_sim.world.arena import Segments, build_default
+from hero_sim.world.body import Body
 from hero_sim.world.kinematics import find_heading
 from hero_sim.world.robot_errors import draw_errors
-from hero_sim.world.world import World
+from hero_sim.world.shared_readings import SharedReadings
+from hero_sim.world.world import STEP_MS, World
 
 NO_WALLS = np.empty((0, 4))
 NO_CIRCLES = np.empty((0, 3))
@@ -137,3 +140,54 @@ def test_readings_are_whole_counts_with_the_published_noise():
     assert readings.mean() == pytest.approx(0.423 / 0.01 - 0.93, abs=0.15)
     assert readings.std() == pytest.approx(1.3, abs=0.15)
     assert readings.min() >= 0
+
+
+def log_readings(world):
+    """Note the rows of each look of the world's sensors."""
+    read_infrared, looks = world.read_infrared, []
+
+    def read(rows):
+        looks.append(rows.tolist())
+        return read_infrared(rows)
+
+    world.read_infrared = read
+    return looks
+
+
+def test_readings_that_are_due_in_one_step_are_computed_together():
+    poses = np.array([(0.0, 0.0, 0.0), (-0.02, 1.0, 0.0), (-0.04, 2.0, 0.0), (-0.06, 3.0, 0.0)])
+    arena = build_default(4)._replace(segments_m=wall_at(0.05))
+    rng = np.random.RandomState(0)
+    world = World(arena, poses, [rng], draw_errors([rng] * 4, 0.0))
+    looks, infrared = log_readings(world), SharedReadings(world)
+    bodies = [Body(world, index, infrared) for index in range(4)]
+    for _ in range(3):
+        world.step()
+    # Of a step the start is past, and the end still shows its state.
+    for body, due_ms in zip(bodies, (30 + STEP_MS, 31, 30 + STEP_MS + 1, 30)):
+        body.expect_infrared(due_ms)
+    first, second = bodies[1].read_infrared(), bodies[0].read_infrared()
+    assert looks == [[0, 1]]
+    assert [second[4], first[4]] == pytest.approx([0.423 / 0.05**2 - 0.93, 0.423 / 0.07**2 - 0.93], abs=6.0)
+    bodies[0].read_infrared()
+    assert looks == [[0, 1], [0]], "a second reading is a new one"
+    bodies[1].expect_infrared(45)
+    world.step()
+    bodies[2].read_infrared()
+    assert looks[2:] == [[1, 2]]
+    world.step()
+    bodies[1].read_infrared()
+    assert looks[3:] == [[1]], "a reading of the step before is not given"
+
+
+def test_robots_that_stream_expect_all_of_their_readings():
+    driver = DriverSide("--count", "12")
+    driver.start_streaming()
+    looks = log_readings(driver.swarm.world)
+    start_ms = driver.swarm.now_ms
+    driver.run(4100)
+    sent = sum(len(driver.list_packets(index, declarations.ID_LASER, start_ms)) for index in range(12))
+    assert sent == 12 * 20
+    # Few are lost to other work of a robot, which delays its reading into the next step.
+    assert sent <= sum(map(len, looks)) < 1.05 * sent
+    assert len(looks) < 0.8 * sent

@@ -32,6 +32,7 @@ from hero_sim.robot.servo_pins import CORE_2, ServoPins
 from hero_sim.stepped.proximity import correct_ranges, measure_ranges
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.body import Body
+from hero_sim.world.shared_readings import SharedReadings
 from hero_sim.world.world import STEP_MS
 
 READY_MS = 5000
@@ -57,9 +58,9 @@ def read_proximity(laser_payload):
 class ScalarRobot:
     """One robot of the parts that the simulator behind sockets is made of, and its half of the driver."""
 
-    def __init__(self, world, index, model):
+    def __init__(self, world, index, model, infrared):
         name, errors = "hero_%d" % index, world.errors
-        body = Body(world, index)
+        body = Body(world, index, infrared)
         calibration = calibrate(errors.alpha_counts_m2[index], errors.beta_counts[index])
         self.flash = flash = Flash(calibration.tolist(), np.rint(errors.servo_center_us[index]).tolist())
         self.sensing = Sensing(name, body, False, flash, model)
@@ -131,7 +132,8 @@ class ScalarRobots:
     def __init__(self, world, models):
         self.world = world
         self.now_ms = -1
-        self.robots = [ScalarRobot(world, index, model) for index, model in enumerate(models)]
+        infrared = SharedReadings(world)
+        self.robots = [ScalarRobot(world, index, model, infrared) for index, model in enumerate(models)]
         for robot in self.robots:
             robot.sensing.begin(READY_MS)
         self._control_ms, self._read_ms = 9, 50
@@ -260,7 +262,8 @@ class WholeFirmware:
         flash = Flash([0.5] * 8)
         rng = np.random.RandomState(0)
         self.world = world
-        self.firmware = Firmware(0, Body(world, 0), flash, rng, "127.0.0.1", False, CORE_2, pytest.fail)
+        body = Body(world, 0, SharedReadings(world))
+        self.firmware = Firmware(0, body, flash, rng, "127.0.0.1", False, CORE_2, pytest.fail)
         self.firmware.switch_on(0)
         while not self.has_sent(ids.ID_ODOM):
             now_ms = self.firmware.due_ms

@@ -8,6 +8,7 @@ from hero_sim.world.arena import build_default, place_robots
 from hero_sim.world.body import Body
 from hero_sim.world.kinematics import split_to_wheels
 from hero_sim.world.robot_errors import MAX_WHEEL_M_S, SERVO_LAG_S, draw_errors
+from hero_sim.world.shared_readings import SharedReadings
 
 
 def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):
@@ -80,9 +81,9 @@ def test_reading_wheels_within_a_step_meets_the_end_of_the_step():
     world = build_world()
     command(world, 0, 0.2, 0.0)
     run(world, 0.2)
-    foreseen_m = Body(world, 0).read_wheels(world.time_ms + worlds.STEP_MS)
+    foreseen_m = Body(world, 0, SharedReadings(world)).read_wheels(world.time_ms + worlds.STEP_MS)
     world.step()
-    assert Body(world, 0).travels_m == pytest.approx(foreseen_m)
+    assert Body(world, 0, SharedReadings(world)).travels_m == pytest.approx(foreseen_m)
 
 
 def test_pulses_written_to_all_robots_at_once_are_those_of_each_alone():
@@ -90,7 +91,7 @@ def test_pulses_written_to_all_robots_at_once_are_those_of_each_alone():
     pulses_us = np.random.RandomState(0).randint(1000, 2001, (9, 2))
     together.write_pulses(np.arange(9), pulses_us)
     for row in range(9):
-        Body(alone, row).write_pulses(*pulses_us[row].tolist())
+        Body(alone, row, SharedReadings(alone)).write_pulses(*pulses_us[row].tolist())
     assert together.commands_m_s.tolist() == alone.commands_m_s.tolist()
     together.release(np.array([2, 5]))
     assert np.nonzero((together.commands_m_s == 0.0).all(axis=1))[0].tolist() == [2, 5]

@@ -119,6 +119,7 @@ class Sensing:
         self.due_ms = millis + CYCLE_MS
         if self.laser_enabled and self.due_ms - self._laser_at_ms > LASER_GATE_MS:
             self.due_ms += LASER_READ_MS
+            self._body.expect_infrared(now_ms + self.due_ms - millis)
         return b"".join(parts)
 
     def measure_distance(self, millis: int) -> bytes:

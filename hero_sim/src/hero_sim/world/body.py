@@ -10,6 +10,7 @@ import numpy as np
 from hero_node.geometry import Pose, find_frame
 
 from .kinematics import join_wheels
+from .shared_readings import SharedReadings
 from .world import World
 
 __all__ = ["Body"]
@@ -24,10 +25,11 @@ class Body:
             firmware does not change it: odometry continues where it was.
     """
 
-    def __init__(self, world: World, index: int) -> None:
-        """Be the robot at index of world."""
+    def __init__(self, world: World, index: int, infrared: SharedReadings) -> None:
+        """Be the robot at index of world, whose infrared readings all its robots share."""
         self._world = world
         self.index = index
+        self._infrared = infrared
         self.odom_origin = self.true_pose
 
     @property
@@ -57,9 +59,13 @@ class Body:
         since_step_s = (time_ms - self._world.time_ms) / 1000.0
         return [left_m + left_m_s * since_step_s, right_m + right_m_s * since_step_s]
 
+    def expect_infrared(self, time_ms: int) -> None:
+        """Note when the next reading of the eight sensors is due."""
+        self._infrared.due_ms[self.index] = time_ms
+
     def read_infrared(self) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors."""
-        return self._world.read_infrared(np.array([self.index]))[0]
+        return self._infrared.read(self.index)
 
     def read_distance(self) -> float:
         """Return one noisy reading (m) of the distance sensor ahead, from the robot's center."""
