@@ -63,7 +63,8 @@ class SafetyFilter:
         """Return safe linear and angular speeds (W, N) for those wanted, at poses (W, N, 3) that are ages_s old (W, N).
 
         Wanted ones are those of all robots of all worlds (W * N,), or one for all, as a behavior gives them. Robots
-        drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it.
+        drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it; speeds
+        that are no finite numbers count as zero.
         """
         linear_m_s, angular_rad_s = (
             np.broadcast_to(np.ravel(values), poses[..., 0].size).reshape(poses.shape[:2])
@@ -71,6 +72,9 @@ class SafetyFilter:
         )
         if self.mode == OFF:
             return linear_m_s, angular_rad_s
+        linear_m_s, angular_rad_s = (
+            np.where(np.isfinite(values), values, 0.0) for values in (linear_m_s, angular_rad_s)
+        )
         ages_s = np.zeros(poses.shape[:2]) if ages_s is None else ages_s
         known = np.isfinite(poses).all(axis=2) & (ages_s <= MAX_AGE_S)
         yaw_rad = np.where(known, poses[..., 2], 0.0)

@@ -9,7 +9,7 @@ from typing import Any, Tuple
 import numpy as np
 
 from hero_sim.world.kinematics import split_to_wheels
-from hero_sim.world.robot_errors import SERVO_GAIN_M_S_US, RobotErrors
+from hero_sim.world.robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
 __all__ = ["find_pulses", "list_dead_zones"]
 
@@ -25,9 +25,13 @@ def find_pulses(linear_m_s: Any, angular_rad_s: Any, dead_zones_us: np.ndarray) 
     """Return the pulses (us, whole numbers) of the left and right servos (R,) for speeds, each a number or (R,).
 
     dead_zones_us (R, 4): lower and upper edge of the left servo's dead zone, then of the right one's, as `calibrate
-    motors` finds them. Beyond them all servos count as equally fast. A wheel without speed gets the middle.
+    motors` finds them. Beyond them all servos count as equally fast. A wheel without speed gets the middle; faster
+    ones than MAX_WHEEL_M_S turn as fast as they can.
     """
-    left_m_s, right_m_s = split_to_wheels(linear_m_s, angular_rad_s)
+    left_m_s, right_m_s = (
+        np.minimum(np.maximum(wheel_m_s, -MAX_WHEEL_M_S), MAX_WHEEL_M_S)
+        for wheel_m_s in split_to_wheels(linear_m_s, angular_rad_s)
+    )
     low_left_us, high_left_us, low_right_us, high_right_us = dead_zones_us.T
     # The servos are mounted as mirror images: the left one drives forward below its center.
     return (

@@ -178,9 +178,12 @@ def test_speeds_that_are_no_numbers_stop_their_robot_alone(stage, tmp_path):
     )
     stage.start(str(tmp_path / "odd.py"))
     before_m = stage.places_m
-    stage.run(1.0)
+    stage.run(4.0)
     moved_m = np.hypot(*np.moveaxis(stage.places_m - before_m, -1, 0))[0]
     assert moved_m[1] == 0.0 and np.delete(moved_m, 1).min() > 0.02
+    assert stage.warnings == [
+        "the behavior gives hero_1 a speed that is no finite number; the robots are stopped meanwhile"
+    ]
 
 
 def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):

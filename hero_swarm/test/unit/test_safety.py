@@ -64,6 +64,15 @@ def test_a_robot_without_a_fresh_pose_is_stopped_and_ignored():
     assert not linear_m_s[0, 1:].any() and not angular_rad_s[0, 1:].any()
 
 
+def test_a_speed_that_was_no_number_once_disturbs_nobody_later():
+    poses = np.array([[(0.0, 0.0, 0.0), (0.4, 0.0, 0.0)]])
+    speeds, ages_s = np.full((1, 2), 0.1), np.full((1, 2), 0.1)
+    keep_apart = SafetyFilter(ROBOTS)
+    keep_apart(poses, np.array([[np.nan, 0.1]]), np.array([[0.0, np.inf]]), ages_s)
+    linear_m_s, angular_rad_s = keep_apart(poses, speeds, 0.0 * speeds, ages_s)
+    assert linear_m_s == pytest.approx(speeds) and angular_rad_s == pytest.approx(0.0 * speeds)
+
+
 def test_of_the_allowed_velocities_the_nearest_is_found():
     normals = np.array([[(1.0, 0.0), (0.0, 1.0)], [(-1.0, 0.0), (0.0, 1.0)]])
     bounds = np.array([[0.1, -np.inf], [0.0, 0.05]])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hero_sim.world.kinematics import join_wheels
+from hero_sim.world.robot_errors import MAX_WHEEL_M_S
 from hero_swarm.behavior import PULSES, VELOCITY, Behavior
 from hero_swarm.trial import Trial
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
@@ -29,6 +30,14 @@ def test_pulses_leave_the_dead_zones_as_the_mirrored_servos_need():
     # In a turn to the left, the left wheel goes backward: both pulses are above their centers.
     left_us, right_us = find_pulses(0.0, 2.0, DEAD_ZONES_US)
     assert (left_us > 1530).all() and (right_us > 1540).all()
+
+
+def test_pulses_for_impossible_speeds_are_those_of_the_fastest_wheels():
+    fastest_us = find_pulses(MAX_WHEEL_M_S, 0.0, DEAD_ZONES_US)
+    assert np.array_equal(find_pulses(50.0, 0.0, DEAD_ZONES_US), fastest_us)
+    assert 1000 < fastest_us[0][0] < 1470 and 1540 < fastest_us[1][0] < 2000
+    left_us, right_us = find_pulses(0.0, -1e9, DEAD_ZONES_US)
+    assert left_us[0] == fastest_us[0][0] and 1000 < right_us[0] < 1480
 
 
 @pytest.mark.parametrize("drive", [PULSES, VELOCITY])

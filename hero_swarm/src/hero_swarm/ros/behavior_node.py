@@ -89,14 +89,16 @@ class BehaviorNode:
         linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
         self._filter.radii_m = [robot.model.body_radius_m for robot in self._swarm]
         speeds = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
-        known = sensed.is_known
-        self._commands.send(speeds[0][0], speeds[1][0], known & np.isfinite(speeds).all(axis=(0, 1)))
+        may_move = sensed.is_known & np.isfinite(linear_m_s) & np.isfinite(angular_rad_s)
+        self._commands.send(speeds[0][0], speeds[1][0], may_move)
         self._show_colors()
-        if time.monotonic() >= self._next_report_s and not known.all():
+        if time.monotonic() >= self._next_report_s and not may_move.all():
             self._next_report_s = time.monotonic() + REPORT_PERIOD_S
             missing = self._objects.describe_missing() or self._source.describe_missing()
+            name = self._swarm.robots[int(may_move.argmin())].name
+            missing = missing or "the behavior gives %s a speed that is no finite number" % name
             rospy.logwarn("%s; the robots are stopped meanwhile", missing)
-        if time.monotonic() >= self._next_show_s and known.any():
+        if time.monotonic() >= self._next_show_s and sensed.is_known.any():
             self._next_show_s = time.monotonic() + SHOW_PERIOD_S
             self._show(now_s, poses, sensed, things)
 
