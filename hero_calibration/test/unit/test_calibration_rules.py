@@ -6,8 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hero_calibration import store
+from hero_calibration import calibration, store
+from hero_calibration.calibration import INFRARED, MOTORS, VELOCITY, WHEELS, Calibration
 from hero_calibration.errors import CalibrationError, EndedError
+from hero_calibration.figures import draw_robot
 from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models import infrared_model as model
 from hero_calibration.models.encoder_readings import TICK_M, make_readings
@@ -362,3 +364,132 @@ def test_wheels_drive_a_square_to_each_side_and_are_looked_at_at_rest(monkeypatc
     assert sum(turns_rad[:8]) == pytest.approx(2.0 * math.pi, rel=0.1) and len(set(sides_m)) == 2
     # One look before the first part and one after each; only the second half of a stop counts.
     assert looked == pytest.approx([100.0 + (count + 0.5) * wheels.MEASURE_S for count in range(17)])
+
+
+def list_lines(axes):
+    return [(line.get_label(), line.get_linestyle(), line.get_xydata().tolist()) for line in axes.lines]
+
+
+def test_a_figure_shows_each_result_before_and_after():
+    zones = [dead_zone.DeadZone(1470.0, 1530.0, 1e-3), dead_zone.DeadZone(1480.0, 1542.0, 1e-3)]
+    motors = MotorResult([1400, 1500, 1600], np.array([(0.1, 0.0, -0.1), (-0.1, 0.0, 0.2)]), zones)
+    curve = (np.array([0.0, 1.0]), np.array([0.0, 0.08]))
+    slow, quick = Response(0.3, 0.2, 0.8, (curve, curve)), Response(0.124, 0.0, 0.2, (curve,))
+    velocity = VelocityResult([slow, slow], [quick, quick], [(1.0, 2.0, 0.1)] * 2)
+    after_m = np.array([0.001, -0.002, math.nan, 0.0, 0.0, 0.0, 0.0, 0.003])
+    infrared = InfraredResult([0.42] * 8, np.full(8, math.nan), after_m)
+    figure = draw_robot("hero_3", [motors, velocity, infrared])
+    assert figure.get_size_inches() == pytest.approx((13.2, 3.8)) and figure._suptitle.get_text() == "hero_3"
+    servos, wheels_axes, ranges = figure.axes
+
+    assert list_lines(servos) == [
+        ("left", "-", [[1400.0, 0.1], [1500.0, 0.0], [1600.0, -0.1]]),
+        ("center 1500 us", "-", [[1500.0, 0], [1500.0, 1]]),
+        ("right", "-", [[1400.0, -0.1], [1500.0, 0.0], [1600.0, 0.2]]),
+        ("center 1511 us", "-", [[1511.0, 0], [1511.0, 1]]),
+        ("nominal 1500 us", ":", [[1500, 0], [1500, 1]]),
+    ]
+    to_data = servos.transData.inverted()
+    spans = [patch.get_extents().transformed(to_data).intervalx.tolist() for patch in servos.patches]
+    assert spans == [pytest.approx((1470.0, 1530.0)), pytest.approx((1480.0, 1542.0))]
+    assert servos.lines[0].get_color() == servos.lines[1].get_color() != servos.lines[2].get_color()
+
+    rows = list_lines(wheels_axes)
+    assert [label for label, _, _ in rows if not label.startswith("_") and label] == [
+        "left, before: mean error 30 %", "right, before: mean error 30 %",
+        "left, after: mean error 12 %", "right, after: mean error 12 %",
+    ]  # fmt: skip
+    assert [style for _, style, _ in rows] == [":"] * 4 + ["-"] * 3
+    assert rows[0][2] == [[0.0, 0.0], [1.0, 0.08]] and [point[1] for point in rows[-1][2]] == [0.08, 0.08]
+
+    before, after, zero = list_lines(ranges)
+    assert before[0] == "before: no calibration" and before[2] == []
+    assert after[0] == "after" and np.allclose(after[2], [(0, 1), (1, -2), (3, 0), (4, 0), (5, 0), (6, 0), (7, 3)])
+    assert [point[1] for point in zero[2]] == [0.0, 0.0]
+    assert [tick.get_text() for tick in ranges.get_xticklabels()][:3] == ["rear", "rear\nright", "right"]
+    assert [axes.get_legend() is not None for axes in figure.axes] == [True] * 3
+    labels = [(axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+    assert labels == [
+        ("Servos: dead zones", "pulse (us)", "speed of the wheel (m/s)"),
+        ("Wheels: step response", "time since the command (s)", "speed, both directions (m/s)"),
+        ("Infrared: range error at 10 cm", "", "range too far (mm)"),
+    ]
+
+
+class Kept:
+    """A result that a file and a table can hold."""
+
+    def to_file(self):
+        return {"motor_centers_us": [1500, 1500]}
+
+    def describe(self):
+        return "measured"
+
+
+@pytest.fixture(name="calls")
+def catch_parts(monkeypatch):
+    """What a calibration asks of its procedures, in order; each gives every active robot a result."""
+    calls = []
+
+    def measure(name, session, *arguments):
+        calls.append((name, *arguments))
+        return {probe.robot_id: Kept() for probe in session.active}
+
+    def place(session, at_wall, ask):
+        calls.append(("place", at_wall))
+        if ask is not None:
+            ask(session)
+
+    for name in ("motors", "velocity", "infrared", "wheels"):
+        monkeypatch.setattr(calibration, "calibrate_" + name, lambda *arguments, name=name: measure(name, *arguments))
+    monkeypatch.setattr(calibration, "place_robots", place)
+    monkeypatch.setattr(calibration.importlib.util, "find_spec", lambda name: None)
+    return calls
+
+
+def test_parts_follow_each_other_and_robots_are_placed_where_they_need_it(calls, tmp_path, capsys):
+    def run(*parts, ask=None, tape=None):
+        calls.clear()
+        session = FakeSession(1)
+        status = Calibration(session, parts, str(tmp_path), ask, tape).run()
+        return status, [call[:2] if call[0] == "place" else call[0] for call in calls]
+
+    floor, wall = ("place", False), ("place", True)
+    for parts, expected in (
+        ((MOTORS, VELOCITY, INFRARED, WHEELS), [floor, "motors", "velocity", floor, "wheels", wall, "infrared"]),
+        ((VELOCITY,), [floor, "velocity"]),
+        ((MOTORS,), [floor, "motors"]),
+        ((INFRARED,), [wall, "infrared"]),
+        ((WHEELS,), [floor, "wheels"]),
+    ):
+        assert run(*parts) == (0, expected)
+    assert run(MOTORS, VELOCITY)[0] == 0 and list(calls[2][1]) == [0], "velocity takes the servos' slopes"
+    assert run(WHEELS, tape=min)[0] == 0 and calls[1] == ("wheels", min)
+    capsys.readouterr()
+
+    def lose(session):
+        session.probes[0].failure = "place: lost"
+
+    assert run(MOTORS, WHEELS, INFRARED, ask=lose) == (1, [floor]), "without a robot there is nothing to do"
+    assert capsys.readouterr().out.endswith("hero_0: FAILED: place: lost\n")
+    answers = iter([None])
+
+    def end(session):
+        if next(answers, EndedError):
+            raise EndedError
+
+    assert run(MOTORS, INFRARED, ask=end) == (130, [floor, "motors", wall])
+    text = capsys.readouterr().out
+    assert "hero_0: ok\n  motors    measured\n  %s\n" % store.name_file(str(tmp_path), 0) in text
+    assert text.endswith("ended early: robots hold what the table shows, and keep the rest\n")
+
+
+def test_a_folder_that_is_full_fails_the_robot_in_its_line(calls, tmp_path, monkeypatch, capsys):
+    def refuse(*arguments):
+        raise CalibrationError("hero_0.yaml cannot be written: disk full")
+
+    monkeypatch.setattr(store, "save", refuse)
+    session = FakeSession(2)
+    assert Calibration(session, (MOTORS,), str(tmp_path), None).run() == 1
+    assert "hero_1: FAILED: hero_0.yaml cannot be written: disk full\n  motors    measured\n" in capsys.readouterr().out
+    assert session.probes[0].sent[-1] == "stop"
