@@ -255,7 +255,7 @@ def test_a_body_without_mass_or_friction_is_refused(mass_kg, friction):
 
 
 TRIANGLE = Polygon([(0.0, 0.0), (0.2, 0.02), (0.05, 0.15)])
-HEXAGON = Polygon([(0.1 * math.cos(k * math.pi / 3.0 + 0.2), 0.06 * math.sin(k * math.pi / 3.0 + 0.2)) for k in range(6)])
+HEXAGON = Polygon([(0.1 * math.cos(turn + 0.2), 0.06 * math.sin(turn + 0.2)) for turn in (0, 1, 2, 3, 4, 5)])
 SHAPES = [Disc(0.07), BOX, TRIANGLE, HEXAGON]
 
 
@@ -290,12 +290,13 @@ def holds(body, x_m, y_m):
 
 
 @pytest.mark.parametrize("shape", SHAPES[1:])
-def test_a_polygon_turns_about_its_center_of_area_and_knows_its_reach_and_friction(shape):
+def test_a_polygon_turns_about_its_center_and_knows_its_reach_and_friction(shape):
     body, (low, high) = put(shape), (-0.2, 0.2)
     step_m = (high - low) / 300
     axis = [low + (k + 0.5) * step_m for k in range(300)]
     inside = [(x_m, y_m) for x_m in axis for y_m in axis if holds(body, x_m, y_m)]
-    assert [sum(point[axis] for point in inside) / len(inside) for axis in (0, 1)] == pytest.approx([0.0, 0.0], abs=3e-4)
+    center_m = [sum(values) / len(inside) for values in zip(*inside)]
+    assert center_m == pytest.approx([0.0, 0.0], abs=3e-4)
     assert shape.friction_radius_m == pytest.approx(sum(math.hypot(*point) for point in inside) / len(inside), rel=3e-3)
     assert shape.reach_m == pytest.approx(max(math.hypot(*point) for point in list_outline(body)))
     turned = put(shape, 0.5, -0.2, 0.8)
@@ -335,7 +336,7 @@ def measure_gap(first, second):
 
 
 @pytest.mark.parametrize(("one", "other"), [(a, b) for k, a in enumerate(SHAPES) for b in SHAPES[k:]])
-def test_bodies_touch_where_they_overlap_and_are_pushed_apart_along_the_normal(one, other):
+def test_bodies_touch_where_they_overlap_and_come_apart_along_the_normal(one, other):
     first, near = put(one, 0.01, 0.02, 0.4), 0
     for x_m, y_m, yaw_rad in draw_places(12):
         second = put(other, x_m / 2.0, y_m / 2.0, yaw_rad)
@@ -354,7 +355,7 @@ def test_bodies_touch_where_they_overlap_and_are_pushed_apart_along_the_normal(o
     assert near or not isinstance(one, Disc)
 
 
-def test_two_boxes_touch_at_the_corners_of_both_with_normals_into_the_second():
+def test_two_boxes_touch_at_their_corners_with_normals_into_the_second():
     for yaw_rad in (0.0, 1.0):
         cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
         for gap_m in (-0.001, 0.003):

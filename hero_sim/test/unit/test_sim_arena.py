@@ -3,6 +3,8 @@ import math
 import numpy as np
 import pytest
 
+from hero_node.geometry import Pose
+from hero_sim import scene
 from hero_sim.errors import OptionError
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import arena as arenas
@@ -109,3 +111,79 @@ def test_no_robot_is_placed_inside_an_obstacle(tmp_path):
     arena = load_arena(write(tmp_path, "bounds_m: [0, 0, 1, 1]\npolygons_m: [%s]\ncircles_m: []\n" % square))
     inside = arenas.measure_clearance(np.array([[0.5, 0.5], [0.05, 0.5]]), arena)
     assert inside[0] < 0 < inside[1]
+
+
+def test_starts_are_headed_along_the_rim_counter_clockwise():
+    starts = arenas.build_default(4).starts
+    assert [pose[:2] for pose in starts] == [(-0.375, -0.375), (0.375, -0.375), (-0.375, 0.375), (0.375, 0.375)]
+    degrees = [round(math.degrees(pose.yaw_rad), 6) % 360.0 for pose in starts]
+    assert degrees == [0.0, 90.0, 270.0, 180.0]
+    (alone,) = arenas.build_default(1).starts
+    assert alone == (0.0, 0.0, 0.0)
+    rows = arenas.build_rectangle(3.0, 1.0, 3).starts
+    assert [pose[:2] for pose in rows] == [(-0.75, -0.25), (0.75, -0.25), (-0.75, 0.25)]
+
+
+def test_the_default_field_grows_with_the_robots_and_never_shrinks():
+    sides_m = [arenas.build_default(robots).bounds_m.tolist() for robots in (1, 9, 16, 17, 100)]
+    assert sides_m == [[-half, -half, half, half] for half in (0.75, 0.75, 0.8, 1.0, 2.0)]
+
+
+def test_a_place_is_free_with_room_for_both_bodies_and_beside_objects():
+    arena = load_arena("discs")
+    arena = arena._replace(segments_m=np.array([(0.0, -1.0, 0.0, 1.0)]), circles_m=np.array([(2.0, 0.0, 0.3)]))
+    thing = arena.objects[0]
+    arena = arena._replace(polygons_m=(), objects=(thing._replace(pose=Pose(4.0, 0.0, 0.0)),))
+    reach_m = thing.shape.reach_m
+    for x_m, radius_m, is_free in (
+        (0.051, 0.05, True), (0.049, 0.05, False), (-0.051, 0.05, True),
+        (1.649, 0.05, True), (1.651, 0.05, False),
+        (4.0 + reach_m + 0.051, 0.05, True), (4.0 + reach_m + 0.049, 0.05, False),
+    ):  # fmt: skip
+        assert arenas.is_free(Pose(x_m, 0.0, 0.0), [], arena, radius_m) == is_free, x_m
+    others = [Pose(9.0, 9.0, 0.0), Pose(1.0, 0.0, 0.0)]
+    for x_m, is_free in ((1.111, True), (1.109, False), (0.889, True)):
+        assert arenas.is_free(Pose(x_m, 0.0, 0.0), others, arena, 0.05, 0.06) == is_free
+        assert arenas.is_free(Pose(1.0, x_m - 1.0, 0.0), others, arena, 0.05, 0.06) == is_free
+
+
+def test_robots_are_placed_at_random_with_room_between_them():
+    arena = arenas.build_rectangle(1.5, 1.2, 2)
+    poses = arenas.place_robots(arena, 12, np.random.RandomState(1), 0.06)
+    assert [tuple(pose) for pose in poses[:2].tolist()] == list(arena.starts)
+    apart_m = np.hypot(*(poses[:, None, :2] - poses[:, :2]).transpose(2, 0, 1)) + 9.0 * np.eye(12)
+    assert apart_m[2:].min() >= 2.0 * 0.06 + 0.05
+    assert arenas.measure_clearance(poses[2:, :2], arena).min() >= 0.06 + 0.05
+    assert np.ptp(poses[2:, 2]) > math.pi and np.abs(poses[:, 2]).max() <= math.pi
+    assert (np.ptp(poses[2:, :2], axis=0) > (0.6, 0.4)).all(), "all over the field"
+
+
+def test_viewers_draw_walls_and_robots_with_their_middle_and_size():
+    arena = arenas.build_rectangle(2.0, 1.0, 1)._replace(circles_m=np.array([(0.5, 0.2, 0.1)]))
+    shapes = scene.draw_arena(arena)
+    right = shapes[1]
+    assert (right.namespace, right.number, right.kind) == ("walls", 1, scene.CUBE)
+    assert right.pose == pytest.approx((1.0, 0.0, math.pi / 2.0))
+    assert right.size_m == pytest.approx((1.005, 0.005, 0.05))
+    assert right.z_m == pytest.approx(0.025), "it stands on the floor"
+    post = shapes[-1]
+    assert (post.namespace, post.kind, post.pose) == ("obstacles", scene.CYLINDER, (0.5, 0.2, 0.0))
+    assert post.size_m == pytest.approx((0.2, 0.2, 0.05)) and post.z_m == pytest.approx(0.025)
+    robot, heading, name = scene.draw_robot(3, "hero_7", Pose(0.1, 0.2, 0.3), (0.0, 1.0, 0.0, 0.5), 0.06)
+    assert {shape.number for shape in (robot, heading, name)} == {3} and robot.pose == heading.pose == (0.1, 0.2, 0.3)
+    assert robot.size_m == pytest.approx((0.12, 0.12, 0.045)) and robot.z_m == pytest.approx(0.0225)
+    assert robot.color == (0.0, 1.0, 0.0, 1.0) and name.text == "hero_7"
+    assert robot.z_m * 2.0 < heading.z_m < name.z_m, "above each other"
+    for light in ((0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 0.0)):
+        assert max(scene.draw_robot(0, "", Pose(0.0, 0.0, 0.0), light)[0].color[:3]) < 0.2
+
+
+def test_viewers_draw_objects_by_their_edges_and_rims():
+    things = load_arena("discs").objects[:1] + load_arena("box").objects[:1]
+    bodies = [thing.put_down().body for thing in things]
+    disc, *edges = scene.draw_objects(bodies)
+    assert disc.kind == scene.CYLINDER and disc.pose[:2] == things[0].pose[:2]
+    assert disc.size_m[:2] == pytest.approx((2.0 * things[0].shape.radius_m,) * 2)
+    assert [shape.number for shape in edges] == list(range(1, len(bodies[1].corners_m) + 1))
+    middle_m = np.mean([edge.pose[:2] for edge in edges], axis=0)
+    assert middle_m == pytest.approx(things[1].pose[:2], abs=1e-6)

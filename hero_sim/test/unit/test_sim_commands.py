@@ -108,3 +108,30 @@ def test_a_robot_survives_whatever_a_server_sends(sent, noise):
         assert driver.list_packets(0, packets.ID_PUBLISHER)
     else:
         assert any(12 <= topic_id <= 99 or topic_id in (2, 3, 4, 5, 7, 8, 9, 1) for topic_id, _ in sent)
+
+
+def test_a_service_is_answered_in_its_time_and_later_if_it_is_slow():
+    driver = DriverSide("--count", "12")
+    driver.start_streaming()
+    waits_ms = []
+    for robot in driver.swarm.robots:
+        robot.answer_delay_ms = 300 * (robot.robot_id % 2)
+    sent_ms = driver.swarm.now_ms
+    for index in range(12):
+        driver.send(index, ids.ID_SET_ODOM, struct.pack("<3d", 1.0, 2.0, 0.5))
+    driver.run(500)
+    for index in range(12):
+        (answer,) = driver.list_packets(index, ids.ID_SET_ODOM_ANSWER, sent_ms)
+        waits_ms.append(answer.at_ms - sent_ms - 300 * (index % 2))
+    assert min(waits_ms) >= 42 and max(waits_ms) <= 76 and len(set(waits_ms)) > 5
+
+
+def test_the_light_goes_out_at_its_millisecond_and_searching_is_red():
+    driver = DriverSide()
+    sensing = driver.swarm.robots[0].sensing
+    sensing.set_light(1000, (0.1, 0.2, 0.3, 0.4))
+    assert sensing.show_light(16000) == (0.1, 0.2, 0.3, 0.4) and sensing.show_light(16001) == (0.0, 0.0, 0.0, 0.0)
+    sensing.begin(500)
+    assert sensing.show_light(2500) == (0.0, 0.0, 1.0, 1.0) and sensing.show_light(2501) == (0.0, 0.0, 0.0, 0.0)
+    sensing.show_searching()
+    assert sensing.show_light(10**9) == (1.0, 0.0, 0.0, 1.0)

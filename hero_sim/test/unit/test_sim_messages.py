@@ -3,11 +3,13 @@ import os
 import struct
 
 import driver_side
+import numpy as np
 import pytest
 
 from hero_driver.rosserial import packets, payloads
 from hero_node.geometry import Pose
 from hero_sim.robot import declarations, messages
+from hero_sim.robot.models import MODELS
 
 ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
 CAPTURES = os.environ.get("HERO_CAPTURES", os.path.join(ROOT, "..", "shared", "captures"))
@@ -136,3 +138,80 @@ def test_the_stock_handshake_and_laser_are_rebuilt_byte_for_byte(capture):
         _, ranges_m, counts = driver_side.read_laser(packet.payload)
         ours = encoder.encode(seq, (stamp_s, stamp_ns), ranges_m[::2], counts[::2])
         assert read_packets(ours)[0] == packet
+
+
+def read_transform(payload):
+    """Return frame ids, and the seven values of a tfMessage with one transform."""
+    assert struct.unpack_from("<I", payload) == (1,)
+    parent, start = driver_side.read_text(payload, 16)
+    child, start = driver_side.read_text(payload, start)
+    assert start + 56 == len(payload)
+    return parent, child, struct.unpack_from("<7d", payload, start)
+
+
+def test_transforms_place_the_parts_where_the_stock_robot_has_them():
+    cycle = read_packets(encode_cycle("hero_3"))
+    found = [read_transform(packet.payload) for packet in cycle[1:6]]
+    base = "hero_3/base_link"
+    half_rad = math.pi / 288
+    wheel = (0.0, math.sin(half_rad), 0.0, math.cos(half_rad))
+    expected = [
+        ("hero_3/odom", base, (1.0, 2.0, 0.0, 0.0, 0.0, math.sin(0.25), math.cos(0.25))),
+        (base, "hero_3/left_wheel_link", (0.0, 0.0315, 0.01548, *wheel)),
+        (base, "hero_3/right_wheel_link", (0.0, -0.0315, 0.01548, *wheel)),
+        (base, "hero_3/hat_link", (-0.00245, -0.00216, 0.051, 0.0, 0.0, 0.0, 1.0)),
+        (base, "hero_3/laser_link", (0.0, 0.0, 0.051, 0.0, 0.0, 0.0, 1.0)),
+    ]
+    for (parent, child, values), (expected_parent, expected_child, expected_values) in zip(found, expected):
+        assert (parent, child) == (expected_parent, expected_child)
+        assert values == pytest.approx(expected_values, abs=1e-7), child
+    for packet in cycle[1:6]:
+        assert struct.unpack_from("<II", packet.payload, 8) == (7, 8), "each with the stamp of its cycle"
+
+
+def test_each_wheel_shows_its_own_ticks():
+    cycle = read_packets(encode_cycle(ticks=(71, 143)))
+    for packet, ticks in zip(cycle[2:4], (71, 143)):
+        half_rad = (ticks + 1) * math.pi / 288
+        expected = (0.0, math.sin(half_rad), 0.0, math.cos(half_rad))
+        assert read_transform(packet.payload)[2][3:] == pytest.approx(expected, abs=1e-7)
+
+
+def test_an_encoder_message_holds_its_values_behind_stamp_and_frame():
+    encoder = read_packets(encode_cycle("hero_3"))[6].payload
+    assert struct.unpack_from("<III", encoder) == (messages.SEQ_NEVER_COUNTED, 7, 8)
+    assert driver_side.read_text(encoder, 12) == ("hero_3/encoder", len(encoder) - 88)
+    assert driver_side.read_encoder(encoder) == tuple(range(11))
+
+
+def test_hero_plus_sends_how_far_its_counters_are_apart_too():
+    plus = MODELS["hero_plus"]
+    values = [5.0, -2.0, *range(2, 11)]
+    data = messages.CycleMessages("hero_3", plus).encode((7, 8), Pose(0.0, 0.0, 0.0), (0.0, 0.0), (0, 0), values)
+    packet = read_packets(data)[6]
+    assert packet.topic_id == plus.own_ids[declarations.ID_ENCODER]
+    assert struct.unpack_from("<12d", packet.payload, len(packet.payload) - 96) == (*values[:6], 7.0, *values[6:])
+
+
+def test_a_laser_has_the_fields_of_the_stock_scan():
+    payload = read_packets(messages.LaserMessages("hero_3").encode(2**32 + 5, (1, 2), [0.1] * 8, [9.0] * 8))[0].payload
+    assert struct.unpack_from("<III", payload) == (5, 1, 2)
+    frame, start = driver_side.read_text(payload, 12)
+    assert frame == "hero_3/laser_link"
+    fields = struct.unpack_from("<7f", payload, start)
+    assert fields == pytest.approx((-math.pi, math.pi, 0.395, 0.0, 0.0, 0.036835, 0.236835))
+    assert struct.unpack_from("<I", payload, start + 28) == struct.unpack_from("<I", payload, start + 96) == (16,)
+
+
+def test_an_imu_message_has_its_values_between_symmetric_covariances():
+    (packet,) = read_packets(messages.ImuMessages("hero_3").encode((7, 8), (0.1, 0.2, 0.3, 0.4), (1, 2, 3), (4, 5, 6)))
+    assert struct.unpack_from("<III", packet.payload) == (messages.SEQ_NEVER_COUNTED, 7, 8)
+    frame, start = driver_side.read_text(packet.payload, 12)
+    assert frame == "hero_3/hat_link" and packet.topic_id == declarations.ID_IMU
+    values = struct.unpack_from("<37d", packet.payload, start)
+    assert values[:4] == pytest.approx((0.1, 0.2, 0.3, 0.4)) and not any(values[4:13])
+    assert values[13:16] == (1, 2, 3) and values[25:28] == (4, 5, 6)
+    for first, largest in ((16, 1.7157649993896484), (28, 0.002516058273613453)):
+        covariance = np.reshape(values[first : first + 9], (3, 3))
+        assert (covariance == covariance.T).all() and covariance.max() == largest
+        assert (np.linalg.eigvalsh(covariance) > 0.0).all()

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from hero_driver.rosserial import packets
 from hero_sim.robot import declarations as ids
+from hero_sim.robot.motor_pid import Gains, MotorPid
 from hero_sim.robot_constants import TICK_M
 
 
@@ -289,3 +290,39 @@ def test_no_commands_drive_robots_into_walls_or_keep_them_from_stopping(seed, se
     in_robots_m, in_walls_m = map(max, zip(*overlaps))
     assert in_robots_m < 5e-4 and in_walls_m < 1e-6
     assert abs(world.speeds_m_s).max() < 0.002
+
+
+def test_a_pid_weighs_error_sum_and_change_of_what_it_measures():
+    pid = MotorPid(Gains(100.0, 200.0, 0.1), 250.0)
+    pid.run(0, 0.5, 0.1)
+    assert pid.output_us == int(100.0 * 0.4 + 200.0 * 0.05 * 0.4 - 0.1 / 0.05 * 0.1) == 43
+    pid.run(49, 9.0, 9.0)
+    assert pid.output_us == 43, "only every 50 ms"
+    pid.run(50, 0.5, 0.3)
+    assert pid.output_us == int(100.0 * 0.2 + 4.0 + 2.0 - 0.1 / 0.05 * 0.2) == 25
+    pid.run(100, -0.5, 0.3)
+    assert pid.output_us == int(-80.0 + 6.0 - 8.0) == -82
+    pid.run(150, -0.4055, 0.3)
+    assert pid.output_us == -79, "truncated, not rounded down"
+    pid.reset()
+    assert pid.output_us == 0
+    pid.run(200, 0.1, 0.0)
+    assert pid.output_us == 11
+
+
+def test_the_sum_and_the_output_of_a_pid_stay_within_its_limit():
+    for sign in (1.0, -1.0):
+        pid = MotorPid(Gains(10.0, 200.0, 0.0), 250.0)
+        for now_ms in range(0, 5000, 50):
+            pid.run(now_ms, sign * 1.0, 0.0)
+        assert pid.output_us == sign * 250
+        pid.run(5000, 0.0, sign * 0.1)
+        assert pid.output_us == sign * 248, "no more has been summed up than the limit"
+
+
+def test_gains_with_a_negative_one_are_left_out():
+    pid = MotorPid(Gains(1.0, 2.0, 3.0), 250.0)
+    pid.set_gains(Gains(4.0, -0.1, 5.0))
+    assert pid.gains == (1.0, 2.0, 3.0)
+    pid.set_gains(Gains(0.0, 0.0, 0.0))
+    assert pid.gains == (0.0, 0.0, 0.0)

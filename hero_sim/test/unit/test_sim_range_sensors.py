@@ -191,3 +191,81 @@ def test_robots_that_stream_expect_all_of_their_readings():
     # Few are lost to other work of a robot, which delays its reading into the next step.
     assert sent <= sum(map(len, looks)) < 1.05 * sent
     assert len(looks) < 0.8 * sent
+
+
+def look(x=1.0, y=0.0, reach_m=0.65):
+    """Return one ray of one robot at the origin."""
+    return range_sensors.Rays(np.array([[x]]), np.array([[y]]), reach_m)
+
+
+NOTHING = (1e6, 0.0)
+
+
+def meet(walls=NO_WALLS, circles=NO_CIRCLES, place_m=(0.0, 0.0), **ray):
+    """Return how far away a ray from a place meets the first of some things, and the cosine of its incidence."""
+    rays, (x_m, y_m), circles = look(**ray), place_m, np.array(circles, dtype=float).reshape(-1, 3)
+    walls = Segments.from_ends(np.array(walls, dtype=float).reshape(-1, 4))
+    rays.meet_walls(np.array([[x_m]]), np.array([[y_m]]), walls)
+    rays.meet_circles(circles[None, :, 0] - x_m, circles[None, :, 1] - y_m, circles[:, 2])
+    distance_m = float(rays.distance_m[0, 0])
+    return NOTHING if distance_m == 1e6 else (distance_m, float(rays.cosine[0, 0]))
+
+
+def test_a_ray_meets_a_wall_between_its_ends_and_ahead_of_it():
+    for ends in ((0.3, -0.1, 0.3, 0.2), (0.3, 0.2, 0.3, -0.1)):
+        assert meet([ends]) == pytest.approx((0.3, 1.0))
+        assert meet([ends], place_m=(0.1, 0.19)) == pytest.approx((0.2, 1.0))
+        assert meet([ends], place_m=(0.0, 0.21)) == meet([ends], place_m=(0.0, -0.11)) == NOTHING, "beside its ends"
+        assert meet([ends], x=-1.0) == NOTHING, "behind"
+        assert meet([ends], reach_m=0.29) == NOTHING and meet([ends], reach_m=0.31) != NOTHING
+    assert meet([(-0.5, 0.1, 0.5, 0.1)]) == NOTHING, "parallel"
+    slanted = [(0.2, -0.2, 0.6, 0.2)]
+    assert meet(slanted) == pytest.approx((0.4, math.sqrt(0.5)))
+    assert meet(slanted, x=0.6, y=-0.8, place_m=(0.1, 0.3)) == pytest.approx((0.6 / 1.4, 1.4 * math.sqrt(0.5)))
+
+
+def test_of_several_walls_the_nearest_counts_with_its_own_incidence():
+    walls = [(0.5, -1.0, 0.5, 1.0), (0.2, -0.2, 0.6, 0.2), (0.45, -1.0, 0.45, 1.0)]
+    for order in ((0, 1, 2), (2, 1, 0), (1, 0, 2)):
+        assert meet([walls[index] for index in order]) == pytest.approx((0.4, math.sqrt(0.5)))
+    assert meet(walls, [(0.35, 0.0, 0.05)]) == pytest.approx((0.3, 1.0)), "and a circle before them"
+    assert meet(walls, [(0.5, 0.0, 0.05)]) == pytest.approx((0.4, math.sqrt(0.5))), "and none behind them"
+
+
+def test_a_ray_meets_a_circle_where_its_rim_is_and_by_the_rims_slant():
+    for aside_m in (0.0, 0.03, -0.03, 0.049):
+        depth_m = math.sqrt(0.05**2 - aside_m**2)
+        assert meet(circles=[(0.3, aside_m, 0.05)]) == pytest.approx((0.3 - depth_m, depth_m / 0.05))
+    assert meet(circles=[(0.3, 0.051, 0.05)]) == meet(circles=[(-0.3, 0.0, 0.05)]) == NOTHING
+    assert meet(circles=[(0.71, 0.0, 0.05)]) == NOTHING and meet(circles=[(0.69, 0.0, 0.05)])[0] == pytest.approx(0.64)
+    assert meet(circles=[(0.0, 0.0, 0.05)]) == NOTHING, "its own body"
+    assert meet(circles=[(0.02, 0.0, 0.05)])[0] == 0.0, "in another body, nothing is behind the sensor"
+
+
+def test_things_at_the_rim_of_the_cone_count_for_seven_tenths():
+    for off_rad in (-0.21, 0.21):
+        # So narrow that the middle ray and that of the other side miss it.
+        circle = np.array([[0.16 * math.cos(off_rad), 0.16 * math.sin(off_rad), 0.02]])
+        distance_m = 0.14 - BODY_RADIUS_M
+        assert measure(NO_WALLS, circle)[4] == pytest.approx(0.7 * 0.423 / distance_m**2 - 0.93, rel=1e-6)
+
+
+def test_between_fit_and_table_the_offset_goes_from_one_to_the_other():
+    middle = 0.5 * (-0.93 + 12.0 - 0.423 / 0.04)
+    assert measure(wall_at(0.19))[4] == pytest.approx(0.423 / 0.19**2 + middle * 1.0, rel=1e-3)
+    for distance_m in (0.25, 0.4):
+        share = 0.2**2 / distance_m**2
+        assert measure(wall_at(distance_m))[4] == pytest.approx(12.0 * share, rel=1e-6)
+
+
+def test_the_distance_sensor_looks_ahead_as_far_as_four_meters():
+    def measure_ahead(walls, circles=NO_CIRCLES, yaw_rad=0.0):
+        heading = np.array([[math.cos(yaw_rad), math.sin(yaw_rad)]])
+        walls, place_m = Segments.from_ends(np.array(walls, dtype=float).reshape(-1, 4)), np.zeros((1, 2))
+        sight = range_sensors.Sight(place_m, heading, place_m[None], np.full(1, BODY_RADIUS_M), walls, circles)
+        return range_sensors.measure_distances(sight)[0]
+
+    assert measure_ahead([(1.2, -1.0, 1.2, 1.0)]) == pytest.approx(1.2)
+    assert measure_ahead([(-1.0, 2.0, 1.0, 2.0)], yaw_rad=math.pi / 2.0) == pytest.approx(2.0)
+    assert measure_ahead(NO_WALLS, np.array([(3.0, 0.0, 0.1)])) == pytest.approx(2.9)
+    assert measure_ahead(NO_WALLS) == measure_ahead([(4.1, -1.0, 4.1, 1.0)]) == 4.0

@@ -3,7 +3,8 @@ import pytest
 from driver_side import parse_options
 
 from hero_sim.errors import OptionError
-from hero_sim.population import build_errors
+from hero_sim.population import build_errors, place_worlds
+from hero_sim.world.arena import build_default
 from hero_sim.world.robot_errors import describe_errors
 
 
@@ -61,3 +62,15 @@ def test_a_wrong_error_is_named(text, named):
     with pytest.raises(OptionError) as caught:
         build("--error", text)
     assert named in str(caught.value) and text in str(caught.value)
+
+
+def test_known_errors_hold_in_each_of_many_worlds_for_the_robot_named():
+    arena, poses = build_default(2), np.zeros((3, 2, 3))
+    poses[:, 1, 0], poses[:, :, 1] = 0.3, np.arange(3)[:, None] * 0.01
+    world = place_worlds(arena, poses, (5, 6, 7), 1.0, known=["slip=0.1,robot=1"])
+    assert world.errors.slip.ravel().tolist() == [0.02, 0.1] * 3
+    assert world.worlds == 3 and world.poses[4].tolist() == poses[2, 0].tolist()
+    for index, seed in enumerate((5, 6, 7)):
+        alone = place_worlds(arena, poses[index : index + 1], (seed,), 1.0)
+        assert world.errors.wheel_scale[2 * index : 2 * index + 2].tolist() == alone.errors.wheel_scale.tolist()
+    assert len(set(world.errors.wheel_scale.ravel().tolist())) == 12
