@@ -1,4 +1,4 @@
-"""What all tests of pytest share: markers, and hypothesis without time limits, chance or memory.
+"""Shared by all tests of pytest: markers, and hypothesis without time limits, chance or memory.
 
 A busy machine is not a failure. Every run tries the same examples, whatever earlier runs found or left behind.
 """

@@ -1,4 +1,4 @@
-"""What each example program costs with a simulated swarm, at what rate it commands, and how soon it ends.
+"""Measures CPU, command rate and time to end of each example program with a simulated swarm.
 
 Every program drives all robots at once, for real: random obstacles, goals, formations. Started by script/bench.
 """
@@ -44,7 +44,7 @@ def list_cases(robots):
 
 
 class CommandCount:
-    """How many commands of each kind every robot got."""
+    """Numbers of the commands of each kind that every robot got."""
 
     def __init__(self, robots):
         self.counts = {}
@@ -64,7 +64,7 @@ class CommandCount:
 
 
 class Hands:
-    """What a person does meanwhile: holds a key in a terminal, and a joystick's button and stick."""
+    """A user meanwhile: holds a key in a terminal, and a joystick's button and stick."""
 
     def __init__(self):
         self.master_fd, self.slave_fd = pty.openpty()

@@ -68,7 +68,7 @@ class LabCamera(NamedTuple):
 
     @property
     def rotation(self) -> np.ndarray:
-        """What turns a vector of the arena into the optical frame, (3, 3)."""
+        """The rotation from the arena's frame into the optical frame, (3, 3)."""
         return cv2.Rodrigues(np.array(self.tilt_rad))[0] @ np.diag((1.0, -1.0, -1.0))
 
     @property

@@ -1,4 +1,4 @@
-"""How right the filter's poses and its standard deviations are: robots stepped in process, measured late, and occluded.
+"""Accuracy of the filter's poses and standard deviations: robots stepped in process, measured late, and occluded.
 
 Part of script/bench lab_camera.
 """

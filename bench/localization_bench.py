@@ -129,7 +129,7 @@ class Scene:
         see: Callable[[float, List[TagCorners]], object],
         is_covered: bool = False,
     ) -> None:
-        """Let all robots drive (duration s, m/s, rad/s), and see each picture; is_covered: it shows no robot."""
+        """Drive all robots (duration s, m/s, rad/s), and see each image; is_covered: it shows no robot."""
         for duration_s, linear_m_s, angular_rad_s in parts:
             end_s = self.swarm.now_s + duration_s
             while self.swarm.now_s < end_s:
@@ -258,7 +258,7 @@ def draw_places(random: np.random.RandomState, count: int) -> np.ndarray:
 
 
 class Localization:
-    """What localize makes of odometry and of pictures that arrive late.
+    """Poses that localize computes from odometry and late images.
 
     Attributes:
         errors: of each pose at the present, half a second after the start or later.
@@ -318,7 +318,7 @@ def measure_driving(
     stock: StockMethod,
     parts: Sequence[Tuple[float, float, float]],
 ) -> Dict[str, Measured]:
-    """Let robots drive, and compare measured poses at their time, all others at the present."""
+    """Drive robots, and compare measured poses at their time, all others at the present."""
     errors = {method: Measured([], []) for method in METHODS}
     localization = Localization(scene, camera, layout, delay_s)
     errors["filter"] = localization.errors
@@ -338,7 +338,7 @@ def measure_driving(
 def measure_occlusion(
     scene: Scene, camera: Camera, layout: TagLayout, delay_s: float, speed: Tuple[float, float]
 ) -> Tuple[Measured, Measured, float]:
-    """Let robots drive forward, back and forward again (m/s, rad/s), all covered while they drive back.
+    """Drive robots forward, back and forward again (m/s, rad/s), all occluded while they drive back.
 
     Returns: errors while they are covered; from FOUND_AGAIN_S after it on; the largest step that is not said, m.
     """

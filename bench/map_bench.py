@@ -1,4 +1,4 @@
-"""How well robots reach places of the map, and how well they map an arena; CPU of the node map_arena.
+"""Measures how well robots reach places of the map and map an arena; CPU of the node map_arena.
 
 The robots are stepped in process, with their default errors, and localized by the filter of localize on a model of the
 camera: poses a tenth of a second late, each robot's off by a constant 1 mm and 0.3 degrees, and by noise. What counts

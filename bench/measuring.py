@@ -1,4 +1,4 @@
-"""What the benchmarks share: processes, their CPU time and memory, the speed of the machine, the report."""
+"""Shared by the benchmarks: processes, their CPU time and memory, the speed of the machine, the report."""
 
 import contextlib
 import json

@@ -1,4 +1,4 @@
-"""What the simulator costs: behind real sockets at real time, stepped by a program, and its physics alone.
+"""CPU of the simulator: behind real sockets at real time, stepped by a program, and its physics alone.
 
 Behind sockets a small server in this process takes the driver's place: it requests topics, answers the time, and drives
 every robot in a circle ten times a second. Only the simulator's process is counted. The other figures are seconds of

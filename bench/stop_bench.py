@@ -180,7 +180,7 @@ class StopSuite(RunningSuite):
         rospy.ServiceProxy("/hero_driver/stop", SetBool)(True)
 
     def press(self, method, commander):
-        """Let the robots stop by one of METHODS; return when they should."""
+        """Stop the robots by one of METHODS; return when they should."""
         pressed_s = time.monotonic()
         if method in REQUESTS:
             self._requests[method]()
@@ -194,11 +194,11 @@ class StopSuite(RunningSuite):
         return pressed_s + GONE_AFTER_S.get(method, 0.0)
 
     def release(self):
-        """Let the robots move again that were stopped by one of REQUESTS."""
+        """Release the robots stopped by one of REQUESTS."""
         self._topic.publish(Bool(False))
 
     def move(self, method, commander):
-        """Let the robots move after a press; return when all do."""
+        """Move the robots after a press; return when all do."""
         if method in REQUESTS:
             self.release()
         if method == "silent":

@@ -28,7 +28,7 @@ MOVING_M = 0.01
 MOVING_STEPS = 50
 STEPS_KEPT = 2000
 READING_LENGTH = 1000
-"""What a robot sends with its odometry and encoders is longer, everything else shorter."""
+"""A robot's reading with odometry and encoders is longer, everything else shorter."""
 
 PULSES = packets.encode_packet(declarations.ID_CMD_MOTOR, bytes(4))[:7]
 """Everything of such a packet in front of its payload."""
@@ -37,7 +37,7 @@ ZERO = packets.encode_packet(declarations.ID_VELOCITY_CMD_VEL, bytes(48))
 
 
 class Watch:
-    """What is noted of one swarm."""
+    """Notes on one swarm."""
 
     def __init__(self, simulator):
         """Look at the bytes that robots send and receive, and at their wheels after each step of the world."""

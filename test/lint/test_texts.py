@@ -9,6 +9,9 @@ import sources
 MAX_FILE_LINES = 500
 MAX_TEST_NAME = 70
 MAX_PACE_S = 0.1
+WITHOUT = ("hero_examples", "hero_test")
+"""A module's docstring is enough for their short programs and watchers."""
+
 SUFFIXES = ("", *".py .md .rst .launch .test .xml .yaml .yml .toml .txt .msg .srv .action .urdf".split())
 CHOSEN = os.environ.get("HERO_LINT_FILES", "").split("\n")  # of script/lint FILE ...
 PYTHON = [path for path in sources.list_python_files() if CHOSEN == [""] or sources.name_of(path) in CHOSEN]
@@ -20,6 +23,10 @@ def dotted_name(node):
     if isinstance(node, ast.Attribute):
         return f"{dotted_name(node.value)}.{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
+
+
+def has_docstring(node):
+    return isinstance(node, ast.FunctionDef) and bool(ast.get_docstring(node))
 
 
 def test_nothing_is_left_to_do_in_a_text():
@@ -60,6 +67,28 @@ def test_tests_wait_on_conditions_not_on_sleeps():
                 paces = isinstance(argument, ast.Constant) and argument.value <= MAX_PACE_S
                 where = f"{sources.name_of(path)}:{node.lineno}"
                 assert paces or id(node) in in_loops, f"{where}: sleep as synchronization"
+
+
+def test_public_methods_have_or_inherit_a_docstring():
+    files = [path for path in sources.list_source_modules().values() if sources.package_of(path) not in WITHOUT]
+    found = [node for path in files for node in ast.walk(sources.parse(path)) if isinstance(node, ast.ClassDef)]
+    bases = {node.name: {dotted_name(base).split(".")[-1] for base in node.bases} for node in found}
+    documented = {(node.name, method.name) for node in found for method in node.body if has_docstring(method)}
+
+    def inherits(name, method):
+        return any((base, method) in documented or inherits(base, method) for base in bases.get(name, ()))
+
+    for node in [node for node in found if not node.name.startswith("_")]:
+        for method in [method for method in node.body if isinstance(method, ast.FunctionDef)]:
+            if not method.name.startswith("_") and not has_docstring(method):
+                assert inherits(node.name, method.name), f"{node.name}.{method.name} has no docstring"
+
+
+def test_docstrings_name_a_thing_or_an_action():
+    private = re.compile(r"^ *\"\"\"(See|What|How|Who|Where|Let)\b.*", re.MULTILINE)
+    for path in [path for path in PYTHON if "test" not in path.parts]:
+        found = private.search(path.read_text(encoding="utf-8"))
+        assert not found, f"{sources.name_of(path)}: {found.group()}"
 
 
 def test_names_of_bounds_begin_with_min_or_max():

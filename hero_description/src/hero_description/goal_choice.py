@@ -30,7 +30,7 @@ REACH_M = 0.15
 
 DISC_DIAMETER_M = 0.11
 GROUND_Z_M = -0.00912
-"""Where the wheels touch the ground, in base_link (urdf/hero.urdf: axle height less wheel radius)."""
+"""Height of the ground in base_link (urdf/hero.urdf: axle height less wheel radius)."""
 
 CHOSEN = ColorRGBA(0.05, 0.45, 0.95, 0.7)
 

@@ -21,7 +21,7 @@ REBOOT_SLACK_S = 2.0
 
 
 class RobotLog:
-    """Where the log lines of all robots go."""
+    """The log of all robots' lines."""
 
     def __init__(self, log: LogRelay, stop: Callable[[Peer], None]) -> None:
         """stop(peer) stops a robot that tunes itself though it was not told to."""

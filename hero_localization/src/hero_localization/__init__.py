@@ -1,1 +1,1 @@
-"""Where the robots of a swarm are, in one common frame, and what they map there."""
+"""Poses of the robots of a swarm in one common frame, and their map."""

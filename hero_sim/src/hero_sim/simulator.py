@@ -209,7 +209,6 @@ class Simulator(LinkHandler):
     # -- what the link tells ---------------------------------------------------------------------------------
 
     def connection_made(self, index: int) -> None:
-        """The driver accepted a robot."""
         if self.swarm.robots[index].is_on:
             self.swarm.robots[index].connection_made(self.swarm.now_ms)
         self.swarm.reschedule(index)
@@ -234,7 +233,6 @@ class Simulator(LinkHandler):
             self._report("%s lost its connection: %s" % (self.swarm.robots[index].name, reason))
 
     def receive_bytes(self, index: int, data: bytes) -> None:
-        """Bytes for a robot came."""
         radio, now_ms = self.radios[index], self.swarm.now_ms
         if radio.is_transparent(now_ms):
             self.swarm.robots[index].receive_bytes(now_ms, data)

@@ -77,24 +77,19 @@ class RosProbe(Probe):
         return silence
 
     def drive(self, angular_rad_s: float, linear_m_s: float = 0.0) -> None:
-        """Turn on the spot, or drive, under the velocity controller."""
         self._velocity.publish(_make_twist(angular_rad_s, linear_m_s))
 
     def turn(self, angle_rad: float) -> None:
-        """Turn by an angle under the position controller."""
         self._position.publish(_make_twist(angle_rad))
 
     def set_pulses(self, pulse_us: int) -> None:
-        """Set the pulse of both servos."""
         self._motors.publish(Motor(pulse_us, pulse_us))
 
     def stop(self) -> None:
-        """Stop, whichever controller drives."""
         self.drive(0.0)
         self.turn(0.0)
 
     def write(self, key: str, values: List[float]) -> None:
-        """Write a setting by its service. Raises: CalibrationError with the reason if it fails."""
         service, kind, number = SERVICES[key]
         name = "/%s/%s" % (self.name, service)
         try:

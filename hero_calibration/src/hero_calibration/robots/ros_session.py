@@ -32,7 +32,6 @@ class RosSession(Session):
 
     @property
     def is_ending(self) -> bool:
-        """Whether the program is to end."""
         return not self._program.running
 
     def map(self, work: Callable[[Probe], None], probes: Sequence[Probe]) -> None:

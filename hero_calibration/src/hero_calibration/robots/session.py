@@ -37,7 +37,7 @@ class Session(ABC):
 
     @abstractmethod
     def sleep(self, duration_s: float) -> None:
-        """Simulate about duration_s."""
+        """Wait about duration_s."""
 
     @property
     @abstractmethod

@@ -15,7 +15,7 @@ from hero_msgs.msg import GoToAction, GoToFeedback, GoToResult
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
 from ..controllers.motion import DEFAULT_TIMEOUT_S
 from ..robot import Robot
-from .goals import REPLACED, GoalOutcome, GoalQueue, GoalRequest, InvalidGoalError, check_limits, read_goal
+from . import goals
 
 __all__ = ["GoToGoalServer"]
 
@@ -23,7 +23,7 @@ CLOSE_TIMEOUT_S = 1.0
 """Giving up a goal takes 0.2 s."""
 
 
-class GoToGoalServer:
+class GoToGoalServer(goals.GoalListener):
     """Drives one robot to its goals; the newest counts, wherever it comes from: see goals.GoalQueue."""
 
     def __init__(
@@ -40,7 +40,7 @@ class GoToGoalServer:
         """
         self.robot = robot
         self._tolerance_m, self._timeout_s = tolerance_m, timeout_s
-        self._goals = GoalQueue(robot, self, avoid)
+        self._goals = goals.GoalQueue(robot, self, avoid)
         self._news = threading.Event()
         self._is_closing = False
         self._log = rospy.loginfo
@@ -68,8 +68,8 @@ class GoToGoalServer:
 
     def _receive_goal(self, message: PoseStamped) -> None:
         try:
-            goal, frame = read_goal(message, use_heading=True)
-        except InvalidGoalError as error:
+            goal, frame = goals.read_goal(message, use_heading=True)
+        except goals.InvalidGoalError as error:
             self._reject(str(error), None)
         else:
             self.put_goal(goal, frame)
@@ -79,12 +79,12 @@ class GoToGoalServer:
         tolerance_m = wanted.tolerance or self._tolerance_m
         timeout_s = wanted.timeout or self._timeout_s
         try:
-            goal, frame = read_goal(wanted.target, wanted.use_heading)
-            check_limits(tolerance_m, timeout_s)
-        except InvalidGoalError as error:
+            goal, frame = goals.read_goal(wanted.target, wanted.use_heading)
+            goals.check_limits(tolerance_m, timeout_s)
+        except goals.InvalidGoalError as error:
             self._reject(str(error), handle)
         else:
-            self._put(GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
+            self._put(goals.GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
 
     def _receive_cancel(self, handle: Any) -> None:
         self._goals.cancel(handle)
@@ -92,12 +92,12 @@ class GoToGoalServer:
 
     def put_goal(self, goal: Goal, frame: str = "") -> None:
         """Accept a goal with the server's own tolerance and time limit; an empty frame means hero_N/odom."""
-        self._put(GoalRequest(goal, frame, self._tolerance_m, self._timeout_s))
+        self._put(goals.GoalRequest(goal, frame, self._tolerance_m, self._timeout_s))
 
-    def _put(self, request: GoalRequest) -> None:
+    def _put(self, request: goals.GoalRequest) -> None:
         try:
             self._goals.put(request)
-        except InvalidGoalError as error:
+        except goals.InvalidGoalError as error:
             self._reject(str(error), request.handle)
         self._news.set()
 
@@ -118,27 +118,24 @@ class GoToGoalServer:
             while self._goals.drive_to_next(self._wait):
                 continue
 
-    def accept_goal(self, request: GoalRequest) -> None:
-        """See GoalListener."""
+    def accept_goal(self, request: goals.GoalRequest) -> None:
         if request.handle is not None:
             request.handle.set_accepted()
         frame = request.frame or "odom"
         self._log("%s goes to (%.3f, %.3f) in %s", self.robot.name, request.goal.x_m, request.goal.y_m, frame)
 
-    def show_progress(self, request: GoalRequest, distance_m: float, elapsed_s: float) -> None:
-        """See GoalListener."""
+    def show_progress(self, request: goals.GoalRequest, distance_m: float, elapsed_s: float) -> None:
         if request.handle is not None:
             feedback = GoToFeedback(distance=distance_m, elapsed=elapsed_s)
             if self.robot.fresh_pose() is not None:
                 feedback.pose = self.robot.odometry.pose.pose
             request.handle.publish_feedback(feedback)
 
-    def end_goal(self, request: GoalRequest, outcome: GoalOutcome) -> None:
-        """See GoalListener."""
+    def end_goal(self, request: goals.GoalRequest, outcome: goals.GoalOutcome) -> None:
         handle, name = request.handle, self.robot.name
         reached, gave_up, reason, distance_m, elapsed_s = outcome
         # Goals on the topic may come as a stream.
-        self._log = rospy.logdebug if reason == REPLACED and handle is None else rospy.loginfo
+        self._log = rospy.logdebug if reason == goals.REPLACED and handle is None else rospy.loginfo
         if reached:
             rospy.loginfo("%s is at its goal after %.1f s, %.3f m off", name, elapsed_s, distance_m)
             end = handle and handle.set_succeeded

@@ -29,7 +29,7 @@ PROGRESS_M = 0.01
 
 
 class Goal(NamedTuple):
-    """Where a robot is to drive."""
+    """A place to drive to."""
 
     x_m: float
     y_m: float

@@ -50,10 +50,10 @@ class Member(Protocol):
     _motion: Optional[BackgroundMotion]
 
     def missing(self) -> Optional[str]:
-        """See Robot."""
+        """Return why the robot cannot be driven now; None if it can."""
 
     def check_not_stopped(self) -> None:
-        """See Robot."""
+        """Raises: StoppedError if all robots are stopped."""
 
     def _end_motion(self) -> None: ...
 

@@ -5,7 +5,7 @@ from typing import Optional, Tuple
 
 from ..values.background_motion import BackgroundMotion, Steps
 from ..values.colors import COLORS, Color, parse_color
-from .robot_link import RobotLink
+from ..values.robot_link import RobotLink
 
 __all__ = ["Light"]
 

@@ -20,10 +20,10 @@ from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
 from ..values.readings import FRESH_S, Obstacle, find_nearest
 from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, RobotModel
+from ..values.robot_link import RobotLink
 from ..values.sensing import Neighbor
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
-from .robot_link import RobotLink
 
 __all__ = ["BaseRobot"]
 
@@ -99,7 +99,7 @@ class BaseRobot(Group):
 
     @property
     def pose(self) -> Pose:
-        """Where the robot is by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
+        """The robot's pose by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
 
         In the first 2 s of a Robot it waits for the first odometry, as other data properties wait for theirs.
 
@@ -159,7 +159,7 @@ class BaseRobot(Group):
 
     @property
     def distance(self) -> float:
-        """What HeRo+'s sensor measures ahead, in m from the robot's center; it sees 0.04 to 2.9 m.
+        """The distance ahead by HeRo+'s sensor, in m from the robot's center; it sees 0.04 to 2.9 m.
 
         The first use waits up to 5 s. Raises: StaleDataError as `pose`, also on a robot without the sensor.
         """

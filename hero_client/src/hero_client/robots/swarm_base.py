@@ -19,9 +19,9 @@ from ..controllers.swarm_go_to import SwarmGoToController
 from ..values.background_motion import BackgroundMotion, Steps
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError
+from ..values.robot_link import MAP
 from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .robot_base import BaseRobot
-from .robot_link import MAP
 
 __all__ = ["REPORT_PERIOD_S", "AnyRobot", "BaseSwarm"]
 
@@ -54,7 +54,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
 
     @property
     def poses(self) -> Dict[int, Pose]:
-        """Where all robots are in the frame map, by their ids; needs hero_localization: see Robot.pose_in().
+        """The poses of all robots in the frame map, by their ids; needs hero_localization: see Robot.pose_in().
 
         Raises: FrameError, StaleDataError as Robot.pose_in(), for the first robot whose pose is not known.
         """

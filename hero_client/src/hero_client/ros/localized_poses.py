@@ -1,4 +1,4 @@
-"""Where robots are by hero_localization's program localize: one subscription for all robots of a program."""
+"""Poses from hero_localization's program localize: one subscription for all robots of a program."""
 
 import math
 import threading

@@ -1,4 +1,4 @@
-"""A robot over ROS: its topics and services under /hero_N, tf, and the drivers' reports; see robot_link."""
+"""A robot over ROS: its topics and services under /hero_N, tf, and the drivers' reports."""
 
 import threading
 from concurrent.futures import wait
@@ -21,6 +21,7 @@ from ..values.background_motion import BackgroundMotion, Steps, run_steps
 from ..values.errors import RobotError, StaleDataError
 from ..values.readings import FRESH_S, front_first
 from ..values.robot_constants import HERO, MODELS, RobotModel
+from ..values.robot_link import RobotLink
 from ..values.sensing import Neighbor
 from .drivers import share_drivers
 from .frames import share_frames
@@ -70,17 +71,15 @@ class ThreadMotion(BackgroundMotion):
         return not self._cancelled.wait(duration_s) and not rospy.is_shutdown()
 
     def cancel(self) -> bool:
-        """See BackgroundMotion."""
         self._cancelled.set()
         return not self.done()
 
     def cancel_and_wait(self) -> None:
-        """See BackgroundMotion."""
         self.cancel()
         wait([self], END_TIMEOUT_S)
 
 
-class RosLink:
+class RosLink(RobotLink):
     """One robot over ROS; needs a started node.
 
     Attributes:
@@ -109,11 +108,9 @@ class RosLink:
 
     @property
     def model(self) -> RobotModel:
-        """See RobotLink."""
         return MODELS.get(self._drivers.find_model(self._namespace), HERO)
 
     def missing(self) -> Optional[str]:
-        """See RobotLink."""
         if not self.connected:
             return self._cmd_vel.describe_absence()
         silent = self.messages.find_silent(NEEDED, FRESH_S)
@@ -124,42 +121,33 @@ class RosLink:
         return None
 
     def subscribe(self, topic: str) -> None:
-        """See RobotLink."""
         self.messages.subscribe(topic, MESSAGE_CLASSES[topic])
 
     def age_s(self, topic: str) -> float:
-        """See RobotLink."""
         return self.messages.age_s(topic)
 
     def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
-        """See RobotLink."""
         self.messages.wait_for_next(topic, timeout_s, count)
 
     def read_pose(self) -> Pose:
-        """See RobotLink."""
         pose = self.messages.read("odom").pose.pose
         return Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
 
     def read_velocity(self) -> Velocity:
-        """See RobotLink."""
         twist = self.messages.read("odom").twist.twist
         return Velocity(twist.linear.x, twist.angular.z)
 
     def read_ranges(self) -> List[float]:
-        """See RobotLink."""
         return front_first(self.messages.read("proximity"))
 
     def read_infrared_counts(self) -> List[float]:
-        """See RobotLink."""
         counts = [float(count) for count in self.messages.read("laser").intensities[::2]]  # the others are averages
         return counts[len(counts) // 2 :] + counts[: len(counts) // 2]
 
     def read_distance(self) -> float:
-        """See RobotLink."""
         return float(self.messages.read("distance").data)
 
     def read_neighbors(self) -> List[Neighbor]:
-        """See RobotLink."""
         message = self.messages.read("neighbors")
         if not message.is_known:
             raise StaleDataError(
@@ -169,15 +157,14 @@ class RosLink:
         return [Neighbor(found.id, found.range, found.bearing, found.heading) for found in message.neighbors]
 
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
-        """See RobotLink; the first call subscribes to /localization/poses, for all robots."""
+        """The first call subscribes to /localization/poses, for all robots."""
         return share_poses().find(self._robot_id, frame, timeout_s)
 
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
-        """See RobotLink; the first call subscribes to /tf."""
+        """The first call subscribes to /tf."""
         return share_frames().find_origin(self._name + "/odom", frame, timeout_s)
 
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
-        """See RobotLink."""
         twist = Twist()
         twist.linear.x, twist.angular.z = linear_m_s, angular_rad_s
         if linear_m_s or angular_rad_s:
@@ -186,12 +173,10 @@ class RosLink:
             self._cmd_vel.publish_stop(twist)
 
     def send_color(self, rgb: Tuple[float, float, float]) -> None:
-        """See RobotLink."""
         self._led.wait_until_connected()  # a script that ends with it would end before
         self._led.publish(ColorRGBA(*rgb, 1.0))
 
     def set_odometry(self, pose: Pose) -> None:
-        """See RobotLink."""
         name = self._namespace + "/set_odom"
         try:
             rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
@@ -203,11 +188,9 @@ class RosLink:
 
     @property
     def is_stopped(self) -> bool:
-        """See RobotLink."""
         return self._drivers.is_robot_stopped(self._namespace)
 
     def describe_stop(self) -> str:
-        """See RobotLink."""
         driver = self._drivers.find(self._namespace)
         return (
             "the driver %s has stopped all robots. Release them with r in `rosrun hero_tools fleet`,"
@@ -215,11 +198,9 @@ class RosLink:
         )
 
     def start(self, steps: Steps) -> BackgroundMotion:
-        """Take steps on another thread."""
         return ThreadMotion(steps)
 
     def log_warning(self, text: str) -> None:
-        """See RobotLink."""
         rospy.logwarn(text)
 
     def close(self) -> None:

@@ -52,7 +52,7 @@ BURST_NS = 10 * 10**6
 
 
 class Sink(Protocol):
-    """Where the messages of one topic go."""
+    """Receiver of the messages of one topic."""
 
     @property
     def is_wanted(self) -> bool:

@@ -1,1 +1,1 @@
-"""Where ROS begins: publishers, subscribers and services of robots, and every access to rospy."""
+"""ROS: publishers, subscribers and services of robots, and every access to rospy."""

@@ -37,7 +37,7 @@ _LEVELS = {
 
 
 class LogRelay:
-    """Where every other thread of the driver logs."""
+    """The log for every other thread of the driver."""
 
     def __init__(self) -> None:
         self._worker = Worker("log relay", QUEUE_LENGTH, _report_to_terminal)

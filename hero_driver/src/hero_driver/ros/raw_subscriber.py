@@ -130,7 +130,6 @@ class MessageStream(Reader):
         self.error: Optional[OSError] = None
 
     def fileno(self) -> int:
-        """Return the socket's file descriptor, the same one until close()."""
         return self._socket.fileno()
 
     def resume(self) -> None:

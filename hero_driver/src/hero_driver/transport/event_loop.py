@@ -57,7 +57,7 @@ class NoAnswerError(Exception):
 
 
 class TransportSettings(NamedTuple):
-    """Where and how to connect."""
+    """Addresses, and limits of connections."""
 
     host: str  # empty: do not listen
     port: int  # 0: any free one

@@ -29,7 +29,7 @@ POWER_LINES_HZ = (0, 50, 60)
 
 
 class DeviceControls(NamedTuple):
-    """What a camera file sets; None: stays as it is. gain and focus are in the camera's own units."""
+    """Settings of a camera file; None: stays as it is. gain and focus are in the camera's own units."""
 
     exposure_s: Optional[float] = None
     gain: Optional[int] = None

@@ -239,7 +239,6 @@ class DeviceSource(LiveSource):
         return age_s if math.isfinite(age_s) and 0.0 <= age_s < PLAUSIBLE_AGE_S else 0.0
 
     def close(self) -> None:
-        """Release the device; safe twice."""
         self._ending.set()
         self._thread.join(2.0)
         self._capture.release()
@@ -279,7 +278,6 @@ class VideoSource(FrameSource):
         return Frame(stamp_s, _make_gray(image), next(self._numbers))
 
     def close(self) -> None:
-        """Close the file; safe twice."""
         self._capture.release()
 
 

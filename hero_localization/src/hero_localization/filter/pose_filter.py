@@ -1,4 +1,4 @@
-"""Where one robot is in the frame `map`: its odometry, corrected by poses that are measured from outside. Pure.
+"""The pose of one robot in the frame `map`: its odometry, corrected by poses that are measured from outside. Pure.
 
 An extended Kalman filter of x, y and yaw. Odometry is the motion, not a measurement: between two measured poses the
 estimate follows it exactly, and grows less certain with each meter and radian. A measured pose counts at the time at
@@ -81,7 +81,7 @@ class Measurement(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """Where the robot is in `map`."""
+    """The robot's pose in `map`."""
 
     stamp_s: float
     pose: Pose

@@ -1,4 +1,4 @@
-"""Where all robots of a swarm are in one frame: a filter for each, and reports. Pure.
+"""Poses of all robots of a swarm in one frame: a filter for each, and reports. Pure.
 
 now_s and stamps are ROS time.
 """

@@ -55,7 +55,7 @@ MISSED_S = 0.1
 
 
 class TrueRobots:
-    """Where the robots truly are, by the simulator's topics."""
+    """The robots' true poses, by the simulator's topics."""
 
     def __init__(self, robot_ids: Sequence[int]) -> None:
         self._lock = threading.Lock()

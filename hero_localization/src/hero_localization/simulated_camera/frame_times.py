@@ -1,4 +1,4 @@
-"""When the camera takes its images, and when they arrive. Pure; deterministic by seed."""
+"""Times at which the camera takes its images, and at which they arrive. Pure; deterministic by seed."""
 
 from typing import Iterator, NamedTuple
 

@@ -70,7 +70,6 @@ class AprilTagDetector(TagDetector):
         self._enlarge = enlarge
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
-        """Return the tags in gray."""
         shift, scale = np.array(origin) - 0.5, max(self._enlarge, 1)
         if self._enlarge:
             gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
@@ -111,7 +110,6 @@ class ArucoDetector(TagDetector):
         return -int(np.argmin(corners.sum(axis=1)))
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
-        """Return the tags in gray."""
         found, ids, _ = self._detect(np.ascontiguousarray(gray))
         if ids is None:
             return []

@@ -49,7 +49,7 @@ class Settings(NamedTuple):
     delay_s: float = 0.0
     """Images were taken so long before their stamps."""
     seen_references: Mapping[int, Pose] = {}
-    """Where the calibration of the arena saw the reference tags."""
+    """Poses of the reference tags in the calibration of the arena."""
     controls: DeviceControls = DeviceControls()
 
 

@@ -17,7 +17,7 @@ class TagCorners(NamedTuple):
 
     @property
     def center(self) -> np.ndarray:
-        """Where the diagonals cross, (2,) px: the center of the print, whatever the perspective."""
+        """The crossing of the diagonals, (2,) px: the center of the print, whatever the perspective."""
         (ax, ay), (bx, by), (cx, cy), (dx, dy) = self.corners.tolist()
         area = (cx - ax) * (dy - by) - (cy - ay) * (dx - bx)
         if abs(area) < 1e-9:

@@ -110,7 +110,7 @@ class TagPose(NamedTuple):
 
 
 class Sighting(NamedTuple):
-    """Where a robot, an object or a reference tag was seen.
+    """The measured pose of a robot, an object or a reference tag.
 
     Attributes:
         pose: of base_link (robots, objects) or of the tag itself (references), in `map`.

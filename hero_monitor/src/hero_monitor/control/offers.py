@@ -90,7 +90,7 @@ BEHAVIORS: Dict[str, Dict[str, Field]] = {
 _SAFETY = Field("fence and robots", options=("off", "fence and robots"))
 
 _BEHAVIOR_TITLES = {"formation": "formation by distances"}
-"""Where the name without underscores would not do."""
+"""Titles other than the name without underscores."""
 
 OFFERS = {
     "swarm_go_to": Offer(

@@ -1,4 +1,4 @@
-"""What running behaviors draw on the map: beams of their sensors, and their metric as a line over time. Pure.
+"""Drawings of running behaviors on the map: beams of their sensors, and their metric as a line over time. Pure.
 
 Each behavior sends all of its markers at once; those of one node have names that begin with the node's.
 """

@@ -34,7 +34,7 @@ class Connection(Protocol):
 
 
 class Arrival(NamedTuple):
-    """Where an untrusted connection came from, and when."""
+    """Source and time of an untrusted connection."""
 
     address: str
     time_s: float

@@ -14,7 +14,6 @@ class _RosClock(Clock):
 
     @property
     def now_s(self) -> float:
-        """Seconds since some moment."""
         return time.monotonic()
 
     def sleep(self, duration_s: float) -> bool:

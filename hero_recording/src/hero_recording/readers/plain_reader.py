@@ -8,7 +8,7 @@ from ..topics import Message, RawMessage
 
 
 class Reader:
-    """One open bag; see ros_reader, whose interface it has."""
+    """One open bag, with the interface of ros_reader's."""
 
     unindexed = ("ReaderError", "AnyReaderError")
 
@@ -25,7 +25,7 @@ class Reader:
         self._bag.close()
 
     def list_topics(self) -> Dict[str, Tuple[str, int]]:
-        """See ros_reader."""
+        """Return the type of every topic, and the number of its messages."""
         counts: Dict[str, Tuple[str, int]] = {}
         for connection in self._bag.connections:
             _, before = counts.get(connection.topic, ("", 0))
@@ -33,18 +33,18 @@ class Reader:
         return counts
 
     def find_span(self) -> Tuple[float, float]:
-        """See ros_reader."""
+        """Return the times of the first and the last message, seconds since 1970."""
         # Its end_time lies behind the last message.
         return self._bag.start_time / 1e9, (self._bag.end_time - 1) / 1e9
 
     def read(self, topics: Sequence[str]) -> Iterator[Message]:
-        """See ros_reader."""
+        """Yield messages in order of time."""
         for connection, time_ns, content in self._bag.messages(self._choose(topics)):
             message = self._bag.deserialize(content, connection.msgtype)
             yield Message(connection.topic, _name_in_ros1(connection.msgtype), message, time_ns / 1e9)
 
     def read_raw(self, topics: Sequence[str]) -> Iterator[RawMessage]:
-        """See ros_reader."""
+        """Yield messages in order of time, without decoding them."""
         headers = {connection.id: _make_header(connection) for connection in self._bag.connections}
         for connection, time_ns, content in self._bag.messages(self._choose(topics)):
             yield RawMessage(connection.topic, headers[connection.id], bytes(content), time_ns)

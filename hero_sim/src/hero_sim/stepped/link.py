@@ -1,4 +1,4 @@
-"""A robot that is stepped in process, as a BaseRobot needs it: see hero_client.robots.robot_link. Pure."""
+"""A robot that is stepped in process, for a BaseRobot. Pure."""
 
 import math
 import sys
@@ -6,11 +6,11 @@ from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from hero_client.robots.robot_link import MAP
 from hero_client.values.background_motion import BackgroundMotion, Steps
 from hero_client.values.errors import FrameError, StaleDataError
 from hero_client.values.readings import FRESH_S
 from hero_client.values.robot_constants import RobotModel
+from hero_client.values.robot_link import MAP, RobotLink
 from hero_client.values.sensing import Neighbor, Neighbors, list_neighbors, sense_neighbors
 from hero_node.command_line import say
 from hero_node.geometry import Pose, Velocity, find_frame
@@ -22,7 +22,7 @@ __all__ = ["StepLink"]
 WORLD = "world"
 
 
-class StepLink:
+class StepLink(RobotLink):
     """One robot: a row of RobotRows.
 
     Attributes:
@@ -33,12 +33,12 @@ class StepLink:
     """
 
     connected = True
+    is_stopped = False
 
     def __init__(self, clock: StepClock, row: int, robot_id: int) -> None:
         """Be the robot at row, whose odometry begins where it is."""
         self.clock = clock
         self.row = row
-        self.is_stopped = False
         self._robot_id = robot_id
         self._name = "hero_%d" % robot_id
         self._rows = rows = clock.rows
@@ -52,32 +52,28 @@ class StepLink:
 
     @property
     def true_pose(self) -> Pose:
-        """Where the robot is in the world."""
+        """The robot's pose in the world."""
         return Pose(*self._rows.world.poses[self.row].tolist())
 
     @property
     def model(self) -> RobotModel:
-        """See RobotLink."""
         model = self._rows.models[self.row]
         return RobotModel(model.radius_m, model.wheel_separation_m)
 
     def missing(self) -> Optional[str]:
-        """See RobotLink."""
         for topic in ("odom", "proximity"):
             if self.age_s(topic) > FRESH_S:
                 return "no message on /%s/%s: is the robot on and in reach?" % (self._name, topic)
         return None
 
     def subscribe(self, topic: str) -> None:
-        """See RobotLink; everything arrives without."""
+        """Do nothing: everything arrives."""
 
     def age_s(self, topic: str) -> float:
-        """See RobotLink."""
         arrival_ms = self._arrivals_ms[topic].item(self.row)
         return math.inf if arrival_ms < 0 else (self._rows.now_ms - arrival_ms) / 1000.0
 
     def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
-        """See RobotLink."""
         arrivals_ms = self._arrivals_ms[topic]
         deadline_s = self.clock.now_s + timeout_s
         for _ in range(count):
@@ -88,29 +84,24 @@ class StepLink:
                 self.clock.sleep(0.001)
 
     def read_pose(self) -> Pose:
-        """See RobotLink."""
         return Pose(*self._rows.odometry[self.row].tolist())
 
     def read_velocity(self) -> Velocity:
-        """See RobotLink."""
         return Velocity(*self._rows.velocities[self.row].tolist())
 
     def read_ranges(self) -> List[float]:
-        """See RobotLink."""
         ranges_m: List[float] = self._rows.proximity_m[self.row].tolist()
         return ranges_m
 
     def read_infrared_counts(self) -> List[float]:
-        """See RobotLink."""
         counts: List[float] = np.roll(self._rows.counts[self.row], 4).tolist()
         return counts
 
     def read_distance(self) -> float:
-        """See RobotLink."""
         return float(self._rows.distance_m[self.row])
 
     def read_neighbors(self) -> List[Neighbor]:
-        """See RobotLink; all robots of the same world are sensed, where they are."""
+        """All robots of the same world are sensed, where they are."""
         world = self._rows.world
         poses = world.poses.reshape(world.worlds, -1, 3)
         robots = poses.shape[1]
@@ -120,11 +111,11 @@ class StepLink:
         return list_neighbors(near, number, range(first_id, first_id + robots))
 
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
-        """See RobotLink; there is always a localization."""
+        """There is always a localization."""
         return self.localize() if frame == MAP else None
 
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
-        """See RobotLink; known are "world" and the robot's own odometry."""
+        """Known are "world" and the robot's own odometry."""
         if frame == WORLD:
             return self._origin
         if frame == self._name + "/odom":
@@ -132,21 +123,17 @@ class StepLink:
         raise FrameError("no transform from %s/odom to %s: robots in process know map and world" % (self._name, frame))
 
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
-        """See RobotLink."""
         if not self.is_stopped:
             self._rows.send_velocity(self.row, linear_m_s, angular_rad_s)
 
     def send_color(self, rgb: Tuple[float, float, float]) -> None:
-        """See RobotLink."""
         self._rows.send_light(self.row, (*rgb, 1.0))
 
     def set_odometry(self, pose: Pose) -> None:
-        """See RobotLink."""
         self._rows.set_odometry(self.row, *pose)
         self._origin = find_frame(self.true_pose, pose)
 
     def describe_stop(self) -> str:
-        """See RobotLink."""
         return "all robots are stopped. Release them with StepSwarm.release_stop()"
 
     def start(self, steps: Steps) -> BackgroundMotion:
@@ -154,8 +141,7 @@ class StepLink:
         return StepMotion(self.clock, steps)
 
     def log_warning(self, text: str) -> None:
-        """See RobotLink."""
         say(text, sys.stderr)
 
     def close(self) -> None:
-        """See RobotLink; there is nothing to leave."""
+        """Do nothing: there is no connection."""

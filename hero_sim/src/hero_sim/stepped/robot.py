@@ -34,7 +34,7 @@ class StepRobot(BaseRobot):
 
     @property
     def true_pose(self) -> Pose:
-        """Where the robot is, in the frame world."""
+        """The robot's pose in the frame world."""
         return self._link.true_pose
 
     def localize_by(self, localize: Callable[[], Pose]) -> None:

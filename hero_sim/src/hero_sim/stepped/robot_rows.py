@@ -197,7 +197,7 @@ class RobotRows:
 
     @property
     def distance_m(self) -> np.ndarray:
-        """What HeRo+'s sensor measures ahead of the robot's center (R,), nan without. Ask anew after advance()."""
+        """The distance ahead of the robot's center by HeRo+'s sensor (R,), nan without. Ask anew after advance()."""
         return self._read_distance().distance_m
 
     @property

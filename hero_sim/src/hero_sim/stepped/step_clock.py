@@ -93,7 +93,6 @@ class StepMotion(BackgroundMotion):
             self._clock.schedule(self)
 
     def cancel(self) -> bool:
-        """See BackgroundMotion."""
         if self.done():
             return False
         self._is_cancelled = True
@@ -103,7 +102,6 @@ class StepMotion(BackgroundMotion):
         return True
 
     def cancel_and_wait(self) -> None:
-        """See BackgroundMotion."""
         self.cancel()
         self._wait(None)
 

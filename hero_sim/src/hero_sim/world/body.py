@@ -34,7 +34,7 @@ class Body:
 
     @property
     def true_pose(self) -> Pose:
-        """Where the robot is in the world."""
+        """The robot's pose in the world."""
         return Pose(*self._world.poses[self.index].tolist())
 
     @property

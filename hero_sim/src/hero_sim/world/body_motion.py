@@ -1,4 +1,4 @@
-"""Where the bodies of all robots are: they roll with their wheels, and push each other.
+"""Motion of all robots' bodies: they roll with their wheels, and push each other.
 
 Pure: numpy only, over all robots of all worlds at once, quantities first and robots last.
 """

@@ -113,7 +113,7 @@ class Rays:
 
 
 class Sight(NamedTuple):
-    """What robots with the same walls and obstacles may see.
+    """Robots, with the walls and obstacles that they may see.
 
     Attributes:
         places_m (K, 2), headings (K, 2): of the robots that look; headings are cosine and sine.

@@ -21,6 +21,5 @@ class Aggregation(Behavior):
     v1_m_s, w1_rad_s = 0.0, -5.02  # a robot seen
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         linear_m_s = np.where(sensed.sees, self.v1_m_s, self.v0_m_s)
         return linear_m_s, np.where(sensed.sees, self.w1_rad_s, self.w0_rad_s), memory

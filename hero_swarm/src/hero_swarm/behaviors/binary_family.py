@@ -26,7 +26,6 @@ class WheelGenome(Behavior):
     left0 = right0 = left1 = right1 = 0.0
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         left_m_s = self.wheel_m_s * np.where(sensed.sees, self.left1, self.left0)
         right_m_s = self.wheel_m_s * np.where(sensed.sees, self.right1, self.right0)
         return (*join_wheels(left_m_s, right_m_s), memory)

@@ -19,7 +19,6 @@ class Rendezvous(Behavior):
     max_linear_m_s = 0.1
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         near = sensed.near
         forward_m_s, left_m_s = self.gain_1_s * near.average(near.forward_m), self.gain_1_s * near.average(near.left_m)
         return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), memory)
@@ -36,7 +35,6 @@ class LeaderFollowers(Behavior):
     max_linear_m_s = 0.12
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         near, numbers = sensed.near, sensed.numbers
         robots, leads = np.arange(len(numbers)), np.maximum(numbers - 1, 0)
         ahead_m, left_m = near.forward_m[robots, leads], near.left_m[robots, leads]
@@ -64,7 +62,6 @@ class Formation(Behavior):
     max_linear_m_s = 0.08
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         near, count = sensed.near, sensed.count
         radius_m = self.side_m / (2.0 * np.sin(np.pi / count))
         steps = sensed.numbers[:, None] - np.arange(count)

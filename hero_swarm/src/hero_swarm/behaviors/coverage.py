@@ -25,7 +25,6 @@ class VoronoiCoverage(Behavior):
     max_linear_m_s = 0.1
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         poses = sensed.poses.reshape(-1, sensed.count, 3)
         x_m = np.arange((self.cell_m - self.width_m) / 2.0, self.width_m / 2.0, self.cell_m)
         y_m = np.arange((self.cell_m - self.height_m) / 2.0, self.height_m / 2.0, self.cell_m)

@@ -25,7 +25,6 @@ class Flocking(Behavior):
     max_linear_m_s = 0.1
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         near = sensed.near
         range_m = np.maximum(near.range_m, 1e-6)
         pull_m_s = self.cohesion * (range_m - self.spacing_m) * np.minimum(self.spacing_m / range_m, 3.0)

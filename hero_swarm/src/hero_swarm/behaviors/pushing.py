@@ -32,7 +32,6 @@ class ObjectClustering(Behavior):
     left_robot, right_robot = 0.1, 0.5
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         is_object, is_robot = sensed.sees == OBJECT, sensed.sees == ROBOT
         left = np.where(is_object, self.left_object, np.where(is_robot, self.left_robot, self.left_nothing))
         right = np.where(is_object, self.right_object, np.where(is_robot, self.right_robot, self.right_nothing))
@@ -118,7 +117,6 @@ class CooperativeTransport(PushToGoal):
     shade = 0.6
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         way = self._find_way(sensed)
         hidden = (way.behind_m > 0.0) & (np.abs(way.aside_m) < self.shade * sensed.objects.radii_m[0])
         share_m_s = self.linear_m_s / np.maximum(np.hypot(way.forward_m, way.left_m), 1e-6)
@@ -145,7 +143,6 @@ class BoxPushing(PushToGoal):
     tolerance_m = 0.03
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         way = self._find_way(sensed)
         row_m = sensed.objects.radii_m[0] + BODY_RADIUS_M + self.gap_m
         # From right to left as they are now, so that no two ways cross.

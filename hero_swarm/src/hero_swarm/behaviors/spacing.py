@@ -20,7 +20,6 @@ class Dispersion(Behavior):
     max_linear_m_s = 0.1
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         near = sensed.near
         range_m = np.maximum(near.range_m, 1e-6)
         push = self.gain_1_s * np.maximum(self.spacing_m - range_m, 0.0) * near.seen / range_m
@@ -46,7 +45,7 @@ class Segregation(Behavior):
     max_linear_m_s = 0.1
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior; the memory is the group of each robot."""
+        """The memory is the group of each robot."""
         near, group = sensed.near, sensed.numbers % int(self.groups)
         range_m = np.maximum(near.range_m, 1e-6)
         is_own = group[near.rows] == group[:, None]
@@ -59,7 +58,6 @@ class Segregation(Behavior):
         return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), group)
 
     def colors(self, memory: Any) -> np.ndarray:
-        """See Behavior."""
         palette = np.array([(1, 0, 0), (0, 0, 1), (0, 1, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)], dtype=float)
         shown: np.ndarray = palette[memory % len(palette)]
         return shown

@@ -25,7 +25,6 @@ class Voter(Behavior):
     clear_m = 0.12
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        """See Behavior."""
         near = sensed.near
         opinions = (sensed.numbers >= sensed.count // 2).astype(int) if memory is None else memory
         looks = (random.random() < self.changes_hz / self.rate_hz) & (near.counts > 0)
@@ -43,7 +42,7 @@ class Voter(Behavior):
         return taken
 
     def colors(self, memory: Any) -> np.ndarray:
-        """See Behavior: red for 0, blue for 1."""
+        """Red for 0, blue for 1."""
         return np.column_stack((memory == 0, np.zeros(len(memory)), memory == 1)).astype(float)
 
 
@@ -51,7 +50,6 @@ class Majority(Voter):
     """A robot takes over what most of its neighbors and itself say; a tie changes nothing (Galam 2002)."""
 
     def decide(self, opinions: np.ndarray, near: Any, random: Random) -> np.ndarray:
-        """See Voter."""
         for_one = (opinions[near.rows] * near.seen).sum(axis=1) + opinions
         voters = near.counts + 1
         return np.where(2 * for_one == voters, opinions, (2 * for_one > voters).astype(int))

@@ -1,4 +1,4 @@
-"""Where batches are computed: worker processes of this machine, or a Dask cluster. Both are an Executor.
+"""Workers that compute batches: processes of this machine, or a Dask cluster. Both are an Executor.
 
 Knows nothing of experiments: it calls a function with arguments, and survives workers that die.
 """

@@ -30,7 +30,7 @@ SETTINGS = ("robots", "errors", "delay_s", "arena", "objects")
 ERRORS = {"perfect": 0.0, "default": 1.0}
 """Differences between robots, as an option of the simulator."""
 OBJECTS = ("arena", "scattered")
-"""Where what robots push is at the start: as in the arena, or at places drawn from each seed."""
+"""Places of the objects at the start: as in the arena, or drawn from each seed."""
 TESTS = ("wilcoxon",)
 _REQUIRED = ("behavior", "time_s", "seeds", "metrics")
 _KEYS = (

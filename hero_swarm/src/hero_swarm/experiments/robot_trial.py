@@ -50,7 +50,7 @@ class RobotTrial:
 
     @property
     def drive(self) -> str:
-        """How the behavior wants the wheels to be driven: see Behavior."""
+        """The behavior's way to drive the wheels: see Behavior."""
         return self._behavior.drive
 
     def step(

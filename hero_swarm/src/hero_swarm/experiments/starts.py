@@ -1,4 +1,4 @@
-"""Where the robots of a run begin, which depends on seed and number alone. Pure but for a file."""
+"""Start poses of a run, which depend on seed and number alone. Pure but for a file."""
 
 import math
 from typing import List, Optional, Sequence

@@ -1,4 +1,4 @@
-"""What was recorded of one robot. Pure."""
+"""The recording of one robot. Pure."""
 
 from typing import NamedTuple
 

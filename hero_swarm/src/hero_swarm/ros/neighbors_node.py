@@ -58,7 +58,7 @@ def make_messages(
 
 
 class NeighborsNode:
-    """What all robots sense; robots that join a driver are added."""
+    """Publishes the neighbors of all robots; robots that join a driver are added."""
 
     def __init__(self, parameters: Dict[str, Any]) -> None:
         """Begin with the robots of ~robots."""

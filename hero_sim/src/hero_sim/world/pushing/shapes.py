@@ -12,7 +12,7 @@ Point = Tuple[float, float]
 
 
 class Contact(NamedTuple):
-    """Where a body presses on another one; frame world.
+    """The contact of two bodies; frame world.
 
     Attributes:
         x_m, y_m: the point.

@@ -5,9 +5,9 @@ from typing import List, Optional, Protocol, Tuple
 from hero_node.clock import Clock
 from hero_node.geometry import Pose, Velocity
 
-from ..values.background_motion import BackgroundMotion, Steps
-from ..values.robot_constants import RobotModel
-from ..values.sensing import Neighbor
+from .background_motion import BackgroundMotion, Steps
+from .robot_constants import RobotModel
+from .sensing import Neighbor
 
 __all__ = ["MAP", "RobotLink"]
 
@@ -18,9 +18,8 @@ MAP = "map"
 class RobotLink(Protocol):
     """One robot. Names of topics: "odom", "proximity", "encoder", "laser", "neighbors", "distance"."""
 
-    @property
-    def clock(self) -> Clock:
-        """The time in which the robot lives."""
+    clock: Clock
+    """The time in which the robot lives."""
 
     @property
     def connected(self) -> bool:
