@@ -219,7 +219,8 @@ def test_a_server_gives_each_goal_its_own_limits_or_those_of_the_server(monkeypa
                 assert name == end and reason == result.reason == outcome[2]
                 assert (result.reached, result.distance, result.elapsed) == (outcome[0], *outcome[3:])
     for handle, level in ((None, "logdebug"), (Handle(), "loginfo")):
-        server.end_goal(ask(0.3, handle=handle), server_module.goals.GoalOutcome(False, True, "another goal came", 0.1, 2.0))
+        outcome = server_module.goals.GoalOutcome(False, True, "another goal came", 0.1, 2.0)
+        server.end_goal(ask(0.3, handle=handle), outcome)
         assert logged.pop() == level, "goals on the topic may come as a stream"
     link.silent_s["odom"] = 2.0
     handle = Handle()

@@ -39,7 +39,7 @@ STYLE = {
     "axes.axisbelow": True,
     "legend.frameon": False,
 }
-"""What all figures share: draw within rc_context(STYLE)."""
+"""Style of all figures: draw within rc_context(STYLE)."""
 
 _GRAY = "0.45"
 _OBSTACLES = {"edgecolor": "black", "linewidth": 1.5}
@@ -134,7 +134,8 @@ class Figures:
         axes.add_collection(LineCollection(walls, **_OBSTACLES))
         for x_m, y_m, radius_m in self._seen.circles_m:
             axes.add_patch(patches.Circle((x_m, y_m), radius_m, fill=False, **_OBSTACLES))
-        legend = [Line2D([], [], color=_GRAY, label=label, **style) for label, style in (("start", _BEGIN), ("end", _END))]
+        ends = (("start", _BEGIN), ("end", _END))
+        legend = [Line2D([], [], color=_GRAY, label=label, **style) for label, style in ends]
         if any(map(_has_comparable_truth, drawn.values())):
             legend.append(Line2D([], [], color=_GRAY, label="ground truth", **_TRUTH))
         if self._seen.walls_m or self._seen.circles_m:

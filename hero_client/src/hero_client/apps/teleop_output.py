@@ -16,7 +16,7 @@ class TeleopOutput:
         self._is_moving = False
 
     def demand_stop(self) -> None:
-        """Let the next stop pass, also without a motion before it."""
+        """Pass the next stop on, also without a motion before it."""
         self._is_moving = True
 
     def passes(self, command: Velocity) -> bool:

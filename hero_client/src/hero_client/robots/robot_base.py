@@ -200,7 +200,7 @@ class BaseRobot(Group):
         return self._link.read_ranges() if self._link.age_s("proximity") <= FRESH_S else [math.nan] * 8
 
     def nearest(self) -> Optional[Obstacle]:
-        """Return range (m, from the center) and bearing (rad) of the nearest obstacle; None: none. Raises: as `pose`."""
+        """Return range (m, from the center) and bearing (rad) of the nearest obstacle, or None. Raises: as `pose`."""
         ranges = self.proximity
         return find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
 

@@ -1,4 +1,4 @@
-"""How a robot's wheels roll in the simulator after the commands of a recording. Pure."""
+"""Motion of a robot's wheels in the simulator by the commands of a recording. Pure."""
 
 from collections import deque
 from operator import itemgetter
