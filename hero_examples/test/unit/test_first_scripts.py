@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import true_paths
 
+from hero_client.values.readings import Obstacle
 from hero_examples import all_robots, avoid, drive_a_square, keep_distance, move, read_sensors
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
@@ -102,3 +103,52 @@ def test_all_robots_turns_every_robot_in_a_color_of_its_own():
             assert robot.true_pose.yaw_rad - yaw_rad > 0.8
             assert robot.light == (0.0, 0.0, 0.0)
     assert any(len(set(lights)) == 5 for lights in seen)
+
+
+class Noting:
+    """A robot that sees what a test says, and notes what it is told."""
+
+    def __init__(self, ranges_m=(math.inf,) * 8, nearest=None):
+        self.proximity, self._nearest, self.told = ranges_m, nearest, []
+        self.pose = (0.1, -0.2, 0.3)
+
+    def nearest(self):
+        return self._nearest
+
+    def __getattr__(self, name):
+        return lambda *arguments, **options: self.told.append((name, *arguments, *options.values()))
+
+
+def test_steps_command_what_their_lines_say():
+    free, near = math.inf, 0.149
+    for front, front_left, front_right, expected in (
+        (free, free, free, (0.08, 0.0)),
+        (0.15, 0.15, 0.15, (0.08, 0.0)),
+        (near, free, 0.2, (0.0, 1.5)),
+        (near, 0.2, free, (0.0, -1.5)),
+        (free, near, free, (0.0, -1.5)),
+        (free, free, near, (0.0, 1.5)),
+        (near, 0.2, 0.2, (0.0, -1.5)),
+    ):
+        robot = Noting((front, front_left, near, near, near, near, near, front_right))
+        avoid.step(robot)
+        assert robot.told == [("drive", *expected)], (front, front_left, front_right)
+    for nearest, expected in (
+        (None, (0.05, 0.0)),
+        (Obstacle(0.25, 0.0), (0.08, 0.0)),
+        (Obstacle(0.1, math.pi), (0.04, 1.5 * math.pi)),
+        (Obstacle(0.15, -0.5), (0.0, -0.75)),
+    ):
+        robot = Noting(nearest=nearest)
+        keep_distance.step(robot)
+        ((_, *command),) = robot.told
+        assert command == pytest.approx(expected), nearest
+    robot = Noting()
+    read_sensors.step(robot)
+    assert robot.told == [("drive", 0.0, 0.6)]
+    robot = Noting()
+    move.move(robot)
+    assert robot.told == [("wait_until_ready",), ("drive", 0.1, 0.0, 2.0), ("drive", 0.0, 1.5, 1.0)]
+    robot = Noting()
+    drive_a_square.drive_a_square(robot)
+    assert robot.told == [("blink", "green", 0.5)] + [("forward", 0.2), ("turn", math.pi / 2.0)] * 4

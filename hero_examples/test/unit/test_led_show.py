@@ -46,3 +46,13 @@ def test_blink_alternates_between_red_and_blue_together():
 
 def test_brightness_dims_every_color():
     assert max(max(light) for lights in show("rainbow", 0.25) for light in lights) == 0.25
+
+
+def test_patterns_go_through_their_colors_once_a_period():
+    assert led_show.rainbow(0.0, 0.0, False) == (1.0, 0.0, 0.0)
+    assert led_show.rainbow(0.5, 0.5 + 1.0 / 3.0, False) == pytest.approx((0.0, 1.0, 0.0))
+    assert [led_show.blink(phase, 0.0, False) for phase in (0.49, 0.5)] == [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
+    with StepSwarm(3) as swarm:
+        led_show.step(swarm, led_show.rainbow, 0.0)
+        swarm.sleep(0.2)
+        assert [robot.light for robot in swarm] == [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
