@@ -7,6 +7,7 @@ from typing import Optional, Sequence
 from hero_node import command_line
 from hero_node.errors import HeroError
 from hero_node.safe_file import write_file
+from hero_sim.world.arena_file import load_arena
 
 from .experiments.errors import ExperimentError
 from .fitting.robot_fit import describe_fit, fit_robot
@@ -18,6 +19,9 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="fit", description="Fit the simulator to the robots of recordings.")
     parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of odometry, commands and poses")
+    parser.add_argument(
+        "--arena", metavar="FILE", help="walls of the recordings, in the frame of the poses: fits infrared sensors, too"
+    )
     parser.add_argument("--out", metavar="FILE", default="robots.errors", help="error file (%(default)s)")
     return parser.parse_args(arguments)
 
@@ -26,16 +30,18 @@ def fit(options: argparse.Namespace) -> None:
     """Fit each robot, print what was found, and write the file. Raises: ExperimentError."""
     from .ros.recording_reader import read_recordings  # --help needs no ROS
 
-    lines = []
+    arena = load_arena(options.arena) if options.arena else None
+    lines = ["# slip cannot be told from smaller wheels: it is the usual one, and wheels are fitted with it"]
+    found = len(lines)
     for robot_id, recordings in sorted(read_recordings(options.bags).items()):
         try:
-            own = describe_fit(fit_robot(recordings), robot_id)
+            own = describe_fit(fit_robot(recordings, arena), robot_id)
         except ValueError as error:
             print("hero_%d: %s" % (robot_id, error), file=sys.stderr)
             continue
         print("\n".join(own))
         lines += own
-    if not lines:
+    if len(lines) == found:
         raise ExperimentError("no robot could be fitted")
     write_file(options.out, ("\n".join(lines) + "\n").encode())
     print("written: %s" % options.out)

@@ -1,6 +1,7 @@
 """Fitting the simulator to simulated robots with hidden errors, and the file of what was found."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 from hero_sim.errors import OptionError
 from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.world.arena import build_rectangle
 from hero_sim.world.robot_errors import KINDS, draw_errors, read_known, set_known
 from hero_sim.world.world import World
 from hero_swarm.experiments.batch import build_trial, load_checked
@@ -15,9 +17,11 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body, follow_wheels
-from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, build_errors, predict_ends
+from hero_swarm.fitting.infrared_fit import fit_infrared
+from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
 from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, measure_wheels, sample_times
-from hero_swarm.fitting.robot_fit import describe_fit, fit_robot
+from hero_swarm.fitting.replay import Motors, build_errors
+from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
 from hero_swarm.metrics import METRICS
 from hero_swarm.trial import OPEN
 
@@ -80,6 +84,49 @@ def test_velocities_tell_the_body_but_no_motors():
     assert errors.wheel_scale[0, 1] == pytest.approx(fit.values["right_wheel"], rel=1e-4)
 
 
+INFRARED = "alpha_counts_m2=0.5,alpha3_counts_m2=0.36,beta_counts=-3"
+WALLS = build_rectangle(0.5, 0.4, 1)
+
+
+def record_scans(time_s):
+    """Return signals of a robot that drives in a small arena with another one, and both robots' poses."""
+    errors = draw_errors([np.random.RandomState(1), np.random.RandomState(5)])
+    set_known(errors, 0, "robot=0," + INFRARED)
+    starts = np.array(((-0.1, 0.0, 0.0), (0.1, 0.05, 1.0)))
+    rows = RobotRows(World(WALLS, starts, [np.random.RandomState(2)], errors))
+    random, scans, poses = np.random.RandomState(3), [], ([], [])
+    rows.on_scan.append(lambda _: scans.append((rows.now_ms / 1000.0, *rows.counts[0])))
+    for now_ms in range(0, round(1000.0 * time_s), 100):
+        if now_ms % 1500 == 0:
+            rows.send_velocity(np.arange(2), random.uniform(-0.1, 0.12, 2), random.uniform(-2.0, 2.0, 2))
+        rows.advance(now_ms + 100)
+        for table, pose in zip(poses, rows.world.poses + random.normal(0.0, (0.001, 0.001, 0.01), (2, 3))):
+            table.append((now_ms / 1000.0 + 0.1, *pose))
+    own, other = map(np.array, poses)
+    return Recording("hero_0", np.empty((0, 4)), own, own, np.array(scans), (other,))
+
+
+def test_hidden_infrared_constants_come_back_from_a_known_arena():
+    recording = record_scans(90.0)
+    fit = fit_infrared([recording], WALLS, 2.0 / 3.0)
+    for beam in range(8):
+        assert fit.values["alpha%d_counts_m2" % beam] == pytest.approx(0.36 if beam == 3 else 0.5, rel=0.03), beam
+    assert fit.values["beta_counts"] == pytest.approx(-3.0, abs=0.3)
+    assert fit.after_counts < fit.before_counts / 3.0
+    lines = describe_fit(Fit("hero_4", fit.values, 0.0, 0.03, 0.01, fit), 4)
+    assert re.search(r"# hero_4: held-out infrared signals are \d\.\d counts off, before the fit \d\.\d$", lines[-2])
+    assert ",beta_counts=-" in lines[-1]
+
+
+def test_infrared_sensors_that_saw_too_little_are_named():
+    recording = record_scans(90.0)
+    without_scans = recording._replace(scans=recording.scans[:0])
+    lost = recording._replace(others=(recording.others[0][:5],))  # where the other robot is then, nobody knows
+    for own in (without_scans, lost):
+        with pytest.raises(ValueError, match="infrared sensor . saw .* things at 3 to 20 cm .*--raw"):
+            fit_infrared([own], WALLS, 2.0 / 3.0)
+
+
 def test_a_robot_that_hardly_turns_cannot_be_fitted():
     with pytest.raises(ValueError, match="turned by .* rad only"):
         fit_robot([record(VELOCITY, 20.0, turns=False)])
@@ -129,7 +176,7 @@ def test_wrong_error_files_are_refused_with_the_line(tmp_path):
 
 def test_a_fit_starts_from_the_drawing_within_the_limits_of_errors():
     values = {name: start for name, (start, *_) in _PARAMETERS.items() if name != DELAY}
-    fitted, drawn = build_errors([values]), build_errors([{}])
+    fitted, drawn = build_errors([Motors(values)]), build_errors([Motors({})])
     for name in values:
         _, step, least, most = _PARAMETERS[name]
         kind = KINDS[name]
@@ -194,5 +241,5 @@ def test_a_body_is_fitted_to_stretches_that_have_poses_throughout():
 def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
     recording = make_recording(13.0, yaw_rad=1.0)
     for start_share, paths in ((0.5, 3), (0.0, 6), (0.9, 0)):
-        ends_m = predict_ends(recording, [({}, 0.0), ({"lag_s": 0.2}, 0.1)], start_share, 2.0)
+        ends_m = predict_ends(recording, [(Motors({}), np.ones(3)), (Motors({"lag_s": 0.2}, 0.1), np.ones(3))], start_share, 2.0)
         assert ends_m == pytest.approx(np.full((2, paths), 0.2), abs=1e-6)

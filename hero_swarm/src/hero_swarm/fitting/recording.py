@@ -1,17 +1,19 @@
 """The recording of one robot. Pure."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 
-__all__ = ["PULSES", "SAMPLE_S", "VELOCITY", "Recording", "measure_wheels", "sample_times"]
+__all__ = ["NO_SCANS", "PULSES", "SAMPLE_S", "VELOCITY", "Recording", "measure_wheels", "sample_times"]
 
 VELOCITY, PULSES = 0, 1
 """Kinds of commands."""
 
 SAMPLE_S = 0.05
+
+NO_SCANS = np.empty((0, 9))
 
 
 class Recording(NamedTuple):
@@ -21,12 +23,16 @@ class Recording(NamedTuple):
         commands: time, kind, linear m/s and angular rad/s or left and right servo pulse us (C, 4).
         odometry: time, x m, y m, yaw rad, by the ticks of wheels as on the drawing (T, 4).
         poses: time, x m, y m, yaw rad in a fixed frame (P, 4).
+        scans: time, and the signals of the eight infrared sensors in counts, rear first (S, 9).
+        others: poses of the other robots.
     """
 
     name: str
     commands: np.ndarray
     odometry: np.ndarray
     poses: np.ndarray
+    scans: np.ndarray = NO_SCANS
+    others: Tuple[np.ndarray, ...] = ()
 
     @property
     def time_s(self) -> float:

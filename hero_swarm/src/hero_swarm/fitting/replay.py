@@ -13,7 +13,7 @@ from hero_sim.world.world import STEP_MS, World
 from ..trial import OPEN
 from .recording import PULSES, Recording, sample_times
 
-__all__ = ["Motors", "replay_commands"]
+__all__ = ["Motors", "build_errors", "replay_commands"]
 
 _STEP_S = STEP_MS / 1000.0
 
@@ -37,7 +37,7 @@ def replay_commands(recording: Recording, motors: Sequence[Motors]) -> np.ndarra
     """Return how far both wheels (m) of simulated robots have rolled at sample_times(), each alone (T, R, 2)."""
     robots = len(motors)
     rngs = [np.random.RandomState(0) for _ in motors]
-    rows = RobotRows(World(OPEN, np.zeros((robots, 3)), rngs, _build_errors(motors)))
+    rows = RobotRows(World(OPEN, np.zeros((robots, 3)), rngs, build_errors(motors)))
     phases_s = np.array([own.phase_s for own in motors])
     pending = deque(sorted(
         ((command[0] + phase_s, (phases_s == phase_s).nonzero()[0], command)
@@ -61,7 +61,7 @@ def replay_commands(recording: Recording, motors: Sequence[Motors]) -> np.ndarra
     ).transpose(2, 0, 1)
 
 
-def _build_errors(motors: Sequence[Motors]) -> RobotErrors:
+def build_errors(motors: Sequence[Motors]) -> RobotErrors:
     """Return robots as on the drawing, without chance, but for the motors' values."""
     errors = draw_errors((np.random.RandomState(0) for _ in motors), 0.0)
     for row, own in enumerate(motors):

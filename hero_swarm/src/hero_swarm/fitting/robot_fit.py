@@ -1,12 +1,14 @@
 """Fits the simulator to one robot, and tells how much better it predicts paths that the fit has not seen. Pure."""
 
-from typing import Dict, List, NamedTuple
+from typing import Dict, List, NamedTuple, Optional
 
 import numpy as np
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+from hero_sim.world.arena import Arena
 
 from .body_fit import fit_body
+from .infrared_fit import InfraredFit, fit_infrared
 from .motor_fit import fit_motors, predict_ends
 from .recording import Recording
 from .replay import Motors
@@ -33,6 +35,7 @@ class Fit(NamedTuple):
         values: by key, as --error takes them.
         delay_s: how much later than in the simulator commands work.
         before_m, after_m: median error at the ends of held-out paths, of a robot as on the drawing and of this one.
+        infrared: None without an arena.
     """
 
     name: str
@@ -40,10 +43,14 @@ class Fit(NamedTuple):
     delay_s: float
     before_m: float
     after_m: float
+    infrared: Optional[InfraredFit]
 
 
-def fit_robot(recordings: List[Recording]) -> Fit:
-    """Return the differences of the robot of these recordings. Raises: ValueError if they tell too little."""
+def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit:
+    """Return the differences of the robot of these recordings, its infrared sensors in the arena that it saw only.
+
+    Raises: ValueError if they tell too little.
+    """
     share = 1.0 - HELD_OUT_SHARE
     body = fit_body([recording.cut(0.0, share * recording.time_s) for recording in recordings])
     motors = fit_motors(recordings, share)
@@ -57,8 +64,9 @@ def fit_robot(recordings: List[Recording]) -> Fit:
     left_wheel, right_wheel = (body[:2] / (1.0 - SLIP * _SLIP_MEAN)).tolist()
     rolled = {"left_wheel": left_wheel, "right_wheel": right_wheel, "slip": SLIP}
     separation = {"wheel_separation_m": float(body[2]) * WHEEL_SEPARATION_M}
-    values = {**motors[0].values, **rolled, **separation}
-    return Fit(recordings[0].name, values, motors[0].delay_s, before_m, after_m)
+    infrared = None if arena is None else fit_infrared(recordings, arena, share)
+    values = {**motors[0].values, **rolled, **separation, **(infrared.values if infrared else {})}
+    return Fit(recordings[0].name, values, motors[0].delay_s, before_m, after_m, infrared)
 
 
 def describe_fit(fit: Fit, robot_id: int) -> List[str]:
@@ -68,8 +76,8 @@ def describe_fit(fit: Fit, robot_id: int) -> List[str]:
     motors = "no servo pulses were recorded, so motors are as on the drawing"
     if "lag_s" in fit.values:
         motors = "commands work %.0f ms later than in the simulator" % (1e3 * fit.delay_s)
-    return [
-        "# %s: %s" % (fit.name, ends % (PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m)),
-        "# %s: %s" % (fit.name, motors),
-        "robot=%d,%s" % (robot_id, values),
-    ]
+    remarks = [ends % (PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m), motors]
+    if fit.infrared is not None:
+        errors_counts = fit.infrared.after_counts, fit.infrared.before_counts
+        remarks.append("held-out infrared signals are %.1f counts off, before the fit %.1f" % errors_counts)
+    return ["# %s: %s" % (fit.name, remark) for remark in remarks] + ["robot=%d,%s" % (robot_id, values)]

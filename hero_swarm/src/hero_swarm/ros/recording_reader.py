@@ -10,13 +10,13 @@ from hero_msgs.msg import RobotPose
 from hero_node.geometry import yaw_of
 
 from ..experiments.errors import ExperimentError
-from ..fitting.recording import PULSES, VELOCITY, Recording
+from ..fitting.recording import NO_SCANS, PULSES, VELOCITY, Recording
 
 __all__ = ["read_recordings"]
 
 POSES_TOPIC = "/localization/poses"
 
-_ROBOT = re.compile(r"/hero_(\d+)/(odom|ground_truth|cmd_motor|cmd_vel|velocity_controller/cmd_vel)$")
+_ROBOT = re.compile(r"/hero_(\d+)/(odom|ground_truth|laser|cmd_motor|cmd_vel|velocity_controller/cmd_vel)$")
 
 MAX_SPEED_M_S = 1.0
 """Faster odometry was set, or its robot started anew."""
@@ -36,11 +36,14 @@ def read_recordings(paths: Sequence[str]) -> Dict[int, List[Recording]]:
                 tables = _read_tables(bag)
         except (OSError, rosbag.ROSBagException) as error:
             raise ExperimentError("%s cannot be read: %s" % (path, error or type(error).__name__)) from error
-        for robot_id in sorted({robot_id for robot_id, _ in tables}):
-            odometry, commands = (tables.get((robot_id, kind), []) for kind in ("odom", "commands"))
-            poses = tables.get((robot_id, "map")) or tables.get((robot_id, "ground_truth")) or []
-            if len(odometry) > 1 and commands and poses:
-                found.setdefault(robot_id, []).append(_align(robot_id, odometry, commands, poses))
+        ids = sorted({robot_id for robot_id, _ in tables})
+        poses = {own: tables.get((own, "map")) or tables.get((own, "ground_truth")) or [] for own in ids}
+        for robot_id in ids:
+            odometry, commands, scans = (tables.get((robot_id, kind), []) for kind in ("odom", "commands", "laser"))
+            if len(odometry) > 1 and commands and poses[robot_id]:
+                others = [rows for own, rows in poses.items() if own != robot_id and rows]
+                own_tables = [commands, odometry, poses[robot_id], scans, *others]
+                found.setdefault(robot_id, []).append(_align(robot_id, own_tables))
     if not found:
         text = "%s: no robot with odometry, commands and poses (of localize, or ground truth) in it"
         raise ExperimentError(text % ", ".join(paths))
@@ -72,20 +75,26 @@ def _read_row(topic: str, message: Any, received_s: float) -> Tuple[str, Tuple[f
         pose = message.pose.pose
         place = (pose.position.x, pose.position.y, yaw_of(pose.orientation))
         return topic, (message.header.stamp.to_sec(), *place)
+    if topic == "laser":
+        # Every other beam is an average of its neighbors.
+        return topic, (message.header.stamp.to_sec(), *message.intensities[::2])
     if topic == "cmd_motor":
         return "commands", (received_s, PULSES, message.left_motor_pwm, message.right_motor_pwm)
     return "commands", (received_s, VELOCITY, message.linear.x, message.angular.z)
 
 
-def _align(robot_id: int, odometry: Rows, commands: Rows, poses: Rows) -> Recording:
-    """Return a recording whose time begins with the odometry."""
-    tables = []
-    for rows in (commands, odometry, poses):
-        table = np.array(sorted(rows))
-        table[:, 0] -= min(odometry)[0]
-        tables.append(table[table[:, 0] >= 0.0])
+def _align(robot_id: int, tables: Sequence[Rows]) -> Recording:
+    """Return a recording, of its tables in order, whose time begins with the odometry."""
+    start_s = min(tables[1])[0]
+    commands, odometry, poses, scans, *others = (_shift(rows, start_s) for rows in tables)
     name = "hero_%d" % robot_id
-    steps = np.diff(tables[1], axis=0)
+    steps = np.diff(odometry, axis=0)
     if (np.hypot(steps[:, 1], steps[:, 2]) > MAX_SPEED_M_S * np.maximum(steps[:, 0], 0.02)).any():
         raise ExperimentError("%s: its odometry jumps: it was set, or the robot started anew; record again" % name)
-    return Recording(name, *tables)
+    return Recording(name, commands, odometry, poses, scans, tuple(others))
+
+
+def _shift(rows: Rows, start_s: float) -> np.ndarray:
+    table = np.array(sorted(rows)) if rows else NO_SCANS
+    shifted = table - np.append(start_s, np.zeros(table.shape[1] - 1))
+    return shifted[shifted[:, 0] >= 0.0]

@@ -160,7 +160,7 @@ def _record(program: Program, path: str, name: str, ids: Sequence[int], time_s: 
     bags = os.path.join(path, "bags")
     pattern = os.path.join(glob.escape(bags), name + "_*")
     before = set(glob.glob(pattern))
-    command = ["rosrun", "hero_recording", "record", "--folder", bags, "--name", name]
+    command = ["rosrun", "hero_recording", "record", "--raw", "--folder", bags, "--name", name]
     command += ["--robots", " ".join(map(str, ids))]
     # Should this program be killed, the recorder ends by itself.
     command += ["--seconds", "%g" % (time_s + RECORD_START_S)]
