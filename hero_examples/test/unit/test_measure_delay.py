@@ -68,7 +68,7 @@ def test_delays_of_messages_and_motions_are_measured_to_both_sides(monkeypatch, 
     assert stage.stopped == 1 and stage.receive is None
 
 
-def test_a_robot_that_does_not_move_is_given_two_seconds_and_an_end_is_an_end(monkeypatch):
+def test_a_robot_that_does_not_move_is_given_two_seconds(monkeypatch):
     stage = Stage(monkeypatch, delay_s=9.0)
     assert stage.measure(1)["command to motion"] == [] and stage.now_s == pytest.approx(103.0, abs=0.02)
     ended = Stage(monkeypatch, ends_s=100.5)
