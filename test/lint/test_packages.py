@@ -38,6 +38,16 @@ ORDER = (
 FOR_LEARNING = {"hero_examples", "hero_tutorial"}
 KNOW_NEITHER_DRIVER_NOR_SIMULATOR = {"hero_client", "hero_examples", "hero_tutorial", "hero_description"}
 
+CONDA_NAMES = {"matplotlib": "matplotlib-base", "pil": "pillow", "yaml": "pyyaml"}
+
+
+def name_in_conda(key):
+    """Return what conda-forge or RoboStack call the package of a rosdep key."""
+    if key.startswith("python3-"):
+        name = key[len("python3-") :]
+        return CONDA_NAMES.get(name, name)
+    return "ros-noetic-" + key.replace("_", "-")
+
 
 def needed_package(module, own_package):
     """The package that must be declared for an import, or None for the standard library and for our own."""
@@ -170,6 +180,16 @@ def test_every_dependency_is_a_known_rosdep_key():
     keys = {key for listed in files.values() for key in listed}
     needed = {name for package in PACKAGES for name in sources.read_dependencies(package)} - set(PACKAGES)
     assert needed == keys, f"not looked up: {needed - keys}; of no package: {keys - needed}"
+
+
+def test_the_recipe_of_robostack_has_the_version_and_dependencies_of_all():
+    recipe = yaml.safe_load((sources.ROOT / "packaging" / "robostack" / "recipe.yaml").read_text(encoding="utf-8"))
+    version = ElementTree.parse(sources.ROOT / "hero" / "package.xml").getroot().findtext("version")
+    assert recipe["context"]["version"] == version
+    kinds = {"host": ("depend", "build_depend", "buildtool_depend"), "run": ("depend", "exec_depend")}
+    for part, tags in kinds.items():
+        keys = {name for package in PACKAGES for name in sources.read_dependencies(package, *tags)} - set(PACKAGES)
+        assert {name_in_conda(key) for key in keys} | {"python"} == set(recipe["requirements"][part])
 
 
 def test_bootstrap_installs_the_python_packages_that_are_declared():
