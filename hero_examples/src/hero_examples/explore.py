@@ -7,7 +7,7 @@ import rospy
 from geometry_msgs.msg import PoseArray
 
 from hero_client import CommonFrame, Program, open_swarm, read_parameters, run
-from hero_client.controllers.avoidance import WanderLaw, WanderMemory, wander
+from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
 from hero_client.controllers.motion import State
 from hero_node.geometry import STOP
@@ -44,6 +44,7 @@ class Explorer:
         command = STOP
         if pose is not None and not all(map(math.isnan, ranges)):
             self.choose(pose, frontiers, taken, now_s)
+            ranges = shorten_for_body(ranges, self.robot.model.body_radius_m)
             if self.controller:
                 command = self.controller.step(pose, ranges, now_s)
             else:

@@ -6,7 +6,7 @@ import random
 import rospy
 
 from hero_client import Program, open_swarm, read_parameters, run
-from hero_client.controllers.avoidance import WanderLaw, WanderMemory, wander
+from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
 from hero_node.geometry import STOP
 from hero_node.parameters import number, robot_ids, whole_number
@@ -28,6 +28,7 @@ class Walker:
             missing = missing or "no usable ranges: infrared calibration?"
             command, self.memory, color = STOP, WanderMemory(), "blue"
         else:
+            ranges = shorten_for_body(ranges, self.robot.model.body_radius_m)
             command, self.memory = wander(ranges, self.memory, self.random.random(), self.law)
             color = "green" if command.linear_m_s >= self.law.cruise_m_s else "yellow"
             color = "red" if self.memory.escape_sign else color

@@ -60,6 +60,7 @@ def form():
         common = CommonFrame(parameters["frame"])
         with open_swarm(program, ids) as swarm:
             poses = common.wait_for_poses(program, swarm)
+            law = law._replace(body_m=swarm.max_body_radius_m)
             goals = place_formation(wanted, len(swarm), law.min_spacing_m)
             if parameters["assign"]:
                 goals = [goals[index] for index in assign_goals([pose[:2] for pose in poses], goals)]

@@ -8,7 +8,9 @@ import pytest
 import true_paths
 
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.world.arena import build_default
 from hero_sim.world.arena_file import load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
@@ -46,6 +48,15 @@ def test_walkers_touch_nothing_that_they_see_and_visit_most_cells():
     green, yellow, red = (0.0, 1.0, 0.0), (1.0, 1.0, 0.0), (1.0, 0.0, 0.0)
     assert {green, yellow, red} <= lights
     assert true_paths.stop_within(swarm)
+
+
+def test_walkers_keep_a_bump_shield_as_far_away_as_a_stock_body():
+    with StepSwarm(4, seed=1, model="hero_plus", worlds=4) as swarm:
+        wider_m = swarm.max_body_radius_m - BODY_RADIUS_M
+        paths, _ = walk(swarm, 30.0)
+    for path in paths:
+        assert true_paths.measure_gaps(path).min() - 2.0 * wider_m > 0.015
+        assert true_paths.measure_wall_gaps(path, build_default(4)).min() - wider_m > 0.04
 
 
 def test_the_same_seeds_give_the_same_walk():

@@ -363,6 +363,22 @@ def test_robots_change_places_around_each_other_and_around_one_that_stays(tmp_pa
         assert math.dist(swarm[2].true_pose[:2], stays[:2]) < 0.01
 
 
+def test_a_bump_shield_is_kept_from_walls_and_from_other_robots(tmp_path):
+    arena = tmp_path / "arena.yaml"
+    arena.write_text(
+        "walls_m: [[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]]\n"
+        "starts_m_deg: [[-0.3, 0, 0], [0.3, 0, 180]]\n"
+    )
+    with StepSwarm(2, seed=3, arena=str(arena), model="hero_plus") as swarm:
+        radius_m, log = swarm.max_body_radius_m, swarm.log()
+        swarm.go_to_each({0: (0.3, 0.0), 1: (-0.3, 0.0)}, frame="world", tolerance_m=0.02)
+        path = log.true_pose[:, 0, :, :2]
+        assert np.hypot(*(path[:, 0] - path[:, 1]).T).min() > 2.0 * radius_m + 0.02
+        with pytest.raises(GoalError, match=r"0.0[78] m from the robot's center"):
+            swarm[0].go_to(2.0, 0.0, frame="world")
+        assert swarm[0].true_pose.x_m < 1.0 - radius_m - 0.005
+
+
 def test_robots_that_do_not_get_to_their_goals_are_named_and_stopped():
     with StepSwarm(2, seed=1, arena="empty") as swarm:
         with pytest.raises(GoalError, match="no goal is reached by hero_1: not there after 2 s"):

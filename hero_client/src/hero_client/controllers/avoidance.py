@@ -5,7 +5,7 @@ nan: not known, which counts as an obstacle.
 """
 
 import math
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 from hero_node.geometry import STOP, Velocity, clamp, wrap_angle
 
@@ -20,9 +20,15 @@ __all__ = [
     "WanderMemory",
     "bend_around",
     "find_in_path",
+    "shorten_for_body",
     "split_sectors",
     "wander",
 ]
+
+
+def shorten_for_body(ranges: Sequence[float], body_radius_m: float) -> List[float]:
+    """Return ranges of a robot with another body, from which the stock robot keeps as far away: laws are made for it."""
+    return [range_m - (body_radius_m - BODY_RADIUS_M) for range_m in ranges]
 
 
 def split_sectors(ranges: Sequence[float]) -> Tuple[float, float, float]:

@@ -13,7 +13,8 @@ from typing import Optional, Sequence
 from hero_node.geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
 
 from ..values.readings import Obstacle
-from .avoidance import find_in_path
+from ..values.robot_constants import BODY_RADIUS_M
+from .avoidance import find_in_path, shorten_for_body
 from .pose_check import PoseCheck
 
 __all__ = ["DEFAULT_TIMEOUT_S", "SILENT_STEPS", "MotionController", "State"]
@@ -79,6 +80,7 @@ class MotionController:
         state: see State; once it is not ACTIVE it stays, and step() returns STOP.
         reason: why it failed, for users; empty otherwise.
         distance_m: still to drive at the last step; nan before the first pose.
+        body_radius_m: of this robot's model.
     """
 
     def __init__(self, now_s: float, timeout_s: float) -> None:
@@ -86,6 +88,7 @@ class MotionController:
         self.state = State.ACTIVE
         self.reason = ""
         self.distance_m = math.nan
+        self.body_radius_m = BODY_RADIUS_M
         self._timeout_s = timeout_s
         self._start_s = now_s
         self._stepped_s = now_s
@@ -126,9 +129,10 @@ class MotionController:
         self._silent_steps = 0
         self._seen_s += step_s
         seen_s = self._seen_s
+        ranges = shorten_for_body(ranges or (), self.body_radius_m)
         # It stops well inside the tolerance and restarts only outside: hysteresis against chattering at the border.
         self._at_goal = self._offset(pose) < (1.0 if self._at_goal else AIM_SHARE)
-        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges or (), seen_s)
+        command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges, seen_s)
         if self._at_goal and command == STOP:
             if self._stopped_since_s is None:
                 self._stopped_since_s = seen_s
@@ -136,7 +140,7 @@ class MotionController:
                 self.state = State.REACHED
             return STOP
         self._stopped_since_s = None
-        command = self._slow_for_obstacle(command, ranges or (), seen_s)
+        command = self._slow_for_obstacle(command, ranges, seen_s)
         self._check_wheels(pose, odometry, command, seen_s)
         problem = self._pose_check.add(pose, odometry, seen_s) if odometry is not None else ""
         if problem:
@@ -208,7 +212,8 @@ class MotionController:
         if self._obstacle is None:
             return ""
         range_m, bearing_rad = self._obstacle
-        place = "%.2f m from the robot's center" % range_m if range_m > 0.0 else "too close to measure"
+        from_center_m = range_m + self.body_radius_m - BODY_RADIUS_M
+        place = "%.2f m from the robot's center" % from_center_m if range_m > 0.0 else "too close to measure"
         return "an obstacle is in the way, %s, at %+.0f degrees" % (place, math.degrees(bearing_rad))
 
 

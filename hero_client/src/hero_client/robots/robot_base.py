@@ -436,6 +436,7 @@ class BaseRobot(Group):
         read_pose: Optional[Callable[[], Pose]],
         on_step: Callable[[], None],
     ) -> Steps:
+        controller.body_radius_m = self.model.body_radius_m
         while True:
             self.check_not_stopped()
             pose, odometry, absence = None, None, ""

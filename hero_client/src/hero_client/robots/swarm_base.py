@@ -82,6 +82,11 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         self._await_first("proximity")
         return np.array([robot.fresh_proximity() for robot in self.robots])
 
+    @property
+    def max_body_radius_m(self) -> float:
+        """Radius of the widest body: see Robot.model."""
+        return max(robot.model.body_radius_m for robot in self.robots)
+
     def _await_first(self, topic: str) -> None:
         for robot in self.robots:
             robot.await_first(topic)
@@ -139,7 +144,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
 
             swarm.go_to_each({0: (0.2, 0.1), 1: (-0.2, 0.1)})
 
-        goals: robot's id -> (x m, y m), at least 0.18 m apart, also from robots without a goal: they stay where they
+        goals: robot's id -> (x m, y m), at least 0.18 m apart (HeRo+: 0.23 m), also from robots without a goal: they stay where they
         are, and the others drive around them. Law: controllers.swarm_go_to.
 
         Raises: GoalError for goals too near to each other, and with the robots that are not there after timeout_s.
@@ -159,7 +164,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         yield from wait_for_all(self._members)
         starts = [robot.pose_in(frame)[:2] for robot in self.robots]  # waits for tf or localization, unlike below
         places = [goals.get(robot.robot_id, start) for robot, start in zip(self.robots, starts)]
-        law = AvoidanceLaw()
+        law = AvoidanceLaw(body_m=self.max_body_radius_m)
         for (one, place), (other, beside) in combinations(zip(self.robots, places), 2):
             apart_m = math.dist(place, beside)
             if apart_m < law.min_spacing_m and {one.robot_id, other.robot_id} & set(goals):

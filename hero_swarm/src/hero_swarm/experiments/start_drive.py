@@ -7,6 +7,7 @@ import numpy as np
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_client.controllers.swarm_go_to import SwarmGoToController
 from hero_client.controllers.unicycle import go_to_pose
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.geometry import STOP, Pose
 
 __all__ = ["PERIOD_S", "StartDrive"]
@@ -25,11 +26,12 @@ class StartDrive:
         done: all robots are in their places, and turned.
     """
 
-    def __init__(self, places: np.ndarray) -> None:
-        """Begin; places: poses (N, 3), x m, y m, yaw rad."""
+    def __init__(self, places: np.ndarray, body_radius_m: float = BODY_RADIUS_M) -> None:
+        """Begin; places: poses (N, 3), x m, y m, yaw rad. body_radius_m: of the widest robot."""
         self.done = False
         self._goals = [Pose(*place) for place in places.tolist()]
-        self._controller = SwarmGoToController([goal[:2] for goal in self._goals], AvoidanceLaw(), PERIOD_S, seed=0)
+        law = AvoidanceLaw(body_m=body_radius_m)
+        self._controller = SwarmGoToController([goal[:2] for goal in self._goals], law, PERIOD_S, seed=0)
         self._steps_at_rest = 0
 
     def step(self, poses: np.ndarray, ranges_m: Optional[Sequence[Sequence[float]]] = None) -> np.ndarray:

@@ -88,7 +88,7 @@ def run_on_robots(
 def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource, label: str) -> None:
     """Drive all robots to their places, and turn them; the time limit and a stop end it, too."""
     print("%s: driving to the start" % label)
-    drive, end_s = StartDrive(starts), time.monotonic() + START_LIMIT_S
+    drive, end_s = StartDrive(starts, swarm.max_body_radius_m), time.monotonic() + START_LIMIT_S
     try:
         for _ in program.rate(1.0 / PERIOD_S):
             if drive.done or time.monotonic() > end_s:
