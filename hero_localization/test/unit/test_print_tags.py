@@ -1,6 +1,7 @@
 """Printed tags: their true size on the page, cut out without overlap, numbers, wrong options."""
 
 import io
+import math
 
 import numpy as np
 import pytest
@@ -130,3 +131,82 @@ def test_ids_must_be_named(capsys):
     with pytest.raises(SystemExit):
         print_tags.parse_options(["--robots", "all"])
     assert "name the ids" in capsys.readouterr().err
+
+
+def draw(sheet, x_mm=100.0, y_mm=150.0, family="36h11"):
+    """Return what is drawn of a sheet besides tag and ruler: patches, lines and texts."""
+    _, empty = print_tags._open_page(A4_MM)
+    (axes,) = print_tags.draw_page([(sheet, x_mm, y_mm)], family, A4_MM).axes
+    return axes.patches, axes.lines[len(empty.lines) :], axes.texts[len(empty.texts) :]
+
+
+def test_a_robots_disc_shows_front_and_number_outside_of_the_white_margin():
+    for size_mm, family, cells in ((40.0, "36h11", 8), (30.0, "16h5", 6), (45.0, "36h11", 8)):
+        (circle, front), lines, (number,) = draw(print_tags.Sheet(7, size_mm, 73.0, True), family=family)
+        assert circle.center == (100.0, 150.0) and circle.radius == 36.5 and not lines
+        white_mm = size_mm / 2.0 + 1.2 * size_mm / cells
+        tip, left, right = front.get_xy()[:3].tolist()
+        assert tip[0] == 100.0 and left[1] == right[1] < tip[1], "a triangle that points up, to the front"
+        assert 100.0 - left[0] == right[0] - 100.0 == pytest.approx(tip[1] - left[1])
+        band_mm = 36.5 - white_mm
+        assert left[1] - 150.0 > white_mm - 0.5 and math.hypot(right[0] - 100.0, tip[1] - 150.0) < 36.5 + 0.5
+        assert (tip[1] + left[1]) / 2.0 - 150.0 == pytest.approx((white_mm + 36.5) / 2.0)
+        assert tip[1] - left[1] == pytest.approx(max(0.6 * band_mm, 1.0))
+        assert number.get_text() == "7" and number.get_ha() == number.get_va() == "center"
+        assert number.get_position() == pytest.approx((100.0, 150.0 - (white_mm + 36.5) / 2.0))
+        assert number.get_fontsize() * 25.4 / 72.0 == pytest.approx(max(0.6 * band_mm, 1.0))
+
+
+def test_a_reference_tag_has_marks_at_the_middle_of_its_sides():
+    (frame,), lines, (label,) = draw(print_tags.Sheet(101, 100.0, 150.0, False))
+    assert (frame.get_xy(), frame.get_width(), frame.get_height()) == ((25.0, 75.0), 150.0, 150.0)
+    ends = sorted(tuple(map(tuple, np.column_stack(line.get_data()).tolist())) for line in lines)
+    assert ends == sorted(
+        [((175.0, 150.0), (169.0, 150.0)), ((25.0, 150.0), (31.0, 150.0)),
+         ((100.0, 225.0), (100.0, 219.0)), ((100.0, 75.0), (100.0, 81.0))]
+    )  # fmt: skip
+    assert label.get_text() == "101 (36h11, 100 mm)" and label.get_position() == (27.0, 76.0)
+
+
+def test_the_ruler_has_a_mark_for_each_centimeter_above_its_line():
+    _, axes = print_tags._open_page(A4_MM)
+    (xs, ys), *marks = (line.get_data() for line in axes.lines)
+    assert tuple(xs) == (55.0, 155.0) and tuple(ys) == (12.0, 12.0)
+    assert [mark[0][0] for mark in marks] == pytest.approx([55.0 + 10.0 * index for index in range(11)])
+    assert [mark[1][1] - mark[1][0] for mark in marks] == [4.0 if index in (0, 5, 10) else 2.0 for index in range(11)]
+    assert all(mark[0][0] == mark[0][1] and mark[1][0] == 12.0 for mark in marks)
+    assert axes.texts[0].get_position() == (105.0, 18.0) and "must measure 100 mm" in axes.texts[0].get_text()
+    assert axes.get_xlim() == (0.0, 210.0) and axes.get_ylim() == (0.0, 297.0)
+
+
+def test_the_board_lies_in_the_middle_above_the_ruler():
+    for paper_mm in print_tags.PAPERS_MM.values():
+        (axes,) = print_tags.draw_board_page(paper_mm).axes
+        left_mm, right_mm, low_mm, high_mm = axes.images[0].get_extent()
+        assert left_mm + right_mm == pytest.approx(paper_mm[0]) and low_mm == 28.0
+        assert (right_mm - left_mm, high_mm - low_mm) == pytest.approx((175.0, 225.0)) and high_mm < paper_mm[1]
+
+
+def test_sheets_fill_rows_from_the_upper_left_and_pages_in_turn():
+    small, large = print_tags.Sheet(1, 20.0, 40.0, True), print_tags.Sheet(2, 40.0, 80.0, True)
+    first, second = print_tags.split_pages([large, *[small] * 4, large, large], (200.0, 200.0))
+    assert [(sheet.tag_id, x_mm, y_mm) for sheet, x_mm, y_mm in first] == [
+        (2, 52.0, 148.0), (1, 116.0, 168.0), (1, 160.0, 168.0), (1, 32.0, 84.0), (1, 76.0, 84.0),
+    ]  # fmt: skip
+    assert [(sheet.tag_id, x_mm, y_mm) for sheet, x_mm, y_mm in second] == [(2, 52.0, 148.0), (2, 136.0, 148.0)]
+    (alone,) = print_tags.split_pages([print_tags.Sheet(3, 90.0, 190.0, False)], (200.0, 200.0))
+    assert len(alone) == 1, "what is larger than a page has one of its own"
+    assert list(print_tags.split_pages([], (200.0, 200.0))) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "limits"),
+    [(["--robots", "3", "--size"], (5.0, 45.88)), (["--references", "100", "--reference-size"], (5.0, 124.0))],
+)
+def test_sizes_may_be_as_small_and_as_large_as_named(arguments, limits):
+    low_mm, high_mm = limits
+    for size_mm in limits:
+        assert list_pages(*arguments, str(size_mm))[0][0][0].size_mm == size_mm
+    for size_mm in (low_mm - 0.01, high_mm + 0.01):
+        with pytest.raises(LocalizationError, match="must be from 5 to"):
+            list_pages(*arguments, str(size_mm))

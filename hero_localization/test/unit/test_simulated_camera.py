@@ -12,14 +12,22 @@ cv2 = pytest.importorskip("cv2")
 from hero_localization.errors import SettingsError  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.simulated_camera import camera_node  # noqa: E402
+from hero_localization.simulated_camera.board_renderer import list_board_places  # noqa: E402
 from hero_localization.simulated_camera.frame_times import list_frames  # noqa: E402
 from hero_localization.simulated_camera.lab_setup import (  # noqa: E402
+    describe_references,
     hang_above,
     list_references,
     write_camera_file,
 )
 from hero_localization.simulated_camera.renderer import CameraRenderer  # noqa: E402
-from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, View, tag_corners  # noqa: E402
+from hero_localization.simulated_camera.view import (  # noqa: E402
+    CameraOptions,
+    PrintedTag,
+    View,
+    hand_outlines,
+    tag_corners,
+)
 from hero_localization.tracking import settings as camera_file  # noqa: E402
 from hero_sim.world.arena import build_default, build_rectangle  # noqa: E402
 from hero_sim.world.arena_file import load_arena  # noqa: E402
@@ -237,3 +245,178 @@ def test_written_camera_file_holds_the_view_and_the_tags(tmp_path):
     assert np.abs(settings.camera.project(points_m) - View(SMALL).project(points_m)).max() < 1e-6
     assert settings.layout.mounts[3].x_m == 0.002 and settings.layout.default_mount.size_m == 0.048
     assert sorted(settings.seen_references) == sorted(settings.layout.references) == [100, 101, 102, 103]
+
+
+STRAIGHT = SMALL._replace(
+    tilt_rad=(0.0, 0.0, 0.0), position_m=(0.0, 0.0, 2.2), distortion=(0.0,) * 5, center_px=(320.0, 180.0), blur_px=0.0
+)
+"""Looks straight down without distortion: 463 px by the depth in m."""
+
+
+def find_spot(spots):
+    """Return center and area of pixels by their weights (H, W), px."""
+    rows, columns = np.indices(spots.shape)
+    return np.array(((columns * spots).sum(), (rows * spots).sum())) / spots.sum(), float(spots.sum())
+
+
+def test_everything_has_its_own_shade_and_solids_their_height():
+    circle, post = (-0.6, 0.3, 0.15), np.array([(0.5, -0.5), (0.8, -0.5), (0.8, -0.2), (0.5, -0.2)])
+    arena = ARENA._replace(circles_m=np.array([circle]), polygons_m=(post,))
+    renderer, view = CameraRenderer(STRAIGHT, arena, (None,), [PrintedTag(7, 0.12, 0.0, 0.1, 0.4)]), View(STRAIGHT)
+    image = renderer.render(np.array([(-0.3, -0.3, 0.0)]))
+
+    def shade(*point_m):
+        return shade_at(image, view, point_m)
+
+    assert shade(-0.6, 0.3, 0.05) == shade(0.65, -0.35, 0.05) == 60, "obstacles"
+    assert shade(-0.3, -0.3, 0.076) == 45, "a robot without a tag"
+    assert shade(0.1 - 0.053, 0.4, 0.0) == 25 and shade(0.1, 0.4 + 0.06 + 0.022, 0.0) == 225, "print and sheet"
+    assert abs(np.median(image) - 150.0) < 3.0, "floor"
+    # Tops are seen further from the axis than the floor under them, by 2.3 %.
+    for x_m, edge_m in ((0.8, 463.0 * 0.8 / 2.15), (-0.75, -463.0 * 0.75 / 2.15)):
+        row = image[180 + round(463.0 * 0.35 / 2.15)] if x_m > 0.0 else image[180 - round(463.0 * 0.3 / 2.15)]
+        inner, outer = (round(320 + edge_m + sign * 2.5) for sign in (-1, 1))
+        assert {int(row[inner]), int(row[outer])} >= {60} and max(row[inner], row[outer]) > 130, x_m
+    wall = image[180, 560:640] < 110
+    assert 320 + 463.0 * 1.2 / 2.2 - 1 < 560 + np.flatnonzero(wall)[0] < 320 + 463.0 * 1.2 / 2.2 + 2
+    assert wall.sum() == pytest.approx(463.0 * 1.2 * (1.0 / 2.15 - 1.0 / 2.2), abs=2.5)
+
+
+def test_a_robots_top_is_a_disc_round_its_center_wherever_its_tag_sits():
+    for tag, pose in (
+        (TAG._replace(x_m=0.008, y_m=-0.006, yaw_rad=0.5), (0.3, -0.2, 1.0)),
+        (TAG._replace(size_m=0.03, x_m=-0.009, y_m=0.004, yaw_rad=-2.0), (-0.5, 0.4, -2.5)),
+    ):
+        sharp = STRAIGHT._replace(width_px=960, height_px=540, focal_px=(694.5, 694.5), center_px=(480.0, 270.0))
+        with_top, body = (render([pose], (one,), sharp).astype(float) for one in (tag, None))
+        # All of the top differs from the body but the black of the print; a filled hull has no holes.
+        top = np.zeros(body.shape, np.uint8)
+        points = np.argwhere(np.abs(with_top - body) > 60.0)[:, ::-1].astype(np.int32)
+        cv2.fillConvexPoly(top, cv2.convexHull(points), 1)
+        center_px, area_px = find_spot(top)
+        expected_px = View(sharp).project(np.array((pose[0], pose[1], tag.height_m)))
+        assert center_px == pytest.approx(expected_px, abs=0.6)
+        radius_px = 0.036835 * 694.5 / (2.2 - tag.height_m)
+        assert area_px == pytest.approx(math.pi * radius_px**2, rel=0.12)
+        rim = with_top[tuple(np.rint(expected_px + (0.93 * radius_px, 0.0)).astype(int)[::-1])]
+        assert rim == pytest.approx(205, abs=12) or rim > 200, "between the white margin and the edge"
+
+
+def test_light_falls_off_mostly_to_the_right_and_on_robots_too():
+    image = render(np.empty((0, 3)), (), STRAIGHT._replace(light_gradient=0.4)).astype(float)
+    bright = image[:12, :12].mean()
+    assert image[:12, -12:].mean() / bright == pytest.approx(1.0 - 0.4 * 0.7, abs=0.03)
+    assert image[-12:, :12].mean() / bright == pytest.approx(1.0 - 0.4 * 0.3, abs=0.03)
+    options = STRAIGHT._replace(light_gradient=0.8)
+    left, right = (render([(x_m, 0.0, 0.0)], (TAG,), options).astype(float) for x_m in (-1.0, 1.0))
+    tops = [image[180, 310 + offset : 330 + offset].max() for image, offset in ((left, -218), (right, 218))]
+    share = [1.0 - 0.8 * (0.7 * (320 + offset) / 640 + 0.15) for offset in (-218, 218)]
+    assert tops[1] / tops[0] == pytest.approx(share[1] / share[0], abs=0.04)
+
+
+def test_blur_widens_edges_of_walls_and_prints():
+    steepest = []
+    for blur_px in (0.0, 1.0, 2.0):
+        image = render([(0.0, 0.0, 0.0)], options=STRAIGHT._replace(blur_px=blur_px)).astype(int)
+        steps = np.abs(np.diff(image, axis=1))
+        steepest.append((steps[180, 560:600].max(), steps[150:210, 290:350].max()))
+    for sharp, soft in zip(steepest, steepest[1:]):
+        assert soft[0] < 0.75 * sharp[0] and soft[1] < 0.9 * sharp[1]
+
+
+def test_the_poses_of_an_exposure_lie_on_the_arc_round_its_middle():
+    renderer = CameraRenderer(STRAIGHT._replace(exposure_s=0.05), ARENA, (TAG,))
+    pose = np.array((0.3, 0.2, 0.5))
+    assert renderer._list_moments(pose, 0.0, 0.0).tolist() == [pose.tolist()]
+    moments = renderer._list_moments(pose, 0.2, 1.0)
+    pixel_m, moved_m = 2.2 / 463.0, (0.2 + 0.03) * 0.05
+    assert len(moments) == 1 + math.ceil(2.0 * moved_m / pixel_m - 0.1) == 6
+    times_s = (np.arange(6) - 2.5) / 6.0 * 0.05
+    assert moments[:, 2] == pytest.approx(0.5 + times_s)
+    for (x_m, y_m, _), time_s in zip(moments, times_s):
+        chord_m, angle_rad = 0.2 * time_s, 0.5 + time_s / 2.0
+        assert (x_m, y_m) == pytest.approx((0.3 + chord_m * math.cos(angle_rad), 0.2 + chord_m * math.sin(angle_rad)))
+    assert len(renderer._list_moments(pose, -2.0, 0.0)) == 8, "no more, however fast"
+    assert len(renderer._list_moments(pose, 0.0, -6.0)) == 1 + math.ceil(2.0 * 0.03 * 6.0 * 0.05 / pixel_m - 0.1)
+
+
+def test_noise_is_centered_and_never_repeats_in_place():
+    renderer = CameraRenderer(STRAIGHT._replace(noise=3.0), ARENA, ())
+    still = render(np.empty((0, 3)), (), STRAIGHT).astype(float)
+    noise = [renderer.render(np.empty((0, 3))).astype(float) - still for _ in range(6)]
+    assert max(abs(field.mean()) for field in noise) < 0.2
+    for index, field in enumerate(noise):
+        assert field.std() == pytest.approx(3.0, rel=0.05)
+        assert all((field != other).mean() > 0.5 for other in noise[:index])
+
+
+def test_a_hand_reaches_in_from_below():
+    hand, arm = hand_outlines((0.3, 0.2))
+    assert hand.shape == (24, 3) and (hand[:, 2] == 0.25).all() and (arm[:, 2] == 0.25).all()
+    assert np.hypot(*(hand[:, :2] - (0.3, 0.2)).T) == pytest.approx(np.full(24, 0.06))
+    assert sorted(map(tuple, arm[:, :2].round(6).tolist())) == [(0.26, -1.8), (0.26, 0.2), (0.34, -1.8), (0.34, 0.2)]
+    assert cv2.contourArea(arm[:, :2].astype(np.float32)) == pytest.approx(0.16), "its corners in order"
+
+
+def test_boards_are_held_tilted_in_nine_places_of_the_image():
+    options = CameraOptions()
+    holds = list(itertools.islice(list_board_places(options, np.random.RandomState(2)), 90))
+    turns, places = (np.array(values) for values in zip(*holds))
+    (fx, fy), (cx, cy) = options.focal_px, options.center_px
+    pixels = places[:, :2] / places[:, 2:] * (fx, fy) + (cx, cy)
+    expected = [(1920 * u, 1080 * v) for v in (0.2, 0.5, 0.8) for u in (0.18, 0.5, 0.82)]
+    np.testing.assert_allclose(pixels, expected * 10, atol=1e-6)
+    for values, low, high in ((places[:, 2], 0.35, 0.5), (np.abs(turns[:, :2]), 0.25, 0.6), (turns[:, 2], -0.3, 0.3)):
+        assert low <= values.min() < low + 0.1 * (high - low) and high - 0.1 * (high - low) < values.max() <= high
+    assert {tuple(sign) for sign in np.sign(turns[:, :2]).tolist()} == set(itertools.product((-1.0, 1.0), repeat=2))
+
+
+def test_reference_tags_lie_beside_the_arena_and_are_described_by_place():
+    arena = build_rectangle(2.0, 1.0, 1)
+    arena = arena._replace(bounds_m=np.array([-0.5, 0.25, 1.5, 1.25]))
+    tags = list_references(arena, "36h11")
+    assert [(tag.tag_id, tag.x_m, tag.y_m) for tag in tags] == [
+        (100, -0.62, 0.35), (101, -0.62, 1.15), (102, 1.62, 0.35), (103, 1.62, 1.15),
+    ]  # fmt: skip
+    assert {(tag.size_m, tag.height_m, tag.yaw_rad) for tag in tags} == {(0.1, 0.0, 0.0)}
+    assert describe_references(tags[:2]) == "references: {100: [-0.620, 0.350, 0], 101: [-0.620, 1.150, 0]}"
+    assert [tag.tag_id for tag in list_references(arena, "16h5")] == [26, 27, 28, 29], "the last ones of a small family"
+
+
+def test_camera_hangs_over_the_middle_of_the_arena_as_high_as_it_must():
+    arena = build_rectangle(4.0, 2.0, 1)._replace(bounds_m=np.array([1.0, 2.0, 5.0, 4.0]))
+    references = list_references(arena, "36h11")
+    camera = hang_above(CameraOptions(), arena, references, 0.04)
+    assert camera.position_m[:2] == pytest.approx((0.03 + 3.0, -0.02 + 3.0))
+    lower = View(camera._replace(position_m=(*camera.position_m[:2], camera.position_m[2] - 0.05)))
+    sheets = [tag._replace(size_m=0.13) for tag in references]
+    corners = np.vstack([tag_corners(tag, np.zeros((1, 3)))[0] for tag in sheets])
+    for view, is_seen in ((View(camera), True), (lower, False)):
+        pixels = view.project(corners)
+        assert ((pixels >= 0.0) & (pixels <= (1919.0, 1079.0))).all() == is_seen
+
+
+def test_a_camera_with_fewer_pixels_sees_the_same():
+    small = camera_node._scale(CameraOptions(), 960, 540)
+    points_m = np.array([(0.7, -0.3, 0.076), (-1.0, 0.5, 0.0)])
+    large_px, small_px = (View(options).project(points_m) for options in (CameraOptions(), small))
+    assert small_px + 0.5 == pytest.approx((large_px + 0.5) / 2.0)
+    assert (small.width_px, small.height_px, small.blur_px) == (960, 540, 0.35)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--count", "501"], "--count: 501 is not from 1 to 500"),
+        (["--first-id", "-1"], "--first-id: -1 is not"),
+        (["--width", "159"], "--width: 159 is not from 160 to 4096"),
+        (["--rate", "0.4"], "--rate: 0.4 is not from 0.5 to 120"),
+        (["--delay", "5.1"], "--delay: 5.1 is not from 0 to 5"),
+        (["--exposure", "0.11"], "--exposure: 0.11 is not from 0 to 0.1"),
+        (["--tag-size", "nan"], "--tag-size: nan is not from 0.01 to 0.2"),
+    ],
+)
+def test_options_beyond_their_limits_are_named(arguments, words, capsys):
+    with pytest.raises(SystemExit):
+        camera_node.parse_options(arguments)
+    assert words in capsys.readouterr().err
