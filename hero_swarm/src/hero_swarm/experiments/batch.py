@@ -5,9 +5,7 @@ Metrics are taken once per second of simulated time. A run has the same values a
 """
 
 import math
-import os
 import time
-import traceback
 from contextlib import contextmanager
 from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -22,7 +20,7 @@ from ..behavior import Objects
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..trial import OPEN, Trial
-from .errors import ExperimentError
+from .errors import ExperimentError, report_place
 from .experiment_file import ERRORS, Cell, Experiment, Metric, parse_experiment
 from .results_folder import Run
 from .starts import place_all, place_objects
@@ -155,22 +153,8 @@ def compute_batch(
     experiment = parse_experiment(text, "the experiment", METRICS)
     cell = experiment.cells[cell_index]
     trial = build_trial(experiment, cell, seeds)
-    try:
+    with report_place("%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1])):
         series, ends = _run(experiment, trial, stem, with_poses)
-    except Exception as error:
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        raise ExperimentError(
-            "%s with seeds %d to %d: %s: %s (%s, line %s)"
-            % (
-                cell.label,
-                seeds[0],
-                seeds[-1],
-                type(error).__name__,
-                error,
-                os.path.basename(place.filename),
-                place.lineno,
-            )
-        ) from error
     runs = [
         Run(cell_index, seed, take_values(experiment, series[: ends[world] + 1, world]))
         for world, seed in enumerate(seeds)

@@ -15,6 +15,7 @@ from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..safety import SafetyFilter
 from .batch import SAMPLE_S, list_sources, load_cell_arena, take_values
+from .errors import report_place
 from .experiment_file import Cell, Experiment
 
 __all__ = ["RobotTrial"]
@@ -33,6 +34,7 @@ class RobotTrial:
         """Begin; names: of the robots, in the order of their poses."""
         self.remark = ""
         self._experiment = experiment
+        self._label = "%s, seed %d" % (cell.label, seed)
         self._behavior = find_behavior(experiment.behavior)(**cell.parameters)
         self._objects = len(load_cell_arena(cell).objects)
         self._names = names
@@ -59,6 +61,7 @@ class RobotTrial:
         """Return the speeds of all robots, m/s and rad/s (N,), at poses (N, 3); None: the trial has ended.
 
         A robot without a pose, NaN, or an object of the arena without one ends the trial with a remark.
+        Raises: ExperimentError for whatever the behavior raises.
         """
         lost = [name for name, pose in zip(self._names, poses) if not np.isfinite(pose).all()]
         if lost:
@@ -72,7 +75,8 @@ class RobotTrial:
         if self._reached or time_s >= self._experiment.time_s:
             return None
         sensed = sense(self._behavior, time_s, poses[None], self._random, things)
-        linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
+        with report_place(self._label):
+            linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
         linear_m_s, angular_rad_s = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         return linear_m_s[0], angular_rad_s[0]
 

@@ -7,6 +7,7 @@ import pytest
 
 from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
+from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.robot_trial import RobotTrial
 from hero_swarm.experiments.start_drive import PERIOD_S, StartDrive
@@ -111,7 +112,7 @@ def test_robots_have_arrived_when_all_were_there_for_half_a_second():
 
 
 def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
-    monkeypatch.setitem(METRICS, "consensus_error", lambda poses, velocities, objects: velocities[:, 0, 0])
+    monkeypatch.setitem(METRICS, "consensus_error", lambda poses, velocities, *rest: velocities[:, 0, 0])
     experiment = parse_experiment(FILE, "e.yaml", METRICS)
     trial = RobotTrial(experiment, experiment.cells[0], 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
     for time_s in (0.0, 0.9, 1.05, 2.1, 2.1, 2.9):
@@ -121,3 +122,13 @@ def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
     for _ in range(2):
         late.step(5.0, STARTS, np.zeros(3))
     assert [values[0] for values in late._samples] == [0.0, 0.0], "also where no time has passed"
+
+
+def test_what_a_behavior_raises_in_a_trial_is_one_line_with_its_place(tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from hero_swarm.behavior import Behavior\n\n\nclass Mine(Behavior):\n"
+        "    def step(self, sensed, memory, random):\n        return 1 / 0, 0.0, memory\n"
+    )
+    with pytest.raises(ExperimentError, match=r"seed 1: ZeroDivisionError: division by zero \(mine.py, line 6\)$"):
+        drive(FILE.replace("rendezvous", str(file)))
