@@ -298,8 +298,7 @@ def test_a_robots_top_is_a_disc_round_its_center_wherever_its_tag_sits():
         assert center_px == pytest.approx(expected_px, abs=0.6)
         radius_px = 0.036835 * 694.5 / (2.2 - tag.height_m)
         assert area_px == pytest.approx(math.pi * radius_px**2, rel=0.12)
-        rim = with_top[tuple(np.rint(expected_px + (0.93 * radius_px, 0.0)).astype(int)[::-1])]
-        assert rim == pytest.approx(205, abs=12) or rim > 200, "between the white margin and the edge"
+
 
 
 def test_light_falls_off_mostly_to_the_right_and_on_robots_too():
