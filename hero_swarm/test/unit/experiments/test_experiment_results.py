@@ -3,16 +3,19 @@
 import json
 import math
 import os
+import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from hero_swarm.experiments import report
+from hero_swarm.experiments import code_version, report
 from hero_swarm.experiments.batch import METRICS_ENDING
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.summary import build_report
 from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
+from hero_swarm.experiments.streams import open_stream
 
 FILE = """\
 behavior: a.B
@@ -221,3 +224,70 @@ def test_a_report_compares_runs_of_one_seed_and_says_what_is_missing():
     remarks = "\n".join(found.remarks)
     for words in ("2 of 8 runs are still missing", "4 seeds: ", "1 runs are left out", "not reached in 1 runs"):
         assert words in remarks
+
+
+def test_what_runs_record_is_found_by_cell_and_seed(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    for cell, seeds in ((0, [5, 7]), (1, [6]), (0, [6])):
+        folder.write_batch([make_run(cell, seed) for seed in seeds])
+        values = np.array([[[10.0 * cell + seed] for seed in seeds]] * 2)
+        np.save(folder.name_series(cell, seeds) + METRICS_ENDING, values)
+    folder.write_batch([make_run(0, 8)])  # nothing was recorded of it
+    for cell, seeds in ((0, {5, 6, 7}), (1, {6})):
+        found = folder.read_series(cell, METRICS_ENDING)
+        assert {seed: values.tolist() for seed, values in found.items()} == {
+            seed: [[10.0 * cell + seed]] * 2 for seed in seeds
+        }
+    assert folder.read_series(0, ".poses.npy") == {}
+
+
+def test_times_of_batches_are_appended_below_one_heading(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    folder.note_time(1, [5, 6], 1.23456)
+    folder.note_time(0, [7], 0.5)
+    assert (tmp_path / "times.csv").read_text() == "cell,first_seed,runs,wall_s\n1,5,2,1.235\n0,7,1,0.500\n"
+
+
+def test_a_stream_has_its_name_once_it_is_whole(tmp_path):
+    path = tmp_path / "a.npy"
+    stream = open_stream(str(path), (3, 2))
+    for values in ((1.0, 2.0), (3.0, 4.0)):
+        stream.append(np.array(values))
+    assert stream.count == 2 and not path.exists()
+    stream.close()
+    written = np.load(str(path))
+    assert written.dtype == np.float32 and written[:2].tolist() == [[1.0, 2.0], [3.0, 4.0]] and np.isnan(written[2]).all()
+    assert os.listdir(str(tmp_path)) == ["a.npy"]
+
+
+def test_code_is_the_sources_of_all_packages_and_the_users_file(tmp_path, monkeypatch):
+    for package in code_version.PACKAGES:
+        (tmp_path / package / "deep" / "__pycache__").mkdir(parents=True)
+        (tmp_path / package / "__init__.py").write_text("")
+    modules = {name: SimpleNamespace(__file__=str(tmp_path / name / "__init__.py")) for name in code_version.PACKAGES}
+    monkeypatch.setattr(code_version, "import_module", modules.__getitem__)
+    own = tmp_path / "own.py"
+    own.write_text("x = 1\n")
+
+    def change(path, text="changed\n", behavior="milling"):
+        before = code_version.hash_code(behavior)
+        path.write_text(text)
+        return code_version.hash_code(behavior) != before
+
+    inner = tmp_path / "hero_sim" / "deep"
+    assert change(inner / "new.py") and change(inner / "new.py", "again\n") and change(tmp_path / "hero_node" / "b.py")
+    assert not change(inner / "notes.txt") and not change(inner / "__pycache__" / "c.py")
+    assert not change(own) and change(own, "x = 2\n", "%s:Own" % own)
+    before = code_version.hash_code("milling")
+    (inner / "new.py").rename(inner / "other.py")
+    assert len(before) == 16 and code_version.hash_code("milling") != before
+    assert {"commit", "machine", "numpy", "python"} == set(code_version.describe_machine())
+
+
+@pytest.mark.parametrize("failure", [OSError("no git"), subprocess.TimeoutExpired("git", 10.0)])
+def test_outside_of_a_checkout_the_commit_is_unknown(monkeypatch, failure):
+    def fail(*arguments, **options):
+        raise failure
+
+    monkeypatch.setattr(code_version.subprocess, "run", fail)
+    assert code_version.describe_machine()["commit"] == "unknown"

@@ -229,6 +229,13 @@ def test_starts_keep_their_gap_and_their_center(start, check):
     assert (np.abs(poses[:, 2]) <= math.pi).all()
 
 
+def test_starts_of_a_file_are_its_first_poses(tmp_path):
+    path = tmp_path / "starts.csv"
+    path.write_text("# x, y, yaw\n0, 0.5, 1\n\n-1,2,-3.0\n5,5,5\n")
+    poses = place_all(Start("file", 0.0, 0.0, str(path)), None, 2, [1, 2])
+    assert poses.tolist() == [[[0.0, 0.5, 1.0], [-1.0, 2.0, -3.0]]] * 2
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -236,6 +243,8 @@ def test_starts_keep_their_gap_and_their_center(start, check):
         ("0,0\n", "line 1"),
         ("0,0,0\n0,x,0\n", "line 2"),
         ("0,0,inf\n", "line 1"),
+        ("0,0,0,0\n", "line 1: must be x m, y m, yaw rad"),
+        ("#\n\n0,0,0\n\nx\n", "line 5"),
     ],
 )
 def test_a_wrong_file_of_starts_is_refused_with_its_line(content, words, tmp_path):
