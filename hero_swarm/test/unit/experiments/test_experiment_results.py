@@ -256,7 +256,8 @@ def test_a_stream_has_its_name_once_it_is_whole(tmp_path):
     assert stream.count == 2 and not path.exists()
     stream.close()
     written = np.load(str(path))
-    assert written.dtype == np.float32 and written[:2].tolist() == [[1.0, 2.0], [3.0, 4.0]] and np.isnan(written[2]).all()
+    assert written.dtype == np.float32 and written[:2].tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    assert np.isnan(written[2]).all()
     assert os.listdir(str(tmp_path)) == ["a.npy"]
 
 
