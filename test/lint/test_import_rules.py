@@ -33,6 +33,7 @@ ROOMS = {
     "hero_sim.world": SIM_GROUND,
     "hero_sim.robot": SIM_GROUND | {"world"},
     "hero_sim.link": SIM_GROUND,
+    "hero_sim.stepped.rules": SIM_GROUND | {"world", "robot", "link"},
     "hero_sim.stepped": SIM_GROUND | {"world", "robot", "link", "population", "scene"},
     "hero_client.values": set(),
     "hero_client.controllers": {"values"},

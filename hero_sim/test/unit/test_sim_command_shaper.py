@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hero_driver.commands.velocity_shaper import VelocityShaper
-from hero_sim.stepped.command_shaper import INTERVAL_MS, MAX_AGE_MS, CommandShaper
+from hero_sim.stepped.rules.command_shaper import INTERVAL_MS, MAX_AGE_MS, CommandShaper
 
 STOP = struct.pack("<2d", 0.0, 0.0)
 

@@ -32,14 +32,14 @@ from ..robot_constants import (
 )
 from ..world.kinematics import split_to_wheels
 from ..world.world import STEP_MS, View, World
-from .command_shaper import CommandShaper, Rows, Values
-from .proximity import correct_ranges, measure_ranges
-from .radio_rows import RadioRows
-from .readings import DISTANCE, SCAN, WHEELS, Readings
-from .servo_pulses import ServoPulses
-from .tick_odometry import TickOdometryRows
-from .wheel_controllers import WheelControllers
-from .wheel_encoders import WheelEncoders
+from .rules.command_shaper import CommandShaper, Rows, Values
+from .rules.proximity import correct_ranges, measure_ranges
+from .rules.radio_rows import RadioRows
+from .rules.readings import DISTANCE, SCAN, WHEELS, Readings
+from .rules.servo_pulses import ServoPulses
+from .rules.tick_odometry import TickOdometryRows
+from .rules.wheel_controllers import WheelControllers
+from .rules.wheel_encoders import WheelEncoders
 
 __all__ = ["Hook", "RobotRows"]
 

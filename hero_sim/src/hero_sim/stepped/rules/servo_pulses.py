@@ -7,9 +7,9 @@ from typing import Union
 
 import numpy as np
 
-from ..robot.clock import NEVER_MS
-from ..robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
-from ..world.world import World
+from ...robot.clock import NEVER_MS
+from ...robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
+from ...world.world import World
 from .which import Which, assign
 
 __all__ = ["ServoPulses"]

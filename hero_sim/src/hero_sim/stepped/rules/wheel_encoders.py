@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
-from ..world.world import World
+from ...robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
+from ...world.world import World
 from .which import Which, choose
 
 __all__ = ["WheelEncoders"]

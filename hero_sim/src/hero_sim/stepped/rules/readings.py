@@ -5,7 +5,7 @@ from typing import Collection
 
 import numpy as np
 
-from ..robot.clock import LONG_AGO_MS
+from ...robot.clock import LONG_AGO_MS
 
 __all__ = ["DISTANCE", "SCAN", "WHEELS", "Readings"]
 

@@ -8,8 +8,8 @@ import numpy as np
 from hero_driver.corrections.message_layouts import CLAMP_TOLERANCE_M
 from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M
 
-from ..robot.ranges import convert_to_ranges
-from ..world.range_sensors import BEAMS
+from ...robot.ranges import convert_to_ranges
+from ...world.range_sensors import BEAMS
 
 __all__ = ["correct_ranges", "measure_ranges"]
 

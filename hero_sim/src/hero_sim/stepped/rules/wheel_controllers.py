@@ -8,9 +8,9 @@ from typing import Sequence, Union
 
 import numpy as np
 
-from ..robot.clock import LONG_AGO_MS
-from ..robot.motor_pid import SAMPLE_MS, Gains
-from ..robot_constants import COMMAND_GAP_MS
+from ...robot.clock import LONG_AGO_MS
+from ...robot.motor_pid import SAMPLE_MS, Gains
+from ...robot_constants import COMMAND_GAP_MS
 from .which import Which, assign, simplify
 
 __all__ = ["WheelControllers"]

@@ -11,7 +11,7 @@ import numpy as np
 
 from hero_driver.corrections.tick_odometry import TWIST_WINDOW, WheelGeometry
 
-from ..world.kinematics import find_heading, follow_arcs, join_wheels
+from ...world.kinematics import find_heading, follow_arcs, join_wheels
 
 __all__ = ["TickOdometryRows"]
 

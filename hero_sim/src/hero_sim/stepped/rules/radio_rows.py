@@ -10,8 +10,8 @@ from typing import Collection, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from ..link.wifi import Radio
-from ..robot.clock import NEVER_MS
+from ...link.wifi import Radio
+from ...robot.clock import NEVER_MS
 from .command_shaper import Sent
 from .readings import DISTANCE, SCAN, WHEELS, Readings
 
