@@ -19,7 +19,7 @@ from hero_sim.main import build_parser
 from hero_sim.stepped.swarm import StepSwarm
 from hero_swarm.behavior import Behavior, Binary, Neighbors, Sight, sense
 from hero_swarm.metrics import consensus_error
-from hero_swarm.ros import behavior_node
+from hero_swarm.ros import behavior_node, pose_source
 from hero_swarm.ros.behavior_markers import BehaviorMarkers
 from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode, _parse_fence
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
@@ -44,7 +44,8 @@ class Stage:
         monkeypatch.setattr(rospy, "Subscriber", lambda *arguments, **options: None)
         monkeypatch.setattr(rospy, "Publisher", self.advertise)
         monkeypatch.setattr(rospy, "logwarn", lambda text, *values: self.warnings.append(text % values))
-        monkeypatch.setattr(behavior_node, "time", SimpleNamespace(monotonic=lambda: self.swarm.now_s))
+        for module in (behavior_node, pose_source):
+            monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.swarm.now_s))
 
     def advertise(self, topic, message_class, **options):
         messages = self.sent.setdefault(topic, [])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+from hero_client.values.wheel_paths import follow_wheels
 from hero_sim.errors import OptionError
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import build_rectangle
@@ -16,7 +17,7 @@ from hero_swarm.experiments.batch import build_trial, load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
-from hero_swarm.fitting.body_fit import _list_stretches, fit_body, follow_wheels
+from hero_swarm.fitting.body_fit import _list_stretches, fit_body
 from hero_swarm.fitting.infrared_fit import fit_infrared
 from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
 from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, measure_wheels, sample_times
@@ -207,9 +208,9 @@ def test_wheels_roll_as_far_as_their_arcs():
         aside_m_s = turn_rad_s * WHEEL_SEPARATION_M / 2.0
         speeds_m_s = np.array((0.1 - aside_m_s, 0.1 + aside_m_s))
         assert rolled_m == pytest.approx(np.outer((0.0, 2.5, 10.0), speeds_m_s), rel=2e-3)
-        path = follow_wheels(rolled_m, np.array((1.1, 1.1, 1.1)))
+        path = follow_wheels(rolled_m, WHEEL_SEPARATION_M)
         assert path[:, 2] == pytest.approx(turn_rad_s * np.array((0.0, 2.5, 10.0)), rel=2e-3)
-    straight = follow_wheels(np.array([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]), np.array((1.1, 0.9, 2.0)))
+    straight = follow_wheels(np.array([(0.0, 0.0), (1.1, 0.9), (2.2, 1.8)]), 2.0 * WHEEL_SEPARATION_M)
     step_rad = -0.2 / (2.0 * WHEEL_SEPARATION_M)
     assert straight[:, 2] == pytest.approx([0.0, step_rad, 2.0 * step_rad])
     assert straight[1, :2] == pytest.approx((math.cos(step_rad / 2.0), math.sin(step_rad / 2.0)))

@@ -13,6 +13,7 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+from hero_client.values.wheel_paths import follow_wheels
 from hero_node.command_line import say
 from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
@@ -74,12 +75,9 @@ class WheelResult(NamedTuple):
 
 def follow_ticks(ticks: np.ndarray, wheels_m: np.ndarray) -> Pose:
     """Return where ticks (K, 2) lead a robot with these wheels (3,) from 0, 0, 0."""
-    left_m, right_m = (np.diff(ticks, axis=0) * (TICK_M / DIAMETER_M * wheels_m[:2])).T
-    turns_rad = (right_m - left_m) / wheels_m[2]
-    yaws_rad = np.cumsum(turns_rad) - turns_rad / 2.0
-    distance_m = (left_m + right_m) / 2.0
-    x_m, y_m = (distance_m * np.cos(yaws_rad)).sum(), (distance_m * np.sin(yaws_rad)).sum()
-    return Pose(float(x_m), float(y_m), wrap_angle(float(turns_rad.sum())))
+    rolled_m = ticks * (TICK_M / DIAMETER_M * wheels_m[:2])
+    x_m, y_m, yaw_rad = follow_wheels(rolled_m, wheels_m[2])[-1].tolist()
+    return Pose(x_m, y_m, wrap_angle(yaw_rad))
 
 
 def fit_wheels(legs: Sequence[Leg]) -> WheelResult:

@@ -91,8 +91,8 @@ class ResultsFolder:
     def _delete(self, kind: str) -> None:
         """Delete the runs of a kind, and all of other experiments: trials on robots outlive changes of the code."""
         for name in os.listdir(self._batches):
-            header = self._read_header(name)
-            if header is None or header["kind"] == kind or header["cell"] not in self._cells:
+            read = self._read_lines(name)
+            if read is None or read[0]["kind"] == kind or read[0]["cell"] not in self._cells:
                 os.remove(os.path.join(self._batches, name))
         if kind == SIMULATED:
             shutil.rmtree(os.path.join(self.path, "series"), ignore_errors=True)
@@ -114,29 +114,25 @@ class ResultsFolder:
                         found[key] = run
         return [found[key] for key in sorted(found)]
 
-    def _read_header(self, name: str) -> Optional[Dict[str, Any]]:
-        """Return cell, code, kind and seeds of a batch; None if the file is damaged."""
+    def _read_lines(self, name: str) -> Optional[Tuple[Dict[str, Any], Dict[int, Dict[str, Any]]]]:
+        """Return cell, code, kind and seeds of a batch, and its runs by seed; None if the file is damaged."""
         try:
             with open(os.path.join(self._batches, name), encoding="utf-8") as file:
-                header = json.loads(file.readline())
-            seeds = [int(seed) for seed in header["seeds"]]
-            return {"cell": header["cell"], "code": header["code"], "kind": header["kind"], "seeds": seeds}
+                first, *lines = map(json.loads, file)
+            header = {key: first[key] for key in ("cell", "code", "kind")}
+            header["seeds"] = [int(seed) for seed in first["seeds"]]
+            return header, {int(line["seed"]): line for line in lines}
         except (ValueError, KeyError, TypeError):
             return None
 
     def _read_batch(self, name: str) -> List[Run]:
         """Return the runs of a batch; none if the file is damaged, so that they are computed again."""
-        path = os.path.join(self._batches, name)
-        header = self._read_header(name)
-        if header is None:
+        read = self._read_lines(name)
+        if read is None:
             return []
+        header, by_seed = read
         digest, code, kind, seeds = header["cell"], header["code"], header["kind"], header["seeds"]
-        try:
-            with open(path, encoding="utf-8") as file:
-                by_seed = {int(line["seed"]): line for line in map(json.loads, list(file)[1:])}
-        except (ValueError, KeyError, TypeError):
-            return []
-        remedy = "start over with --fresh, or choose another --out"
+        path, remedy = os.path.join(self._batches, name), "start over with --fresh, or choose another --out"
         if self._code not in (None, code) and kind == SIMULATED:
             raise ExperimentError(
                 "%s: computed by other code (%s, now %s); %s" % (path, code, self._code, remedy)
@@ -186,8 +182,8 @@ class ResultsFolder:
             if name.endswith(".jsonl") and os.path.isfile(path):
                 runs = [run for run in self._read_batch(name) if run.cell == cell]
                 recorded = np.load(path, mmap_mode="r")
-                header = self._read_header(name)
-                seeds = header["seeds"] if header else []
+                read = self._read_lines(name)
+                seeds = read[0]["seeds"] if read else []
                 series.update({run.seed: recorded[:, seeds.index(run.seed)] for run in runs})
         return series
 

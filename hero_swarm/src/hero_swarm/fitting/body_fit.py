@@ -10,10 +10,11 @@ from typing import Iterator, List
 import numpy as np
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+from hero_client.values.wheel_paths import follow_wheels
 
 from .recording import Recording, measure_wheels
 
-__all__ = ["MIN_TURN_RAD", "fit_body", "follow_wheels"]
+__all__ = ["MIN_TURN_RAD", "fit_body", "follow_body"]
 
 STRETCH_S = 8.0
 POSE_PERIOD_S = 0.1
@@ -27,21 +28,16 @@ _ITERATIONS = 8
 _STEP = 1e-4
 
 
-def follow_wheels(wheels_m: np.ndarray, body: np.ndarray) -> np.ndarray:
+def follow_body(wheels_m: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Return poses (K, 3) from 0, 0, 0 for what the ticks of both wheels say (K, 2).
 
     body: travel by travel of the ticks, left and right, and distance between the wheels by that on the drawing (3,).
     """
-    left_m, right_m = np.diff(wheels_m * body[:2], axis=0).T
-    yaw_rad = np.concatenate(([0.0], np.cumsum((right_m - left_m) / (WHEEL_SEPARATION_M * body[2]))))
-    middle_rad = (yaw_rad[1:] + yaw_rad[:-1]) / 2.0
-    paths_m = (left_m + right_m) / 2.0
-    places_m = np.cumsum(np.column_stack((paths_m * np.cos(middle_rad), paths_m * np.sin(middle_rad))), axis=0)
-    return np.column_stack((np.vstack(([(0.0, 0.0)], places_m)), yaw_rad))
+    return follow_wheels(wheels_m * body[:2], WHEEL_SEPARATION_M * body[2])
 
 
 def fit_body(recordings: List[Recording]) -> np.ndarray:
-    """Return the body (3,), as follow_wheels() takes it, from what was recorded of one robot.
+    """Return the body (3,), as follow_body() takes it, from what was recorded of one robot.
 
     Raises: ValueError if the robot did not move enough.
     """
@@ -75,7 +71,7 @@ def _compare(stretches: List[List[np.ndarray]], body: np.ndarray) -> np.ndarray:
     """Return the differences in m of all poses, with the odometry of each stretch laid over them as well as it goes."""
     differences = []
     for wheels_m, poses in stretches:
-        path = follow_wheels(wheels_m, body)
+        path = follow_body(wheels_m, body)
         turn_rad = np.unwrap(poses[:, 2]) - path[:, 2]
         yaw_rad = turn_rad.mean()
         rotation = np.array(((np.cos(yaw_rad), -np.sin(yaw_rad)), (np.sin(yaw_rad), np.cos(yaw_rad))))

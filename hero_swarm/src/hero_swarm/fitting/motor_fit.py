@@ -10,7 +10,7 @@ import numpy as np
 
 from hero_sim.robot.firmware import SPIN_MS
 
-from .body_fit import follow_wheels
+from .body_fit import follow_body
 from .recording import PULSES, SAMPLE_S, Recording, measure_wheels, sample_times
 from .replay import Motors, replay_commands
 
@@ -95,7 +95,7 @@ def predict_ends(
     Each path begins where the robot was; the simulated robots, motors and body (3,), know the commands alone.
     """
     wheels_m = replay_commands(recording, [motors for motors, _ in robots])
-    poses = np.stack([follow_wheels(wheels_m[:, row], body) for row, (_, body) in enumerate(robots)], axis=1)
+    poses = np.stack([follow_body(wheels_m[:, row], body) for row, (_, body) in enumerate(robots)], axis=1)
     times_s = sample_times(recording)
     measured = np.column_stack(
         [np.interp(times_s, recording.poses[:, 0], column)

@@ -23,7 +23,6 @@ from .behavior_markers import BehaviorMarkers
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
 
-FIRST_REPORT_S, REPORT_PERIOD_S = 3.0, 5.0
 SHOW_PERIOD_S = 0.1
 
 
@@ -67,7 +66,7 @@ class BehaviorNode:
         self._memory: Any = None
         self._start_s = rospy.get_time()
         self._last: Optional[Tuple[float, np.ndarray]] = None
-        self._next_report_s, self._next_show_s = time.monotonic() + FIRST_REPORT_S, 0.0
+        self._next_show_s = 0.0
         self._colors: Optional[np.ndarray] = None
         self._metric = rospy.Publisher("~metric", Float32, queue_size=5)
         self._drawing = BehaviorMarkers(self._behavior, self._frame, rospy.get_name())
@@ -92,12 +91,11 @@ class BehaviorNode:
         may_move = sensed.is_known & np.isfinite(linear_m_s) & np.isfinite(angular_rad_s)
         self._commands.send(speeds[0][0], speeds[1][0], may_move)
         self._show_colors()
-        if time.monotonic() >= self._next_report_s and not may_move.all():
-            self._next_report_s = time.monotonic() + REPORT_PERIOD_S
-            missing = self._objects.describe_missing() or self._source.describe_missing()
+        if not may_move.all():
             name = self._swarm.robots[int(may_move.argmin())].name
+            missing = self._objects.describe_missing() or self._source.describe_missing()
             missing = missing or "the behavior gives %s a speed that is no finite number" % name
-            rospy.logwarn("%s; the robots are stopped meanwhile", missing)
+            self._source.warn(missing + "; the robots are stopped meanwhile")
         if time.monotonic() >= self._next_show_s and sensed.is_known.any():
             self._next_show_s = time.monotonic() + SHOW_PERIOD_S
             self._show(now_s, poses, sensed, things)

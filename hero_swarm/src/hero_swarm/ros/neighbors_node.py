@@ -4,7 +4,6 @@ rosrun hero_swarm neighbors _range_m:=1.0
 """
 
 import math
-import time
 from typing import Any, Dict, List, Sequence
 
 import numpy as np
@@ -22,8 +21,6 @@ from ..behavior import Random
 from .pose_source import PoseSource
 
 __all__ = ["NeighborsNode", "make_messages"]
-
-FIRST_REPORT_S, REPORT_PERIOD_S = 3.0, 5.0
 
 PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
@@ -68,7 +65,6 @@ class NeighborsNode:
         self._source = PoseSource([], parameters["frame"])
         self._publishers: Dict[int, rospy.Publisher] = {}
         self._random = Random([self._seed], 0)
-        self._next_report_s = time.monotonic() + FIRST_REPORT_S
         self._add_robots(self._chosen or [])
 
     def _add_robots(self, ids: Sequence[int]) -> None:
@@ -87,7 +83,7 @@ class NeighborsNode:
             report = share_drivers().read()
             self._add_robots(ready_ids(report) if report else [])
         if not self._publishers:
-            self._report("no robot has joined a driver yet: are the robots on?")
+            self._source.warn("no robot has joined a driver yet: are the robots on?")
             return
         poses, ages_s = self._source.read()
         now = rospy.Time.now()
@@ -99,13 +95,7 @@ class NeighborsNode:
             publisher.publish(message)
         missing = self._source.describe_missing()
         if missing:
-            self._report(missing + "; who has no pose senses nothing")
-
-    def _report(self, text: str) -> None:
-        """Warn, every few seconds, and not while all starts at once."""
-        if time.monotonic() >= self._next_report_s:
-            self._next_report_s = time.monotonic() + REPORT_PERIOD_S
-            rospy.logwarn(text)
+            self._source.warn(missing + "; who has no pose senses nothing")
 
 
 def neighbors() -> None:

@@ -1,5 +1,6 @@
 """Poses of all robots in one frame as arrays: from localize, or the ground truth of the simulator."""
 
+import time
 from functools import partial
 from typing import Dict, List, Sequence, Tuple
 
@@ -18,6 +19,8 @@ __all__ = ["SIMULATOR_FRAME", "ObjectSource", "PoseSource"]
 SIMULATOR_FRAME = "world"
 """The frame of the simulator's ground truth, /hero_N/ground_truth; all other frames are those of localize."""
 
+FIRST_REPORT_S, REPORT_PERIOD_S = 3.0, 5.0
+
 MAX_AGE_S = 0.5
 """A robot whose pose is older than this senses nothing, and is stopped."""
 
@@ -31,6 +34,7 @@ class PoseSource:
         self._frame = frame
         self._true: Dict[int, Tuple[Pose, float]] = {}
         self._missing: List[str] = []
+        self._next_report_s = time.monotonic() + FIRST_REPORT_S
         if frame != SIMULATOR_FRAME:
             share_poses()  # subscribes
         self.add_robots(robot_ids)
@@ -77,6 +81,12 @@ class PoseSource:
         """Return why the last read() lacks poses, for users; empty if all are known."""
         more = " (and %d more robots)" % (len(self._missing) - 1) if len(self._missing) > 1 else ""
         return "%s%s" % (self._missing[0], more) if self._missing else ""
+
+    def warn(self, text: str) -> None:
+        """Log that something is missing, every few seconds, and not while all starts at once."""
+        if time.monotonic() >= self._next_report_s:
+            self._next_report_s = time.monotonic() + REPORT_PERIOD_S
+            rospy.logwarn(text)
 
 
 class ObjectSource:
