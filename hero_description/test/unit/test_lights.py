@@ -23,7 +23,7 @@ def test_a_ring_is_closed_and_lies_around_the_body():
     angles_rad = [math.atan2(point.y, point.x) % math.tau for point in ring.points]
     radii_m = [math.hypot(point.x, point.y) for point in ring.points]
     assert radii_m == pytest.approx([lights.RING_RADIUS_M] * len(radii_m))
-    assert BODY_RADIUS_M < lights.RING_RADIUS_M - ring.scale.x / 2 < lights.RING_RADIUS_M < 2 * BODY_RADIUS_M
+    assert BODY_RADIUS_M + 0.004 < lights.RING_RADIUS_M - ring.scale.x / 2 < lights.RING_RADIUS_M < 2 * BODY_RADIUS_M
     steps_rad = {round((after - before) % math.tau, 6) for before, after in zip(angles_rad, angles_rad[1:])}
     assert steps_rad == {round(math.tau / (len(radii_m) - 1), 6)}
     assert math.degrees(steps_rad.pop()) == pytest.approx(15.0, abs=1e-3)
@@ -50,10 +50,15 @@ def test_a_light_has_its_color_for_as_long_as_the_firmware_shows_it():
     assert light.pose.position.z == float(dark.find("origin").get("xyz").split()[2])
     assert 2.0 * float(dark.find("geometry/sphere").get("radius")) < light.scale.x < 0.03, "covers the dark one"
     assert lights.make_light(3, ColorRGBA(0.0, 0.0, 0.0, 1.0)).action == light.DELETE
+    for color in (ColorRGBA(0.1, 0.0, 0.0, 1.0), ColorRGBA(0.0, 0.0, 0.1, 1.0)):
+        assert lights.make_light(3, color).action == light.ADD
+
+
+LINE_Y_M = 0.7
 
 
 class Stage:
-    """Robots on the x axis, 0.3 m apart, in place of all that goal_choice has of ROS."""
+    """Robots on a line along x, 0.3 m apart, in place of all that goal_choice has of ROS."""
 
     def __init__(self, monkeypatch, count=3, connections=1):
         self.sent, self.told, self.latched = {}, [], []
@@ -61,7 +66,8 @@ class Stage:
         rospy = goal_choice.rospy
         monkeypatch.setattr(rospy, "Publisher", self.advertise)
         monkeypatch.setattr(rospy, "Subscriber", lambda *arguments, **options: None)
-        monkeypatch.setattr(rospy, "sleep", lambda duration_s: None)
+        self.slept_s = 0.0
+        monkeypatch.setattr(rospy, "sleep", lambda duration_s: setattr(self, "slept_s", duration_s))
         for name in ("loginfo", "logwarn", "logdebug"):
             monkeypatch.setattr(rospy, name, lambda text, *values: self.told.append(text % values))
         listener = SimpleNamespace(unregister=lambda: None)
@@ -76,15 +82,15 @@ class Stage:
         return SimpleNamespace(publish=messages.append, get_num_connections=lambda: self.connections)
 
     def lookup_transform(self, target, source, time):
-        if source not in self.known:
+        if source not in self.known or not self.slept_s:
             raise goal_choice.tf2_ros.LookupException("no %s" % source)
         transform = TransformStamped()
-        transform.transform.translation.x = self.known[source]
+        transform.transform.translation.x, transform.transform.translation.y = self.known[source], LINE_Y_M
         return transform
 
     def click(self, x_m, y_m=0.0):
         point = PointStamped()
-        point.point.x, point.point.y = x_m, y_m
+        point.point.x, point.point.y = x_m, LINE_Y_M + y_m
         self.choice._receive_point(point)
         return self.discs[-1].header.frame_id
 
