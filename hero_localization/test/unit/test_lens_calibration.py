@@ -5,7 +5,14 @@ import pytest
 
 pytest.importorskip("cv2")
 
-from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board, is_mirrored
+from hero_localization.calibration.lens_calibration import (
+    REGIONS,
+    BoardView,
+    _list_empty_regions,
+    calibrate_lens,
+    find_board,
+    is_mirrored,
+)
 from hero_localization.errors import CalibrationError
 from hero_localization.prints.boards import Board, draw_board, list_board_corners
 from hero_localization.simulated_camera.board_renderer import BoardRenderer
@@ -168,3 +175,31 @@ def test_a_mirrored_board_is_recognized():
     picture = BoardRenderer(OPTIONS, BOARD).render(*list_holds(1, 0.3)[0], random)
     assert not is_mirrored(picture, BOARD)
     assert is_mirrored(np.ascontiguousarray(picture[:, ::-1]), BOARD)
+
+
+def put_corners(places):
+    """Return a view with so many corners at shares of the image's width and height."""
+    pixels = [(u * 960.0, v * 540.0) for (u, v), count in places.items() for _ in range(count)]
+    return BoardView(np.arange(len(pixels)), np.array(pixels, dtype=np.float32))
+
+
+def test_each_third_of_the_image_needs_twenty_corners():
+    names = [name for row in REGIONS for name in row]
+    middles = [(u, v) for v in (0.17, 0.5, 0.83) for u in (0.17, 0.5, 0.83)]
+    for name, middle in zip(names, middles):
+        for count, missing in ((19, [name]), (20, [])):
+            view = put_corners({other: count if other == middle else 25 for other in middles})
+            assert _list_empty_regions([view], 960, 540) == missing
+    # The rims belong to it, and what lies just beyond them.
+    corners = {(-0.01, -0.01): 20, (1.01, 1.01): 20, (0.34, 0.32): 20}
+    assert [name for name in names if name not in _list_empty_regions([put_corners(corners)], 960, 540)] == [
+        "upper left", "upper middle", "lower right",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("tilt_rad", "is_told"), [(0.21, True), (0.29, False)])
+def test_four_views_tilted_by_a_quarter_radian_are_enough(tilt_rad, is_told):
+    tilts_rad = [tilt_rad] * 4 + [0.02] * 6
+    holds = [((0.0, tilt, 0.1), place) for tilt, (_, place) in zip(tilts_rad, list_holds(10, 0.5))]
+    problems = calibrate(project(holds, noise_px=0.05)).problems
+    assert any("hardly tilted" in problem for problem in problems) == is_told

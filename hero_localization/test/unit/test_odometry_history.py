@@ -39,6 +39,11 @@ def test_only_what_wheels_cannot_do_in_the_time_is_a_jump():
             assert make_history((1.0, *ORIGIN), (1.0 + elapsed_s, *pose)).jumps == jumps
 
 
+def test_a_motion_twice_as_fast_as_wheels_is_none():
+    for pose, jumps in ((0.078, 0.0, 0.0), 0), ((0.0, -0.082, 0.0), 1), ((0.0, 0.0, 2.25), 0), ((0.0, 0.0, -2.35), 1):
+        assert make_history((1.0, *ORIGIN), (1.1, *pose)).jumps == jumps, pose
+
+
 def test_a_restart_goes_on_where_the_robot_stood_with_its_lengths():
     history = make_history((0.0, 1.0, 2.0, 0.0), (0.1, 1.05, 2.0, 0.2), (0.2, 0.0, 0.0, 0.0), (0.3, 0.03, 0.0, -0.1))
     assert history.jumps == 1 and history.raw_pose == (0.03, 0.0, -0.1)
@@ -47,7 +52,9 @@ def test_a_restart_goes_on_where_the_robot_stood_with_its_lengths():
     assert found.pose == pytest.approx(expected)
     assert (found.distance_m, found.turned_rad, found.heading_rad) == pytest.approx((0.08, 0.3, 0.1))
     middle = history.find(0.05)
-    assert middle.pose == pytest.approx((1.025, 2.0, 0.1)) and middle.turned_rad == pytest.approx(0.1)
+    assert middle.pose == pytest.approx((1.025, 2.0, 0.1))
+    assert middle[1:] == pytest.approx((0.025, 0.1, 0.1)), "lengths of path and turns, and heading"
+    assert history.find(0.25)[1:] == pytest.approx((0.065, 0.25, 0.15))
     assert history.find(9.0) == found and history.find(-0.01) is None
 
 

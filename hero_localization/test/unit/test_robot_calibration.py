@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_localization.calibration.robot_calibration import calibrate_robot
+from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
 from hero_localization.errors import CalibrationError
 from hero_node.geometry import Pose, transform_pose, wrap_angle
 
@@ -131,3 +131,52 @@ def test_tag_of_another_robot_is_named():
         assert "clocks" in str(error)
     else:
         assert found.problems
+
+
+def test_the_drive_turns_to_both_sides_and_ends_where_it_begins():
+    turns_rad = [duration_s * angular_rad_s for duration_s, _, angular_rad_s in CALIBRATION_DRIVE]
+    steps_m = [duration_s * linear_m_s for duration_s, linear_m_s, _ in CALIBRATION_DRIVE]
+    assert sum(turns_rad) == 0.0 and sum(steps_m) == 0.0
+    assert max(turns_rad) == 6.5 and max(steps_m) == 0.12
+    assert all(not turn_rad or not step_m for turn_rad, step_m in zip(turns_rad, steps_m)), "one after the other"
+    assert 11.0 < sum(duration_s for duration_s, _, _ in CALIBRATION_DRIVE) < 12.0
+    found = calibrate_robot(*drive(CALIBRATION_DRIVE))
+    assert found.problems == [] and (found.x_m, found.y_m) == pytest.approx(MOUNT[:2], abs=0.0005)
+
+
+@pytest.mark.parametrize("delay_s", [-0.08, 0.0, 0.25, 0.48])
+def test_delays_are_found_as_far_as_they_are_looked_for(delay_s):
+    assert calibrate_robot(*drive(delay_s=delay_s)).delay_s == pytest.approx(delay_s, abs=0.003)
+
+
+@pytest.mark.parametrize("delay_s", [-0.13, 0.56])
+def test_a_delay_beyond_that_is_of_another_clock(delay_s):
+    with pytest.raises(CalibrationError, match="no delay between -100 and 500 ms: do the clocks agree"):
+        calibrate_robot(*drive(delay_s=delay_s))
+
+
+def test_problems_begin_at_their_limits():
+    for x_m, named in ((0.0192, False), (0.0208, True)):
+        found = calibrate_robot(*drive(mount=Pose(x_m, 0.0, 0.0), noise_m=1e-4, noise_rad=1e-3))
+        assert any("from the robot's center" in problem for problem in found.problems) == named, x_m
+    for noise_m, named in ((0.00125, False), (0.0016, True)):
+        found = calibrate_robot(*drive(noise_m=noise_m))
+        assert any("loosely" in problem for problem in found.problems) == named, noise_m
+        assert found.rms_m == pytest.approx(math.sqrt(2.0) * noise_m, rel=0.1), "of both axes"
+
+
+def test_the_reported_error_of_the_delay_is_the_true_one():
+    found = [calibrate_robot(*drive(seed=seed, noise_rad=0.02)) for seed in range(12)]
+    off_s = np.array([one.delay_s - 0.08 for one in found])
+    assert np.sqrt((off_s**2).mean()) == pytest.approx(np.mean([one.delay_error_s for one in found]), rel=0.6)
+
+
+def test_a_short_drive_is_enough_from_its_limit_on():
+    for duration_s, is_enough in ((1.05, True), (0.85, False)):
+        parts = (*FULL[:4], (duration_s, 0.1, 0.0))
+        try:
+            calibrate_robot(*drive(parts, noise_m=1e-4))
+        except CalibrationError as error:
+            assert not is_enough and "it takes 80" in str(error)
+        else:
+            assert is_enough

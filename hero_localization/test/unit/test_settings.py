@@ -178,3 +178,46 @@ def test_no_file_breaks_the_reader_or_the_writer(tmp_path, key):
                 use(str(path))
             except SettingsError as error:
                 assert str(error).isprintable() and len(str(error)) < 600
+
+
+def test_poses_are_written_to_hundredths_of_a_millimeter():
+    assert settings.describe_pose(Pose(0.1234567, -0.9876543, 1.0)) == [0.12346, -0.98765, 57.296]
+
+
+@pytest.mark.parametrize(
+    ("key", "low", "high"),
+    [
+        ("tag_size_m", 0.005, 1.0), ("tag_height_m", 0.0, 1.0), ("reference_size_m", 0.005, 1.0),
+        ("decimate", 1.0, 8.0), ("delay_s", -1.0, 5.0), ("exposure_s", 0.0001, 1.0),
+    ],
+)  # fmt: skip
+def test_numbers_are_taken_up_to_their_limits(path, key, low, high):
+    for value in (low, high):
+        write(path, "%s: %r\n" % (key, value))
+        settings.load(path)
+    for value in (low - 1e-5, high + 1e-5):
+        write(path, "%s: %r\n" % (key, value))
+        with pytest.raises(SettingsError, match="%s is .* must be a number from %g to %g" % (key, low, high)):
+            settings.load(path)
+
+
+def test_what_a_file_leaves_out_has_its_default(path):
+    write(path, "references: {100: [1, 2, 90]}\nmounts: {3: [0.01, 0.02, -90]}\n")
+    found = settings.load(path)
+    assert (found.decimate, found.delay_s, found.controls) == (2.0, 0.0, (None, None, None, None))
+    assert found.layout.default_mount[:2] == (0.04, 0.076)
+    assert found.layout.references[100] == (Pose(1.0, 2.0, math.pi / 2.0), 0.1, 0.0)
+    assert found.layout.mounts[3] == pytest.approx((0.04, 0.076, 0.01, 0.02, -math.pi / 2.0))
+
+
+def test_a_place_of_the_camera_must_turn_without_mirroring_or_scaling(path):
+    for rotation, is_right in (
+        (np.diag((1.0, -1.0, -1.0)), True), (np.diag((1.0, -1.0, 1.0)), False), (1.01 * np.eye(3), False),
+    ):  # fmt: skip
+        text = LENS_TEXT + "camera: {rotation: %s, position_m: [0, 0, 2]}\n" % rotation.ravel().tolist()
+        write(path, text)
+        if is_right:
+            assert settings.load(path).camera.position_m.tolist() == [0.0, 0.0, 2.0]
+        else:
+            with pytest.raises(SettingsError, match="calibrate the arena"):
+                settings.load(path)

@@ -182,3 +182,8 @@ def test_after_a_quiet_while_each_lost_robot_has_a_line_again():
     swarm.lines.clear()
     others = {robot_id: place for robot_id, place in places.items() if robot_id}
     assert swarm.run(1.5, others, robots=robots).lines == ["hero_0 lost: its pose follows its odometry"]
+
+
+def test_steps_are_told_by_distance_and_by_the_shorter_turn():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 3.1)}).run(2.0).run(0.3, {0: (1.0, 2.0, -3.12)})
+    assert swarm.lines[-1].endswith("0 mm and 4 degrees off its odometry"), swarm.lines

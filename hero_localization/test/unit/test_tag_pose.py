@@ -14,6 +14,7 @@ from hero_localization.tracking.tag_pose import (
     MountedTag,
     ReferenceTag,
     TagLayout,
+    find_smallest_side,
     fit_squares,
     locate,
 )
@@ -191,3 +192,44 @@ def test_tag_on_upside_down_is_told_from_one_that_is_turned():
     assert is_upside_down(find_heading_error(*drive([(0.2, 0.0)], math.pi)))
     assert is_upside_down(-3.0)
     assert not is_upside_down(math.pi / 2.0) and not is_upside_down(0.1)
+
+
+@pytest.mark.parametrize(("share", "is_right"), [(0.84, False), (0.86, True), (1.14, True), (1.16, False)])
+def test_tags_may_measure_15_percent_more_or_less_than_their_print(share, is_right):
+    seen = locate(CAMERA, [see(3, Pose(0.2, 0.1, 0.5), 0.04 * share)], TagLayout())
+    assert (3 in seen.robots) == is_right and (3 in seen.misshapen) == (not is_right)
+
+
+def test_uncertainty_is_that_of_the_corners_and_what_calibration_leaves():
+    tag = see(1, Pose(0.1, 0.0, 0.4))
+    (found,) = fit_squares(CAMERA, [tag], [0.04], [0.076])
+    side_px = np.linalg.norm(tag.corners - np.roll(tag.corners, 1, axis=0), axis=1).mean()
+    corner_m = 0.1 * 0.04 / side_px
+    place_m2, yaw_rad2 = corner_m**2 / 4.0 + 0.0007**2, (corner_m / 0.04) ** 2 / 2.0 + 0.003**2
+    np.testing.assert_allclose(found.covariance, np.diag((place_m2, place_m2, yaw_rad2)))
+
+
+def test_the_smallest_side_is_that_of_the_tag_seen_from_farthest():
+    straight = Lens(1920, 1080, np.array(((1390.0, 0.0, 959.5), (0.0, 1390.0, 539.5), (0.0, 0.0, 1.0))), np.zeros(5))
+    down = Camera(straight, np.diag((1.0, -1.0, -1.0)), np.array((0.1, 0.0, 2.2)))
+    assert find_smallest_side(down, MountedTag()) == pytest.approx(1390.0 * 0.04 / (2.2 - 0.076))
+    assert find_smallest_side(down, MountedTag(0.05, 0.2)) == pytest.approx(1390.0 * 0.05 / 2.0)
+    tilted = down._replace(rotation=TILT @ down.rotation)
+    depth_m = 2.124 / math.cos(0.1 + math.atan(0.47 * 1080.0 / 1390.0)) * math.cos(math.atan(0.47 * 1080.0 / 1390.0))
+    assert find_smallest_side(tilted, MountedTag()) == pytest.approx(1390.0 * 0.04 / depth_m, rel=0.12)
+    up = down._replace(rotation=np.eye(3))
+    assert find_smallest_side(up, MountedTag()) == math.inf
+
+
+def test_objects_and_robots_may_be_mounted_each_in_its_own_way():
+    layout = TagLayout(mounts={4: MountedTag(0.05)}, default_mount=MountedTag(0.03))
+    assert layout.find_mount(4).size_m == 0.05 and layout.find_mount(5).size_m == 0.03
+    assert MountedTag() == (0.04, 0.076, 0.0, 0.0, 0.0) and ReferenceTag(Pose(0.0, 0.0, 0.0))[1:] == (0.1, 0.0)
+
+
+def test_center_and_side_of_a_tag_are_those_of_its_print_in_perspective():
+    tag = TagCorners(0, np.array(((0.0, 0.0), (40.0, 0.0), (30.0, 20.0), (10.0, 20.0))))
+    assert tag.center == pytest.approx((20.0, 40.0 / 3.0)), "where the diagonals cross"
+    assert tag.side_px == pytest.approx(math.sqrt(600.0))
+    flat = TagCorners(0, np.array(((0.0, 0.0), (2.0, 2.0), (4.0, 4.0), (6.0, 6.0))))
+    assert flat.center == pytest.approx((3.0, 3.0)) and flat.side_px == 0.0

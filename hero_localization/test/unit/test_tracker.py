@@ -146,3 +146,57 @@ def test_reference_tags_that_are_not_seen_for_long_are_named(seen, name, text):
     assert tracker.list_problems() == [Problem(name, text, False)]
     tracker.take(see_references(0.0), 6.1, 7)
     assert tracker.list_problems() == []
+
+
+@pytest.mark.parametrize(("shade", "count"), [(34, 1), (35, 0), (36, 0), (225, 0), (226, 1)])
+def test_images_may_be_as_dark_and_bright_as_the_limits(shade, count):
+    tracker = make_tracker()
+    tracker.measure_shade(np.full((48, 64), shade, np.uint8))
+    assert len(tracker.list_problems()) == count
+
+
+def test_what_is_missed_moved_or_missing_counts_from_its_limit_on():
+    for missed, count in ((12, 0), (13, 1)):
+        tracker = make_tracker()
+        for frame in range(60):
+            tags = [] if frame < missed else [see(0, 0.0, 0.0)]
+            tracker.take([*tags, *see_references(0.0)], frame / 30.0, frame, tracker.project({0: Pose(0.0, 0.0, 0.0)}))
+        assert len(tracker.list_problems()) == count, missed
+    for last_s, count in ((0.45, 0), (0.55, 1)):
+        tracker = make_tracker()
+        for stamp_s in (0.0, 0.2, last_s):
+            tracker.take(see_references(0.01, [101]) + see_references(0.0, [100, 102]), stamp_s, 0)
+        assert len(tracker.list_problems()) == count, last_s
+    for last_s, count in ((4.9, 0), (5.1, 1)):
+        tracker = make_tracker()
+        tracker.take(see_references(0.0), 0.0, 0)
+        tracker.take(see_references(0.0, [100, 102]), last_s, 1)
+        assert len(tracker.list_problems()) == count, last_s
+
+
+def test_a_tag_expected_near_the_border_need_not_be_seen():
+    for place, count in (((41.0, 500.0), 1), ((39.0, 500.0), 0), ((1879.0, 41.0), 1), ((1881.0, 41.0), 0),
+                         ((900.0, 1039.0), 1), ((900.0, 1041.0), 0), ((900.0, 39.0), 0)):  # fmt: skip
+        tracker = make_tracker()
+        for frame in range(60):
+            tracker.take(see_references(0.0), frame / 30.0, frame, {7: place})
+        assert len(tracker.list_problems()) == count, place
+
+
+def test_a_tag_that_left_the_image_is_expected_anew_when_it_is_back():
+    tracker = make_tracker()
+    for frame in range(120):
+        place = (10.0, 10.0) if frame == 40 else (900.0, 500.0)
+        tracker.take(see_references(0.0), frame / 30.0, frame, {7: place})
+        assert len(tracker.list_problems()) == (frame >= 100), frame
+
+
+def test_a_busy_computer_is_named_when_a_fifth_of_the_images_is_left_out():
+    for every, count in ((4, 1), (8, 0)):
+        tracker = make_tracker()
+        numbers = [number for number in range(100) if number % every][:30]
+        for number in numbers:
+            tracker.take(see_references(0.0), number / 30.0, number)
+        assert len(tracker.list_problems()) == count, every
+        used_hz, sent_hz = tracker.rates_hz
+        assert used_hz == pytest.approx(29 * 30.0 / (numbers[-1] - numbers[0])) and sent_hz == pytest.approx(30.0)
