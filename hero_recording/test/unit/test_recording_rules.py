@@ -94,6 +94,18 @@ def test_the_delay_of_a_motion_counts_from_the_first_command_at_rest():
     assert rested.encoder.columns()[1].max() == 701.0
 
 
+def test_each_start_from_rest_has_a_delay_of_its_own():
+    robot, ticks = RobotObservations(), 0.0
+    for reading in range(int(12.0 / PERIOD_S)):
+        time_s = reading * PERIOD_S
+        ticks += 3.0 * (3.2 <= time_s < 4.1 or 6.3 <= time_s < 7.0 or 9.1 <= time_s < 9.5)
+        robot.encoder.add(time_s, -ticks, 0.0)
+    starts = ((3.0, 0.0, -0.1), (3.1, -0.1, 0.0), (4.0, 0.0, 0.0), (6.0, 0.0, 0.1), (6.9, 0.0, 0.0), (9.0, 0.1, 0.0))
+    for command in starts:
+        robot.commands.add(*command)
+    assert analysis.compute_motion_delays(robot) == pytest.approx([0.2, 0.3, 0.1], abs=PERIOD_S)
+
+
 def test_gaps_begin_beyond_their_limits():
     reports = [
         StateReport(0.0, "ready", 0),
