@@ -18,7 +18,7 @@ from measuring import measure_machine_us, print_machine
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board
 from hero_localization.calibration.print_fit import refine_corners
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import CalibrationError
 from hero_localization.filter.pose_filter import Measurement
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
@@ -58,7 +58,7 @@ def find_camera(lab: LabCamera) -> Camera:
     """Return the lab's camera as a perfect calibration would find it."""
     lens = lab.lens
     matrix = np.array(((lens.focal_px, 0, lab.center_px[0]), (0, lens.focal_px, lab.center_px[1]), (0, 0, 1.0)))
-    model = Lens(*lens.size_px, matrix, np.array((lens.k1, lens.k2, 0.0, 0.0, 0.0)))
+    model = Intrinsics(*lens.size_px, matrix, np.array((lens.k1, lens.k2, 0.0, 0.0, 0.0)))
     return Camera(model, lab.rotation, np.array(lab.position_m))
 
 

@@ -21,7 +21,7 @@ from measuring import measure_machine_us, print_machine
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.calibration.lens_calibration import calibrate_lens, find_board
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.filter.pose_filter import Estimate, Measurement
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_localization.prints.boards import Board
@@ -144,7 +144,7 @@ class Scene:
                 see(stamp_s, self.search.search(image, stamp_s))
 
 
-def find_lens(random: np.random.RandomState) -> Lens:
+def find_lens(random: np.random.RandomState) -> Intrinsics:
     """Calibrate the lens by pictures of the board all over the picture."""
     board, views = Board(), []
     renderer = BoardRenderer(OPTIONS, board)
@@ -160,7 +160,7 @@ def find_lens(random: np.random.RandomState) -> Lens:
     return result.lens
 
 
-def find_camera(scene: Scene, lens: Lens) -> Camera:
+def find_camera(scene: Scene, lens: Intrinsics) -> Camera:
     """Calibrate the camera's place by the reference tags."""
     detector = create_detector(decimate=1.0)
     frames = [detector.detect(scene.renderer.render(scene.true)) for _ in range(5)]

@@ -19,7 +19,7 @@ from measuring import read_cpu_s, start, start_master, stop
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, View
 from hero_localization.tracking.settings import describe_camera, update
@@ -55,7 +55,7 @@ def render_turn(poses):
 def write_camera_file(path):
     """Write the pose of the rendered camera."""
     view = View(OPTIONS)
-    lens = Lens(OPTIONS.width_px, OPTIONS.height_px, view.matrix, view.distortion)
+    lens = Intrinsics(OPTIONS.width_px, OPTIONS.height_px, view.matrix, view.distortion)
     update(path, describe_camera(Camera(lens, view.rotation, view.position_m), {}))
 
 

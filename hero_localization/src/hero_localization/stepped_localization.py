@@ -50,7 +50,7 @@ class StepLocalization:
         self._biases = self._random.normal(0.0, _list_sds(camera.bias_sd_m, camera.bias_sd_rad), (count, 3))
         self._covariance = make_covariance(camera.noise_sd_m, camera.noise_sd_rad)
         self._filters = [PoseFilter() for _ in swarm.robots]
-        self._pictures: List[Deque[Tuple[float, Pose]]] = [deque() for _ in swarm.robots]
+        self._images: List[Deque[Tuple[float, Pose]]] = [deque() for _ in swarm.robots]
         self._published: List[Optional[Estimate]] = [None] * count
         self._published_s = [0.0] * count
         for robot in swarm.robots:
@@ -88,11 +88,11 @@ class StepLocalization:
         )
         seen = self._rows.world.poses[rows] + self._biases[rows] + noise
         for row, pose in zip(rows.tolist(), seen.tolist()):
-            pictures, pose_filter = self._pictures[row], self._filters[row]
+            images, pose_filter = self._images[row], self._filters[row]
             pose_filter.add_odometry(now_s, Pose(*self._rows.odometry[row].tolist()))
-            pictures.append((now_s, Pose(*pose)))
-            while pictures and pictures[0][0] <= now_s - self._camera.delay_s:
-                taken_s, measured = pictures.popleft()
+            images.append((now_s, Pose(*pose)))
+            while images and images[0][0] <= now_s - self._camera.delay_s:
+                taken_s, measured = images.popleft()
                 pose_filter.add_measurement(Measurement(taken_s, measured, self._covariance))
             if now_s >= self._published_s[row] + 1.0 / PUBLISH_RATE_HZ:
                 self._published_s[row], self._published[row] = now_s, pose_filter.estimate()

@@ -21,7 +21,7 @@ from geometry_msgs.msg import Point, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from hero_localization.camera.camera_model import Lens
+from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.prints.tag_images import draw_tag
 from hero_localization.simulated_camera.camera_node import list_references
 from hero_localization.tracking import settings as camera_file
@@ -155,7 +155,7 @@ class TrackTest(unittest.TestCase):
 
     def test_1_the_arenas_calibration_ends_with_figures_a_verdict_and_a_file(self):
         info = rospy.wait_for_message("/camera/camera_info", CameraInfo, 60.0)
-        lens = Lens.from_camera_info(info.width, info.height, info.K, info.distortion_model, info.D)
+        lens = Intrinsics.from_camera_info(info.width, info.height, info.K, info.distortion_model, info.D)
         camera_file.update(self.path, camera_file.describe_lens(lens))
         size_px = (info.width, info.height)
         writer = cv2.VideoWriter(self.video, cv2.VideoWriter_fourcc(*"MJPG"), VIDEO_HZ, size_px, False)

@@ -14,7 +14,7 @@ from hero_localization.calibration.arena_calibration import (  # noqa: E402
     measure_residuals,
 )
 from hero_localization.calibration.print_fit import refine_corners  # noqa: E402
-from hero_localization.camera.camera_model import Camera, Lens  # noqa: E402
+from hero_localization.camera.camera_model import Camera, Intrinsics  # noqa: E402
 from hero_localization.errors import CalibrationError  # noqa: E402
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
@@ -26,7 +26,7 @@ from hero_node.geometry import (  # noqa: E402 - without OpenCV there is no cali
     transform_pose,
 )
 
-LENS = Lens(
+LENS = Intrinsics(
     1920,
     1080,
     np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0))),

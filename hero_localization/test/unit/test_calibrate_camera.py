@@ -8,7 +8,7 @@ import pytest
 
 from hero_localization.calibration.lens_calibration import BoardView, LensCalibration
 from hero_localization.calibration.robot_calibration import RobotCalibration
-from hero_localization.camera.camera_model import Lens
+from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.camera.frame_source import Frame
 from hero_localization.errors import CalibrationError
 from hero_localization.nodes import calibrate_camera
@@ -92,7 +92,7 @@ class Board:
     def calibrate(self, views, width_px, height_px, board):
         self.calibrated.append(len(views))
         problems = [] if len(views) >= self.enough else ["the board is hardly tilted"]
-        return LensCalibration(Lens(width_px, height_px, np.eye(3), np.zeros(5)), 0.1, 0.001, [], problems)
+        return LensCalibration(Intrinsics(width_px, height_px, np.eye(3), np.zeros(5)), 0.1, 0.001, [], problems)
 
 
 @pytest.mark.parametrize(

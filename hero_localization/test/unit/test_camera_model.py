@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 
 MATRIX = np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0)))
 DISTORTION = np.array((-0.12, 0.03, 0.0008, -0.0006, -0.002))
@@ -14,7 +14,7 @@ DOWN = np.diag((1.0, -1.0, -1.0))
 def overhead(distortion=DISTORTION, tilt_rad=0.0):
     cos, sin = np.cos(tilt_rad), np.sin(tilt_rad)
     tilt = np.array(((1.0, 0.0, 0.0), (0.0, cos, -sin), (0.0, sin, cos)))
-    return Camera(Lens(1920, 1080, MATRIX, distortion), tilt @ DOWN, np.array((0.1, -0.2, 2.2)))
+    return Camera(Intrinsics(1920, 1080, MATRIX, distortion), tilt @ DOWN, np.array((0.1, -0.2, 2.2)))
 
 
 def grid(height_m):
@@ -32,7 +32,7 @@ def test_pinhole_gives_the_pixels_of_similar_triangles():
 
 def test_distortion_is_that_of_the_formula():
     # By hand: x = 0.4, y = 0, r2 = 0.16: radial = 1 - 0.12 * 0.16 + 0.03 * 0.0256 - 0.002 * 0.004096.
-    seen = Lens(1920, 1080, MATRIX, DISTORTION).distort(np.array(((0.4, 0.0),)))
+    seen = Intrinsics(1920, 1080, MATRIX, DISTORTION).distort(np.array(((0.4, 0.0),)))
     x = 0.4 * (1.0 - 0.0192 + 0.000768 - 8.192e-6) - 0.0006 * (0.16 + 2 * 0.16)
     assert seen == pytest.approx(np.array(((955.0 + 1390.0 * x, 545.0 + 1385.0 * 0.0008 * 0.16),)))
 
@@ -70,7 +70,7 @@ def test_what_a_camera_cannot_see_is_nan():
 
 
 def test_pixels_where_the_lens_folds_back_are_nan():
-    lens = Lens(1920, 1080, MATRIX, np.array((-0.5, 0.0, 0.0, 0.0, 0.0)))
+    lens = Intrinsics(1920, 1080, MATRIX, np.array((-0.5, 0.0, 0.0, 0.0, 0.0)))
     assert np.isnan(lens.undistort(np.array(((955.0 + 1390.0 * 0.8, 545.0),)))).all()
 
 
@@ -82,9 +82,9 @@ def test_each_pixel_may_have_a_height_of_its_own():
 
 
 def test_lens_is_read_from_camera_information():
-    lens = Lens.from_camera_info(1920, 1080, MATRIX.ravel().tolist(), "plumb_bob", DISTORTION.tolist())
+    lens = Intrinsics.from_camera_info(1920, 1080, MATRIX.ravel().tolist(), "plumb_bob", DISTORTION.tolist())
     assert (lens.matrix == MATRIX).all() and (lens.distortion == DISTORTION).all()
-    assert (Lens.from_camera_info(640, 480, MATRIX.ravel(), "", ()).distortion == 0.0).all()
+    assert (Intrinsics.from_camera_info(640, 480, MATRIX.ravel(), "", ()).distortion == 0.0).all()
 
 
 @pytest.mark.parametrize(
@@ -99,4 +99,4 @@ def test_lens_is_read_from_camera_information():
 )
 def test_camera_information_that_does_not_fit_is_refused(matrix, model, distortion, words):
     with pytest.raises(ValueError, match=words):
-        Lens.from_camera_info(1920, 1080, matrix, model, distortion)
+        Intrinsics.from_camera_info(1920, 1080, matrix, model, distortion)

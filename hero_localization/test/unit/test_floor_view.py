@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_camera_model import DISTORTION, MATRIX
 
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import SettingsError
 from hero_localization.tracking.floor_view import MAX_SIDE_PX, FloorView
 from hero_localization.tracking.tag_corners import TagCorners
@@ -17,7 +17,7 @@ def hang_camera(tilt_rad, yaw_rad):
     (cos, sin), (cos_yaw, sin_yaw) = ((np.cos(angle), np.sin(angle)) for angle in (tilt_rad, yaw_rad))
     tilt = np.array(((1.0, 0.0, 0.0), (0.0, cos, -sin), (0.0, sin, cos)))
     turn = np.array(((cos_yaw, sin_yaw, 0.0), (-sin_yaw, cos_yaw, 0.0), (0.0, 0.0, 1.0)))
-    lens = Lens(1920, 1080, MATRIX, DISTORTION)
+    lens = Intrinsics(1920, 1080, MATRIX, DISTORTION)
     return Camera(lens, tilt @ np.diag((1.0, -1.0, -1.0)) @ turn, np.array((0.1, -0.2, 2.2)))
 
 

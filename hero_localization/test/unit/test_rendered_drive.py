@@ -11,7 +11,7 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.camera.frame_source import Frame
 from hero_localization.filter.pose_filter import Measurement
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
@@ -92,7 +92,7 @@ class TrackedCamera:
         ]
         references = {tag.tag_id: ReferenceTag(geometry.Pose(tag.x_m, tag.y_m, 0.0)) for tag in floor}
         self.renderer = CameraRenderer(options, load_arena(scene.path), [PrintedTag(0)], floor, first_reference)
-        lens = Lens(options.width_px, options.height_px, self.renderer.view.matrix, self.renderer.view.distortion)
+        lens = Intrinsics(options.width_px, options.height_px, self.renderer.view.matrix, self.renderer.view.distortion)
         detector = create_detector(decimate=1.0)
         frames = [detector.detect(scene.render(self.renderer)) for _ in range(5)]
         camera = calibrate_arena(lens, average_tags(frames), references).camera
@@ -168,7 +168,7 @@ def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeyp
     options = OPTIONS._replace(width_px=240, center_px=(121.0, 118.0), position_m=place_m)
     renderer = CameraRenderer(options, load_arena(scene.path), [PrintedTag(0, yaw_rad=yaw_rad)])
     view = renderer.view
-    lens = Lens(options.width_px, options.height_px, view.matrix, view.distortion)
+    lens = Intrinsics(options.width_px, options.height_px, view.matrix, view.distortion)
     settings.update(path, settings.describe_camera(Camera(lens, view.rotation, view.position_m), {}))
 
     def subscribe(topic, kind, receive, **others):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import SettingsError
 from hero_localization.tracking import settings
 from hero_localization.tracking.detectors import DEFAULT_BACKEND
@@ -17,7 +17,7 @@ from hero_node.geometry import Pose
 from hero_test.bad_yaml import make_bad_yaml
 
 MATRIX = (1390.0, 0.0, 950.0, 0.0, 1391.0, 550.0, 0.0, 0.0, 1.0)
-LENS = Lens.from_camera_info(1920, 1080, MATRIX, "plumb_bob", (-0.1, 0.02, 0.0, 0.0))
+LENS = Intrinsics.from_camera_info(1920, 1080, MATRIX, "plumb_bob", (-0.1, 0.02, 0.0, 0.0))
 CAMERA = Camera(LENS, np.diag((1.0, -1.0, -1.0)), np.array((0.1, 0.2, 2.2)))
 
 LENS_TEXT = "lens: {width_px: 10, height_px: 10, matrix: [9, 0, 5, 0, 9, 5, 0, 0, 1], distortion: []}\n"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.filter.heading_check import HeadingCheck, is_upside_down
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import (
@@ -20,7 +20,7 @@ from hero_localization.tracking.tag_pose import (
 )
 from hero_node.geometry import Pose, transform_pose, wrap_angle
 
-LENS = Lens(
+LENS = Intrinsics(
     1920,
     1080,
     np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0))),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_localization.camera.camera_model import Camera, Lens
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.tracking.settings import Settings
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout
@@ -12,7 +12,9 @@ from hero_node.geometry import Pose
 
 MATRIX = (1390.0, 0.0, 960.0, 0.0, 1390.0, 540.0, 0.0, 0.0, 1.0)
 CAMERA = Camera(
-    Lens.from_camera_info(1920, 1080, MATRIX, "plumb_bob", ()), np.diag((1.0, -1.0, -1.0)), np.array((0.0, 0.0, 2.2))
+    Intrinsics.from_camera_info(1920, 1080, MATRIX, "plumb_bob", ()),
+    np.diag((1.0, -1.0, -1.0)),
+    np.array((0.0, 0.0, 2.2)),
 )
 REFERENCES = {100 + index: ReferenceTag(Pose(0.3 * index, 0.4, 0.0)) for index in range(3)}
 LAYOUT = TagLayout(

@@ -135,8 +135,8 @@ def _compare(path: Path, poses: Series, ground_truth: Series, is_aligned: bool) 
     yaw_rad = np.interp(stamp_s[known], true_stamp_s, np.unwrap(true_yaw_rad[order]))
     path = Path(*(column[known] for column in path))
     if is_aligned:
-        turn_rad = yaw_rad[0] - path.yaw_rad[0]
-        turned = transform_path(path, [Origin(0.0, 0.0, 0.0, turn_rad)])
+        angle_rad = yaw_rad[0] - path.yaw_rad[0]
+        turned = transform_path(path, [Origin(0.0, 0.0, 0.0, angle_rad)])
         shift = Origin(0.0, x_m[0] - turned.x_m[0], y_m[0] - turned.y_m[0], 0.0)
         path = transform_path(turned, [shift])
     return PoseErrors(path.times_s, np.hypot(path.x_m - x_m, path.y_m - y_m), wrap(path.yaw_rad - yaw_rad))

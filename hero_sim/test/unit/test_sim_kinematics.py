@@ -10,14 +10,14 @@ HEADING = np.array([[0.6], [0.8]])
 
 
 def test_without_rotation_an_arc_is_a_straight_line():
-    ways_m, heading = kinematics.follow_arcs(HEADING, np.array([[0.25]]), np.array([[0.0]]))
-    assert ways_m[0] == pytest.approx(np.array([[0.15], [0.2]]))
+    displacements_m, heading = kinematics.follow_arcs(HEADING, np.array([[0.25]]), np.array([[0.0]]))
+    assert displacements_m[0] == pytest.approx(np.array([[0.15], [0.2]]))
     assert heading.tolist() == HEADING.tolist()
 
 
 def test_without_travel_an_arc_is_a_rotation_on_the_spot():
-    ways_m, heading = kinematics.follow_arcs(np.array([[1.0], [0.0]]), np.array([[0.0]]), np.array([[0.1]]))
-    assert not ways_m.any()
+    displacements_m, heading = kinematics.follow_arcs(np.array([[1.0], [0.0]]), np.array([[0.0]]), np.array([[0.1]]))
+    assert not displacements_m.any()
     assert heading == pytest.approx(np.array([[math.cos(0.1)], [math.sin(0.1)]]), abs=1e-12)
 
 
@@ -26,8 +26,8 @@ def test_a_full_circle_comes_back_whatever_the_step(steps):
     half = np.full((steps // 2, 1), 1.0)
     heading = HEADING
     for sign in (1.0, -1.0):
-        ways_m, heading = kinematics.follow_arcs(heading, half / steps, half * (2 * math.pi / steps))
-        diameter_m = ways_m.sum(axis=0)
+        displacements_m, heading = kinematics.follow_arcs(heading, half / steps, half * (2 * math.pi / steps))
+        diameter_m = displacements_m.sum(axis=0)
         assert diameter_m == pytest.approx(sign * np.array([[-0.8], [0.6]]) / math.pi, abs=1e-9)  # to the left
         assert heading == pytest.approx(-sign * HEADING, abs=1e-9)
 
@@ -40,8 +40,8 @@ def test_several_arcs_of_several_robots_are_as_one_after_the_other():
         heading = headings[:, robot, None]
         for arc in range(5):
             one = slice(arc, arc + 1), slice(robot, robot + 1)
-            ways_m, heading = kinematics.follow_arcs(heading, travels_m[one], rotations_rad[one])
-            assert ways_m[0, :, 0].tolist() == together_m[arc, :, robot].tolist()
+            displacements_m, heading = kinematics.follow_arcs(heading, travels_m[one], rotations_rad[one])
+            assert displacements_m[0, :, 0].tolist() == together_m[arc, :, robot].tolist()
         assert heading[:, 0].tolist() == ends[:, robot].tolist()
 
 

@@ -56,7 +56,7 @@ def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[
         raise FormationError("formation: shape is %s, but must be one of: %s" % (shorten(shape), ", ".join(SHAPES)))
     center = _read_point("center", formation.get("center", [0.0, 0.0]))
     spacing_m = _read_number("spacing_m", formation.get("spacing_m", DEFAULT_SPACING_M))
-    turn_rad = math.radians(_read_number("turn_deg", formation.get("turn_deg", 0.0)))
+    angle_rad = math.radians(_read_number("turn_deg", formation.get("turn_deg", 0.0)))
     if shape == "circle":
         places = _circle(count, spacing_m)
     elif shape == "line":
@@ -66,7 +66,7 @@ def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[
     else:
         places = _read_points(formation, count)
     _check_spacing(places, least_spacing_m)
-    cos, sin = math.cos(turn_rad), math.sin(turn_rad)
+    cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return [(center[0] + x * cos - y * sin, center[1] + x * sin + y * cos) for x, y in places]
 
 

@@ -50,8 +50,8 @@ class ForwardController(MotionController):
     def _approach(self, pose: Pose, ranges: Sequence[float], seen_s: float) -> Velocity:
         speed_m_s = min(self._linear_m_s, max(MIN_LINEAR_M_S, LINEAR_GAIN * self.distance_m))
         start_yaw_rad = self._start.yaw_rad if self._start else pose.yaw_rad
-        turn_rad_s = clamp(ANGULAR_GAIN * wrap_angle(start_yaw_rad - pose.yaw_rad), 1.0)
-        return Velocity(math.copysign(speed_m_s, self._remaining_m), turn_rad_s)
+        angular_rad_s = clamp(ANGULAR_GAIN * wrap_angle(start_yaw_rad - pose.yaw_rad), 1.0)
+        return Velocity(math.copysign(speed_m_s, self._remaining_m), angular_rad_s)
 
 
 class TurnController(MotionController):

@@ -113,9 +113,9 @@ class SwarmGoToController:
         straight = to_goal_m * (speed_m_s / max(distance_m, 1e-9))
         side = np.array([-straight[1], straight[0]])
         if jam.look(distance_m, self.step_s):
-            jam.turn_rad = self._random.uniform(0.5, 2.5) * self._random.choice((-1.0, 1.0))
-        turn_rad = jam.turn_rad if jam.aside else NUDGE_RAD * self._random.uniform(-1.0, 1.0)
-        wanted: np.ndarray = straight * math.cos(turn_rad) + side * math.sin(turn_rad)
+            jam.angle_rad = self._random.uniform(0.5, 2.5) * self._random.choice((-1.0, 1.0))
+        angle_rad = jam.angle_rad if jam.aside else NUDGE_RAD * self._random.uniform(-1.0, 1.0)
+        wanted: np.ndarray = straight * math.cos(angle_rad) + side * math.sin(angle_rad)
         return wanted
 
 
@@ -123,7 +123,7 @@ class _Jam:
     """Whether one robot makes progress towards its goal."""
 
     def __init__(self) -> None:
-        self.turn_rad = 0.0
+        self.angle_rad = 0.0
         self._min_distance_m = math.inf
         self._waited_s = 0.0
 

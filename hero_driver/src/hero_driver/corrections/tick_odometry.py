@@ -141,11 +141,11 @@ class TickOdometry:
     def _move(self, left_m: float, right_m: float) -> None:
         """Follow the arc that two wheels describe which run left_m and right_m at steady speeds."""
         distance_m = (left_m + right_m) / 2.0
-        turn_rad = (right_m - left_m) / self._separation_m
-        half_rad = turn_rad / 2.0
+        angle_rad = (right_m - left_m) / self._separation_m
+        half_rad = angle_rad / 2.0
         # The chord of the arc: its length is distance * sin(half) / half, its direction yaw + half.
         chord_m = distance_m if -1e-9 < half_rad < 1e-9 else distance_m * math.sin(half_rad) / half_rad
         direction_rad = self.yaw_rad + half_rad
         self.x_m += chord_m * math.cos(direction_rad)
         self.y_m += chord_m * math.sin(direction_rad)
-        self.yaw_rad = math.remainder(self.yaw_rad + turn_rad, 2.0 * math.pi)
+        self.yaw_rad = math.remainder(self.yaw_rad + angle_rad, 2.0 * math.pi)

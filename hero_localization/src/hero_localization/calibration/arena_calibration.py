@@ -9,7 +9,7 @@ import numpy as np
 
 from hero_node.geometry import Pose
 
-from ..camera.camera_model import Camera, Lens
+from ..camera.camera_model import Camera, Intrinsics
 from ..errors import CalibrationError
 from ..tracking.tag_corners import TagCorners
 from ..tracking.tag_pose import ReferenceTag, TagPose, fit_squares
@@ -52,10 +52,10 @@ _SEEN_SHARE = 0.5
 
 
 class ArenaCalibration(NamedTuple):
-    """The camera at its place.
+    """The calibrated camera.
 
     Attributes:
-        camera: lens and place in `map`.
+        camera: intrinsics, and pose in `map`.
         residuals_m: how far each reference tag is seen from the place it was given, by id.
         left_out: ids of tags that were left out, as they contradict all others.
         problems: what speaks against using it; empty: it is good.
@@ -88,7 +88,7 @@ def average_tags(frames: Sequence[Sequence[TagCorners]]) -> List[TagCorners]:
 
 
 def calibrate_arena(
-    lens: Lens, tags: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+    lens: Intrinsics, tags: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
 ) -> ArenaCalibration:
     """Return the camera pose from the image of the reference tags; other tags are ignored.
 
@@ -128,7 +128,7 @@ def calibrate_arena(
     return ArenaCalibration(camera, residuals_m, left_out, problems)
 
 
-def _refuse_mistakes(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
+def _refuse_mistakes(lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
     """Try mistakes that people make with places. Raises: CalibrationError that names those that explain all."""
     mirrored = {
         tag_id: tag._replace(pose=Pose(tag.pose.x_m, -tag.pose.y_m, 0.0)) for tag_id, tag in references.items()
@@ -155,7 +155,7 @@ class _WrongTag(NamedTuple):
 
 
 def _find_wrong_tag(
-    lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
 ) -> Optional[_WrongTag]:
     """Return the tags without one of which the others agree by far better; None if there is none, or none to spare."""
     if len(seen) <= MIN_TAGS:
@@ -230,7 +230,7 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Reference
         )
 
 
-def _fit(lens: Lens, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> Optional[Camera]:
+def _fit(lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> Optional[Camera]:
     """Return the camera above the floor that sees the tags like this best; None if there is none."""
     known = [references[tag.tag_id] for tag in seen]
     # The yaws are not known: centers first.

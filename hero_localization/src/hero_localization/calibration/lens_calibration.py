@@ -1,4 +1,4 @@
-"""The lens of a camera, from images of a ChArUco board. Pure but for OpenCV."""
+"""Intrinsics of a camera, from images of a ChArUco board. Pure but for OpenCV."""
 
 import math
 from typing import List, NamedTuple, Optional, Sequence, Tuple
@@ -6,7 +6,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 import cv2
 import numpy as np
 
-from ..camera.camera_model import Lens
+from ..camera.camera_model import Intrinsics
 from ..errors import CalibrationError
 from ..prints.boards import Board, create_board, list_board_corners
 
@@ -48,7 +48,7 @@ class BoardView(NamedTuple):
 
 
 class LensCalibration(NamedTuple):
-    """A lens.
+    """Calibrated intrinsics.
 
     Attributes:
         rms_px: how far the board's corners lie from where the lens puts them.
@@ -57,7 +57,7 @@ class LensCalibration(NamedTuple):
         problems: what speaks against using it; empty: it is good.
     """
 
-    lens: Lens
+    lens: Intrinsics
     rms_px: float
     focal_error: float
     left_out: List[int]
@@ -103,7 +103,7 @@ def _refine(gray: np.ndarray, pixels: np.ndarray) -> np.ndarray:
 def calibrate_lens(
     views: Sequence[BoardView], width_px: int, height_px: int, board: Board
 ) -> LensCalibration:
-    """Return the lens through which the board was seen.
+    """Return the intrinsics of the camera that saw the board.
 
     Raises: CalibrationError for fewer than eight images, or images that no lens explains.
     """
@@ -141,16 +141,16 @@ def calibrate_lens(
 
 
 class _Fit(NamedTuple):
-    lens: Lens
+    lens: Intrinsics
     rms_px: float
     errors_px: np.ndarray
     tilts_rad: np.ndarray
 
 
 def _fit(
-    views: Sequence[BoardView], width_px: int, height_px: int, board: Board, guess: Optional[Lens] = None
+    views: Sequence[BoardView], width_px: int, height_px: int, board: Board, guess: Optional[Intrinsics] = None
 ) -> _Fit:
-    """Return the lens that explains the views best, sought from a guess; None: from OpenCV's own."""
+    """Return the intrinsics that explain the views best, sought from a guess; None: from OpenCV's own."""
     corners_m = list_board_corners(board).astype(np.float32)
     # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
     flags = cv2.CALIB_FIX_K3 | (0 if guess is None else cv2.CALIB_USE_INTRINSIC_GUESS)
@@ -169,7 +169,7 @@ def _fit(
         ) from None
     if not np.isfinite(matrix).all() or not math.isfinite(rms_px):
         raise CalibrationError("no lens explains these images: take them again")
-    lens = Lens(width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[:5])
+    lens = Intrinsics(width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[:5])
     tilts_rad = np.array([math.acos(min(abs(cv2.Rodrigues(turn)[0][2, 2]), 1.0)) for turn in turns])
     return _Fit(lens, float(rms_px), np.asarray(errors_px).ravel(), tilts_rad)
 

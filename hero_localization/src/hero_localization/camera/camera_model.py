@@ -11,15 +11,15 @@ import numpy as np
 
 from ..errors import CalibrationError
 
-__all__ = ["Camera", "Lens"]
+__all__ = ["Camera", "Intrinsics"]
 
 _MAX_ROUNDS = 50
 _ROUNDING = 1e-10
 """Normalized image coordinates: a ten millionth of a pixel."""
 
 
-class Lens(NamedTuple):
-    """Intrinsics: projection of directions in the optical frame to pixels."""
+class Intrinsics(NamedTuple):
+    """Projection of directions in the optical frame to pixels."""
 
     width_px: int
     height_px: int
@@ -31,8 +31,8 @@ class Lens(NamedTuple):
     @classmethod
     def from_camera_info(
         cls, width_px: int, height_px: int, matrix: Sequence[float], model: str, d: Sequence[float]
-    ) -> "Lens":
-        """Return the lens that a sensor_msgs/CameraInfo describes (K as nine numbers, distortion_model, D).
+    ) -> "Intrinsics":
+        """Return the intrinsics that a sensor_msgs/CameraInfo describes (K as nine numbers, distortion_model, D).
 
         Raises: ValueError for a camera that is not calibrated, or a lens of another model.
         """
@@ -95,9 +95,9 @@ def _bend(rays: np.ndarray, distortion: np.ndarray) -> np.ndarray:
 
 
 class Camera(NamedTuple):
-    """A lens at its place in the frame `map`."""
+    """Intrinsics and pose (extrinsics) in the frame `map`."""
 
-    lens: Lens
+    lens: Intrinsics
     rotation: np.ndarray
     """(3, 3): turns a vector of `map` into the optical frame."""
     position_m: np.ndarray

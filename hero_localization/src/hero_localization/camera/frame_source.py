@@ -15,7 +15,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from hero_node.geometry import clamp
 
 from ..errors import FrameSourceError
-from .camera_model import Lens
+from .camera_model import Intrinsics
 from .device_controls import ControlPort, DeviceControls, apply_controls
 
 __all__ = ["DeviceSource", "Frame", "FrameSource", "LiveSource", "Newest", "TopicSource", "VideoSource", "open_source"]
@@ -85,14 +85,14 @@ class FrameSource:
     """Images of a camera.
 
     Attributes:
-        lens: as the camera's driver tells; None if it does not.
+        lens: the intrinsics in camera_info; None without it.
         problem: why there are no usable images, for people; empty if there are.
         warning: what may spoil images that come, for people; empty if nothing is known.
         arrived_s: when the newest image came; before, when the source was opened.
     """
 
     def __init__(self) -> None:
-        self.lens: Optional[Lens] = None
+        self.lens: Optional[Intrinsics] = None
         self.problem = self.warning = ""
         self.arrived_s = rospy.get_time()
 
@@ -111,16 +111,16 @@ class LiveSource(FrameSource):
         super().__init__()
         self._newest: Newest[Any] = Newest()
 
-    def _keep(self, picture: Any) -> None:
+    def _keep(self, received: Any) -> None:
         self.arrived_s = rospy.get_time()
-        self._newest.keep(picture)
+        self._newest.keep(received)
 
     def poll(self, timeout_s: float) -> Any:
         """Return the newest image, unless an earlier call did; None if none comes in time or is usable."""
-        picture = self._newest.take(timeout_s)
-        return None if picture is None else self._decode(picture)
+        received = self._newest.take(timeout_s)
+        return None if received is None else self._decode(received)
 
-    def _decode(self, picture: Any) -> Any:
+    def _decode(self, received: Any) -> Any:
         raise NotImplementedError
 
 
@@ -138,16 +138,16 @@ class TopicSource(LiveSource):
 
     def _read_info(self, info: CameraInfo) -> None:
         try:
-            self.lens = Lens.from_camera_info(info.width, info.height, info.K, info.distortion_model, info.D)
+            self.lens = Intrinsics.from_camera_info(info.width, info.height, info.K, info.distortion_model, info.D)
         except ValueError:
             self.lens = None  # the file's lens counts
 
-    def _decode(self, picture: Any) -> Optional[Frame]:
-        gray = self._decode_jpeg(picture) if self._is_compressed else self._decode_image(picture)
+    def _decode(self, received: Any) -> Optional[Frame]:
+        gray = self._decode_jpeg(received) if self._is_compressed else self._decode_image(received)
         if gray is None:
             return None
         self.problem = ""
-        header = picture.header
+        header = received.header
         return Frame((header.stamp if header.stamp else rospy.get_rostime()).to_sec(), gray, header.seq)
 
     def _decode_image(self, message: Image) -> Optional[np.ndarray]:
@@ -228,8 +228,8 @@ class DeviceSource(LiveSource):
             except FrameSourceError as error:
                 self.problem = str(error)
 
-    def _decode(self, picture: Tuple[float, np.ndarray, int]) -> Frame:
-        stamp_s, image, number = picture
+    def _decode(self, received: Tuple[float, np.ndarray, int]) -> Frame:
+        stamp_s, image, number = received
         return Frame(stamp_s, _make_gray(image), number)
 
     @staticmethod

@@ -4,16 +4,16 @@ from hero_node.texts import one_line
 from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from ..errors import CalibrationError
-from .camera_model import Lens
+from .camera_model import Intrinsics
 
 __all__ = ["load_lens"]
 
 
-def load_lens(path: str) -> Lens:
-    """Return the lens in a file of camera_calibration. Raises: CalibrationError."""
+def load_lens(path: str) -> Intrinsics:
+    """Return the intrinsics in a file of camera_calibration. Raises: CalibrationError."""
     try:
         content = parse_yaml(read_text(path))
-        return Lens.from_camera_info(
+        return Intrinsics.from_camera_info(
             int(content["image_width"]),
             int(content["image_height"]),
             content["camera_matrix"]["data"],

@@ -27,11 +27,11 @@ def save_map(path: str, grid: OccupancyGrid) -> str:
     pixels = np.full(grid.log_odds.shape, UNKNOWN, dtype=np.uint8)
     pixels[grid.free] = FREE
     pixels[grid.occupied] = OCCUPIED
-    picture = os.path.splitext(path)[0] + ".png"
-    with replace_file(picture) as file:
+    image = os.path.splitext(path)[0] + ".png"
+    with replace_file(image) as file:
         Image.fromarray(pixels[::-1]).save(file, "PNG")  # the first row of an image is its upper one
     content = {
-        "image": os.path.basename(picture),
+        "image": os.path.basename(image),
         "resolution": grid.cell_m,
         "origin": [*grid.origin_m, 0.0],
         "negate": 0,
@@ -39,4 +39,4 @@ def save_map(path: str, grid: OccupancyGrid) -> str:
         "free_thresh": FREE_SHARE,
     }
     write_file(path, yaml.safe_dump(content, sort_keys=False).encode())
-    return picture
+    return image

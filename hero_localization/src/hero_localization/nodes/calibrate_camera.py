@@ -40,7 +40,7 @@ from ..calibration.lens_calibration import (
 )
 from ..calibration.print_fit import refine_corners
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
-from ..camera.camera_model import Lens
+from ..camera.camera_model import Intrinsics
 from ..camera.device_controls import DeviceControls
 from ..camera.frame_source import Frame, open_source
 from ..camera.lens_file import load_lens
@@ -72,7 +72,7 @@ LOOK_S = 3.0
 """A robot whose tag is not seen within this time is not moved."""
 
 
-class Pictures:
+class Images:
     """The newest image of the camera, for a program that works on one after another."""
 
     def __init__(self, options: argparse.Namespace, program: Program, controls: DeviceControls) -> None:
@@ -121,8 +121,8 @@ class Pictures:
             self._check_running()  # what ends this program may end the detector first
             raise
 
-    def find_lens(self, settings: Settings) -> Optional[Lens]:
-        """Return the lens of the file, else that of camera_info; None if neither is known."""
+    def find_lens(self, settings: Settings) -> Optional[Intrinsics]:
+        """Return the intrinsics in the file, else those of camera_info; None if neither is known."""
         return settings.lens or self.source.lens
 
     def close(self) -> None:
@@ -132,7 +132,7 @@ class Pictures:
             self._finder.close()
 
 
-def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, program: Program) -> int:
+def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program: Program) -> int:
     """Collect views of the board, and calibrate. Return the exit code."""
     board = Board()
     say("move the board slowly through the whole image, near and far, tilted by 30 to 45 degrees; hold still between")
@@ -143,7 +143,7 @@ def calibrate_lens_by_board(options: argparse.Namespace, pictures: Pictures, pro
     found_s = program.now_s
     result: Optional[LensCalibration] = None
     while len(views) < wanted and (result is None or result.problems):
-        frame = pictures.take()
+        frame = images.take()
         size = (frame.gray.shape[1], frame.gray.shape[0])
         view = find_board(frame.gray, board)
         if view is not None:
@@ -180,20 +180,20 @@ def _measure_shift(view: BoardView, other: BoardView) -> float:
 
 
 def import_lens(options: argparse.Namespace) -> int:
-    """Take the lens of a YAML file as camera_calibration writes it. Return the exit code. Raises: CalibrationError."""
+    """Take the intrinsics in a YAML file of camera_calibration. Return the exit code. Raises: CalibrationError."""
     lens = load_lens(options.yaml)
     say("focal lengths %.1f and %.1f px" % (lens.matrix[0, 0], lens.matrix[1, 1]))
     return _finish(options.file, camera_file.describe_lens(lens), [])
 
 
-def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
+def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
     """Calibrate the camera pose (extrinsics). Return the exit code."""
     settings = camera_file.load(options.file)
     frames: List[Sequence[TagCorners]] = []
     while len(frames) < ARENA_FRAMES:
-        frame = pictures.take()
-        frames.append(pictures.find_tags(settings, 1.0, frame))
-    lens = pictures.find_lens(settings)
+        frame = images.take()
+        frames.append(images.find_tags(settings, 1.0, frame))
+    lens = images.find_lens(settings)
     if lens is None:
         raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
     lens.check_size(*frame.gray.shape)
@@ -212,7 +212,7 @@ def calibrate_place(options: argparse.Namespace, pictures: Pictures) -> int:
     return _finish(options.file, parts, result.problems)
 
 
-def calibrate_robot_tags(options: argparse.Namespace, pictures: Pictures, program: Program) -> int:
+def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: Program) -> int:
     """Turn and drive robots, one after another, and measure how their tags sit. Return the exit code."""
     settings = camera_file.load(options.file)
     robots: Sequence[int] = options.robots
@@ -226,7 +226,7 @@ def calibrate_robot_tags(options: argparse.Namespace, pictures: Pictures, progra
             problems.append(text % (robot_id, robot_id))
             continue
         try:
-            result = results[tag_id] = _watch_robot(settings, pictures, program, robot_id, tag_id)
+            result = results[tag_id] = _watch_robot(settings, images, program, robot_id, tag_id)
         except ProgramError:
             raise
         except (CalibrationError, HeroError) as error:
@@ -256,7 +256,7 @@ def calibrate_robot_tags(options: argparse.Namespace, pictures: Pictures, progra
 
 
 def _watch_robot(
-    settings: Settings, pictures: Pictures, program: Program, robot_id: int, tag_id: int
+    settings: Settings, images: Images, program: Program, robot_id: int, tag_id: int
 ) -> RobotCalibration:
     """Drive one robot, and return how its tag sits. Raises: CalibrationError if it cannot be seen; HeroError."""
     camera, mount = settings.camera, settings.layout.find_mount(tag_id)
@@ -265,7 +265,7 @@ def _watch_robot(
     seen: List[Tuple[float, Pose]] = []
 
     def watch(frame: Optional[Frame]) -> int:
-        found = pictures.find_tags(settings, settings.decimate, frame) if frame is not None else []
+        found = images.find_tags(settings, settings.decimate, frame) if frame is not None else []
         tags = [tag for tag in found if tag.tag_id == tag_id]
         if frame is not None and len(tags) == 1:
             pose = fit_squares(camera, tags, [mount.size_m], [mount.height_m])[0].pose
@@ -278,7 +278,7 @@ def _watch_robot(
         robot.check_not_stopped()
         look_until_s, count = rospy.get_time() + LOOK_S, 0
         while not seen:
-            count = max(count, watch(pictures.take()))
+            count = max(count, watch(images.take()))
             if not seen and rospy.get_time() > look_until_s:
                 reason = "appears more than once" if count else "is not in the image, or too dark"
                 raise CalibrationError("tag %d %s; the robot was not moved" % (tag_id, reason))
@@ -291,7 +291,7 @@ def _watch_robot(
                 end_s = rospy.get_time() + duration_s
                 while rospy.get_time() < end_s:
                     robot.drive(linear_m_s, angular_rad_s)
-                    watch(pictures.poll())
+                    watch(images.poll())
         finally:
             subscriber.unregister()
     return calibrate_robot(seen, odometry)
@@ -354,15 +354,15 @@ def run(arguments: Sequence[str]) -> int:
         return import_lens(options)
     settings = _check_file(options)
     with Program("calibrate_camera", anonymous=True) as program:
-        pictures = Pictures(options, program, settings.controls)
+        images = Images(options, program, settings.controls)
         try:
             if options.part == "lens":
-                return calibrate_lens_by_board(options, pictures, program)
+                return calibrate_lens_by_board(options, images, program)
             if options.part == "arena":
-                return calibrate_place(options, pictures)
-            return calibrate_robot_tags(options, pictures, program)
+                return calibrate_extrinsics(options, images)
+            return calibrate_robot_tags(options, images, program)
         finally:
-            pictures.close()
+            images.close()
 
 
 def main() -> None:

@@ -47,7 +47,7 @@ class LocalizationNode:
         self._inputs: Dict[int, List[Any]] = {}
         self._next_diagnostics_s = 0.0
         self._unknown_s: Dict[int, float] = {}
-        self._picture = threading.Event()
+        self._image_used = threading.Event()
         self._add_robots(self._chosen or [])
         self._swarm_topic = str(parameters["swarm_topic"])
         rospy.Subscriber(self._swarm_topic, RobotPoses, self._receive_swarm, queue_size=10, tcp_nodelay=True)
@@ -96,13 +96,13 @@ class LocalizationNode:
         with self._lock:
             lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
             self._localizer.distrust(report.header.stamp.to_sec(), lost)
-        self._picture.set()
+        self._image_used.set()
         _log(lines)
 
     def step(self, period_s: float) -> None:
         """Wait for the poses of an image, or for period_s, and publish."""
-        self._picture.wait(period_s)
-        self._picture.clear()
+        self._image_used.wait(period_s)
+        self._image_used.clear()
         if self._chosen is None:
             report = share_drivers().read()
             self._add_robots(sorted(robot.id for robot in report.robots if robot.id >= 0) if report else [])

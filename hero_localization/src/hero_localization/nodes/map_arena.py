@@ -113,10 +113,10 @@ class MapNode:
         try:
             os.makedirs(os.path.dirname(self._path), exist_ok=True)
             with self._lock:
-                picture = save_map(self._path, self._grid)
+                image = save_map(self._path, self._grid)
         except OSError as error:
             return TriggerResponse(False, "%s cannot be written: %s" % (error.filename or self._path, error.strerror))
-        return TriggerResponse(True, "%s and %s" % (self._path, picture))
+        return TriggerResponse(True, "%s and %s" % (self._path, image))
 
 
 def _check_path(path: str) -> str:

@@ -24,8 +24,8 @@ def list_board_places(options: CameraOptions, random: np.random.RandomState) -> 
         v = options.height_px * (0.2 + 0.3 * (index // 3 % 3))
         distance_m = random.uniform(0.35, 0.5)
         tilt_rad = random.choice((-1.0, 1.0), 2) * random.uniform(0.25, 0.6, 2)
-        turn_rad = (float(tilt_rad[0]), float(tilt_rad[1]), random.uniform(-0.3, 0.3))
-        yield turn_rad, ((u - cx) / fx * distance_m, (v - cy) / fy * distance_m, distance_m)
+        rotation_rad = (float(tilt_rad[0]), float(tilt_rad[1]), random.uniform(-0.3, 0.3))
+        yield rotation_rad, ((u - cx) / fx * distance_m, (v - cy) / fy * distance_m, distance_m)
         index += 1
 
 
@@ -42,17 +42,17 @@ class BoardRenderer:
         self._texture = printed.astype(np.float32)
 
     def render(
-        self, turn_rad: Sequence[float], position_m: Sequence[float], random: np.random.RandomState
+        self, rotation_rad: Sequence[float], position_m: Sequence[float], random: np.random.RandomState
     ) -> np.ndarray:
         """Return an image (H, W), gray, 8 bit.
 
         Args:
-            turn_rad: rotation vector of the board, in the optical frame.
+            rotation_rad: rotation vector of the board, in the optical frame.
             position_m: of the board's center, in the optical frame.
             random: noise is drawn from it.
         """
         options = self._options
-        rotation = cv2.Rodrigues(np.array(turn_rad, dtype=float))[0]
+        rotation = cv2.Rodrigues(np.array(rotation_rad, dtype=float))[0]
         # A point of the board, x and y from its center, lies along the ray that this matrix gives.
         to_ray = np.column_stack((rotation[:, 0], rotation[:, 1], np.asarray(position_m, dtype=float)))
         scale = 1.0 / TEXEL_M

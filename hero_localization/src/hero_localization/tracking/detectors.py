@@ -105,8 +105,8 @@ class ArucoDetector(TagDetector):
     def _find_roll(self, family: str) -> int:
         """Return by how many corners this version's order has to be moved on, found by a tag of known heading."""
         cells = draw_tag(family, 0)
-        picture = np.kron(np.pad(cells, 3, constant_values=255), np.ones((10, 10), np.uint8))
-        corners = self.detect(picture)[0].corners
+        image = np.kron(np.pad(cells, 3, constant_values=255), np.ones((10, 10), np.uint8))
+        corners = self.detect(image)[0].corners
         return -int(np.argmin(corners.sum(axis=1)))
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:

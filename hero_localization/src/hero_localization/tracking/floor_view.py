@@ -66,9 +66,9 @@ class FloorView:
             raise SettingsError("the camera does not look at the floor below it: calibrate the arena again")
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
-    def rectify(self, picture: np.ndarray) -> np.ndarray:
+    def rectify(self, gray: np.ndarray) -> np.ndarray:
         """Return a camera's image (H, W) as seen from above: x right, y up, black where it saw nothing."""
-        return cv2.remap(picture, self._maps[0], self._maps[1], cv2.INTER_LINEAR)
+        return cv2.remap(gray, self._maps[0], self._maps[1], cv2.INTER_LINEAR)
 
     def find_pixels(self, pixels: np.ndarray) -> np.ndarray:
         """Return where pixels (N, 2) of the camera's image are in the view."""
@@ -76,9 +76,9 @@ class FloorView:
         left_m, _, _, high_m = self.box_m
         return np.column_stack((points_m[:, 0] - left_m, high_m - points_m[:, 1])) * self._px_per_m - 0.5
 
-    def draw(self, picture: np.ndarray, tags: Sequence[TagCorners], unusable: Collection[int]) -> np.ndarray:
+    def draw(self, gray: np.ndarray, tags: Sequence[TagCorners], unusable: Collection[int]) -> np.ndarray:
         """Return a camera's image from above in color (H, W, 3), with the tags in it; unusable: ids drawn in red."""
-        drawn = cv2.cvtColor(self.rectify(picture), cv2.COLOR_GRAY2BGR)
+        drawn = cv2.cvtColor(self.rectify(gray), cv2.COLOR_GRAY2BGR)
         for tag in tags:
             corners = self.find_pixels(tag.corners)
             if not np.isfinite(corners).all():

@@ -1,4 +1,4 @@
-"""The file of one camera: lens, place, tags. Calibrations write their parts of it, the tracker reads it all.
+"""The file of one camera: intrinsics, extrinsics, tags. Calibrations write their parts of it, the tracker reads it all.
 
 Pure but for the file. Lengths in m, angles in degrees, pixels as in camera_model.
 """
@@ -16,7 +16,7 @@ from hero_node.texts import shorten
 from hero_node.yaml_edit import replace_values
 from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
-from ..camera.camera_model import Camera, Lens
+from ..camera.camera_model import Camera, Intrinsics
 from ..camera.device_controls import POWER_LINES_HZ, DeviceControls
 from ..errors import SettingsError
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
@@ -44,7 +44,7 @@ class Settings(NamedTuple):
     family: str = "36h11"
     decimate: float = 2.0
     layout: TagLayout = TagLayout()
-    lens: Optional[Lens] = None
+    lens: Optional[Intrinsics] = None
     camera: Optional[Camera] = None
     delay_s: float = 0.0
     """Images were taken so long before their stamps."""
@@ -85,8 +85,8 @@ def update(path: str, parts: Mapping[str, Any]) -> None:
         raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
 
 
-def describe_lens(lens: Lens) -> Dict[str, Any]:
-    """Return the part of the file that holds a lens."""
+def describe_lens(lens: Intrinsics) -> Dict[str, Any]:
+    """Return the part of the file that holds the intrinsics."""
     return {
         "lens": {
             "width_px": lens.width_px,
@@ -98,7 +98,7 @@ def describe_lens(lens: Lens) -> Dict[str, Any]:
 
 
 def describe_camera(camera: Camera, seen: Mapping[int, Pose]) -> Dict[str, Any]:
-    """Return the parts of the file that hold a camera's place and what it saw of the reference tags from there."""
+    """Return the parts of the file that hold a camera's intrinsics, its pose, and the reference tags that it saw."""
     return {
         **describe_lens(camera.lens),
         "camera": {"rotation": camera.rotation.ravel().tolist(), "position_m": camera.position_m.tolist()},
@@ -233,9 +233,9 @@ def _pose(values: Any) -> Pose:
     return Pose(x_m, y_m, math.radians(yaw_deg))
 
 
-def _build_lens(part: Any) -> Lens:
+def _build_lens(part: Any) -> Intrinsics:
     try:
-        return Lens.from_camera_info(
+        return Intrinsics.from_camera_info(
             int(part["width_px"]), int(part["height_px"]), part["matrix"], "plumb_bob", part["distortion"]
         )
     except (KeyError, TypeError, OverflowError):
@@ -245,7 +245,7 @@ def _build_lens(part: Any) -> Lens:
         raise ValueError("lens: %s: calibrate the lens" % error) from None
 
 
-def _build_camera(part: Any, lens: Optional[Lens]) -> Camera:
+def _build_camera(part: Any, lens: Optional[Intrinsics]) -> Camera:
     if lens is None:
         raise ValueError("camera needs lens: calibrate the lens, then the arena")
     try:

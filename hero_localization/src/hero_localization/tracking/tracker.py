@@ -73,7 +73,7 @@ class Tracker:
         self._settings = settings
         self.camera = camera
         self._smallest_px = find_smallest_side(camera, settings.layout.default_mount)
-        self._pictures: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
+        self._images: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
         self._shade = math.nan
         self._tag_problems: Dict[int, Tuple[float, str]] = {}
         self.is_moved = False
@@ -98,7 +98,7 @@ class Tracker:
         as project() tells.
         """
         self._note_expected({tag.tag_id for tag in tags}, expected or {})
-        self._pictures.append((stamp_s, number))
+        self._images.append((stamp_s, number))
         self.found = tags
         self.sightings = sightings = locate(self.camera, tags, self._settings.layout)
         self._note_problems(sightings, stamp_s)
@@ -157,10 +157,10 @@ class Tracker:
     @property
     def rates_hz(self) -> Tuple[float, float]:
         """Images per second that were used, and those that the camera sent."""
-        if len(self._pictures) < 2 or self._pictures[-1][0] <= self._pictures[0][0]:
+        if len(self._images) < 2 or self._images[-1][0] <= self._images[0][0]:
             return 0.0, 0.0
-        (first_s, first), (last_s, last) = self._pictures[0], self._pictures[-1]
-        used = len(self._pictures) - 1
+        (first_s, first), (last_s, last) = self._images[0], self._images[-1]
+        used = len(self._images) - 1
         return used / (last_s - first_s), max(used, last - first) / (last_s - first_s)
 
     def describe_rate(self) -> str:
@@ -170,10 +170,10 @@ class Tracker:
 
     def list_problems(self) -> List[Problem]:
         """Return what is wrong with light, camera and tags."""
-        newest_s = self._pictures[-1][0] if self._pictures else -math.inf
+        newest_s = self._images[-1][0] if self._images else -math.inf
         problems = []
         used_hz, sent_hz = self.rates_hz
-        if used_hz < MIN_USED_SHARE * sent_hz and len(self._pictures) == RATE_FRAMES:
+        if used_hz < MIN_USED_SHARE * sent_hz and len(self._images) == RATE_FRAMES:
             text = "%s are used: this computer is busy, or too slow for more" % self.describe_rate()
             problems.append(Problem("camera", text, False))
         if self._shade < DARK or self._shade > BRIGHT:

@@ -63,7 +63,7 @@ class Arena(NamedTuple):
 
 
 def square_length(ways_m: np.ndarray) -> np.ndarray:
-    """Return the squares of the lengths (...) of ways (2, ...)."""
+    """Return the squares of the lengths (...) of vectors (2, ...)."""
     squares_x_m2, squares_y_m2 = ways_m * ways_m
     return squares_x_m2 + squares_y_m2
 

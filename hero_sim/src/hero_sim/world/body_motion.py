@@ -56,11 +56,11 @@ class BodyMotion:
         """Move all bodies by K steps of their left and right wheels over the ground (K, 2, R)."""
         travels_m, rotations_rad = join_wheels(ground_m[:, 0], ground_m[:, 1], self._separations_m)
         fastest_m = np.abs(travels_m).max(axis=1).tolist()
-        ways_m, self.headings[:] = follow_arcs(self.headings, travels_m, rotations_rad)
+        displacements_m, self.headings[:] = follow_arcs(self.headings, travels_m, rotations_rad)
         places_m, theta_rad = self.poses[:2], self.poses[2]
-        for moved_m, way_m, rotation_rad in zip(fastest_m, ways_m, rotations_rad):
+        for moved_m, displacement_m, rotation_rad in zip(fastest_m, displacements_m, rotations_rad):
             before_m = places_m.copy() if self.pushing else places_m
-            places_m += way_m
+            places_m += displacement_m
             theta_rad += rotation_rad
             if self.contacts.could_touch(moved_m):
                 self.contacts.separate(places_m)

@@ -58,7 +58,7 @@ def find_heading(theta_rad: Number) -> Tuple[np.ndarray, np.ndarray]:
 def follow_arcs(
     heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray
 ) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the ways (K, 2, R), x and y in m, along K arcs one after the other, and the heading (2, R) after them.
+    """Return the displacements (K, 2, R), x and y in m, along K consecutive arcs, and the heading (2, R) after them.
 
     heading: cosine and sine (2, R) before them. It stays of length 1 whatever the number of arcs.
     travels_m, rotations_rad: length and turn of each arc (K, R), turns of less than 0.5 rad. Several arcs at once are
@@ -68,11 +68,11 @@ def follow_arcs(
     half_tangents = rotations_rad * ratios
     shorten = 2.0 / (1.0 + half_tangents * half_tangents)
     cosine, sine = heading
-    ways_m = np.empty((len(travels_m), *heading.shape))
-    for way_m, half_tangent, turn in zip(ways_m, half_tangents, half_tangents * shorten):
+    displacements_m = np.empty((len(travels_m), *heading.shape))
+    for displacement_m, half_tangent, turn in zip(displacements_m, half_tangents, half_tangents * shorten):
         # The direction of the chord, 1 / cos(rotation / 2) long.
         chord_x, chord_y = cosine - half_tangent * sine, sine + half_tangent * cosine
         cosine, sine = cosine - turn * chord_y, sine + turn * chord_x
-        way_m[0], way_m[1] = chord_x, chord_y
-    ways_m *= (travels_m * ratios * shorten)[:, None]
-    return ways_m, np.array((cosine, sine))
+        displacement_m[0], displacement_m[1] = chord_x, chord_y
+    displacements_m *= (travels_m * ratios * shorten)[:, None]
+    return displacements_m, np.array((cosine, sine))

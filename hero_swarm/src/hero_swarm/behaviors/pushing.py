@@ -145,7 +145,7 @@ class BoxPushing(PushToGoal):
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         way = self._find_way(sensed)
         row_m = sensed.objects.radii_m[0] + BODY_RADIUS_M + self.gap_m
-        # From right to left as they are now, so that no two ways cross.
+        # From right to left as they are now, so that no two paths cross.
         ranks = (-way.aside_m).reshape(-1, sensed.count).argsort(axis=1).argsort(axis=1).ravel()
         off_m = way.aside_m + (ranks - (sensed.count - 1) / 2.0) * self.spacing_m
         lag_m = way.behind_m - row_m

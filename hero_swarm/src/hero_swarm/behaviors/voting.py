@@ -21,7 +21,7 @@ class Voter(Behavior):
     rate_hz = 10.0
     changes_hz = 0.5  # how often a robot looks at the others
     cruise_m_s = 0.1
-    turn_rad_s = 1.5
+    angular_rad_s = 1.5
     clear_m = 0.12
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
@@ -32,7 +32,7 @@ class Voter(Behavior):
         opinions = np.where(looks, decided, opinions)
         ahead = near.seen & (near.forward_m > 0.0) & (near.range_m < self.clear_m)
         blocked = ahead.any(axis=1)
-        angular_rad_s = np.where(blocked, self.turn_rad_s, self.turn_rad_s * random.normal())
+        angular_rad_s = np.where(blocked, self.angular_rad_s, self.angular_rad_s * random.normal())
         return np.where(blocked, 0.0, self.cruise_m_s), angular_rad_s, opinions
 
     def decide(self, opinions: np.ndarray, near: Any, random: Random) -> np.ndarray:

@@ -72,9 +72,9 @@ def _compare(stretches: List[List[np.ndarray]], body: np.ndarray) -> np.ndarray:
     differences = []
     for wheels_m, poses in stretches:
         path = follow_body(wheels_m, body)
-        turn_rad = np.unwrap(poses[:, 2]) - path[:, 2]
-        yaw_rad = turn_rad.mean()
+        angle_rad = np.unwrap(poses[:, 2]) - path[:, 2]
+        yaw_rad = angle_rad.mean()
         rotation = np.array(((np.cos(yaw_rad), -np.sin(yaw_rad)), (np.sin(yaw_rad), np.cos(yaw_rad))))
         places_m: np.ndarray = poses[:, :2] - path[:, :2] @ rotation.T
-        differences += [(places_m - places_m.mean(axis=0)).ravel(), HEADING_M * (turn_rad - yaw_rad)]
+        differences += [(places_m - places_m.mean(axis=0)).ravel(), HEADING_M * (angle_rad - yaw_rad)]
     return np.concatenate(differences)

@@ -113,7 +113,7 @@ export class ProgramPanel {
       const what = robots.length === 1 ? robots[0] : `${robots.length} robots`;
       const text = failure ? `${title} failed: ${failure}` : `${title}, ${what}, ${clock(seconds)}${ending ? ", ending" : ""}`;
       if (row.text.textContent !== text) row.text.textContent = text;
-      row.line.classList.toggle("trouble", Boolean(failure));
+      row.line.classList.toggle("problem", Boolean(failure));
       row.button.textContent = failure ? "Dismiss" : "End";
       row.button.setAttribute("aria-label", `${row.button.textContent} ${title}`);
     }

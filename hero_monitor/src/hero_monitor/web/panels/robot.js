@@ -168,9 +168,9 @@ export class RobotPanel {
     element("control").hidden = !isKnown || !state.hello.control;
     element("advice").hidden = robots.length === 0 || state.hello.control;
     element("advice").textContent = "View only. control:=true lets the monitor drive robots.";
-    const trouble = robot ? healthOf(robot) : "";
-    element("trouble").hidden = !trouble;
-    element("trouble").textContent = trouble;
+    const problem = robot ? healthOf(robot) : "";
+    element("problem").hidden = !problem;
+    element("problem").textContent = problem;
     this.showFacts(robot === null ? [] : this.listFacts(robot, state));
   }
 

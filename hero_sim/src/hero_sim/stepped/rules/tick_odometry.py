@@ -73,11 +73,11 @@ class TickOdometryRows:
         moved_m = np.array(self._moved_ticks) * self._tick_m
         self._moved_ticks.clear()
         distances_m, turns_rad = join_wheels(moved_m[:, 0], moved_m[:, 1], self._separation_m)
-        ways_m, self._headings[:] = follow_arcs(self._headings, distances_m, turns_rad)
+        displacements_m, self._headings[:] = follow_arcs(self._headings, distances_m, turns_rad)
         places_m, yaw_rad = self._poses[:2], self._poses[2]
-        for way_m, turn_rad in zip(ways_m, turns_rad):
-            places_m += way_m
-            yaw_rad += turn_rad
+        for displacement_m, angle_rad in zip(displacements_m, turns_rad):
+            places_m += displacement_m
+            yaw_rad += angle_rad
             yaw_rad -= np.rint(yaw_rad / _TURN_RAD) * _TURN_RAD
 
     def measure_velocities(self) -> np.ndarray:
