@@ -33,7 +33,7 @@ class RobotStatus:
 
     @property
     def name(self) -> str:
-        """The robot's name without slash, for people."""
+        """The robot's name without slash, for users."""
         return str(self.message.namespace).lstrip("/")
 
 

@@ -115,7 +115,7 @@ class StopInterface:
 
 
 def describe_stop(stops: Stops) -> str:
-    """Return how far the stop of all robots has come, for people."""
+    """Return how far the stop of all robots has come, for users."""
     parts = ["%d at rest" % sum(state is StopState.AT_REST for _, state in stops)]
     for text, state in (
         ("still moving", StopState.MOVING),

@@ -53,7 +53,7 @@ class Explorer:
         self.robot.led("green" if self.controller else "yellow")
 
     def choose(self, pose, frontiers, taken, now_s):
-        """Keep the goal while the map ends there, or take the nearest that no other robot has."""
+        """Keep the goal while it is a frontier, or take the nearest that no other robot has."""
         if self.controller and self.controller.state is State.FAILED:
             self.failed = [*self.failed[-4:], self.goal]
         elif self.controller and is_near(self.goal, frontiers, APART_M / 2.0):

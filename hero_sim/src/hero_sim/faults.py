@@ -128,7 +128,7 @@ class FaultInjector:
     """Injects faults into one simulator, each at its time."""
 
     def __init__(self, simulator: "Simulator", report: Callable[[str], None]) -> None:
-        """The simulator calls run() between its steps; report takes lines for people."""
+        """The simulator calls run() between its steps; report takes lines for users."""
         self._simulator = simulator
         self._report = report
         self._waiting: List[Tuple[int, int, Fault]] = []  # time (ms) and robot of each, the next one first

@@ -45,7 +45,7 @@ class LogLine(NamedTuple):
     boot: Optional[BootLine]
     heartbeat: Optional[Heartbeat]
     tunes: Optional[bool]  # True: a controller tunes itself; False: it has ended that; None: nothing of that
-    is_routine: bool  # said so often, and so independently of what happens, that it is no news to people
+    is_routine: bool  # said so often, and so independently of what happens, that it is no news
 
 
 def clean_text(text: str) -> str:

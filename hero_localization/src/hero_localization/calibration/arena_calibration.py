@@ -129,7 +129,7 @@ def calibrate_arena(
 
 
 def _refuse_mistakes(lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
-    """Try mistakes that people make with places. Raises: CalibrationError that names those that explain all."""
+    """Try mistakes that users make with places. Raises: CalibrationError that names those that explain all."""
     mirrored = {
         tag_id: tag._replace(pose=Pose(tag.pose.x_m, -tag.pose.y_m, 0.0)) for tag_id, tag in references.items()
     }

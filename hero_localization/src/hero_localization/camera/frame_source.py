@@ -86,8 +86,8 @@ class FrameSource:
 
     Attributes:
         lens: the intrinsics in camera_info; None without it.
-        problem: why there are no usable images, for people; empty if there are.
-        warning: what may spoil images that come, for people; empty if nothing is known.
+        problem: why there are no usable images, for users; empty if there are.
+        warning: what may spoil images that come, for users; empty if nothing is known.
         arrived_s: when the newest image came; before, when the source was opened.
     """
 

@@ -94,7 +94,7 @@ class SwarmLocalizer:
             self._robots.setdefault(robot_id, _Robot())
 
     def add_odometry(self, robot_id: int, stamp_s: float, pose: Pose) -> List[str]:
-        """Follow a reading of /hero_N/odom; return lines for people."""
+        """Follow a reading of /hero_N/odom; return lines for users."""
         robot = self._robots[robot_id]
         used_s, lines = robot.filter.used_s, []
         for measurement, outcome, before in robot.filter.add_odometry(stamp_s, pose):
@@ -106,7 +106,7 @@ class SwarmLocalizer:
         return lines
 
     def add_measurement(self, robot_id: int, measurement: Measurement) -> List[str]:
-        """Correct a robot by a measured pose; return lines for people.
+        """Correct a robot by a measured pose; return lines for users.
 
         Raises: KeyError for a robot that is not expected. ValueError as PoseFilter.add_measurement().
         """
@@ -119,7 +119,7 @@ class SwarmLocalizer:
     def _note(
         self, robot_id: int, measurement: Measurement, outcome: Outcome, before: Optional[Pose], used_s: float
     ) -> List[str]:
-        """Note what became of a measured pose; return lines for people.
+        """Note what became of a measured pose; return lines for users.
 
         before, used_s: where the robot was taken to be before it, and the stamp of the last one that was used.
         """
@@ -164,7 +164,7 @@ class SwarmLocalizer:
                 robot.untrusted_s = stamp_s
 
     def find_lost(self, now_s: float) -> List[str]:
-        """Notice robots that are not measured any more; return lines for people. Call it some times a second.
+        """Notice robots that are not measured any more; return lines for users. Call it some times a second.
 
         If time jumps back, as when a recording is played again, all robots are to be found anew.
         """

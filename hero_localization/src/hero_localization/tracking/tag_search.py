@@ -107,7 +107,7 @@ class TagSearch:
     def search(
         self, gray: np.ndarray, stamp_s: float, expected: Optional[Mapping[int, Tuple[float, float]]] = None
     ) -> List[TagCorners]:
-        """Return the tags found in the next frame; an id that is there twice comes twice.
+        """Return the tags found in the next frame; an id that appears twice is returned twice.
 
         Args:
             gray: (H, W), 8 bit.

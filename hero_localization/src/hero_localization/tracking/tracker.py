@@ -47,7 +47,7 @@ DARK, BRIGHT = 35.0, 225.0
 
 
 class Problem(NamedTuple):
-    """Something that people should see to."""
+    """A problem that users should solve."""
 
     name: str
     """Its subject: camera, or "tag 17"."""

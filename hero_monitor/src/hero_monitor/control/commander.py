@@ -28,7 +28,7 @@ STOP_PERIOD_S = 0.06
 
 
 class Notice(NamedTuple):
-    """A line for the people at a page."""
+    """A line for the users of a page."""
 
     level: str  # info, warn, error
     text: str

@@ -55,7 +55,7 @@ class Placement:
         return robot in self._known
 
     def set_robots(self, robots: Iterable[str]) -> None:
-        """Place robots of which nothing else is known side by side, in the order given."""
+        """Place robots without a map transform side by side, in the order given."""
         unknown: List[str] = [robot for robot in robots if robot not in self._known]
         middle = (len(unknown) - 1) / 2.0
         self._assumed = {

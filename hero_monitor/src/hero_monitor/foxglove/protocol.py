@@ -75,7 +75,7 @@ def make_unadvertise(ids: Iterable[int]) -> str:
 
 
 def make_status(level: int, text: str) -> str:
-    """Return a line for the people at a client."""
+    """Return a line for the users of a client."""
     return json.dumps({"op": "status", "level": level, "message": text})
 
 

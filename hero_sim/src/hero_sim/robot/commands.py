@@ -49,7 +49,7 @@ class CommandTable:
         warn: Callable[[str], None],
         model: RobotModel = HERO,
     ) -> None:
-        """Serve the parts of the robot called name; log takes lines for the server, warn lines for people."""
+        """Serve the parts of the robot called name; log takes lines for the server, warn lines for users."""
         self._own_ids = model.own_ids
         self._name = name
         self._sensing = sensing

@@ -89,7 +89,7 @@ class Firmware:
         report: Callable[[str], None],
         model: RobotModel = HERO,
     ) -> None:
-        """Build a robot that is switched off; address is for its boot line, report takes lines for people."""
+        """Build a robot that is switched off; address is for its boot line, report takes lines for users."""
         self.model = model
         self._stock_ids = {own: stock for stock, own in model.own_ids.items()}
         self.robot_id = robot_id
@@ -226,7 +226,7 @@ class Firmware:
         self.send(packets.encode_packet(packets.ID_LOG, line))
 
     def warn(self, text: str) -> None:
-        """Report a line to people, not to the server."""
+        """Report a line to users, not to the server."""
         self._report("%s: %s" % (self.name, text))
 
     # -- time passes ---------------------------------------------------------------------------------------

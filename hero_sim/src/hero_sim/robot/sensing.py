@@ -96,7 +96,7 @@ class Sensing:
         self._light, self._light_until_ms = color, now_ms + LED_WATCHDOG_MS
 
     def show_light(self, now_ms: int) -> Color:
-        """Return the color that people see."""
+        """Return the visible color."""
         return self._light if now_ms <= self._light_until_ms else _DARK
 
     def read_encoders(self, millis: int, now_ms: int) -> None:

@@ -153,7 +153,7 @@ class RobotRows:
 
     @property
     def lights(self) -> np.ndarray:
-        """The lights as people see them (R, 4), red green blue alpha; dark 15 s after the last command."""
+        """The visible lights (R, 4), red green blue alpha; dark 15 s after the last command."""
         return self._lights * (self.now_ms <= self._light_end_ms)[:, None]
 
     def set_odometry(self, row: int, x_m: float, y_m: float, yaw_rad: float) -> None:

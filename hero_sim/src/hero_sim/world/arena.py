@@ -44,7 +44,7 @@ class Arena(NamedTuple):
     """Walls, obstacles and starts of one world.
 
     Attributes:
-        name: for people.
+        name: for users.
         segments_m: walls and the edges of polygons, shape (S, 4), x1 y1 x2 y2.
         circles_m: round obstacles, shape (C, 3), x y radius.
         starts: free poses of the first robots; the others are placed at random.

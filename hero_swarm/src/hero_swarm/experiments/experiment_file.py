@@ -102,7 +102,7 @@ class Cell(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The values that vary, for people."""
+        """The values that vary, for users."""
         return ", ".join("%s %s" % item for item in self.varied.items()) or "all"
 
 

@@ -172,7 +172,7 @@ def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFo
 
 
 def run_experiment(options: argparse.Namespace) -> str:
-    """Run what is missing; return a line for people.
+    """Run what is missing; return a line for users.
 
     Raises: ExperimentError.
     """

@@ -42,7 +42,7 @@ START, DRIVE, END = "", "d", "q"
 def run_on_robots(
     experiment: Experiment, folder: ResultsFolder, runs: Sequence[Run], options: argparse.Namespace
 ) -> str:
-    """Run the trials that are missing on robots, one after the other; return a line for people.
+    """Run the trials that are missing on robots, one after the other; return a line for users.
 
     runs: those that folder holds already. options: robots; frame of the start places and of the poses, that of
     localize, or world for the simulator's ground truth; calibration, the folder of `calibrate`.

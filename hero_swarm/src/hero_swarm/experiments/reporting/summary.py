@@ -149,7 +149,7 @@ def describe(report: Report) -> str:
 
 
 def format_interval(interval: Interval) -> str:
-    """Return a median with its interval, for people."""
+    """Return a median with its interval, for users."""
     return "%.4g (%.4g to %.4g)" % interval
 
 
