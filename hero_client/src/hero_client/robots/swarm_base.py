@@ -144,8 +144,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
 
             swarm.go_to_each({0: (0.2, 0.1), 1: (-0.2, 0.1)})
 
-        goals: robot's id -> (x m, y m), at least 0.18 m apart (HeRo+: 0.23 m), also from robots without a goal: they stay where they
-        are, and the others drive around them. Law: controllers.swarm_go_to.
+        goals: robot's id -> (x m, y m), at least 0.18 m apart (HeRo+: 0.23 m), also from robots without a goal: they
+        stay, and the others drive around them. Law: controllers.swarm_go_to.
 
         Raises: GoalError for goals too near to each other, and with the robots that are not there after timeout_s.
         KeyError for a robot of no swarm. FrameError, StoppedError and RobotNotReadyError as Robot.go_to(). All robots

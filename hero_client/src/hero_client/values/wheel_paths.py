@@ -1,4 +1,4 @@
-"""Where two wheels lead a robot. Pure."""
+"""The path of a robot by its two wheels. Pure."""
 
 import numpy as np
 

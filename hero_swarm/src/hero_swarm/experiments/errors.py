@@ -11,7 +11,7 @@ __all__ = ["ExperimentError", "report_place"]
 
 
 class ExperimentError(HeroError):
-    """One line for people: the thing, its value and the remedy."""
+    """One line for users: the thing, its value and the remedy."""
 
 
 @contextmanager
