@@ -27,7 +27,7 @@ __all__ = [
 
 
 def shorten_for_body(ranges: Sequence[float], body_radius_m: float) -> List[float]:
-    """Return ranges of a robot with another body, from which the stock robot keeps as far away: laws are made for it."""
+    """Return ranges at which the laws, made for the stock body, keep a robot with another body as far away."""
     return [range_m - (body_radius_m - BODY_RADIUS_M) for range_m in ranges]
 
 
