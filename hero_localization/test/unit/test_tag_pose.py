@@ -210,7 +210,8 @@ def test_uncertainty_is_that_of_the_corners_and_what_calibration_leaves():
 
 
 def test_the_smallest_side_is_that_of_the_tag_seen_from_farthest():
-    straight = Lens(1920, 1080, np.array(((1390.0, 0.0, 959.5), (0.0, 1390.0, 539.5), (0.0, 0.0, 1.0))), np.zeros(5))
+    matrix = np.array(((1390.0, 0.0, 959.5), (0.0, 1390.0, 539.5), (0.0, 0.0, 1.0)))
+    straight = Intrinsics(1920, 1080, matrix, np.zeros(5))
     down = Camera(straight, np.diag((1.0, -1.0, -1.0)), np.array((0.1, 0.0, 2.2)))
     assert find_smallest_side(down, MountedTag()) == pytest.approx(1390.0 * 0.04 / (2.2 - 0.076))
     assert find_smallest_side(down, MountedTag(0.05, 0.2)) == pytest.approx(1390.0 * 0.05 / 2.0)

@@ -242,5 +242,6 @@ def test_a_body_is_fitted_to_stretches_that_have_poses_throughout():
 def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
     recording = make_recording(13.0, yaw_rad=1.0)
     for start_share, paths in ((0.5, 3), (0.0, 6), (0.9, 0)):
-        ends_m = predict_ends(recording, [(Motors({}), np.ones(3)), (Motors({"lag_s": 0.2}, 0.1), np.ones(3))], start_share, 2.0)
+        fits = [(Motors({}), np.ones(3)), (Motors({"lag_s": 0.2}, 0.1), np.ones(3))]
+        ends_m = predict_ends(recording, fits, start_share, 2.0)
         assert ends_m == pytest.approx(np.full((2, paths), 0.2), abs=1e-6)
