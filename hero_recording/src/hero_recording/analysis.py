@@ -152,7 +152,7 @@ def compute_motion_delays(robot: RobotObservations) -> np.ndarray:
     """Return the delays (s) from a command to the first motion of a robot at rest, as the recorder received both."""
     command_s, linear_m_s, angular_rad_s = robot.commands.columns()
     encoder_s, left_ticks, right_ticks = robot.encoder.columns()
-    if not len(command_s) or len(encoder_s) < 2:
+    if not len(command_s):
         return np.zeros(0)
     moving = (linear_m_s != 0.0) | (angular_rad_s != 0.0)
     is_first = np.concatenate(([True], ~moving[:-1] | (np.diff(command_s) > COMMAND_TIMEOUT_S)))

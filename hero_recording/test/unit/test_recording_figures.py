@@ -190,6 +190,9 @@ def test_every_figure_says_what_its_axes_are():
         ("odometry", "", "position error (mm)"), ("localization", "", ""),
         ("", "time (s)", heading), ("", "time (s)", ""),
     ]  # fmt: skip
+    for name in ("speeds", "errors"):
+        (above, _, below, _) = draw_page(name, make_driven(2)).axes
+        assert above.get_shared_x_axes().joined(above, below), "one time for all"
     silent = make_driven(1)
     silent[0].states.clear()
     assert "were not recorded: lines show odometry" in draw_page("connections", silent).axes[0].get_title()

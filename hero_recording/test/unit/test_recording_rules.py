@@ -85,6 +85,11 @@ def test_the_delay_of_a_motion_counts_from_the_first_command_at_rest():
         for command in commands:
             robot.commands.add(*command)
         assert analysis.compute_motion_delays(robot) == pytest.approx(expected_s, abs=PERIOD_S)
+    jerked = turn_wheels(5.001, moves=False, moved=4.0)
+    jerked.commands.add(5.0, 0.1, 0.0)
+    assert analysis.compute_motion_delays(jerked) == pytest.approx([0.032]), "moved in its first reading, then no more"
+    jerked.encoder = RobotObservations().encoder
+    assert len(analysis.compute_motion_delays(jerked)) == 0
     settling = turn_wheels(5.3, moves=False, moved=1.0)
     settling.commands.add(5.0, 0.1, 0.0)
     assert len(analysis.compute_motion_delays(settling)) == 0, "one tick is no motion"
