@@ -69,3 +69,13 @@ def test_of_places_that_were_not_reached_the_newest_are_not_tried_again(swarm):
         explorer.controller.state = State.FAILED
     explorer.choose(pose, places, [], 0.0)
     assert explorer.goal == places[0]  # failed longest ago
+
+
+def test_a_robot_without_ranges_stops_and_goes_on_when_they_come(swarm, monkeypatch):
+    robot, driven = swarm[0], []
+    monkeypatch.setattr(robot, "drive", lambda *command: driven.append(command))
+    explorer, ranges = Explorer(robot, CommonFrame("map")), robot.fresh_proximity()
+    for known in ([math.nan] * 8, [*ranges[:1], *[math.nan] * 7]):
+        monkeypatch.setattr(robot, "fresh_proximity", lambda known=known: known)
+        explorer.step([LEFT], [], 0.0)
+    assert driven[0] == (0.0, 0.0) and driven[1] != (0.0, 0.0)

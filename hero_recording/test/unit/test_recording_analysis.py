@@ -120,7 +120,7 @@ def test_paths_are_in_the_shared_frame(two_robots):
 def test_a_path_is_moved_and_turned_with_the_origin_of_its_time():
     times_s = np.array([0.0, 1.0, 2.0])
     path = analysis.Path(times_s, np.array([1.0, 1.0, 0.0]), np.array([0.5, 0.5, 1.0]), np.array([0.0, 0.0, 3.0]))
-    origins = [Origin(0.5, 2.0, 0.0, math.pi / 2.0), Origin(1.5, -1.0, -1.0, math.pi)]
+    origins = [Origin(0.5, 2.0, 0.0, math.pi / 2.0), Origin(2.0, -1.0, -1.0, math.pi)]
     moved = analysis.transform_path(path, origins)
     assert moved.x_m == pytest.approx([1.5, 1.5, -1.0])
     assert moved.y_m == pytest.approx([1.0, 1.0, -2.0])

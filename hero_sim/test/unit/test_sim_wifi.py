@@ -128,3 +128,10 @@ def test_outages_last_as_long_and_come_as_often_as_the_profile_says():
     assert np.count_nonzero(delays_ms) / 200000 == pytest.approx(100.0 / 600.0, rel=0.15)
     late = Radio(profile, np.random.RandomState(1))
     assert [late.find_arrival(199990.0 + step) - 199990.0 - step for step in range(10)] == list(delays_ms[-10:])
+
+
+def test_what_waits_for_a_stall_to_end_passes_at_the_networks_pace():
+    radio = Radio(make_profile(bytes_per_s=1000.0), np.random.RandomState(0))
+    radio.stall(0, 500)
+    assert [radio.up.send(now_ms, 100) for now_ms in (100, 200)] == [600.0, 700.0]
+    assert radio.down.send(2000, 100) == 2100.0
