@@ -46,6 +46,7 @@ class StopTest(unittest.TestCase):
         cls.behave = rospy.Publisher("/hero_driver/behave", String, queue_size=5)
         cls.requests = [rospy.Publisher("/%s/stop_request" % name, Bool, queue_size=5) for name in DRIVERS]
         cls.page, cls.other = (MonitorPage("http://%s/" % HOST) for _ in range(2))
+        cls.other.leave()
 
     @classmethod
     def tearDownClass(cls):
@@ -62,10 +63,18 @@ class StopTest(unittest.TestCase):
         for publisher in (self.behave, *self.requests):
             wait_for(publisher.get_num_connections, "connections to the drivers")
         self.set_behavior()
-        for page in (self.page, self.other):
-            page.open()
-            page.wait_for_text("#ready", "6 of 7")
+        self.pages = []
+        self.open_page(self.page)
         self.release()
+
+    def open_page(self, page):
+        page.open()
+        page.wait_for_text("#ready", "6 of 7")
+        self.pages.append(page)
+
+    def open_other(self):
+        self.open_page(self.other)
+        self.addCleanup(self.other.leave)
 
     def tearDown(self):
         self.set_behavior()
@@ -89,14 +98,15 @@ class StopTest(unittest.TestCase):
     def all_report(self, stopped):
         return [report.stopped for report in self.reports.values()] == [stopped] * len(DRIVERS)
 
-    def wait_for_banner(self, level, text, *pages):
-        for page in pages or (self.page, self.other):
+    def wait_for_banner(self, level, text):
+        for page in self.pages:
             wait_for(lambda page=page: page.banner() == (level, text), lambda page=page: page.banner())
 
     def stop_states(self, page):
         return {row["Robot"]: row["Stop"] for row in page.rows() if row["State"] != "REFUSED"}
 
     def test_all_pages_show_that_robots_are_stopping_and_at_rest(self):
+        self.open_other()
         self.set_behavior(rest=False)
         self.assertEqual(self.page.press_stop(), (AMBER, "stopping"))
         wait_for(lambda: self.stop_states(self.page)["hero_0"] == "stopping", "a robot that stops")
@@ -104,17 +114,18 @@ class StopTest(unittest.TestCase):
         self.set_behavior()
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
         self.page.save("monitor_at_rest.png")
-        for page in (self.page, self.other):
+        for page in self.pages:
             # Banner and table are told one after the other.
             wait_for(lambda page=page: set(self.stop_states(page).values()) == {"at rest"}, page.rows)
             page.wait_for_text("#stop", "STOPPED")
 
     def test_a_robot_that_moves_though_stopped_is_named_in_red_until_it_stands(self):
+        self.open_other()
         self.set_behavior(moving=[3])
         self.page.click("#stop")
         self.wait_for_banner(RED, "NOT STOPPED: hero_3 moves")
         self.page.save("monitor_not_stopped.png")
-        for page in (self.page, self.other):
+        for page in self.pages:
             wait_for(lambda page=page: self.stop_states(page)["hero_3"] == "MOVING", page.rows)
             page.wait_for_text("#stop", "STOP ALL")
         self.set_behavior()
@@ -129,6 +140,7 @@ class StopTest(unittest.TestCase):
         wait_for(lambda: self.page.banner() == (RED, "NOT STOPPED: hero_2 moves"), self.page.banner)
 
     def test_a_page_drives_no_robot_until_all_are_released(self):
+        self.open_other()
         commands = []
         rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
         self.page.choose("hero_2")
@@ -207,7 +219,7 @@ class StopTest(unittest.TestCase):
     def test_the_page_reports_that_the_monitor_does_not_answer(self):
         with suspended(find_pid("/hero_monitor")):
             self.assertEqual(self.page.press_stop(), (AMBER, "stopping"))
-            self.wait_for_banner(RED, "NOT STOPPED: the monitor does not answer", self.page)
+            self.wait_for_banner(RED, "NOT STOPPED: the monitor does not answer")
             self.page.save("monitor_no_answer.png")
         self.wait_for_reports(True)
         self.wait_for_banner(GREEN, "stopped, all wheels at rest")
@@ -227,7 +239,7 @@ class StopTest(unittest.TestCase):
         process = start_monitor()
         try:
             self.wait_for_reports(True)
-            self.wait_for_banner(GREEN, "stopped, all wheels at rest", self.page)
+            self.wait_for_banner(GREEN, "stopped, all wheels at rest")
         finally:
             end(process)
 
