@@ -134,6 +134,8 @@ def main():
     if not jobs:
         parser.exit(1, "no unit tests, and no rostest, for %s\n" % ", ".join(map(str, options.paths)))
     passed = run_jobs(jobs, count_cores())
+    if {"rostest", "faults"} & set(options.stages) or any(path.suffix == ".test" for path in options.paths):
+        print("the robots of rostests and faults were drawn with HERO_SEED=%s" % os.environ.get("HERO_SEED", "0"))
     if "faults" in options.stages:
         faults.print_table(faults.read_rows(options.results / "faults.jsonl"))
     return int(not passed)

@@ -49,7 +49,8 @@ class CalibrateTest(unittest.TestCase):
         cls.simulator = Program(
             find_program("hero_sim", "hero_sim"),
             *("--count", "5", "--port", "21298", "--arena", ARENA, "--flash-dir", cls.folder + "/flash", "--quiet"),
-            *("--motors", "factory", "--ir", "factory"),
+            *("--motors", "factory", "--ir", "factory", "--servo-timing", "drawn"),
+            *("--seed", os.environ.get("HERO_SEED", "0")),
         )
         cls.wheel_m_s = dict.fromkeys(range(5), 0.0)
         for robot_id in cls.wheel_m_s:
