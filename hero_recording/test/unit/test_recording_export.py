@@ -152,6 +152,17 @@ def test_a_ros_2_bag_holds_as_many_messages_of_each_topic(bag, tmp_path, capsys)
         assert {topic: info.msgcount for topic, info in reader.topics.items()} == counts
 
 
+def test_mcap_has_no_offsets_of_groups_that_it_does_not_have(bag, tmp_path, capsys):
+    streams = pytest.importorskip("mcap.stream_reader", reason="the optional package mcap is missing")
+    run_export(capsys, bag, "--out", tmp_path / "out.mcap", "--format", "mcap")
+    with open(str(tmp_path / "out.mcap"), "rb") as file:
+        records = list(streams.StreamReader(file, emit_chunks=True).records)
+    kinds = {type(record).__name__ for record in records}
+    offsets = [record for record in records if type(record).__name__ == "SummaryOffset"]
+    assert "ChunkIndex" in kinds and "MessageIndex" in kinds and offsets
+    assert all(offset.group_length > 0 for offset in offsets)
+
+
 @pytest.mark.parametrize(("kind", "package"), [("parquet", "pyarrow"), ("mcap", "mcap"), ("ros2", "rosbags")])
 def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, monkeypatch, kind, package):
     for module in ("pyarrow", "mcap.writer", "rosbags.rosbag2"):

@@ -42,7 +42,8 @@ def write_mcap(bags: BagSet, path: str) -> int:
         count += 1
 
     with explain_write_errors(path), open(path, "wb") as file:
-        writer = writers.Writer(file)
+        # The library writes an offset of every index, also of attachments and metadata, of which there are none.
+        writer = writers.Writer(file, index_types=writers.IndexType.CHUNK | writers.IndexType.MESSAGE)
         writer.start(profile="ros1", library="hero_recording")
         bags.read_raw(receive)
         writer.finish()
