@@ -1,6 +1,6 @@
-"""Accuracy and cost of the overhead camera on rendered pictures, beside what the stock method makes of them.
+"""Accuracy and cost of the overhead camera on rendered images, beside what the stock method makes of them.
 
-The camera is calibrated as a user does it: by pictures of the board, by reference tags whose places are a little wrong,
+The camera is calibrated as a user does it: by images of the board, by reference tags whose places are a little wrong,
 and by robots that turn and drive. Then robots stand all over the field, drive straight, and drive circles. The stock
 method has the same tags and the same lens: a homography of the floor, or the pose of the single tag; stamps of arrival;
 and tags that sit exactly in the robots' centers. The nodes are measured by localization_nodes. Run it with script/bench
@@ -42,7 +42,7 @@ FRAME_S = 1.0 / OPTIONS.rate_hz
 FIELD_M = (2.5, 1.4)
 GRID = (4, 3)
 REFERENCES_M = ((-1.3, -0.7), (1.3, -0.7), (1.3, 0.7), (-1.3, 0.7), (0.0, -0.72), (0.0, 0.72))
-BOARD_PICTURES = 24
+BOARD_IMAGES = 24
 PLACEMENTS = 20
 COVERED_S = 2.0
 FOUND_AGAIN_S = 0.2
@@ -84,7 +84,7 @@ def describe_arena() -> str:
 
 
 class Scene:
-    """Simulated robots below a simulated camera, and a search for their tags in its pictures."""
+    """Simulated robots below a simulated camera, and a search for their tags in its images."""
 
     def __init__(self, seed: int, tape_m: float) -> None:
         random = np.random.RandomState(seed)
@@ -136,7 +136,7 @@ class Scene:
                 for robot in self.swarm.robots:
                     robot.drive(linear_m_s, angular_rad_s)
                 self.swarm.sleep(FRAME_S)
-                # Pictures are taken at whole milliseconds, as all happens here.
+                # Images are taken at whole milliseconds, as all happens here.
                 stamp_s = self.swarm.rows.now_ms / 1e3
                 shown = slice(0, 0) if is_covered else slice(None)
                 speeds = self.swarm.rows.world.measure_body_speeds()
@@ -145,17 +145,17 @@ class Scene:
 
 
 def find_lens(random: np.random.RandomState) -> Intrinsics:
-    """Calibrate the lens by pictures of the board all over the picture."""
+    """Calibrate the lens by images of the board at places all over them."""
     board, views = Board(), []
     renderer = BoardRenderer(OPTIONS, board)
-    for turn_rad, place_m in itertools.islice(list_board_places(OPTIONS, random), BOARD_PICTURES):
+    for turn_rad, place_m in itertools.islice(list_board_places(OPTIONS, random), BOARD_IMAGES):
         view = find_board(renderer.render(turn_rad, place_m, random), board)
         if view is not None:
             views.append(view)
     result = calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px, board)
     verdict = "; ".join(result.problems) or "good"
     found_px, true_px = result.lens.matrix[0, 0], OPTIONS.focal_px[0]
-    text = "lens: %d pictures, %.2f px rms, focal length %.1f px (true %.1f); %s"
+    text = "lens: %d images, %.2f px rms, focal length %.1f px (true %.1f); %s"
     print(text % (len(views), result.rms_px, found_px, true_px, verdict))
     return result.lens
 
@@ -276,7 +276,7 @@ class Localization:
         self._waiting: List[Tuple[float, Sequence[TagCorners]]] = []
 
     def see(self, stamp_s: float, tags: Sequence[TagCorners]) -> List[Sequence[TagCorners]]:
-        """Take a picture, and the odometry up to it; return the tags of the pictures that arrive now."""
+        """Take an image, and the odometry up to it; return the tags of the images that arrive now."""
         for robot, readings in enumerate(self._scene.odometry):
             for odometry_s, pose in readings[self._fed[robot] :]:
                 self._localizer.add_odometry(robot, odometry_s, pose)
@@ -386,7 +386,7 @@ def measure_accuracy(seed: int, tape_m: float) -> None:
 
 def main() -> None:
     """Measure what the command line asks for."""
-    parser = argparse.ArgumentParser(description="Accuracy and cost of the overhead camera, on rendered pictures.")
+    parser = argparse.ArgumentParser(description="Accuracy and cost of the overhead camera, on rendered images.")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
     parser.add_argument("--seed", type=int, default=0)
     text = "error of the reference tags' places, mm (%(default)s)"

@@ -1,7 +1,7 @@
 """CPU of the nodes track and localize, and the age of their poses, for robots that turn on the spot.
 
 The nodes run as launched; this process replaces camera and driver. It renders one turn of the robots beforehand, and
-publishes pictures and odometry at the times at which a camera and a driver would.
+publishes images and odometry at the times at which a camera and a driver would.
 """
 
 import bisect
@@ -33,7 +33,7 @@ TURN_FRAMES = 90
 TURN_RAD_S = 2.0 * math.pi * OPTIONS.rate_hz / TURN_FRAMES
 DELAY_S = OPTIONS.delay_s + OPTIONS.delay_jitter_s / 2.0
 ODOMETRY_GROUPS = 5
-"""Each robot sends as often as the camera, in as many groups between two pictures."""
+"""Each robot sends as often as the camera, in as many groups between two images."""
 SETTLE_S = 5.0
 START_S = 60.0
 
@@ -45,7 +45,7 @@ def place_robots(count):
 
 
 def render_turn(poses):
-    """Return the pictures (H, W) of one turn of all robots."""
+    """Return the images (H, W) of one turn of all robots."""
     renderer = CameraRenderer(OPTIONS, build_rectangle(*ARENA_M, 0), [PrintedTag(index) for index in range(len(poses))])
     speeds = np.column_stack((np.zeros(len(poses)), np.full(len(poses), TURN_RAD_S)))
     turns_rad = 2.0 * math.pi * np.arange(TURN_FRAMES) / TURN_FRAMES
@@ -60,11 +60,11 @@ def write_camera_file(path):
 
 
 class CameraAndDriver:
-    """Publishers of pictures and odometry, and what came of them."""
+    """Publishers of images and odometry, and what came of them."""
 
-    def __init__(self, pictures, count):
+    def __init__(self, images, count):
         self.arrivals_s, self.measured_s, self.published_s, self.tracked = {}, {}, [], 0
-        self._pictures, self._index, self._start_s = pictures, 0, rospy.get_time()
+        self._images, self._index, self._start_s = images, 0, rospy.get_time()
         self._image = rospy.Publisher("/camera/image_raw", Image, queue_size=1)
         self._odometry = [
             rospy.Publisher("/hero_%d/odom" % index, Odometry, queue_size=5, tcp_nodelay=True) for index in range(count)
@@ -90,7 +90,7 @@ class CameraAndDriver:
                 self._send_odometry(self._odometry[group::ODOMETRY_GROUPS], now_s)
             taken_s = frame_start_s - late_frames * frame_s
             _sleep_until(taken_s + DELAY_S)
-            self._send_picture(self._index - late_frames, taken_s)
+            self._send_image(self._index - late_frames, taken_s)
             self._index += 1
 
     def _send_odometry(self, publishers, now_s):
@@ -101,8 +101,8 @@ class CameraAndDriver:
         for publisher in publishers:
             publisher.publish(message)
 
-    def _send_picture(self, index, taken_s):
-        gray = self._pictures[index % TURN_FRAMES]
+    def _send_image(self, index, taken_s):
+        gray = self._images[index % TURN_FRAMES]
         message = Image(height=gray.shape[0], width=gray.shape[1], encoding="mono8", step=gray.shape[1])
         message.header.stamp = rospy.Time.from_sec(taken_s)
         message.data = gray.tobytes()
@@ -110,7 +110,7 @@ class CameraAndDriver:
         self._image.publish(message)
 
     def list_ages_s(self, from_s):
-        """Return for how long each picture was under way in track, and until localize published the poses after it."""
+        """Return for how long each image was under way in track, and until localize published the poses after it."""
         stamps_s = [stamp_s for stamp_s, _ in self.published_s]
         ages_s = []
         for stamp_ns, measured_s in sorted(self.measured_s.items()):
@@ -126,15 +126,15 @@ def _sleep_until(time_s):
 
 
 def measure_nodes(count, seconds, rounds):
-    """Print CPU (of one core) of track and localize, and the ages of pictures and poses, in each of some rounds."""
-    pictures = render_turn(place_robots(count))
+    """Print CPU (of one core) of track and localize, and the ages of images and poses, in each of some rounds."""
+    images = render_turn(place_robots(count))
     with contextlib.ExitStack() as stack:
         environment = stack.enter_context(start_master())
         os.environ["ROS_MASTER_URI"] = environment["ROS_MASTER_URI"]
         path = str(Path(stack.enter_context(tempfile.TemporaryDirectory())) / "camera.yaml")
         write_camera_file(path)
         rospy.init_node("camera_and_driver", disable_signals=True)
-        source = CameraAndDriver(pictures, count)
+        source = CameraAndDriver(images, count)
 
         def start_node(program, *arguments):
             command = ["catkin_find", "--first-only", "--libexec", "hero_localization", program]
@@ -161,8 +161,8 @@ def measure_round(source, pids, seconds):
     cpu = [(read_cpu_s(pid) - cpu_s) / seconds for pid, cpu_s in zip(pids, before_s)]
     ages_ms = 1e3 * source.list_ages_s(from_s)
     sent = sum(stamp_ns * 1e-9 >= from_s for stamp_ns in source.arrivals_s)
-    print("\n%d robots, load %.1f: used %d of %d pictures" % (source.tracked, os.getloadavg()[0], len(ages_ms), sent))
+    print("\n%d robots, load %.1f: used %d of %d images" % (source.tracked, os.getloadavg()[0], len(ages_ms), sent))
     print("CPU of track %.0f %%, of localize %.0f %% of a core" % (100.0 * cpu[0], 100.0 * cpu[1]))
     for name, ages in zip(("track publishes", "localize publishes"), ages_ms.T):
-        text = "from a picture's arrival until %s: %.0f ms on average, 99 %% within %.0f ms, at most %.0f ms"
+        text = "from an image's arrival until %s: %.0f ms on average, 99 %% within %.0f ms, at most %.0f ms"
         print(text % (name, ages.mean(), np.percentile(ages, 99), ages.max()))
