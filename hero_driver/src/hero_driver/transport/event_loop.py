@@ -222,7 +222,6 @@ class EventLoop(LinkOwner):
         self._epoll.modify(link.fileno(), READ | (WRITE if link.is_full else 0))
 
     def close_link(self, link: Link, reason: str) -> None:
-        """Close link and tell the handler; safe to call twice."""
         if link.closed:
             return
         del self._links[link.fileno()]

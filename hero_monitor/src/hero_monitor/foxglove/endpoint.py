@@ -63,7 +63,6 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 
     @property
     def is_logged_in(self) -> bool:
-        """Whether the client has given the token, or needs none."""
         return self._gave_token or super().is_logged_in
 
     def _check_token(self) -> None:
