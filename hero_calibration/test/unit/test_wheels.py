@@ -97,6 +97,7 @@ def test_answers_that_are_no_numbers_are_asked_for_again(session):
     assert list(answers) == []
 
 
+@pytest.mark.slow
 def test_robots_that_no_camera_sees_fail_with_the_remedy(session):
     assert calibrate_wheels(session) == {}
     assert "localize does not track it: is its tag in view? Or measure by --tape" in session.probes[0].failure

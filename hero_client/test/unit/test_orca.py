@@ -94,6 +94,7 @@ def swap(count, radius_m, seed):
     return min_distance_m, [body.pose for body in bodies], goals
 
 
+@pytest.mark.slow
 def test_robots_swap_places_across_a_circle_without_touching():
     for count, radius_m, seeds in ((2, 0.4, 4), (3, 0.4, 4), (10, 0.6, 1)):
         for seed in range(seeds):

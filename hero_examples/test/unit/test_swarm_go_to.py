@@ -45,6 +45,7 @@ def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
     assert true_paths.stop_within(swarm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["circle", "grid", "line"])
 def test_robots_take_their_places_in_a_formation(shape):
     wanted = {"shape": shape, "spacing_m": 0.25}

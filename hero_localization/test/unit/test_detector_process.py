@@ -36,6 +36,7 @@ def process():
     started.close()
 
 
+@pytest.mark.slow
 def test_process_finds_what_a_search_in_this_process_does(process):
     search = TagSearch(create_detector("aruco", "36h11", 2.0), WIDTH_PX, HEIGHT_PX)
     for index in range(10):
@@ -54,6 +55,7 @@ def test_expected_places_go_over(process):
     assert found.center == pytest.approx((419.5, 319.5), abs=0.5)
 
 
+@pytest.mark.slow
 def test_process_answers_also_where_sockets_have_a_default_timeout():
     socket.setdefaulttimeout(60.0)  # as rospy does
     try:
@@ -65,6 +67,7 @@ def test_process_answers_also_where_sockets_have_a_default_timeout():
     assert [tag.tag_id for tag in found[-1]] == [5]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("backend", "family", "words"), [("zbar", "36h11", "zbar"), ("aruco", "9h9", "9h9")])
 def test_detector_that_cannot_be_made_is_named(backend, family, words):
     with pytest.raises(DetectorError, match=words):
@@ -79,11 +82,13 @@ def test_process_that_died_is_named(process):
         process.search(picture(60, 60), 0.1, {})
 
 
+@pytest.mark.slow
 def test_frame_of_another_size_is_refused(process):
     with pytest.raises(ValueError, match="480"):
         process.search(picture(60, 60)[:100], 0.0, {})
 
 
+@pytest.mark.slow
 def test_close_ends_the_process_and_is_safe_twice(process):
     process.close()
     assert process._process.returncode == 0

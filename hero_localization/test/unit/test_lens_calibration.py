@@ -108,6 +108,7 @@ def test_lens_is_found_from_rendered_pictures(views):
     assert np.abs(shift - shift.mean(axis=0)).max() < 1.0
 
 
+@pytest.mark.slow
 def test_boards_corners_are_found_where_they_are(views):
     exact = project(list_holds(18, 0.55), 0.0)
     for found, true in zip(views, exact):

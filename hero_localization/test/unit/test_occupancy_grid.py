@@ -61,6 +61,7 @@ def test_occupied_cells_lie_on_the_walls_and_the_post(grid):
     assert (distance_m < 0.015).mean() > 0.95
 
 
+@pytest.mark.slow
 def test_all_of_the_walls_is_mapped(grid):
     occupied_m = grid.centers_of(grid.occupied)
     for side_m in np.linspace(0.03 - ROOM_M, ROOM_M - 0.03, 40):

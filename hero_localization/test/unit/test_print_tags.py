@@ -36,6 +36,7 @@ def list_pages(*arguments, cells=8):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("family", "cells"), [("36h11", 8), ("16h5", 6)])
 def test_tags_on_paper_have_their_true_size_and_place(family, cells):
     (page,) = list_pages("--robots", "0 7", "--references", "20", "--reference-size", "90", cells=cells)
@@ -76,6 +77,7 @@ def test_ruler_is_100_mm_long():
     assert (dark[-1] - dark[0]) / DOTS_PER_MM == pytest.approx(100.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_board_on_paper_is_that_of_the_lens_calibration():
     board = Board()
     for paper_mm in print_tags.PAPERS_MM.values():

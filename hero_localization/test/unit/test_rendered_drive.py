@@ -161,6 +161,7 @@ def make_odometry(stamp_s, pose):
     return Odometry(header=Header(stamp=rospy.Time.from_sec(stamp_s)), pose=place)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("yaw_rad", [0.05, math.pi - 0.05])
 def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeypatch, capsys, yaw_rad):
     scene, path = Scene(tmp_path), str(tmp_path / "camera.yaml")

@@ -86,6 +86,7 @@ def test_tags_that_do_not_exist_are_refused(family, tag_id):
         draw_tag(family, tag_id)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["36h11", "16h5"])
 @pytest.mark.parametrize("pose", [(0.0, 0.0, 0.0), (0.9, -0.4, 2.0), (-0.7, 0.4, -1.0)])
 def test_picture_shows_every_cell_of_a_robots_tag_at_its_place(family, pose):

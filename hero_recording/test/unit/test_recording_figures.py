@@ -132,6 +132,7 @@ def draw_page(name, robots, duration_s=END_S):
         return getattr(Figures(seen, START_S, START_S + duration_s, "test.bag"), "draw_" + name)()
 
 
+@pytest.mark.slow
 def test_a_page_grows_with_its_robots():
     for name, count, height_in in (
         ("paths", 9, 8.0), ("errors", 9, 6.0), ("speeds", 3, 5.7), ("speeds", 9, 13.2),
@@ -258,6 +259,7 @@ def test_frames_are_told_where_robots_are_not_all_in_one():
     assert describe(make(True), make(False, with_truth=True)) == "frame world; hero_1: own odom frame"
 
 
+@pytest.mark.slow
 def test_speeds_are_drawn_beside_commands_up_to_eight_robots():
     robots = make_driven(9)
     robots[1].odometry = type(robots[1].odometry)(2, 5)

@@ -73,6 +73,7 @@ def test_hidden_errors_come_back_and_predict_paths_not_seen():
     assert fit.after_m < fit.before_m / 3.0 and fit.after_m < 0.01
 
 
+@pytest.mark.slow
 def test_velocities_tell_the_body_but_no_motors():
     fit = fit_robot([record(VELOCITY, 40.0)])
     assert set(fit.values) == {"left_wheel", "right_wheel", "wheel_separation_m", "slip"}

@@ -113,6 +113,7 @@ def cross_ring(mode):
     return np.median(across_s), nearest_m
 
 
+@pytest.mark.slow
 def test_robots_cross_a_ring_untouched_in_little_more_time_than_pushing():
     pushing_s, _ = cross_ring(OFF)
     across_s, nearest_m = cross_ring(ROBOTS)

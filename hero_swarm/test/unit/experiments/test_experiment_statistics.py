@@ -36,6 +36,7 @@ def test_no_value_and_nan_are_refused(values):
         statistics.bootstrap_median(values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("draw", "median"), [("standard_normal", 0.0), ("standard_exponential", math.log(2.0))]
 )

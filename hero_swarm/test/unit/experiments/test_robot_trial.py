@@ -93,6 +93,7 @@ def test_robots_that_change_places_drive_around_each_other_and_turn():
     assert np.abs(np.remainder(poses - places + math.pi, 2.0 * math.pi) - math.pi)[:, 2].max() < 0.1
 
 
+@pytest.mark.slow
 def test_robots_wait_for_a_pose_that_is_lost_on_the_way():
     usual_s, later_s = drive_to(STARTS[[1, 2, 0]])[1], drive_to(STARTS[[1, 2, 0]], (3.0, 13.0))[1]
     assert 8.0 < later_s - usual_s < 14.0
