@@ -3,6 +3,7 @@
 Knows nothing of experiments: it calls a function with arguments, and survives workers that die.
 """
 
+import asyncio
 import collections
 import multiprocessing
 import os
@@ -19,6 +20,9 @@ MAX_NEW_POOLS = 3
 """Worker pools that are started in place of broken ones; a batch that kills its worker would do so for ever."""
 
 DASK_RETRIES = 3
+
+DASK_TIMEOUT_S = 20.0
+"""A cluster that is started at the same time has workers by then."""
 
 _WAITING = 2
 """Batches that wait for each worker: none idles while results are written, and few are lost by a kill."""
@@ -60,17 +64,13 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
     is_address = "://" in address
     try:
         client = Client(
-            address if is_address else None, scheduler_file=None if is_address else address, timeout=20
+            address if is_address else None, scheduler_file=None if is_address else address, timeout=DASK_TIMEOUT_S
         )
+        client.wait_for_workers(1, timeout=DASK_TIMEOUT_S)
         codes = client.run(check)
-    except (OSError, ValueError) as error:
-        raise ExperimentError(
-            "no Dask cluster at %s: %s" % (address, " ".join(str(error).split()))
-        ) from error
-    if not codes:
-        raise ExperimentError(
-            "the Dask cluster at %s has no workers: start dask-worker %s" % (address, address)
-        )
+    except (OSError, ValueError, asyncio.TimeoutError) as error:
+        text = "no Dask cluster with workers at %s (%s): start dask-scheduler and dask-worker"
+        raise ExperimentError(text % (address, " ".join(str(error).split()))) from error
     own = check()
     for worker, code in sorted(codes.items()):
         if code != own:
