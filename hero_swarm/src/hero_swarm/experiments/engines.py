@@ -3,7 +3,6 @@
 Knows nothing of experiments: it calls a function with arguments, and survives workers that die.
 """
 
-import asyncio
 import collections
 import multiprocessing
 import os
@@ -57,6 +56,7 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
     """
     try:
         from distributed import Client
+        from distributed import TimeoutError as DaskTimeoutError
     except ImportError as error:
         raise ExperimentError(
             "--executor dask needs distributed: apt install python3-distributed, or pip install distributed"
@@ -68,7 +68,7 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
         )
         client.wait_for_workers(1, timeout=DASK_TIMEOUT_S)
         codes = client.run(check)
-    except (OSError, ValueError, asyncio.TimeoutError) as error:
+    except (OSError, ValueError, DaskTimeoutError) as error:
         text = "no Dask cluster with workers at %s (%s): start dask-scheduler and dask-worker"
         raise ExperimentError(text % (address, " ".join(str(error).split()))) from error
     own = check()

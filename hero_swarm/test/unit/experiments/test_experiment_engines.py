@@ -1,6 +1,6 @@
 """Batches on worker processes: all are computed once, whatever workers do."""
 
-import asyncio
+
 import functools
 import os
 import signal
@@ -64,15 +64,20 @@ def test_without_dask_the_error_names_its_package(monkeypatch):
         engines.open_dask("tcp://127.0.0.1:1", lambda: "")
 
 
+class ArrivalError(Exception):
+    pass
+
+
 class ClusterWithoutWorkers:
     def __init__(self, address, scheduler_file, timeout):
         pass
 
     def wait_for_workers(self, count, timeout):
-        raise asyncio.TimeoutError("Only 0/1 workers arrived after 20s")
+        raise ArrivalError("Only 0/1 workers arrived after 20s")
 
 
 def test_a_dask_cluster_without_workers_is_named_with_the_remedy(monkeypatch):
-    monkeypatch.setitem(sys.modules, "distributed", types.SimpleNamespace(Client=ClusterWithoutWorkers))
+    stub = types.SimpleNamespace(Client=ClusterWithoutWorkers, TimeoutError=ArrivalError)
+    monkeypatch.setitem(sys.modules, "distributed", stub)
     with pytest.raises(ExperimentError, match="workers at s.json .Only 0/1 .*: start dask-scheduler and dask-worker$"):
         engines.open_dask("s.json", lambda: "")
