@@ -1,6 +1,5 @@
 """Batches on worker processes: all are computed once, whatever workers do."""
 
-
 import functools
 import os
 import signal
@@ -79,5 +78,7 @@ class ClusterWithoutWorkers:
 def test_a_dask_cluster_without_workers_is_named_with_the_remedy(monkeypatch):
     stub = types.SimpleNamespace(Client=ClusterWithoutWorkers, TimeoutError=ArrivalError)
     monkeypatch.setitem(sys.modules, "distributed", stub)
-    with pytest.raises(ExperimentError, match="workers at s.json .Only 0/1 .*: start dask-scheduler and dask-worker$"):
-        engines.open_dask("s.json", lambda: "")
+    with pytest.raises(ExperimentError, match="no Dask scheduler file no.json: start .* --scheduler-file no.json$"):
+        engines.open_dask("no.json", lambda: "")
+    with pytest.raises(ExperimentError, match="workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and dask-worker$"):
+        engines.open_dask("tcp://a:1", lambda: "")
