@@ -24,7 +24,7 @@ LIGHTS = {0: (1.0, 0.0, 0.0), 1: (0.0, 1.0, 0.0), 2: (0.0, 0.0, 1.0)}
 BRIGHT, DIM = 110, 60
 BLOB_PIXELS_MIN = 8
 SIDE_M = 1.6  # of the walls in square_arena.yaml
-WALL_SHARE = 0.6
+WALL_SHARE = 0.8  # the side panels are 0.7 as wide as a wall is long
 WALL_PIXELS = 4
 
 

@@ -15,9 +15,8 @@ LIGHTS_TOPIC = "/hero_lights"
 CHOICE_TOPIC = "/hero_choice/chosen"
 POINT_TOPIC = "/hero_choice/point"
 GOAL_TOPIC = "/hero_choice/goal"
-ABOVE_PIXELS_PER_M = 400
-MAP_PIXELS_PER_M = 300
-"""An arena of 2.2 m fits into the window."""
+ABOVE_PIXELS_PER_M = 300
+"""Of the views from above: an arena of 2.2 m fits into the window."""
 
 PLUS_DESCRIPTION = "hero_plus_description"
 """Parameter that holds the URDF of HeRo+."""
@@ -147,7 +146,7 @@ def make_view(view: str) -> Dict[str, Any]:
     if view not in ORBITS:
         return {
             "Class": "rviz/TopDownOrtho",
-            "Scale": MAP_PIXELS_PER_M if view == "map" else ABOVE_PIXELS_PER_M,
+            "Scale": ABOVE_PIXELS_PER_M,
             "X": 0.0,
             "Y": 0.0,
             "Angle": 0.0,

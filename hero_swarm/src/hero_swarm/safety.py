@@ -67,14 +67,11 @@ class SafetyFilter:
         that are no finite numbers count as zero.
         """
         linear_m_s, angular_rad_s = (
-            np.broadcast_to(np.ravel(values), poses[..., 0].size).reshape(poses.shape[:2])
-            for values in (linear_m_s, angular_rad_s)
-        )
+            np.broadcast_to(np.where(np.isfinite(values), values, 0.0).ravel(), poses[..., 0].size)
+            .reshape(poses.shape[:2]) for values in (linear_m_s, angular_rad_s)
+        )  # fmt: skip
         if self.mode == OFF:
             return linear_m_s, angular_rad_s
-        linear_m_s, angular_rad_s = (
-            np.where(np.isfinite(values), values, 0.0) for values in (linear_m_s, angular_rad_s)
-        )
         ages_s = np.zeros(poses.shape[:2]) if ages_s is None else ages_s
         known = np.isfinite(poses).all(axis=2) & (ages_s <= MAX_AGE_S)
         yaw_rad = np.where(known, poses[..., 2], 0.0)

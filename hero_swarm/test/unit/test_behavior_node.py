@@ -257,15 +257,15 @@ def test_beams_end_where_sensors_do_and_the_metric_scales_itself(monkeypatch):
     draw(0.4, 9.0)
     second = draw(0.5, 3.0, (0.1, 0.2))
     # The corner stays where the middle of all robots was; it goes up with the robots.
-    left_m, low_m = 0.6 - 0.4, 0.3 + 0.2 + 0.12
+    left_m, low_m = 0.6 - 0.4, 0.3 + 0.2 + 0.06
     assert place(second["/node/metric_axes"]) == [
-        pytest.approx((left_m, low_m + 0.12)), pytest.approx((left_m, low_m)), pytest.approx((left_m + 0.8, low_m))
+        pytest.approx((left_m, low_m + 0.1)), pytest.approx((left_m, low_m)), pytest.approx((left_m + 0.8, low_m))
     ]  # fmt: skip
     assert second["/node/metric"].text == "order 3.00 (1.00 to 3.00 in 120 s)"
     assert second["/node/metric"].pose.position.x == pytest.approx(left_m + 0.4)
     third = draw(120.4, 2.0)
     assert place(third["/node/metric_line"]) == [
-        pytest.approx((left_m + 0.8 * 0.1 / 120.0, low_m + 0.12), abs=1e-6), pytest.approx((left_m + 0.8, low_m))
+        pytest.approx((left_m + 0.8 * 0.1 / 120.0, low_m + 0.1), abs=1e-6), pytest.approx((left_m + 0.8, low_m))
     ], "what is 120 s old is gone, and a value between two points was not kept"  # fmt: skip
     assert draw(121.0, 2.5)["/node/metric"].text == "order 2.50 (2.00 to 2.50 in 120 s)"
 

@@ -19,10 +19,10 @@ BEAM_M = 3.0
 """Length at which a beam of endless range is drawn."""
 
 PLOT_S, PLOT_STEP_S = 120.0, 0.5
-PLOT_M = (0.8, 0.12)
+PLOT_M = (0.8, 0.1)
 """Time, time between points, and size, wide and high, of the metric's line, which scales itself to its values."""
 
-PLOT_GAP_M = 0.12
+PLOT_GAP_M = 0.06
 
 _FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.1, 0.9)
 _PLOT_COLOR, _AXES_COLOR = ColorRGBA(0.9, 0.5, 0.0, 1.0), ColorRGBA(0.5, 0.5, 0.5, 1.0)
@@ -97,6 +97,6 @@ class BehaviorMarkers:
         text = self._make_marker("metric", Marker.TEXT_VIEW_FACING)
         text.text = "%s %.2f (%.2f to %.2f in %.0f s)" % (self._behavior.metric, value, least, most, PLOT_S)
         text.scale.z, text.color = 0.045, _PLOT_COLOR
-        text.pose.position = Point(left_m + width_m / 2.0, low_m + height_m + 0.04, 0.1)
+        text.pose.position = Point(left_m + width_m / 2.0, low_m + height_m + 0.03, 0.1)
         # A line of one point is none that RViz draws.
         return [axes, text, *([line] if len(line.points) > 1 else [])]
