@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_client.values.sensing import Binary, Neighbors, sense_binary, sense_neighbors
+from hero_client.values.sensing import Binary, Neighbors, list_neighbors, sense_binary, sense_neighbors
 
 
 class Fixed:
@@ -157,3 +157,12 @@ def test_errors_drop_outs_and_noise_are_as_often_as_they_should_be():
     assert 1300 < len(ranges_m) < 1500
     assert np.std(ranges_m) == pytest.approx(0.02, rel=0.1)
     assert np.std([near.bearing_rad[0, 1] for near in found if near.seen[0, 1]]) == pytest.approx(0.1, rel=0.1)
+
+
+def test_neighbors_are_listed_nearest_first_under_their_ids():
+    poses = np.array([[(0.0, 0.0, 0.0), (0.4, 0.0, 1.0), (0.0, 0.1, 0.0), (-0.2, 0.0, 0.0)]])
+    near = sense_neighbors(poses, Neighbors(range_m=0.3))
+    found = list_neighbors(near, 0, (7, 8, 9, 10))
+    assert [neighbor.robot_id for neighbor in found] == [9, 10]
+    assert [neighbor.range_m for neighbor in found] == pytest.approx([0.1, 0.2])
+    assert [neighbor.bearing_rad for neighbor in found] == pytest.approx([math.pi / 2.0, math.pi])

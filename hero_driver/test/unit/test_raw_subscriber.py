@@ -15,7 +15,7 @@ from std_msgs.msg import String
 
 from hero_driver.ros import raw_subscriber, rospy_internals
 from hero_driver.ros.message_types import make_raw_class
-from hero_driver.ros.raw_subscriber import MESSAGE_LENGTH_MAX, RawSubscriber
+from hero_driver.ros.raw_subscriber import MESSAGE_LENGTH_MAX, MessageStream, RawSubscriber
 from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
 
 DEADLINE_S = 60.0
@@ -293,3 +293,18 @@ def test_the_first_message_of_a_publisher_right_after_a_pause_is_old(bench):
     bench.wait_for(1)
     bench.loop._resumed_s = time.monotonic() - raw_subscriber.RESUMED_S
     assert bench.old == [b"first"]
+
+
+def test_a_message_that_was_begun_before_a_pause_counts_to_what_is_old():
+    near, far = socket.socketpair()
+    with near, far:
+        old, subscriber = [], RawSubscriber(lambda payload: old.append((payload, subscriber.is_old)), None)
+        long = b"l" * 300
+        connection = SimpleNamespace(stat_bytes=0, stat_num_msg=0)
+        stream = MessageStream(subscriber, connection, far, frame(long)[:250])
+        near.sendall(frame(long)[250:] + frame(b"short"))
+        stream.resume()
+        near.sendall(frame(b"new"))
+        assert stream.read()
+        assert old == [(long, True), (b"short", True), (b"new", False)]
+        assert (connection.stat_bytes, connection.stat_num_msg) == (54 + 9 + 7, 3)

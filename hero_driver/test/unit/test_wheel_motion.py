@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hero_driver.corrections.wheel_motion import REST_READINGS, WheelMotion
+from hero_driver.corrections.wheel_motion import MOVES_KEPT, REST_READINGS, WheelMotion
 
 
 def read_all(wheels, ticks):
@@ -47,8 +47,22 @@ def test_settled_wheels_may_move_by_two_ticks_and_not_by_three():
     wheels.settle()
     read_all(wheels, [(5.0, 7.0), (6.0, 8.0), (7.0, 5.0)])
     assert wheels.still_readings == REST_READINGS + 1
-    wheels.read_ticks(8.0, 7.0)
-    assert wheels.still_readings == 0
+    for left_ticks in (8.0, 10.0):
+        wheels.read_ticks(left_ticks, 7.0)
+        assert wheels.still_readings == 0, "once they turn, two are a turn again"
+
+
+@pytest.mark.parametrize(("later_ticks", "go_on"), [(12, True), (6, True), (4, False)])
+def test_wheels_go_on_if_they_did_not_slow_down_by_half(later_ticks, go_on):
+    wheels, left_ticks = WheelMotion(), 0.0
+    wheels.read_ticks(left_ticks, 0.0)
+    for step_ticks in [10.0] * (MOVES_KEPT // 2) + [float(later_ticks)] * (MOVES_KEPT // 2):
+        left_ticks -= step_ticks
+        wheels.read_ticks(left_ticks, 0.0)
+    assert wheels.go_on == go_on
+    for _ in range(REST_READINGS):
+        wheels.read_ticks(left_ticks, 0.0)
+    assert not wheels.go_on
 
 
 def test_counters_that_are_set_to_zero_are_no_turn():

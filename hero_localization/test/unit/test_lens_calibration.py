@@ -156,6 +156,15 @@ def test_one_bad_picture_is_left_out():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("count", "left_out"), [(8, []), (9, [4])])
+def test_bad_pictures_stay_where_too_few_others_are_left(count, left_out):
+    views = project(list_holds(count, 0.5))
+    off = np.random.RandomState(0).normal(0.0, 4.0, views[4].pixels.shape).astype(np.float32)
+    views[4] = views[4]._replace(pixels=views[4].pixels + off)
+    assert calibrate(views).left_out == left_out
+
+
+@pytest.mark.slow
 def test_the_focal_length_is_no_worse_than_reported():
     """Of views whose corners are wrong together, as those of a board that is a little bent or blurred."""
     random, off, reported = np.random.RandomState(1), [], []

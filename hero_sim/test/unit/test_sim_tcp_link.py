@@ -1,0 +1,151 @@
+"""The TCP side of simulated robots: what a driver does not read waits, in order, up to a limit."""
+
+import contextlib
+import socket
+
+import pytest
+
+from hero_sim.link import tcp_link
+from hero_sim.link.tcp_link import LinkHandler, TcpLink
+
+
+class Events(LinkHandler):
+    """Notes what happens to the connections."""
+
+    def __init__(self):
+        self.seen, self.received = [], b""
+
+    def connection_made(self, index):
+        self.seen.append("made")
+
+    def connection_failed(self, index, reason):
+        self.seen.append("failed")
+
+    def connection_lost(self, index, reason):
+        self.seen.append("lost")
+
+    def receive_bytes(self, index, data):
+        self.received += data
+
+    def writing_blocked(self, index):
+        self.seen.append("blocked")
+
+    def writing_resumed(self, index):
+        self.seen.append("resumed")
+
+
+class Driver:
+    """A link of one robot, and the socket at its other end."""
+
+    def __init__(self):
+        with socket.socket() as listener:
+            # Little is kept by the system: a link that is not read is soon full.
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            listener.bind(("127.0.0.1", 0))
+            listener.listen()
+            self.link, self.events = TcpLink(1, *listener.getsockname()), Events()
+            self.link.handler = self.events
+            self.link.connect(0)
+            assert self.link.is_connecting(0) and self.link.count_open() == 0
+            self.socket, _ = listener.accept()
+        self.poll_until(lambda: self.events.seen)
+        assert self.events.seen == ["made"] and not self.link.is_connecting(0) and self.link.count_open() == 1
+
+    def poll_until(self, is_done):
+        while not is_done():
+            self.link.poll(1.0)
+
+    def fill(self):
+        """Send numbered pieces until the link is full; return all that was sent."""
+        sent = b""
+        while self.events.seen[-1] != "blocked":
+            piece = len(sent).to_bytes(4, "big") * 500
+            self.link.send(0, piece)
+            sent += piece
+        return sent
+
+    def read_to(self, end):
+        """Read up to an end while the link goes on."""
+        data = b""
+        self.socket.settimeout(0.01)
+        while not data.endswith(end):
+            self.link.poll(0.0)
+            with contextlib.suppress(socket.timeout):
+                data += self.socket.recv(65536)
+        return data
+
+
+@pytest.fixture()
+def driver():
+    made = Driver()
+    yield made
+    made.link.close_all()
+    made.socket.close()
+
+
+def test_what_a_driver_does_not_read_waits_and_is_sent_when_it_does(driver):
+    sent = driver.fill()
+    for piece in (b"a" * 100, b"b" * 100, b"end"):
+        driver.link.send(0, piece)
+        sent += piece
+    assert driver.read_to(b"end") == sent
+    driver.poll_until(lambda: driver.events.seen[-1] == "resumed")
+    assert driver.events.seen == ["made", "blocked", "resumed"]
+    driver.link.send(0, b"again")
+    assert driver.read_to(b"again") == b"again" and driver.events.seen[-1] == "resumed"
+
+
+def test_what_waits_is_limited_and_can_be_dropped(driver, monkeypatch):
+    monkeypatch.setattr(tcp_link, "_MAX_UNSENT", 2000)
+    sent = driver.fill()
+    for _ in range(20):
+        driver.link.send(0, b"x" * 1000)
+    assert 2000 <= len(driver.link._connections[0].unsent) < 3000
+    driver.link.drop_unsent(0)
+    driver.socket.settimeout(None)
+    received = driver.socket.recv(len(sent))
+    driver.link.send(0, b"end")
+    received += driver.read_to(b"end")
+    assert sent.startswith(received[:-3]) and len(received) < len(sent) + 3, "whole until there, nothing twice"
+
+
+def test_a_paused_robot_leaves_what_comes_to_the_system(driver):
+    driver.link.pause(0, True)
+    driver.socket.sendall(b"later")
+    driver.link.poll(0.05)
+    assert driver.events.received == b""
+    driver.link.pause(0, False)
+    driver.poll_until(lambda: driver.events.received)
+    assert driver.events.received == b"later"
+
+
+def test_the_end_of_a_connection_is_told_once_and_nothing_is_sent_after_it(driver):
+    driver.socket.close()
+    driver.poll_until(lambda: driver.events.seen[-1] == "lost")
+    driver.link.send(0, b"nobody")
+    driver.link.pause(0, True)
+    driver.link.drop_unsent(0)
+    driver.link.close(0)
+    assert driver.events.seen == ["made", "lost"] and driver.link.count_open() == 0
+
+
+def test_an_abandoned_connection_gets_no_end(driver):
+    driver.link.abandon(0)
+    driver.socket.settimeout(0.05)
+    with pytest.raises(socket.timeout):
+        driver.socket.recv(1)
+    assert driver.link.count_open() == 0 and not driver.link.is_connecting(0)
+    driver.link.abandon(0)
+
+
+def test_robots_connect_from_addresses_of_their_own():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        link = TcpLink(3, *taken.getsockname(), first_number=248)
+        link.handler = events = Events()
+        assert link.own_addresses == ["127.0.1.249", "127.0.1.250", "127.0.2.1"]
+        link.connect(0)
+        while not events.seen:
+            link.poll(1.0)
+        assert events.seen == ["failed"], "nobody listens"
+        link.close_all()
