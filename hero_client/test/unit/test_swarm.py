@@ -8,11 +8,12 @@ import pytest
 from linkless_robot import FakeSwarm
 
 from hero_client.robots.common_frame import POLL_HZ, CommonFrame
-from hero_client.robots.group import NAMES_SHOWN, wait_for_all
+from hero_client.robots.group import wait_for_all
 from hero_client.robots.swarm_base import FIRST_REPORT_S, REPORT_PERIOD_S
 from hero_client.values.errors import FrameError, GoalError, RobotNotReadyError, StaleDataError, StoppedError
 from hero_node.errors import ProgramError
 from hero_node.geometry import Pose, Velocity
+from hero_node.texts import NAMES_SHOWN
 
 
 def test_robots_are_taken_by_their_numbers():
@@ -174,7 +175,8 @@ def test_what_is_waited_for_is_reported_now_and_then_and_its_end_once():
 
 def test_of_many_robots_that_are_not_ready_some_are_named():
     swarm = FakeSwarm(*range(NAMES_SHOWN + 1))
-    for count, says in ((1, "hero_0 is not ready after 0.5 s"), (NAMES_SHOWN, "hero_9 are not"), (11, "hero_9... are")):
+    many = ((NAMES_SHOWN, "hero_9 are not"), (NAMES_SHOWN + 1, "hero_9 and 1 more are"))
+    for count, says in ((1, "hero_0 is not ready after 0.5 s"), *many):
         for link in swarm.links[:count]:
             link.ready_s = math.inf
         with pytest.raises(RobotNotReadyError) as raised:

@@ -11,6 +11,7 @@ __all__ = [
     "find_frame",
     "invert_pose",
     "measure_distance",
+    "pose_of",
     "transform_pose",
     "wrap_angle",
     "yaw_of",
@@ -92,3 +93,8 @@ def yaw_of(orientation: Any) -> float:
     """Return the turn about z, -pi..pi rad, of a geometry_msgs/Quaternion; nan for entries that are not finite."""
     x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def pose_of(place: Any, turn: Any) -> Pose:
+    """Return the pose in the plane of a geometry_msgs/Point or Vector3, and a Quaternion."""
+    return Pose(place.x, place.y, yaw_of(turn))

@@ -1,9 +1,11 @@
 """Texts from robots, files and other programs, made fit for one line of a terminal. Pure."""
 
 import reprlib
-from typing import Any
+from typing import Any, Sequence
 
-__all__ = ["make_printable", "one_line", "shorten"]
+__all__ = ["NAMES_SHOWN", "list_names", "make_printable", "one_line", "shorten"]
+
+NAMES_SHOWN = 10
 
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel = 2
@@ -23,3 +25,9 @@ def one_line(error: Exception) -> str:
 def shorten(value: Any) -> str:
     """Return a value as a printable text of some words; a list may hold thousands, or itself."""
     return make_printable(_SHORT.repr(value))
+
+
+def list_names(names: Sequence[str], most: int = NAMES_SHOWN) -> str:
+    """Return names as text, and of many only how many more there are."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (" and %d more" % more if more > 0 else "")

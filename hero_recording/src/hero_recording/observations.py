@@ -7,7 +7,7 @@ import math
 from collections import defaultdict
 from typing import Any, DefaultDict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
-from hero_node.geometry import yaw_of
+from hero_node.geometry import pose_of, yaw_of
 
 from .series import Series
 from .tables import STATUS, TABLES, Row, read_rows
@@ -144,8 +144,8 @@ class Observations:
             if frame != "odom" or not number.isdecimal() or not self._wants_robot(int(number)):
                 continue
             self.shared_frame = transform.header.frame_id.strip("/")
-            translation = transform.transform.translation
-            origin = Origin(message.time_s, translation.x, translation.y, yaw_of(transform.transform.rotation))
+            found = transform.transform
+            origin = Origin(message.time_s, *pose_of(found.translation, found.rotation))
             if not all(map(math.isfinite, origin)):
                 continue
             origins = self.robots[int(number)].origins

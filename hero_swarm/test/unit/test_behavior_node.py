@@ -201,11 +201,11 @@ def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):
     assert told_s == pytest.approx([3.0, 8.0, 13.0], abs=0.2) and "hero_0" in stage.warnings[0]
 
 
-@pytest.mark.parametrize(("count", "words"), [(8, "hero_6, hero_7 are not"), (9, "hero_6, hero_7, ... are not")])
-def test_of_many_robots_without_calibration_eight_are_named(monkeypatch, count, words):
+@pytest.mark.parametrize(("count", "words"), [(10, "hero_8, hero_9 are not"), (11, "hero_9 and 1 more are not")])
+def test_of_many_robots_without_calibration_ten_are_named(monkeypatch, count, words):
     stage = Stage(monkeypatch, count)
     stage.start("milling")
-    assert words in stage.warnings[0] and "hero_8" not in stage.warnings[0]
+    assert words in stage.warnings[0] and "hero_10" not in stage.warnings[0]
 
 
 def test_a_fence_has_a_width_and_a_height():

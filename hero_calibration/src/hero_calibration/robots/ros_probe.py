@@ -9,7 +9,7 @@ from sensor_msgs.msg import LaserScan
 
 from hero_msgs.msg import Encoder, Motor, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
-from hero_node.geometry import Pose, yaw_of
+from hero_node.geometry import Pose, pose_of
 from hero_node.texts import one_line
 
 from ..errors import CalibrationError
@@ -60,8 +60,8 @@ class RosProbe(Probe):
         self.receive_scan(rospy.get_time(), read_signals(message.intensities), read_signals(message.ranges))
 
     def _take_odometry(self, message: Odometry) -> None:
-        position = message.pose.pose.position
-        self.receive_pose(rospy.get_time(), Pose(position.x, position.y, yaw_of(message.pose.pose.orientation)))
+        pose = message.pose.pose
+        self.receive_pose(rospy.get_time(), pose_of(pose.position, pose.orientation))
 
     def _take_places(self, report: RobotPoses) -> None:
         for robot in report.robots:

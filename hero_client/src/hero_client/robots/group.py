@@ -7,6 +7,7 @@ from operator import index
 from typing import Optional, Protocol, Sequence, SupportsIndex, TypeVar
 
 from hero_node.clock import Clock
+from hero_node.texts import list_names
 
 from ..values.background_motion import SEND_TIME_S, BackgroundMotion, FullWait, Sleep, Steps, run_steps
 from ..values.errors import RobotNotReadyError
@@ -27,8 +28,6 @@ POLL_PERIOD_S = 0.02
 
 ROUNDING_S = 1e-6
 """Sums of seconds are this exact."""
-
-NAMES_SHOWN = 10
 
 Self = TypeVar("Self", bound="Group")
 
@@ -73,7 +72,7 @@ def wait_for_all(robots: Sequence[Member], timeout_s: float = READY_TIMEOUT_S) -
         if not late:
             return
         if polls <= 0 or not is_to_continue:
-            names = ", ".join(robot.name for robot in late[:NAMES_SHOWN]) + ("..." if len(late) > NAMES_SHOWN else "")
+            names = list_names([robot.name for robot in late])
             verb = "is" if len(late) == 1 else "are"
             raise RobotNotReadyError("%s %s not ready after %.3g s: %s" % (names, verb, timeout_s, late[0].missing()))
         polls -= 1

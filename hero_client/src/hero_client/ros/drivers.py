@@ -19,6 +19,7 @@ from std_msgs.msg import Bool
 from hero_msgs.msg import Robot, RobotArray
 from hero_node.errors import NodeError, ProgramError
 from hero_node.ros.master import ask_master
+from hero_node.texts import list_names
 
 from ..values.robot_states import STATES, STOP_STATES
 from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
@@ -40,8 +41,6 @@ SILENT_S = 2.5
 """A driver whose last report is older does not answer."""
 
 POLL_PERIOD_S = 0.02
-
-NAMES_SHOWN = 10
 
 PREFERENCE = (Robot.READY, Robot.JOINING, Robot.AWAY)
 """If a robot has moved from one driver to another, the entry that counts."""
@@ -331,9 +330,7 @@ class Drivers:
                 reason = ": " + robot.last_error if robot.last_error else ""
                 return "the driver reports %s as %s%s" % (namespace.strip("/"), STATES[robot.state], reason)
         names = [robot.namespace.strip("/") for robot in report.robots if robot.state == Robot.READY]
-        more = len(names) - NAMES_SHOWN
-        known = ", ".join(names[:NAMES_SHOWN]) + (" and %d more" % more if more > 0 else "")
-        return "connected are %s: is the robot on, and its id right?" % (known or "no robots")
+        return "connected are %s: is the robot on, and its id right?" % (list_names(names) or "no robots")
 
     # -- stop requests --------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 import rospy
 import tf2_ros
 
-from hero_node.geometry import Pose, yaw_of
+from hero_node.geometry import Pose, pose_of
 from hero_node.texts import one_line
 
 from ..values.errors import FrameError
@@ -36,7 +36,7 @@ class FrameListener:
         while True:
             try:
                 found = self._buffer.lookup_transform(within, frame, rospy.Time(0)).transform
-                return Pose(found.translation.x, found.translation.y, yaw_of(found.rotation))
+                return pose_of(found.translation, found.rotation)
             except tf2_ros.TransformException as error:
                 if time.monotonic() >= deadline_s or rospy.is_shutdown():
                     raise FrameError(

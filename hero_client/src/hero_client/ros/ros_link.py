@@ -13,7 +13,7 @@ from std_msgs.msg import ColorRGBA, Float32
 from hero_msgs.msg import Encoder, Neighbors
 from hero_msgs.srv import SetOdom
 from hero_node.errors import HeroError
-from hero_node.geometry import Pose, Velocity, yaw_of
+from hero_node.geometry import Pose, Velocity, pose_of
 from hero_node.ros.ros_clock import ROS_CLOCK
 from hero_node.texts import one_line
 
@@ -131,7 +131,7 @@ class RosLink(RobotLink):
 
     def read_pose(self) -> Pose:
         pose = self.messages.read("odom").pose.pose
-        return Pose(pose.position.x, pose.position.y, yaw_of(pose.orientation))
+        return pose_of(pose.position, pose.orientation)
 
     def read_velocity(self) -> Velocity:
         twist = self.messages.read("odom").twist.twist

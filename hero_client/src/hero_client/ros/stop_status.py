@@ -6,6 +6,7 @@ Pure: knows neither topics nor a clock; times are monotonic.
 from typing import List, NamedTuple, Optional, Sequence, Set
 
 from hero_msgs.msg import Robot, RobotArray
+from hero_node.texts import list_names
 
 __all__ = ["TIME_LIMIT_S", "DriverReply", "StopRequest", "StopStatus", "paint"]
 
@@ -147,9 +148,7 @@ def _tell(robots: Sequence[Robot], one: str, many: str) -> List[str]:
     if not robots:
         return []
     names = [robot.namespace.strip("/") or robot.address for robot in robots]
-    more = len(names) - NAMES_SHOWN
-    shown = ", ".join(names[:NAMES_SHOWN]) + (" and %d more" % more if more > 0 else "")
-    return ["%s %s" % (shown, one if len(names) == 1 else many)]
+    return ["%s %s" % (list_names(names, NAMES_SHOWN), one if len(names) == 1 else many)]
 
 
 def paint(level: str, text: str) -> str:

@@ -6,7 +6,7 @@ Messages are only read; their meaning: REP 105 (frames), REP 117 (ranges).
 import math
 from typing import Any, List, NamedTuple, Optional, Sequence
 
-from hero_node.geometry import Pose, wrap_angle, yaw_of
+from hero_node.geometry import Pose, pose_of, wrap_angle
 
 __all__ = [
     "FRESH_S",
@@ -47,7 +47,7 @@ class Obstacle(NamedTuple):
 
 def read_pose(message: Any) -> Optional[Pose]:
     """Return the pose in the plane of a geometry_msgs/Pose; None if it is implausible."""
-    pose = Pose(message.position.x, message.position.y, yaw_of(message.orientation))
+    pose = pose_of(message.position, message.orientation)
     return pose if is_plausible(pose) else None
 
 

@@ -25,7 +25,7 @@ from hero_client.ros.robot_listener import NewestMessage
 from hero_client.ros.stop_status import StopStatus
 from hero_client.values.readings import finite, is_plausible, read_pose
 from hero_msgs.msg import Robot, RobotPose, RobotPoses
-from hero_node.geometry import Pose, yaw_of
+from hero_node.geometry import Pose, pose_of
 from hero_node.texts import make_printable
 
 from ..background import Background
@@ -263,8 +263,7 @@ class FleetFeed:
         taken = {topic: newest.take() for topic, newest in self._scene.items()}
         if taken.get("/tf_static") is not None:
             for transform in taken["/tf_static"].transforms:
-                place, turn = transform.transform.translation, transform.transform.rotation
-                pose = Pose(place.x, place.y, yaw_of(turn))
+                pose = pose_of(transform.transform.translation, transform.transform.rotation)
                 if is_plausible(pose):
                     self.placement.receive_transform(transform.header.frame_id, transform.child_frame_id, pose)
             self.placement.set_robots(self.robots)

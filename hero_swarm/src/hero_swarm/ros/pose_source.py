@@ -12,7 +12,7 @@ from hero_client.ros.localized_poses import share_poses
 from hero_client.values.errors import FrameError, StaleDataError
 from hero_client.values.object_sensing import NO_OBJECTS, Things
 from hero_msgs.msg import ObjectPoses
-from hero_node.geometry import Pose, yaw_of
+from hero_node.geometry import Pose, pose_of
 
 __all__ = ["SIMULATOR_FRAME", "ObjectSource", "PoseSource"]
 
@@ -47,8 +47,8 @@ class PoseSource:
             rospy.Subscriber(topic, Odometry, receive, queue_size=1, tcp_nodelay=True)
 
     def _receive_truth(self, robot_id: int, message: Odometry) -> None:
-        place, yaw_rad = message.pose.pose.position, yaw_of(message.pose.pose.orientation)
-        self._true[robot_id] = Pose(place.x, place.y, yaw_rad), message.header.stamp.to_sec()
+        pose = message.pose.pose
+        self._true[robot_id] = pose_of(pose.position, pose.orientation), message.header.stamp.to_sec()
 
     def read(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return the poses (N, 3), NaN for those that are not known or too old, and their ages in s (N,)."""

@@ -7,7 +7,7 @@ import numpy as np
 import rosbag
 
 from hero_msgs.msg import RobotPose
-from hero_node.geometry import yaw_of
+from hero_node.geometry import pose_of
 
 from ..experiments.errors import ExperimentError
 from ..fitting.recording import NO_SCANS, PULSES, VELOCITY, Recording
@@ -73,8 +73,7 @@ def _read_row(topic: str, message: Any, received_s: float) -> Tuple[str, Tuple[f
     """Return the table of a message, and its row there."""
     if topic in ("odom", "ground_truth"):
         pose = message.pose.pose
-        place = (pose.position.x, pose.position.y, yaw_of(pose.orientation))
-        return topic, (message.header.stamp.to_sec(), *place)
+        return topic, (message.header.stamp.to_sec(), *pose_of(pose.position, pose.orientation))
     if topic == "laser":
         # Every other beam is an average of its neighbors.
         return topic, (message.header.stamp.to_sec(), *message.intensities[::2])

@@ -8,6 +8,7 @@ import rospy
 
 from hero_client import Swarm
 from hero_msgs.msg import Motor
+from hero_node.texts import list_names
 from hero_node.yaml_text import read_calibrations
 from hero_sim.stepped.swarm import StepSwarm
 
@@ -47,11 +48,10 @@ class WheelCommands:
         names = ["hero_%d" % robot.robot_id for robot in swarm]
         missing = [name for name in names if name not in found]
         if missing:
-            shown = ", ".join(missing[:8]) + (", ..." if len(missing) > 8 else "")
             rospy.logwarn(
                 "the motors of %s are not calibrated (~calibration_folder %r): all robots are driven by their velocity"
                 " controllers, which the wheels follow late; see rosrun hero_calibration calibrate motors",
-                shown, folder,
+                list_names(missing), folder,
             )  # fmt: skip
             return
         self._dead_zones_us = np.array([found[name] for name in names])
