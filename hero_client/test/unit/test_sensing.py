@@ -160,9 +160,9 @@ def test_errors_drop_outs_and_noise_are_as_often_as_they_should_be():
 
 
 def test_neighbors_are_listed_nearest_first_under_their_ids():
-    poses = np.array([[(0.0, 0.0, 0.0), (0.4, 0.0, 1.0), (0.0, 0.1, 0.0), (-0.2, 0.0, 0.0)]])
+    poses = np.array([[(0.0, 0.0, 0.0), (0.4, 0.0, 1.0), (-0.2, 0.0, 0.0), (0.0, 0.1, 0.0)]])
     near = sense_neighbors(poses, Neighbors(range_m=0.3))
     found = list_neighbors(near, 0, (7, 8, 9, 10))
-    assert [neighbor.robot_id for neighbor in found] == [9, 10]
+    assert [neighbor.robot_id for neighbor in found] == [10, 9]
     assert [neighbor.range_m for neighbor in found] == pytest.approx([0.1, 0.2])
     assert [neighbor.bearing_rad for neighbor in found] == pytest.approx([math.pi / 2.0, math.pi])
