@@ -6,7 +6,7 @@ from fake_motors import LAG_S, FakeMotors
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.commands.commander import Commanders
+from hero_driver.commands.commander import Commander, Commanders
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
 from hero_driver.gateway import COMMANDER_POLL_S
@@ -278,3 +278,14 @@ def test_motion_counts_until_the_firmware_has_ended_it():
     for now_s, is_moving in ((100.0 + MAX_WATCHDOG_S - 0.01, True), (100.0 + MAX_WATCHDOG_S + 0.01, False)):
         stopper = commanders.note_command(VELOCITY, "b", "sender", "/program", False, now_s)
         assert commanders.has_more_to_stop(stopper, now_s) == is_moving
+
+
+def test_a_pause_that_began_before_the_last_command_moves_it_not_beyond_now():
+    commander = Commander("sender", "/program", VELOCITY)
+    for index in range(8):
+        commander.note_command(True, 0.1 * index)
+    commander.forgive_pause(0.9, 1.0)
+    assert commander.commanded_s == 1.0
+    assert not commander.has_fallen_silent(0.4, 1.3) and commander.has_fallen_silent(0.4, 1.5)
+    commander.forgive_pause(0.5, 1.6)
+    assert commander.commanded_s == 1.0, "once between two commands"

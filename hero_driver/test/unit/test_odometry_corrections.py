@@ -161,6 +161,9 @@ def test_the_robots_own_odometry_is_taken_where_that_is_asked_for():
     assert list_odometry(outputs)[0][2:5] == pytest.approx((1.0, 2.0, 0.5))
     outputs = robot.receive("/hero_0/encoder", build_encoder(NOW_NS, 500.0, 500.0), NOW_NS)
     assert [name for name, _ in outputs] == ["/hero_0/encoder"]
+    robot.receive("/hero_0/encoder", build_encoder(NOW_NS + PERIOD_NS, 900.0, 900.0), NOW_NS + PERIOD_NS)
+    outputs = robot.receive("/hero_0/odom", build_odometry(NOW_NS + 2 * PERIOD_NS, 1.1, 2.0, 0.5), NOW_NS)
+    assert list_odometry(outputs)[0][2:5] == pytest.approx((1.1, 2.0, 0.5)), "whatever the encoders have counted"
 
 
 def test_a_reading_without_subscribers_moves_the_odometry():

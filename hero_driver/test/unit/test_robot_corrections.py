@@ -15,7 +15,7 @@ from robot_messages import (
     read_stamp_ns,
 )
 
-from hero_driver.corrections.robot_corrections import OFFSET_MAX_S
+from hero_driver.corrections.robot_corrections import OFFSET_MAX_S, OFFSET_SAMPLES
 
 UPTIME_NS = 2 * NS_PER_S
 
@@ -58,9 +58,10 @@ def test_the_clock_offset_is_the_median_of_stamp_minus_arrival():
     for ahead_ms in (20, 30, -1000):
         robot.receive("/hero_0/odom", build_odometry(NOW_NS + ahead_ms * MS), NOW_NS)
     assert robot.corrections.clock_offset_s == pytest.approx(0.02)
-    for _ in range(100):
-        robot.receive("/hero_0/odom", build_odometry(NOW_NS - 5 * MS), NOW_NS)
-    assert robot.corrections.clock_offset_s == pytest.approx(-0.005)
+    for number in range(OFFSET_SAMPLES):
+        robot.receive("/hero_0/odom", build_odometry(NOW_NS - (number % 7 + number // 7) * MS), NOW_NS)
+    late_ms = sorted(number % 7 + number // 7 for number in range(OFFSET_SAMPLES))
+    assert robot.corrections.clock_offset_s == pytest.approx(-1e-3 * late_ms[(OFFSET_SAMPLES - 1) // 2])
 
 
 @pytest.mark.parametrize("stamp_ns, offset_s", [(0, -OFFSET_MAX_S), (0xFFFFFFFF * NS_PER_S, OFFSET_MAX_S)])
