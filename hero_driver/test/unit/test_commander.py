@@ -280,7 +280,7 @@ def test_motion_counts_until_the_firmware_has_ended_it():
         assert commanders.has_more_to_stop(stopper, now_s) == is_moving
 
 
-def test_a_pause_that_began_before_the_last_command_moves_it_not_beyond_now():
+def test_a_forgiven_pause_never_puts_the_last_command_into_the_future():
     commander = Commander("sender", "/program", VELOCITY)
     for index in range(8):
         commander.note_command(True, 0.1 * index)
