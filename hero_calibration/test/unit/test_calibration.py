@@ -413,3 +413,14 @@ def test_files_to_restore_follow_the_word_restore():
     options = calibrate.parse_options(["restore", "a.yaml", "b.yaml"])
     assert (options.restore, options.files, options.parts) == (True, ["a.yaml", "b.yaml"], [])
     assert calibrate.parse_options([]).parts == ["motors", "velocity", "infrared"]
+
+
+@pytest.mark.parametrize("turned_deg", [-10.0, -3.0, 0.0, 5.0, 11.0])
+@pytest.mark.parametrize("moved_m", [-0.01, 0.0, 0.02])
+def test_the_neighbors_of_a_sensor_tell_how_far_the_robot_is_turned(turned_deg, moved_m):
+    wall_m, turned_rad = 0.1 + BODY_RADIUS_M - moved_m, math.radians(turned_deg)
+    counts = [0.0] * 8
+    for sensor, side in ((5, 1.0), (3, -1.0)):  # turned to the left, the right one is nearer to the wall
+        counts[sensor] = 0.42 * model.expected_brightness(math.pi / 4.0 + side * turned_rad, wall_m)
+    found_rad = model.estimate_misalignment_rad(Facing(4, counts, [0.1] * 8, moved_m))
+    assert found_rad == pytest.approx(turned_rad, rel=0.08, abs=1e-9)

@@ -1,11 +1,15 @@
 """Wheels: simulated robots with hidden wheels are calibrated, and drift less on paths that were not used for it."""
 
+import math
+
 import numpy as np
 import pytest
 from test_calibration_procedures import make_session
 
 from hero_calibration.errors import CalibrationError
+from hero_calibration.models.encoder_readings import TICK_M
 from hero_calibration.procedures.wheels import NOMINAL_M, Leg, calibrate_wheels, fit_wheels, follow_ticks
+from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 HELD_OUT = [(0.12, 0.9, 2.0), (0.15, -0.5, 3.0), (0.0, 2.0, 1.5), (0.1, 0.0, 3.0), (0.12, -1.2, 2.5), (0.1, 0.6, 3.0)]
@@ -108,3 +112,8 @@ def test_wheels_that_no_robot_has_are_refused():
     legs = [Leg(ticks, Pose(0.1, 0.0, 0.0)), Leg(ticks * (-1.0, 1.0), Pose(0.0, 0.0, 1.5))]
     with pytest.raises(CalibrationError, match="did it slip, or was it touched"):
         fit_wheels(legs)
+
+
+def test_a_leg_that_turns_far_ends_within_half_a_turn():
+    ticks = np.column_stack((np.zeros(2), (0.0, 5.0 * WHEEL_SEPARATION_M / TICK_M)))
+    assert follow_ticks(ticks, NOMINAL_M).yaw_rad == pytest.approx(5.0 - 2.0 * math.pi)
