@@ -1,5 +1,9 @@
 """Robots as an environment for learning: the same seed gives the same episode, and PettingZoo accepts it."""
 
+import sys
+from importlib import import_module
+from types import ModuleType
+
 import numpy as np
 import pytest
 
@@ -56,3 +60,46 @@ def test_pettingzoo_accepts_the_environment():
     again, _ = env.reset(seed=5)
     assert list(first) == env.agents == env.possible_agents
     assert all((first[agent] == again[agent]).all() for agent in first)
+
+
+@pytest.fixture(name="env_class")
+def load_env(monkeypatch):
+    """SwarmEnv with stand-ins for gymnasium and pettingzoo, which few have installed."""
+    for name in ("gymnasium", "gymnasium.spaces", "pettingzoo"):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    sys.modules["gymnasium.spaces"].Box = lambda low, high, shape, kind: (low, high, shape, kind)
+    sys.modules["pettingzoo"].ParallelEnv = object
+    monkeypatch.delitem(sys.modules, "hero_swarm.learning.parallel_env", raising=False)
+    yield import_module("hero_swarm.learning.parallel_env").SwarmEnv
+    sys.modules.pop("hero_swarm.learning.parallel_env", None)
+
+
+def test_all_agents_live_until_the_time_is_over(env_class):
+    env = env_class(robots=2, time_s=0.5, neighbors=1, metric="nearest_neighbor")
+    assert env.possible_agents == ["hero_0", "hero_1"] and env.agents == []
+    assert env.observation_space("hero_1") == (-1.0, 1.0, (count_observations(1),), np.float32)
+    assert env.action_space("hero_0") == (-1.0, 1.0, (2,), np.float32)
+    observed, infos = env.reset(seed=5)
+    assert list(observed) == env.agents == ["hero_0", "hero_1"] and infos == {"hero_0": {}, "hero_1": {}}
+    actions = {"hero_0": np.array((1.0, 0.0)), "hero_1": np.array((0.0, 0.0))}
+    for step in range(1, 6):
+        observed, rewards, ended, truncated, infos = env.step(actions)
+        assert set(observed) == set(rewards) == set(infos) == {"hero_0", "hero_1"}
+        assert ended == {"hero_0": False, "hero_1": False}
+        assert truncated == {"hero_0": step == 5, "hero_1": step == 5}
+    assert env.agents == []
+    assert observed["hero_0"][8] > 0.5 > abs(observed["hero_1"][8]), "each agent drives its own robot"
+
+
+def test_episodes_have_the_given_seed_or_the_one_after_the_last(env_class):
+    def start(env, seed=None):
+        """Return what agents observe after some steps: robots of another seed have other motors."""
+        env.reset(seed)
+        for _ in range(5):
+            observed = env.step(dict.fromkeys(env.agents, np.array((0.5, 0.2))))[0]
+        return np.array(list(observed.values())).tobytes()
+
+    first, second = env_class(robots=2), env_class(robots=2, arena="obstacles")
+    assert start(first, 5) == start(first, 5) != start(first) == start(first, 6)
+    assert start(env_class(robots=2)) == start(first, 1)
+    assert start(second, 5) != start(first, 5), "another arena"
