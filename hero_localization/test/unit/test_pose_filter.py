@@ -367,7 +367,7 @@ def hold(counted_m, came_m, elapsed_s):
     return pose_filter.pose().x_m - before.x_m
 
 
-def test_a_robot_is_held_if_it_came_nowhere_though_its_wheels_turned():
+def test_a_robot_is_blocked_if_it_came_nowhere_though_its_wheels_turned():
     free_m = pytest.approx(0.01, abs=1e-3)
     for counted_m, came_m, elapsed_s in ((0.02, 0.0, 0.1), (0.02, 0.0078, 0.1), (0.0052, 0.0, 0.1), (0.02, 0.0, 0.49)):
         assert hold(counted_m, came_m, elapsed_s) == 0.0, (counted_m, came_m, elapsed_s)

@@ -19,7 +19,7 @@ MAX_TURN_RAD = 0.3
 """A drive that bends by more shows no direction."""
 
 MIN_SHARE = 0.7
-"""A robot that came less far than this share of what odometry counted was held, and shows no direction."""
+"""A robot that came less far than this share of what odometry counted was blocked, and shows no direction."""
 
 WRONG_HEADING_RAD = math.pi / 4.0
 """Controllers reach goals with smaller errors; a robot that slides along a wall by MIN_SHARE is off by this at most."""

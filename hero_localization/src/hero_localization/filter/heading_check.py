@@ -12,7 +12,7 @@ MIN_DRIVE_M = 0.04
 """Poses are a millimeter off: over this distance, a direction is right to 2 degrees."""
 MAX_TURN_RAD = 0.15
 MIN_SHARE = 0.5
-"""A robot that came less far than this share of what odometry counted was held, and shows no direction."""
+"""A robot that came less far than this share of what odometry counted was blocked, and shows no direction."""
 
 DRIVES = 3
 """So many drives are averaged."""

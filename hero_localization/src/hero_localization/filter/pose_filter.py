@@ -52,9 +52,9 @@ IDLE_VARIANCE_RAD2_S = 1e-7
 SLIP_M, SLIP_RAD = 0.06, 0.6
 """At most so much of what odometry counted since the last measured pose may be slip; what exceeds that was a jump."""
 
-HELD_S = (0.09, 0.5)
-HELD_SHARE, MIN_SLIP_M = 0.4, 0.005
-"""A robot that came less far than this share of what odometry counted, over a time between these, is held."""
+BLOCKED_S = (0.09, 0.5)
+BLOCKED_SHARE, MIN_SLIP_M = 0.4, 0.005
+"""A robot that came less far than this share of what odometry counted, over a time between these, is blocked."""
 
 GATE = 16.3
 """A measured pose whose squared Mahalanobis distance is larger than this is an outlier: chi-squared, three degrees of
@@ -120,7 +120,7 @@ class _Step(NamedTuple):
     odometry: Odometry
     """At that time."""
     measurement: Optional[Measurement]
-    is_held: bool = False
+    is_blocked: bool = False
     """Whether the wheels slip in place, as at a wall: odometry then does not predict the motion."""
 
 
@@ -212,24 +212,24 @@ class PoseFilter:
                 estimate = self._update(predicted._replace(covariance=predicted.covariance + slip), measurement)
         if estimate is None:
             return None
-        return self._make_step(estimate, measurement)._replace(is_held=self._is_held(steps, measurement))
+        return self._make_step(estimate, measurement)._replace(is_blocked=self._is_blocked(steps, measurement))
 
     def _make_step(self, estimate: Estimate, measurement: Optional[Measurement] = None) -> _Step:
         odometry = self.odometry.find(estimate.stamp_s)
         assert odometry is not None, "poses without odometry of their time are not used"
         return _Step(estimate, estimate, odometry, measurement)
 
-    def _is_held(self, steps: Sequence[_Step], measurement: Measurement) -> bool:
+    def _is_blocked(self, steps: Sequence[_Step], measurement: Measurement) -> bool:
         """Return whether the robot came nowhere since a pose measured a moment ago, though its wheels turned."""
         for step in reversed(steps):
             since_s = measurement.stamp_s - step.estimate.stamp_s
-            if step.measurement is not None and since_s >= HELD_S[0]:
+            if step.measurement is not None and since_s >= BLOCKED_S[0]:
                 start, end = self.odometry.find(step.estimate.stamp_s), self.odometry.find(measurement.stamp_s)
-                if start is None or end is None or since_s > HELD_S[1]:
+                if start is None or end is None or since_s > BLOCKED_S[1]:
                     return False
                 counted_m = measure_distance(start.pose, end.pose)
                 came_m = measure_distance(step.measurement.pose, measurement.pose)
-                return counted_m > MIN_SLIP_M and came_m < HELD_SHARE * counted_m
+                return counted_m > MIN_SLIP_M and came_m < BLOCKED_SHARE * counted_m
         return False
 
     def _start(self, measurement: Measurement) -> None:
@@ -313,7 +313,7 @@ class PoseFilter:
         if start is None or end is None or newest.stamp_s >= self.odometry.newest_s:
             return newest.pose
         pose = transform_pose(newest.pose, transform_pose(invert_pose(start.pose), end.pose))
-        return newest.pose._replace(yaw_rad=pose.yaw_rad) if self._steps[-1].is_held else pose
+        return newest.pose._replace(yaw_rad=pose.yaw_rad) if self._steps[-1].is_blocked else pose
 
     def estimate(self) -> Optional[Estimate]:
         """Return pose() with its covariance; None before the first measured pose."""
