@@ -82,7 +82,7 @@ class Calibration:
         from hero_calibration.robots.ros_probe import RosProbe
 
         rospy.init_node("calibration", anonymous=True, disable_signals=True)
-        self.probe = RosProbe(number)
+        self.probe = RosProbe(number, "hero")
 
     def drive(self):
         self.probe.drive(0.0, SPEED_M_S)

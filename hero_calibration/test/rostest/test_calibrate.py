@@ -55,7 +55,7 @@ class CalibrateTest(unittest.TestCase):
         cls.wheel_m_s = dict.fromkeys(range(5), 0.0)
         for robot_id in cls.wheel_m_s:
             rospy.Subscriber("/hero_%d/ground_truth" % robot_id, Odometry, cls.receive_motion, robot_id)
-        cls.probes = [RosProbe(robot_id) for robot_id in range(5)]
+        cls.probes = [RosProbe(robot_id, "hero") for robot_id in range(5)]
         cls.start_to_restore()
         for probe in cls.probes:
             wait_for(lambda probe=probe: probe.find_silence(rospy.get_time()) is None, "all topics of " + probe.name)
