@@ -63,7 +63,8 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
         ) from error
     is_address = "://" in address
     if not is_address and not os.path.isfile(address):  # Dask would wait for it without end
-        raise ExperimentError("no Dask scheduler file %s: start dask-scheduler --scheduler-file %s" % (address, address))
+        text = "no Dask scheduler file %s: start dask-scheduler --scheduler-file %s"
+        raise ExperimentError(text % (address, address))
     try:
         client = Client(
             address if is_address else None, scheduler_file=None if is_address else address, timeout=DASK_TIMEOUT_S

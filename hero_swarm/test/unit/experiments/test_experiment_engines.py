@@ -80,5 +80,6 @@ def test_a_dask_cluster_without_workers_is_named_with_the_remedy(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", stub)
     with pytest.raises(ExperimentError, match="no Dask scheduler file no.json: start .* --scheduler-file no.json$"):
         engines.open_dask("no.json", lambda: "")
-    with pytest.raises(ExperimentError, match="workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and dask-worker$"):
+    told = "workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and dask-worker$"
+    with pytest.raises(ExperimentError, match=told):
         engines.open_dask("tcp://a:1", lambda: "")
