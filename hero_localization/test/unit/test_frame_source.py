@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 import rospy
-from sensor_msgs.msg import CompressedImage, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from hero_localization.camera import frame_source
 from hero_localization.camera.device_controls import DeviceControls
@@ -90,6 +90,32 @@ def test_only_the_newest_picture_is_decoded_and_counts_once(source):
     source.receive(make_image("mono8", 1))
     assert source.poll(0.0) is not None and source.problem == ""
     assert source.poll(0.0) is None
+
+
+def test_the_time_of_arrival_is_that_of_the_newest_picture(source, monkeypatch):
+    monkeypatch.setattr(rospy, "get_time", lambda: 1234.5)
+    source.receive(make_image("mono8", 1))
+    assert source.arrived_s == 1234.5
+
+
+def test_camera_info_beside_the_pictures_tells_the_lens(receivers):
+    for topic in ("/camera/image_raw", "/camera/image_raw/compressed"):
+        source = TopicSource(topic)
+        receive = receivers["/camera/camera_info"]
+        assert source.lens is None
+        matrix = [900.0, 0.0, 320.0, 0.0, 901.0, 240.0, 0.0, 0.0, 1.0]
+        receive(CameraInfo(width=640, height=480, K=matrix, distortion_model="plumb_bob", D=[0.1] * 5))
+        assert (source.lens.width_px, source.lens.height_px, source.lens.matrix[1, 1]) == (640, 480, 901.0)
+        receive(CameraInfo())
+        assert source.lens is None, "one that is not calibrated"
+
+
+def test_pictures_without_a_stamp_are_as_new_as_now(source, monkeypatch):
+    monkeypatch.setattr(rospy, "get_rostime", lambda: rospy.Time(99))
+    image = make_image("mono8", 1)
+    image.header.stamp = rospy.Time(0)
+    source.receive(image)
+    assert source.poll(0.0).stamp_s == 99.0
 
 
 @pytest.fixture

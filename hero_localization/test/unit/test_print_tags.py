@@ -69,6 +69,11 @@ def test_pieces_lie_on_the_page_and_apart():
                     assert apart_mm >= half_mm + other.outer_mm / 2.0 + 3.9
 
 
+def test_papers_have_their_sizes():
+    assert print_tags.PAPERS_MM["a4"] == (210.0, 297.0)
+    assert [side_mm / 25.4 for side_mm in print_tags.PAPERS_MM["letter"]] == pytest.approx([8.5, 11.0])
+
+
 def test_ruler_is_100_mm_long():
     (page,) = list_pages("--robots", "1")
     image = scan(print_tags.draw_page(page, "36h11", A4_MM))

@@ -165,12 +165,6 @@ def test_problems_begin_at_their_limits():
         assert found.rms_m == pytest.approx(math.sqrt(2.0) * noise_m, rel=0.1), "of both axes"
 
 
-def test_the_reported_error_of_the_delay_is_the_true_one():
-    found = [calibrate_robot(*drive(seed=seed, noise_rad=0.02)) for seed in range(12)]
-    off_s = np.array([one.delay_s - 0.08 for one in found])
-    assert np.sqrt((off_s**2).mean()) == pytest.approx(np.mean([one.delay_error_s for one in found]), rel=0.6)
-
-
 def test_a_short_drive_is_enough_from_its_limit_on():
     for duration_s, is_enough in ((1.05, True), (0.85, False)):
         parts = (*FULL[:4], (duration_s, 0.1, 0.0))

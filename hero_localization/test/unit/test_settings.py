@@ -221,3 +221,11 @@ def test_a_place_of_the_camera_must_turn_without_mirroring_or_scaling(path):
         else:
             with pytest.raises(SettingsError, match="calibrate the arena"):
                 settings.load(path)
+
+
+def test_a_file_that_is_no_text_is_refused_by_its_name(path):
+    settings.update(path, {})
+    with open(path, "wb") as file:
+        file.write(b"family: \xff\xfe\x00")
+    with pytest.raises(SettingsError, match="camera.yaml is no YAML file"):
+        settings.load(path)

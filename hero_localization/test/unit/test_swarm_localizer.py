@@ -5,6 +5,7 @@ import pytest
 
 from hero_localization.filter.pose_filter import Measurement
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
+from hero_msgs.msg import RobotPose
 from hero_node.geometry import Pose
 
 COVARIANCE = np.diag((1e-6, 1e-6, 1e-4))
@@ -182,6 +183,12 @@ def test_after_a_quiet_while_each_lost_robot_has_a_line_again():
     swarm.lines.clear()
     others = {robot_id: place for robot_id, place in places.items() if robot_id}
     assert swarm.run(1.5, others, robots=robots).lines == ["hero_0 lost: its pose follows its odometry"]
+
+
+def test_states_are_those_of_the_message():
+    for state in RobotState:
+        assert getattr(RobotPose, state.name) == state
+    assert len(RobotState) == 3
 
 
 def test_steps_are_told_by_distance_and_by_the_shorter_turn():

@@ -1,5 +1,6 @@
 """The search for tags over the frames of a drive: followed in windows, found anywhere, lost and found again."""
 
+import math
 import sys
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from hero_localization.tracking.detectors import TagDetector
 from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_search import TagSearch
+from hero_localization.tracking.tag_search import TagSearch, _list_tiles
 
 FRAME_S = 1.0 / 30.0
 WIDTH_PX, HEIGHT_PX = 1920, 1080
@@ -261,3 +262,68 @@ def test_frames_with_old_or_equal_stamps_are_searched_in_windows_too():
     assert watch.see([(1, (602.0, 400.0))]) == [1]
     watch.index -= 1
     assert watch.see([(1, (602.0, 400.0))]) == [1]
+
+
+def make_logged_search(center, monkeypatch):
+    """Return a search that follows one tag, and the windows (left, top, width, height) that it looks into."""
+    detector, windows = SeenTags(), []
+    detector.place([(1, center)])
+    search = TagSearch(detector, WIDTH_PX, HEIGHT_PX)
+    assert [tag.tag_id for tag in search.search(FRAME, 0.0)] == [1]
+
+    def detect(gray, origin=(0, 0)):
+        windows.append((*origin, gray.shape[1], gray.shape[0]))
+        return SeenTags.detect(detector, gray, origin)
+
+    monkeypatch.setattr(detector, "detect", detect)
+    return search, detector, windows
+
+
+def window_round(center, half_px):
+    """Return the window of so many pixels around a center, within the image."""
+    (left, top), (right, bottom) = (
+        [max(0, math.floor(place - half_px)) for place in center],
+        [min(end, math.ceil(place + half_px)) for place, end in zip(center, (WIDTH_PX, HEIGHT_PX))],
+    )
+    return left, top, right - left, bottom - top
+
+
+@pytest.mark.parametrize("center", [(900.3, 500.6), (20.0, 500.0), (900.0, 1060.0), (1900.0, 20.0)])
+def test_windows_grow_with_the_time_since_a_tag_was_seen(center, monkeypatch):
+    search, detector, windows = make_logged_search(center, monkeypatch)
+    stamp_s = 0.0
+    for elapsed_s in (0.01, 0.03, 0.06):
+        stamp_s += elapsed_s
+        search.search(FRAME, stamp_s)
+        assert windows == [window_round(center, (0.9 + 6.0 * elapsed_s) * SIDE_PX + 3.0)], elapsed_s
+        windows.clear()
+    # After a longer gap a narrow window comes first, and one of the whole gap where that shows nothing.
+    search.search(FRAME, stamp_s + 0.09)
+    narrow = window_round(center, (0.9 + 6.0 * 0.08) * SIDE_PX + 3.0)
+    assert windows[0] == narrow and window_round(center, (0.9 + 6.0 * 0.09) * SIDE_PX + 3.0) not in windows
+    detector.place([])
+    for gap_s, sides in ((0.2, 0.9 + 1.2), (0.5, 0.9 + 2.5)):
+        windows.clear()
+        search.search(FRAME, stamp_s + 0.09 + gap_s)
+        assert windows[0] == narrow and window_round(center, sides * SIDE_PX + 3.0) in windows, gap_s
+
+
+def test_tiles_cover_the_image_with_room_for_a_tag_on_each_border():
+    tiles = _list_tiles(1920, 1080, 96)
+    assert tiles[0] == (0, 0, 576, 456) and tiles[-1] == (1440, 720, 1920, 1080) and len(tiles) == 12
+    assert [tile[0] for tile in tiles[:4]] == [0, 480, 960, 1440], "row by row"
+    assert _list_tiles(640, 480, 96) == [
+        (0, 0, 416, 336), (320, 0, 640, 336), (0, 240, 416, 480), (320, 240, 640, 480),
+    ]  # fmt: skip
+    assert _list_tiles(320, 240, 96) == [(0, 0, 320, 240)]
+
+
+@pytest.mark.parametrize(("step_s", "sweep_s"), [(0.05, 2.0), (0.1, 2.0), (0.2, 2.0), (0.4, 4.0)])
+def test_the_tiles_take_turns_within_two_seconds(step_s, sweep_s, monkeypatch):
+    search, _, windows = make_logged_search((900.0, 500.0), monkeypatch)
+    tiles = [(left, top, right - left, bottom - top) for left, top, right, bottom in _list_tiles(1920, 1080, 96)]
+    # A gap of more than 0.2 s counts as that.
+    for frame in range(1, round(sweep_s / step_s) + 2):
+        search.search(FRAME, frame * step_s)
+    searched = [window for window in windows if window in tiles]
+    assert searched[:12] == tiles and len(searched) <= 14
