@@ -464,6 +464,7 @@ def test_parts_follow_each_other_and_robots_are_placed_where_they_need_it(calls,
     ):
         assert run(*parts) == (0, expected)
     assert run(MOTORS, VELOCITY)[0] == 0 and list(calls[2][1]) == [0], "velocity takes the servos' slopes"
+    assert wheels.ROOM in capsys.readouterr().out
     assert run(WHEELS, tape=min)[0] == 0 and calls[1] == ("wheels", min)
     capsys.readouterr()
 

@@ -1,0 +1,197 @@
+"""What procedures send and when, and which readings count: by readings whose times are known."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_calibration_rules import FakeSession
+
+from hero_calibration.errors import CalibrationError
+from hero_calibration.models import dead_zone, step_response
+from hero_calibration.models.encoder_readings import TICK_M, Readings
+from hero_calibration.procedures import infrared, motors, velocity
+from hero_calibration.robots.session import SETTLE_S
+from hero_node.geometry import Pose
+
+STEP_S = 0.034
+STARTS_S = [2.0, 2.45, 2.9, 3.35]
+
+
+def make_readings(left_ticks, right_ticks=None):
+    counts = np.arange(len(left_ticks))
+    left_ticks = np.asarray(left_ticks, dtype=float)
+    right_ticks = -left_ticks / 2.0 if right_ticks is None else right_ticks
+    is_even = np.ones(len(counts) - 1, dtype=bool)
+    return Readings(counts * STEP_S, counts, left_ticks, right_ticks, STEP_S, counts * STEP_S, is_even)
+
+
+def test_a_step_of_a_sweep_is_measured_between_its_settling_and_its_end():
+    readings = make_readings(2.0 * np.arange(150))
+    speeds = dead_zone.measure_sweep(readings, STARTS_S)
+    assert np.allclose(speeds, [[2.0 * TICK_M / STEP_S] * 4, [-TICK_M / STEP_S] * 4])
+    inside = (readings.times_s >= 2.2) & (readings.times_s <= 2.48)
+    for ticks in (np.where(readings.times_s < 2.2, 500.0, 0.0), np.where(readings.times_s > 2.48, 500.0, 0.0)):
+        changed = readings._replace(left_ticks=readings.left_ticks + ticks)
+        assert dead_zone.measure_sweep(changed, STARTS_S)[0, 0] == pytest.approx(speeds[0, 0])
+    jump = int(np.flatnonzero(inside)[3])
+    is_even = readings.is_even.copy()
+    is_even[jump] = False
+    paused = readings._replace(left_ticks=readings.left_ticks + 500.0 * (np.arange(150) > jump), is_even=is_even)
+    assert dead_zone.measure_sweep(paused, STARTS_S)[0, 0] == pytest.approx(speeds[0, 0]), "a pause is left out"
+
+
+def test_steps_whose_command_may_have_come_late_are_unknown():
+    readings = make_readings(2.0 * np.arange(150))
+
+    def hear(*silences_s):
+        heard_s = readings.times_s.copy()
+        for start_s, end_s in silences_s:
+            heard_s[(heard_s > start_s) & (heard_s < end_s)] = end_s
+        return np.isnan(dead_zone.measure_sweep(readings._replace(heard_s=heard_s), STARTS_S)[0]).tolist()
+
+    assert hear((2.6, 3.0)) == [False, True, True, False]
+    assert hear((2.6, 2.82)) == [False] * 4, "shorter than what loses a command"
+    assert hear((1.0, 1.8)) == [False] * 4 and hear((1.0, 1.95))[0]
+    assert hear((2.21, 2.9))[:2] == [False, True]
+    with pytest.raises(CalibrationError, match="too few encoder readings came"):
+        hear((2.1, 3.0))
+    few = make_readings(2.0 * np.arange(72))  # ends during the second step
+    assert np.isnan(dead_zone.measure_sweep(few, STARTS_S[:2])[0]).tolist() == [False, True]
+
+
+def test_one_wrong_speed_of_five_moves_no_edge():
+    pulses_us, speeds_m_s = np.arange(5.0) * 6.0 + 1530.0, 0.001 * (np.arange(5.0) * 6.0 + 4.0)
+    speeds_m_s[4] += 0.1
+    assert dead_zone._find_edge(pulses_us, speeds_m_s) == pytest.approx((1526.0, 0.001))
+    with pytest.raises(CalibrationError, match="does not turn faster with a longer pulse"):
+        dead_zone._find_edge(pulses_us, np.full(5, 0.05))
+
+
+def step_wheel(before_ticks=0.0, readings=120):
+    """Readings of a wheel that makes so many ticks before reading 50, and turns at 0.08 m/s from there on."""
+    ticks = np.maximum(np.arange(readings) - 50, 0) * (step_response.STEP_M_S * STEP_S / TICK_M)
+    return make_readings(ticks + before_ticks * (np.arange(readings) >= 48))
+
+
+def test_a_wheel_that_was_not_at_rest_is_not_measured():
+    for ticks, is_taken in ((3.0, True), (-3.0, True), (4.0, False), (-4.0, False)):
+        readings = step_wheel(ticks)
+        if is_taken:
+            step_response.measure_speed(readings, readings.left_ticks, 50, 9.0)
+            continue
+        with pytest.raises(CalibrationError, match="still turned when a test started"):
+            step_response.measure_speed(readings, readings.left_ticks, 50, 9.0)
+
+
+def test_speeds_are_measured_from_the_start_to_the_stop():
+    readings = step_wheel()
+    times_s, speeds_m_s = step_response.measure_speed(readings, readings.left_ticks, 50, 9.0)
+    assert speeds_m_s[:4] == pytest.approx([0.08 / 3.0, 0.16 / 3.0, 0.08, 0.08]), "over three readings each"
+    assert np.allclose(speeds_m_s[2:], step_response.STEP_M_S)
+    assert times_s[0] == pytest.approx(-0.034 * 2 + 1.5 * STEP_S) and 1.3 < times_s[-1] < 1.4 - STEP_S
+    stopped_s, _ = step_response.measure_speed(readings, readings.left_ticks, 50, 50 * STEP_S + 1.3)
+    assert 1.2 < stopped_s[-1] < 1.3 - STEP_S
+    with pytest.raises(CalibrationError, match="speeds could be measured in 1.5 s"):
+        step_response.measure_speed(readings, readings.left_ticks, 50, 50 * STEP_S + 1.19)
+    assert step_response.DEFAULT_GAINS == (1200.0, 2300.0, 0.1), "of an erased flash"
+
+
+class TurningSession(FakeSession):
+    """Robots that are turned as far as they are told after so many seconds, or never."""
+
+    def __init__(self, needs_s):
+        super().__init__(1)
+        (self.probe,) = self.probes
+        self.probe.check_alive = lambda now_s: None
+        self.probe.turn = lambda angle_rad: self.probe.sent.append((self.time_s - 100.0, angle_rad))
+
+        def move(now_s):
+            told = [(start_s, angle_rad) for start_s, angle_rad in self.probe.sent if start_s != "stop"] or [(0.0, 0.0)]
+            if now_s - 100.0 - told[-1][0] >= needs_s:
+                self.probe.pose = Pose(0.0, 0.0, self.target_rad)
+
+        self.on_sleep = move
+
+    def turn(self, target_rad):
+        self.probe.sent, self.target_rad = _Sent(), target_rad
+        infrared._turn(self, "infrared", {0: target_rad})
+        return self.time_s - 100.0
+
+
+class _Sent(list):
+    """Notes turns alone."""
+
+    def append(self, item):
+        if item != "stop":
+            super().append(item)
+
+
+def test_a_turn_ends_when_it_is_reached_and_is_tried_three_times():
+    quick = TurningSession(1.0)
+    assert quick.turn(0.7) == pytest.approx(1.0 + SETTLE_S, abs=0.05) and quick.probe.sent == [(0.0, 0.7)]
+    at_once = TurningSession(0.0)
+    assert at_once.turn(0.7) == pytest.approx(2.5 / 4.0 + SETTLE_S, abs=0.05)
+    stuck = TurningSession(math.inf)
+    assert stuck.turn(0.7) == pytest.approx(3.0 * (2.5 + SETTLE_S), abs=0.1)
+    assert [angle_rad for _, angle_rad in stuck.probe.sent] == [0.7] * 3
+    assert "could not turn on the spot: 40 degrees are missing" in stuck.probe.failure
+    near = TurningSession(math.inf)
+    assert near.turn(math.radians(4.9)) == pytest.approx(2.5 + SETTLE_S, abs=0.05) and near.probe.failure is None
+    off = TurningSession(math.inf)
+    off.turn(math.radians(9.9))
+    assert len(off.probe.sent) == 3 and off.probe.failure is None
+    wrapped = TurningSession(math.inf)
+    wrapped.turn(2.0 * math.pi - 0.1)
+    assert wrapped.probe.sent[0][1] == pytest.approx(-0.1)
+
+
+def test_infrared_says_how_long_it_takes(monkeypatch, capsys):
+    monkeypatch.setattr(infrared, "_face_wall_with_each_sensor", lambda *arguments: {})
+    assert infrared.calibrate_infrared(FakeSession(0)) == {}
+    assert capsys.readouterr().out.startswith("infrared: about 96 s\n")
+
+
+def test_pulses_are_swept_up_and_down_at_their_times(monkeypatch):
+    session, measured = FakeSession(2), []
+    monkeypatch.setattr(dead_zone, "measure_sweep", lambda readings, starts_s: measured.append(list(starts_s)))
+    result = SimpleNamespace(to_file=lambda: {"motor_centers_us": [1500, 1510]})
+    monkeypatch.setattr(motors, "evaluate_sweep", lambda pulses_us, speeds_m_s: result)
+    monkeypatch.setattr(type(session.probes[0]), "read_wheels", lambda probe: None)
+    assert motors.calibrate_motors(session) == {0: result, 1: result}
+    for probe in session.probes:
+        assert [value for name, value in filter(lambda one: one[0] == "pulses", probe.sent)] == dead_zone.list_pulses()
+        assert ("motor_centers_us", [1500, 1510]) in probe.sent
+    assert np.diff(measured[0]) == pytest.approx(np.full(81, 0.45), abs=0.01) and len(measured) == 2
+
+
+def test_a_velocity_test_turns_to_each_side_for_its_time(monkeypatch):
+    session, tested = FakeSession(1), []
+
+    def evaluate(readings, starts_s, may_be_late):
+        tested.append((list(starts_s), may_be_late))
+        return "responses"
+
+    monkeypatch.setattr(velocity, "evaluate_test", evaluate)
+    monkeypatch.setattr(type(session.probes[0]), "read_wheels", lambda probe: None)
+    assert velocity._test(session) == {0: "responses"}
+    speeds = [command[1] for command in session.probes[0].sent if command[0] == "drive"]
+    left = [speed for speed in speeds if speed > 0.0]
+    assert 15 <= len(left) <= 16 and len(speeds) == 2 * len(left), "ten a second"
+    assert speeds == pytest.approx([0.16 / 0.063] * len(left) + [-0.16 / 0.063] * len(left))
+    (starts_s, may_be_late) = tested[0]
+    assert not may_be_late and starts_s == pytest.approx([100.6, 100.6 + 1.5 + SETTLE_S], abs=0.05)
+
+
+@pytest.mark.parametrize(("model", "ticks"), [("hero", 10.0), ("hero_plus", 30.0)])
+def test_ticks_of_other_models_count_as_those_of_the_stock_robot(model, ticks, monkeypatch):
+    ros_probe = pytest.importorskip("hero_calibration.robots.ros_probe", reason="imports rospy")
+    monkeypatch.setattr(ros_probe.rospy, "Publisher", lambda *arguments, **options: None)
+    monkeypatch.setattr(ros_probe.rospy, "Subscriber", lambda *arguments, **options: None)
+    monkeypatch.setattr(ros_probe.rospy, "get_time", lambda: 7.0)
+    probe, heard = ros_probe.RosProbe(3, model), []
+    probe.receive_encoder = lambda *values: heard.append(values)
+    message = ros_probe.Encoder(left_ticks=10, right_ticks=-10)
+    message.header.seq, message.header.stamp = 5, ros_probe.rospy.Time(6)
+    probe._take_encoder(message)
+    assert heard == [(7.0, 6.0, 5, ticks, -ticks)]
