@@ -180,7 +180,7 @@ def test_a_velocity_test_turns_to_each_side_for_its_time(monkeypatch):
     assert 15 <= len(left) <= 16 and len(speeds) == 2 * len(left), "ten a second"
     assert speeds == pytest.approx([0.16 / 0.063] * len(left) + [-0.16 / 0.063] * len(left))
     (starts_s, may_be_late) = tested[0]
-    assert not may_be_late and starts_s == pytest.approx([100.6, 100.6 + 1.5 + SETTLE_S], abs=0.05)
+    assert not may_be_late and starts_s == pytest.approx([100.6, 100.6 + 1.55 + SETTLE_S], abs=0.06)
 
 
 @pytest.mark.parametrize(("model", "ticks"), [("hero", 10.0), ("hero_plus", 30.0)])
