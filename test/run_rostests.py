@@ -17,6 +17,8 @@ from jobs import Job, count_cores, run_jobs
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 3600.0  # of one .test file; each <test> in it has its own, shorter time-limit
 LOAD = 1 / 3  # most of a rostest is waiting
+# roslaunch imports distutils, which setuptools replaces by its own and itself: half of roslaunch's start.
+DISTUTILS = {"SETUPTOOLS_USE_DISTUTILS": "stdlib"} if sys.version_info < (3, 12) else {}
 TIME_LIMIT = re.compile(r'time-limit="([0-9.]+)"')
 
 
@@ -75,6 +77,7 @@ def make_jobs(results_dir, pattern="", paths=()):
         # A driver keeps its stop there by its name, which drivers of several tests have.
         ros_home = Path(os.environ["ROS_HOME"]) / package_dir.name / path.stem
         environment = {"PATH": program_path, "ROS_TEST_RESULTS_DIR": str(own_results), "ROS_HOME": str(ros_home)}
+        environment.update(DISTUTILS)
         jobs.append(Job(str(path.relative_to(ROOT)), command, own_results, LOAD, TIMEOUT_S, environment))
     return jobs
 
