@@ -1,0 +1,177 @@
+"""Robots in real time: the pace of the clock, pauses of the machine, and what is told of connections."""
+
+import pytest
+from driver_side import parse_options
+
+from hero_sim import simulator as simulators
+from hero_sim.build import build_simulator
+from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
+from hero_sim.simulator import _FLAPPING_MS, _LATE_S, _MAX_WAIT_S, _MIN_WAIT_S
+
+
+class Link:
+    """What a simulator asks of its connections, and what it was told."""
+
+    host, port = "driver", 11411
+
+    def __init__(self):
+        self.calls, self.waits_s, self.open, self.connecting = [], [], 0, set()
+
+    def __getattr__(self, name):
+        return lambda *arguments: self.calls.append((name, *arguments))
+
+    def poll(self, timeout_s):
+        self.waits_s.append(timeout_s)
+
+    def count_open(self):
+        return self.open
+
+    def is_connecting(self, index):
+        return index in self.connecting
+
+
+class Clock:
+    """A clock that goes on when it is told to."""
+
+    def __init__(self):
+        self.now_s = 1000.0
+
+    def monotonic(self):
+        return self.now_s
+
+
+@pytest.fixture()
+def bench(monkeypatch):
+    """Return a function that builds a simulator with these options, its lines, link and clock."""
+
+    def build(*arguments):
+        lines, clock = [], Clock()
+        simulator, _ = build_simulator(parse_options("--port", "9", *arguments), lines.append)
+        simulator.link.close_all()
+        monkeypatch.setattr(simulators, "time", clock)
+        simulator.link = Link()
+        lines.clear()
+        simulator._anchor_clock()
+        return simulator, lines, simulator.link, clock
+
+    return build
+
+
+@pytest.mark.parametrize("speed", [1.0, 2.0, 0.5])
+def test_robots_keep_the_pace_of_the_clock(bench, speed):
+    simulator, lines, link, clock = bench("--speed", str(speed))
+    start_ms = simulator.swarm.now_ms
+    for _ in range(100):
+        clock.now_s += 0.013
+        simulator._step(None)
+    assert simulator.swarm.now_ms - start_ms == pytest.approx(1300 * speed, abs=2)
+    assert lines == [] and all(_MIN_WAIT_S <= wait_s <= _MAX_WAIT_S for wait_s in link.waits_s)
+    # Until the next step of the world is due, and no longer.
+    left_ms = simulator.swarm.world.time_ms + 10 - start_ms - 1300 * speed
+    assert link.waits_s[-1] <= max(left_ms / 1000.0 / speed, _MIN_WAIT_S) + 1e-9
+
+
+def test_what_a_busy_machine_missed_is_left_out_and_told_once(bench):
+    simulator, lines, _, clock = bench("--speed", "2")
+    simulator._step(None)
+    for pause_s in (0.9 * _LATE_S, _LATE_S + 3.0, _LATE_S + 4.0):
+        before_ms = simulator.swarm.now_ms
+        clock.now_s += pause_s
+        simulator._step(None)
+        moved_ms = simulator.swarm.now_ms - before_ms
+        assert moved_ms == (1 if pause_s > _LATE_S else pytest.approx(2000 * pause_s, abs=2))
+        clock.now_s += 0.05
+        simulator._step(None)
+        assert simulator.swarm.now_ms - before_ms - moved_ms == pytest.approx(100, abs=3), "then at its pace again"
+    (line,) = lines
+    assert line.startswith("this machine was busy or asleep for %.1f s" % (_LATE_S + 3.0))
+
+
+def test_a_run_ends_after_its_simulated_time_or_when_it_is_told(bench):
+    simulator, _, link, clock = bench("--speed", "1")
+    start_ms = simulator.swarm.now_ms
+    link.poll = lambda timeout_s: setattr(clock, "now_s", clock.now_s + 0.02)
+    simulator.run(0.25)
+    assert simulator.swarm.now_ms - start_ms == 250
+    simulator.before_advance.append(lambda now_ms: setattr(simulator, "stopping", now_ms >= start_ms + 400))
+    simulator.run()
+    assert 400 <= simulator.swarm.now_ms - start_ms <= 450
+
+
+def test_it_lingers_until_a_connection_ends_or_the_time_is_over(bench):
+    for closes_s, limit_s, expected_s in ((0.5, 2.0, 0.5), (9.0, 2.0, 2.0)):
+        simulator, lines, link, clock = bench()
+        simulator.stopping, link.open, begin_s = True, 2, clock.now_s
+
+        def poll(timeout_s, clock=clock, link=link, begin_s=begin_s, closes_s=closes_s):
+            clock.now_s += 0.01
+            link.open = 1 if clock.now_s >= begin_s + closes_s else 2
+
+        link.poll = poll
+        simulator.linger(limit_s)
+        assert clock.now_s - begin_s == pytest.approx(expected_s, abs=0.03)
+    simulator, _, link, clock = bench()
+    before_s = clock.now_s
+    simulator.linger(2.0)
+    assert clock.now_s == before_s and link.waits_s == [], "without connections there is nothing to wait for"
+
+
+def test_a_robot_that_left_connects_again_only_after_its_time(bench):
+    simulator, _, link, _ = bench()
+    robot, start_ms = simulator.swarm.robots[0], simulator.swarm.now_ms
+    simulator.leave(0, 500)
+    assert ("close", 0) in link.calls
+    link.calls.clear()
+    robot.wants_connection = True
+    simulator.serve_robot(0)
+    assert link.calls == [] and not robot.wants_connection, "nobody answers meanwhile"
+    simulator.swarm.now_ms = start_ms + 500
+    robot.wants_connection = True
+    simulator.serve_robot(0)
+    assert link.calls == [("connect", 0)]
+    link.connecting.add(0)
+    simulator.serve_robot(0)
+    assert link.calls == [("connect", 0)], "one attempt is under way"
+
+
+def test_connections_that_come_and_go_are_told_now_and_then(bench):
+    simulator, lines, _, _ = bench("--count", "2")
+    start_ms = simulator.swarm.now_ms
+    for robot in simulator.swarm.robots:
+        robot.switch_on(start_ms)
+    for after_ms in (0, 100, _FLAPPING_MS - 1, _FLAPPING_MS):
+        simulator.swarm.now_ms = start_ms + after_ms
+        simulator.connection_made(0)
+        simulator.connection_lost(0, "the driver closed")
+    lost = "hero_0 lost its connection: the driver closed"
+    assert lines == ["hero_0 connected", lost, "hero_0 connected", lost]
+    lines.clear()
+    for index in (0, 1, 0):
+        simulator.connection_failed(index, "refused")
+    assert lines == ["no driver answers at driver:11411 (refused); the robots keep trying, as real ones do"]
+    simulator.connection_made(1)
+    simulator.connection_failed(0, "refused")
+    assert len(lines) == 3, "told again after a connection"
+
+
+def test_a_full_receive_window_leaves_the_rest_with_the_sender(bench):
+    simulator, _, link, _ = bench()
+    for length, paused in ((RECEIVE_WINDOW_LENGTH - 1, False), (1, True)):
+        link.calls.clear()
+        simulator.receive_bytes(0, bytes(length))
+        assert link.calls == [("pause", 0, paused)]
+    simulator.swarm.robots[0].connection_lost()
+    simulator.swarm.robots[0].connection_made(simulator.swarm.now_ms)
+    link.calls.clear()
+    simulator._step(None)
+    assert ("pause", 0, False) in link.calls, "read again when the robot has taken them"
+
+
+def test_a_robot_that_crashed_restarts_and_is_named(bench):
+    simulator, lines, link, _ = bench()
+    robot = simulator.swarm.robots[0]
+    robot.switch_on(simulator.swarm.now_ms)
+    robot.crash_reason = "id 99"
+    simulator.serve_robot(0)
+    assert lines == ["hero_0 crashed: the server sent id 99; the robot restarts"]
+    assert robot.is_on and robot.crash_reason is None and ("abandon", 0) in link.calls
