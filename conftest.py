@@ -3,10 +3,13 @@
 A busy machine is not a failure. Every run tries the same examples, whatever earlier runs found or left behind.
 """
 
+import importlib
+import os
 from pathlib import Path
 
 import hypothesis
 import hypothesis.configuration
+import pytest
 
 hypothesis.settings.register_profile(
     "repeatable",
@@ -23,3 +26,13 @@ hypothesis.configuration.set_hypothesis_home_dir(str(Path(__file__).resolve().pa
 def pytest_configure(config):
     """Define the markers."""
     config.addinivalue_line("markers", "slow: left out of the stage noetic; quicker tests call the same of libraries")
+    config.addinivalue_line("markers", "option(module): needs this optional package, which the stage options has")
+
+
+def pytest_runtest_setup(item):
+    """Skip a test whose optional package is missing."""
+    for marker in item.iter_markers("option"):
+        (module,) = marker.args
+        if "HERO_OPTIONS" in os.environ:
+            importlib.import_module(module)
+        pytest.importorskip(module, reason="the optional package %s is missing" % module.partition(".")[0])

@@ -15,6 +15,7 @@ from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 3600.0  # of one that hangs
+OPTIONS_PYTHON = (3, 10)  # with an older one the stage options is left out
 COMPUTING_LOAD = 1.0
 WAITING_LOAD = 1 / 3
 
@@ -84,11 +85,15 @@ def make_jobs(stages, results, pattern, paths):
     take longest.
     """
     jobs = []
-    # What these two install the first time comes from the network.
+    # What these install the first time comes from the network.
     if "noetic" in stages and os.environ.get("HERO_PYTHON38"):
         own_results = results / "noetic"
         command = (str(ROOT / "test" / "noetic" / "run"), os.environ["HERO_PYTHON38"], str(own_results))
         jobs.append(Job("noetic", command, own_results, COMPUTING_LOAD, TIMEOUT_S, has_own_network=False))
+    if "options" in stages and sys.version_info >= OPTIONS_PYTHON:
+        own_results = results / "options"
+        command = (str(ROOT / "test" / "options" / "run"), str(own_results))
+        jobs.append(Job("options", command, own_results, COMPUTING_LOAD, TIMEOUT_S, has_own_network=False))
     if "noetic_rostest" in stages and os.environ.get("HERO_PYTHON38"):
         own_results = results / "noetic_rostest"
         script = str(ROOT / "test" / "noetic" / "run_rostests")

@@ -120,16 +120,20 @@ def test_npz_tables_hold_the_values_of_csv(bag, tmp_path, capsys):
                 np.testing.assert_array_equal(column, expected)
 
 
+@pytest.mark.option("pyarrow.parquet")
 def test_parquet_tables_hold_all_rows_and_columns(bag, tmp_path, capsys):
-    parquet = pytest.importorskip("pyarrow.parquet", reason="the optional package pyarrow is missing")
+    from pyarrow import parquet
+
     run_export(capsys, bag, "--out", tmp_path / "out", "--format", "parquet")
     table = parquet.read_table(str(tmp_path / "out" / "hero_3" / "odometry.parquet"))
     assert table.num_rows == 117
     assert table.column_names[:3] == ["time_s", "stamp_s", "x_m"]
 
 
+@pytest.mark.option("mcap.reader")
 def test_mcap_holds_every_message_as_recorded(bag, tmp_path, capsys):
-    reader = pytest.importorskip("mcap.reader", reason="the optional package mcap is missing")
+    from mcap import reader
+
     output = run_export(capsys, bag, "--out", tmp_path / "out.mcap", "--format", "mcap")
     with rosbag.Bag(str(bag)) as recorded:
         expected = [(topic, raw[0], raw[1], time.to_nsec()) for topic, raw, time in recorded.read_messages(raw=True)]
@@ -140,11 +144,12 @@ def test_mcap_holds_every_message_as_recorded(bag, tmp_path, capsys):
     assert "%d messages" % len(expected) in output
 
 
+@pytest.mark.option("rosbags.rosbag2")
 def test_a_ros_2_bag_holds_as_many_messages_of_each_topic(bag, tmp_path, capsys):
-    reason = "the optional package rosbags is missing, or older than 0.10"
-    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason=reason)
+    from rosbags import rosbag2
+
     if not hasattr(rosbag2, "StoragePlugin"):
-        pytest.skip(reason)
+        pytest.skip("rosbags is older than 0.10")
     run_export(capsys, bag, "--out", tmp_path / "out", "--ros2")
     with rosbag.Bag(str(bag)) as recorded:
         counts = {topic: info.message_count for topic, info in recorded.get_type_and_topic_info().topics.items()}
@@ -152,8 +157,10 @@ def test_a_ros_2_bag_holds_as_many_messages_of_each_topic(bag, tmp_path, capsys)
         assert {topic: info.msgcount for topic, info in reader.topics.items()} == counts
 
 
+@pytest.mark.option("mcap.stream_reader")
 def test_mcap_has_no_offsets_of_groups_that_it_does_not_have(bag, tmp_path, capsys):
-    streams = pytest.importorskip("mcap.stream_reader", reason="the optional package mcap is missing")
+    from mcap import stream_reader as streams
+
     run_export(capsys, bag, "--out", tmp_path / "out.mcap", "--format", "mcap")
     with open(str(tmp_path / "out.mcap"), "rb") as file:
         records = list(streams.StreamReader(file, emit_chunks=True).records)

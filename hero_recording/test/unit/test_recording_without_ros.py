@@ -8,7 +8,7 @@ from hero_recording.readers import plain_reader, ros_reader
 from hero_recording.tables import is_exported, read_rows
 from hero_sim.stepped.swarm import StepSwarm
 
-rosbag1 = pytest.importorskip("rosbags.rosbag1", reason="the optional package rosbags is missing")
+pytestmark = pytest.mark.option("rosbags.rosbag1")
 
 
 def read_tables(reader, path):

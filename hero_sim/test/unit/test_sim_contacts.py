@@ -163,8 +163,8 @@ def test_robots_that_press_into_a_corner_or_wall_stay_apart(robots, towards_rad)
     assert np.sort(poses[:, 0])[-4:].min() > poses[:, 0].max() - 2.0 * BODY_RADIUS_M
 
 
+@pytest.mark.option("numba")
 def test_pressed_robots_give_the_same_bytes_compiled_and_not(monkeypatch):
-    pytest.importorskip("numba", reason="the compiled loops need numba")
     results = []
     for rows in (10**9, 0):
         monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
@@ -172,9 +172,9 @@ def test_pressed_robots_give_the_same_bytes_compiled_and_not(monkeypatch):
     assert results[0] == results[1]
 
 
+@pytest.mark.option("numba")
 def test_nothing_is_compiled_at_the_first_contact(monkeypatch):
     """Robots in real time would pause meanwhile."""
-    pytest.importorskip("numba", reason="the compiled loops need numba")
     monkeypatch.setattr(compiled, "COMPILED_ROWS", 0)
     compiled._compile.cache_clear()
     build_world([(0.0, 0.0, 0.0)])

@@ -48,8 +48,8 @@ def test_rewards_add_up_to_what_the_metric_gained():
     assert abs(end_m - start_m) > 0.05
 
 
+@pytest.mark.option("pettingzoo.test")
 def test_pettingzoo_accepts_the_environment():
-    pytest.importorskip("pettingzoo", reason="learning is an option")
     from pettingzoo.test import parallel_api_test
 
     from hero_swarm.learning.parallel_env import SwarmEnv

@@ -213,7 +213,8 @@ class Contacts:
         distances_m = np.sqrt(square_length(positions_m[:, pairs[0]] - positions_m[:, pairs[1]]))
         depths_m = np.maximum(self._radii_m.take(pairs).sum(axis=0) - distances_m, 0.0)
         robots_m = np.zeros(positions_m.shape[1])
-        np.maximum.at(robots_m, pairs, depths_m)
+        # Not broadcast: numpy 2.2 reads past the end of values that are.
+        np.maximum.at(robots_m, pairs.ravel(), np.tile(depths_m, 2))
         return robots_m, np.maximum(self._radii_m - measure_clearance(positions_m.T, self._arena), 0.0)
 
 
