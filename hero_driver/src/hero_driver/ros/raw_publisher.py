@@ -21,7 +21,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class RawPublisher:
-    """One topic's way out; open() may be called by any thread, the rest only by the thread of the sockets."""
+    """Publisher of one topic; open() may be called by any thread, the rest only by the thread of the sockets."""
 
     def __init__(self, queue_length: int, call_later: CallLater) -> None:
         """Keep queue_length messages for each slow subscriber; call_later(delay_s, call) is the loop's."""
@@ -66,11 +66,11 @@ class RawPublisher:
             if backlog is not None:
                 self._keep(backlog, data)
                 continue
-            rest = send(connection, data)
-            if rest:
+            remainder = send(connection, data)
+            if remainder:
                 if not self._backlogs:
                     self._call_later(RETRY_S, self._retry)
-                self._backlogs[connection] = collections.deque((rest,))
+                self._backlogs[connection] = collections.deque((remainder,))
 
     def _keep(self, backlog: Deque[bytes], data: bytes) -> None:
         if len(backlog) > self._queue_length:
@@ -86,9 +86,9 @@ class RawPublisher:
                 del self._backlogs[connection]
                 continue
             while backlog:
-                rest = send(connection, backlog[0])
-                if rest:
-                    backlog[0] = rest
+                remainder = send(connection, backlog[0])
+                if remainder:
+                    backlog[0] = remainder
                     break
                 backlog.popleft()
             if not backlog:

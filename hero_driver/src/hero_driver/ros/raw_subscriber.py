@@ -101,10 +101,10 @@ class RawSubscriber:
 
     def _hand_over(self, connection: Any) -> None:
         """Have the loop read connection; never return, but raise as rospy's own reading does when it ends."""
-        sock, rest = take_socket(connection)
+        sock, remainder = take_socket(connection)
         if sock is None:
             raise TransportTerminated("closed")
-        stream = MessageStream(self, connection, sock, rest)
+        stream = MessageStream(self, connection, sock, remainder)
         if self._loop.has_resumed_within(RESUMED_S):
             stream.resume()
         self._loop.add_reader(stream)
@@ -119,12 +119,12 @@ class RawSubscriber:
 class MessageStream(Reader):
     """The connection of one publisher, while the loop reads it."""
 
-    def __init__(self, subscriber: RawSubscriber, connection: Any, sock: socket.socket, rest: bytes) -> None:
-        """connection is rospy's, for its statistics; rest is the begun message that rospy has read."""
+    def __init__(self, subscriber: RawSubscriber, connection: Any, sock: socket.socket, remainder: bytes) -> None:
+        """connection is rospy's, for its statistics; remainder is the begun message that rospy has read."""
         self._subscriber = subscriber
         self._connection = connection
         self._socket = sock
-        self._rest = rest
+        self._remainder = remainder
         self._old_length = 0  # of what is still to be read
         self.ended = threading.Event()
         self.error: Optional[OSError] = None
@@ -151,12 +151,12 @@ class MessageStream(Reader):
         if not data:
             return False
         length_read, messages = len(data), 0
-        if self._rest:
-            data = self._rest + data
+        if self._remainder:
+            data = self._remainder + data
         subscriber = self._subscriber
         old_end = 0
         if self._old_length:
-            old_end = self._old_length + len(self._rest)
+            old_end = self._old_length + len(self._remainder)
             self._old_length = max(0, self._old_length - length_read)
         position, end = 0, len(data)
         while end - position >= _LENGTH.size:
@@ -171,7 +171,7 @@ class MessageStream(Reader):
             messages += 1
             subscriber.last_sender = self._connection
             subscriber.receive(data[start:position])
-        self._rest = data[position:]
+        self._remainder = data[position:]
         count_read(self._connection, length_read, messages)
         return True
 

@@ -126,9 +126,9 @@ class Link:
         if self._unsent:
             self._keep(packet)
             return
-        rest = self._write(packet)
-        if rest:
-            self._keep(rest)
+        remainder = self._write(packet)
+        if remainder:
+            self._keep(remainder)
             self._loop.watch(self)
 
     def read_unacknowledged_length(self) -> int:
@@ -159,7 +159,7 @@ class Link:
         try:
             data = self._socket.recv(READ_LENGTH)
             if data:
-                # At once, not within 40 ms: a robot's TCP holds the rest of a burst back until its beginning is
+                # At once, not within 40 ms: a robot's TCP holds the remainder of a burst back until its beginning is
                 # acknowledged (Nagle). Holds for this time only; the kernel falls back by itself (tcp(7)).
                 self._acknowledge()
         except (BlockingIOError, InterruptedError):
@@ -175,10 +175,10 @@ class Link:
     def flush(self) -> bool:
         """Write what is left over; return whether nothing is left."""
         while self._unsent:
-            rest = self._write(self._unsent[0])
-            self._unsent_length -= len(self._unsent[0]) - len(rest)
-            if rest:
-                self._unsent[0] = rest
+            remainder = self._write(self._unsent[0])
+            self._unsent_length -= len(self._unsent[0]) - len(remainder)
+            if remainder:
+                self._unsent[0] = remainder
                 return False
             self._unsent.popleft()
         return True

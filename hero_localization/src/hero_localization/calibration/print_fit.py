@@ -78,18 +78,18 @@ def _refine(gray: np.ndarray, tag: TagCorners, cells: np.ndarray) -> TagCorners:
     model = _Print(cells, tag, corner_px, size_px)
     seen = image[model.seen]
     fit = np.clip((1.0, FIRST_BLUR_PX, *np.percentile(seen, (5, 95)), 1.0), LOW, HIGH)
-    rest = seen - model.render(fit)
+    residuals = seen - model.render(fit)
     damping = 0.01
     for _ in range(ROUNDS):
         slopes = [model.render(fit + step) - model.render(fit - step) for step in np.diag(STEPS)]
         jacobian = np.column_stack(slopes) / (2.0 * STEPS)
         normal = jacobian.T @ jacobian
         damped = normal + np.diag(damping * np.diagonal(normal) + 1e-9)
-        tried = np.clip(fit + np.linalg.solve(damped, jacobian.T @ rest), LOW, HIGH)
-        new_rest = seen - model.render(tried)
-        gain = 1.0 - (new_rest @ new_rest) / max(rest @ rest, 1e-9)
+        tried = np.clip(fit + np.linalg.solve(damped, jacobian.T @ residuals), LOW, HIGH)
+        new_residuals = seen - model.render(tried)
+        gain = 1.0 - (new_residuals @ new_residuals) / max(residuals @ residuals, 1e-9)
         if gain > 0.0:
-            fit, rest, damping = tried, new_rest, damping / 5.0
+            fit, residuals, damping = tried, new_residuals, damping / 5.0
         else:
             damping *= 10.0
         if 0.0 <= gain < MIN_GAIN:
