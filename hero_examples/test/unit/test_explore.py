@@ -7,6 +7,7 @@ import true_paths
 
 from hero_client import CommonFrame
 from hero_client.controllers.motion import State
+from hero_node.geometry import Pose
 from hero_sim.stepped.swarm import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
@@ -79,3 +80,38 @@ def test_a_robot_without_ranges_stops_and_goes_on_when_they_come(swarm, monkeypa
         monkeypatch.setattr(robot, "fresh_proximity", lambda known=known: known)
         explorer.step([LEFT], [], 0.0)
     assert driven[0] == (0.0, 0.0) and driven[1] != (0.0, 0.0)
+
+
+HERE = Pose(0.0, 0.0, 0.0)
+
+
+def test_a_goal_is_kept_until_the_map_goes_on_or_the_robot_is_near():
+    explorer = Explorer(None, None)
+    explorer.choose(HERE, [(1.0, 0.0), (0.0, 0.9)], [], 0.0)
+    assert explorer.goal == (0.0, 0.9), "the nearest"
+    kept = explorer.controller
+    for pose, frontiers in ((HERE, [(0.14, 0.9), (0.5, 0.0)]), (Pose(0.0, 0.9 - 1.01 * NEAR_M, 0.0), [(0.0, 0.9)])):
+        explorer.choose(pose, frontiers, [], 1.0)
+        assert explorer.controller is kept
+    explorer.choose(HERE, [(0.16, 0.9), (0.5, 0.0)], [], 1.0)
+    assert explorer.goal == (0.5, 0.0), "the map goes on there now"
+    explorer.choose(Pose(0.5 - 0.99 * NEAR_M, 0.0, 0.0), [(0.5, 0.0), (2.0, 0.0)], [], 1.0)
+    assert explorer.goal is None, "near it, the robot walks at random"
+    explorer.choose(HERE, [(0.99 * NEAR_M, 0.0), (2.0, 0.0)], [], 1.0)
+    assert explorer.goal is None
+    explorer.choose(HERE, [(1.01 * NEAR_M, 0.0)], [], 1.0)
+    assert explorer.goal is not None
+    explorer.choose(HERE, [], [], 1.0)
+    assert explorer.goal is None, "nothing is left"
+
+
+def test_goals_of_robots_are_apart_and_end_after_half_a_minute():
+    explorer, free = Explorer(None, None), (3.0, 0.0)
+    for other, expected in (((1.0, 0.29), free), ((1.0, 0.31), (1.0, 0.0)), ((1.2, 0.2), free)):
+        explorer.controller = None
+        explorer.choose(HERE, [(1.0, 0.0), free], [(9.0, 9.0), other], 5.0)
+        assert explorer.goal == expected, other
+    walled = [math.inf] * 8
+    for now_s, state in ((34.9, State.ACTIVE), (35.1, State.FAILED)):
+        explorer.controller.step(HERE, walled, now_s)
+        assert explorer.controller.state is state

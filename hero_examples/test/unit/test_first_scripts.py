@@ -115,6 +115,12 @@ class Noting:
     def nearest(self):
         return self._nearest
 
+    def __iter__(self):
+        return iter(self.robots)
+
+    def __len__(self):
+        return len(self.robots)
+
     def __getattr__(self, name):
         return lambda *arguments, **options: self.told.append((name, *arguments, *options.values()))
 
@@ -149,6 +155,11 @@ def test_steps_command_what_their_lines_say():
     robot = Noting()
     move.move(robot)
     assert robot.told == [("wait_until_ready",), ("drive", 0.1, 0.0, 2.0), ("drive", 0.0, 1.5, 1.0)]
+    swarm = Noting()
+    swarm.robots = [Noting() for _ in range(3)]
+    all_robots.turn_all(swarm)
+    assert swarm.told == [("wait_until_ready",), ("drive", 0.0, 1.0, 1.5), ("led", "off")]
+    assert [robot.told for robot in swarm] == [[("led", color)] for color in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
     robot = Noting()
     drive_a_square.drive_a_square(robot)
     assert robot.told == [("blink", "green", 0.5)] + [("forward", 0.2), ("turn", math.pi / 2.0)] * 4
