@@ -5,13 +5,13 @@ The README has the format.
 
 import math
 import os
-import reprlib
 from typing import Any, Dict, List
 
 import numpy as np
 import yaml
 
 from hero_node.geometry import Pose
+from hero_node.texts import one_line, shorten
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
@@ -59,9 +59,7 @@ def _read_yaml(path: str) -> Any:
     except RecursionError as error:
         raise OptionError("arena %s: lists within lists, deeper than can be read" % path) from error
     except (UnicodeDecodeError, yaml.YAMLError) as error:
-        # What cannot be printed becomes an escape sequence.
-        text = " ".join(str(error).split()).encode("ascii", "backslashreplace").decode()
-        raise OptionError("arena %s: %s" % (path, text)) from error
+        raise OptionError("arena %s: %s" % (path, one_line(error))) from error
 
 
 def _build_from_map(content: Dict[str, Any], path: str) -> Arena:
@@ -85,10 +83,10 @@ def _build_arena(content: Any, file_name: str) -> Arena:
         raise ValueError("must be a mapping with the keys " + ", ".join(_KEYS))
     for key in content:
         if key not in _KEYS:
-            raise ValueError("unknown key %s; known are %s" % (reprlib.repr(key), ", ".join(_KEYS)))
+            raise ValueError("unknown key %s; known are %s" % (shorten(key), ", ".join(_KEYS)))
     name = content.get("name", file_name)
     if not isinstance(name, str) or not name.isprintable():  # it is printed in terminals
-        raise ValueError("name must be one line of text, not " + reprlib.repr(name))
+        raise ValueError("name must be one line of text, not " + shorten(name))
     walls_m = [_read_rows("walls_m", wall, 2, least=2) for wall in _list_items(content, "walls_m")]
     polygons_m = [_read_rows("polygons_m", corners, 2, least=3) for corners in _list_items(content, "polygons_m")]
     circles_m = _read_rows("circles_m", _list_items(content, "circles_m"), 3)
@@ -117,7 +115,7 @@ def _read_object(item: Any) -> MovableObject:
     known = isinstance(item, dict) and set(item) <= set(_OBJECT_KEYS)
     if not known or ("circle_m" in item) == ("polygon_m" in item):
         raise ValueError(
-            "objects: %s must be a mapping with circle_m or polygon_m, mass_kg and friction" % reprlib.repr(item)
+            "objects: %s must be a mapping with circle_m or polygon_m, mass_kg and friction" % shorten(item)
         )
     mass_kg, friction = (_read_rows(key, [[item.get(key)]], 1)[0, 0] for key in ("mass_kg", "friction"))
     shape: Shape
@@ -148,7 +146,7 @@ def _read_bounds(content: Dict[str, Any], segments_m: np.ndarray) -> np.ndarray:
 def _list_items(content: Dict[str, Any], key: str) -> List[Any]:
     items = content.get(key) or []
     if not isinstance(items, list):
-        raise ValueError("%s must be a list, not %s" % (key, reprlib.repr(items)))
+        raise ValueError("%s must be a list, not %s" % (key, shorten(items)))
     return items
 
 
@@ -162,6 +160,6 @@ def _read_rows(key: str, value: Any, columns: int, least: int = 0) -> np.ndarray
     if not nested or len(rows) < least or not (np.abs(rows) <= _MAX_COORDINATE_M).all():
         raise ValueError(
             "%s: %s is not a list of %sentries of %d numbers, each from -1000 to 1000"
-            % (key, reprlib.repr(value), "at least %d " % least if least else "", columns)
+            % (key, shorten(value), "at least %d " % least if least else "", columns)
         )
     return rows

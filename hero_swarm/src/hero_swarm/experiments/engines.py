@@ -11,6 +11,8 @@ import threading
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
 
+from hero_node.texts import one_line
+
 from .errors import ExperimentError
 
 __all__ = ["compute", "open_dask", "open_pool"]
@@ -73,7 +75,7 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
         codes = client.run(check)
     except (OSError, ValueError, DaskTimeoutError) as error:
         text = "no Dask cluster with workers at %s (%s): start dask-scheduler and dask-worker"
-        raise ExperimentError(text % (address, " ".join(str(error).split()))) from error
+        raise ExperimentError(text % (address, one_line(error))) from error
     own = check()
     for worker, code in sorted(codes.items()):
         if code != own:

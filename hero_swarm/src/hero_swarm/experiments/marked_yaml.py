@@ -9,7 +9,7 @@ from typing import Any, Callable, Collection, Dict, List, NamedTuple, NoReturn, 
 import yaml
 
 from hero_node.number_checks import is_number, is_whole_number
-from hero_node.texts import one_line
+from hero_node.texts import one_line, shorten
 from hero_node.yaml_text import MAX_CHARACTERS
 
 from .errors import ExperimentError
@@ -42,7 +42,7 @@ class Entry(NamedTuple):
             if self.is_list
             else "a mapping"
         )
-        raise ExperimentError("%s: %s is %s, but must be %s" % (self.place, self.name, _quote(shown), text))
+        raise ExperimentError("%s: %s is %s, but must be %s" % (self.place, self.name, shorten(shown), text))
 
     @property
     def is_list(self) -> bool:
@@ -93,7 +93,7 @@ class Entry(NamedTuple):
             if allowed is not None and name not in allowed:
                 raise ExperimentError(
                     "%s: unknown %s%s; allowed are: %s"
-                    % (entry.place, _quote(name), where, ", ".join(allowed))
+                    % (entry.place, shorten(name), where, ", ".join(allowed))
                 )
         for name in required:
             if name not in self.value:
@@ -167,11 +167,6 @@ def _convert_mapping(node: yaml.MappingNode, name: str, file: str, loader: Any) 
             raise ExperimentError("%s: a name must be a text" % place)
         key = str(key_node.value)
         if key in mapping:
-            raise ExperimentError("%s: %s appears twice" % (place, _quote(key)))
+            raise ExperimentError("%s: %s appears twice" % (place, shorten(key)))
         mapping[key] = _convert(value_node, "%s.%s" % (name, key) if name else key, file, loader)
     return mapping
-
-
-def _quote(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
