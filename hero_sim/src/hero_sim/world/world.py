@@ -7,7 +7,7 @@ only operations that IEEE 754 defines to the last bit, and random numbers are ro
 which the differences between mathematical libraries vanish.
 """
 
-from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from .range_sensors import (
 )
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
-__all__ = ["STEP_MS", "View", "World"]
+__all__ = ["STEP_MS", "View", "World", "drive_servos"]
 
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
@@ -65,6 +65,15 @@ class View(NamedTuple):
     obstacles: List[Obstacles]
 
 
+def drive_servos(
+    pulses_us: Any, centers_us: Any, dead_zones_us: Any, gains_m_s_us: Any, least: Any = np.minimum, most: Any = np.maximum
+) -> Any:
+    """Return the wheel speeds (m/s) that pulses stand for: arrays, or with Python's min and max single numbers."""
+    beyond_us = pulses_us - centers_us
+    driven_us = beyond_us - least(most(beyond_us, -dead_zones_us), dead_zones_us)
+    return least(most(driven_us * gains_m_s_us, -MAX_WHEEL_M_S), MAX_WHEEL_M_S)
+
+
 class World:
     """All robots in one arena, or in several worlds with the same arena.
 
@@ -74,6 +83,7 @@ class World:
         time_ms: end of the last step.
         errors: how each robot differs from the drawing; constant.
         commands_m_s: the servos' commands (R, 2), as the wheel speeds they stand for, left and right.
+        servo_gains_m_s_us: of the servos (R, 2), with their directions; constant.
         speeds_m_s, travels_m: of the wheels (R, 2).
     """
 
@@ -112,7 +122,7 @@ class World:
         self.commands_m_s = self._commands.T
         self.travels_m, self.speeds_m_s = self._travels.T, self._speeds.T
         # Below its center the left wheel rolls forward.
-        self._servo_gains = errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US)
+        self.servo_gains_m_s_us = errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US)
         # The share of the difference to its command by which a servo's speed changes in one step.
         shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32)
         self._servo_shares = np.tile(shares.astype(float), (2, 1))  # of each wheel: faster than broadcast in each step
@@ -136,11 +146,8 @@ class World:
 
     def write_pulses(self, rows: Rows, pulses_us: np.ndarray) -> None:
         """Set the servos' pulses, left and right (..., 2), of rows: one or several."""
-        dead_zone_us = self.errors.dead_zone_us[rows]
-        beyond_us = pulses_us - self.errors.servo_center_us[rows]
-        driven_us = beyond_us - np.minimum(np.maximum(beyond_us, -dead_zone_us), dead_zone_us)
-        speeds_m_s = driven_us * self._servo_gains[rows]
-        self.commands_m_s[rows] = np.minimum(np.maximum(speeds_m_s, -MAX_WHEEL_M_S), MAX_WHEEL_M_S)
+        servos = self.errors.servo_center_us[rows], self.errors.dead_zone_us[rows], self.servo_gains_m_s_us[rows]
+        self.commands_m_s[rows] = drive_servos(pulses_us, *servos)
 
     def release(self, rows: Rows) -> None:
         """Stop the pulses of rows: their wheels come to rest."""
