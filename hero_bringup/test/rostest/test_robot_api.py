@@ -12,6 +12,7 @@ import rospy
 import rostest
 
 from hero_client import FrameError, Robot, RobotNotReadyError, StaleDataError, Swarm
+from hero_client.values.robot_constants import MODELS
 from hero_sim.srv import InjectFault
 from hero_test.light_watch import LightWatch
 from hero_test.swarm_watch import SwarmWatch
@@ -22,6 +23,9 @@ CORNERED = 4
 """hero_4 stands in the corner: a wall 0.12 m ahead of its center, another 0.16 m to its left."""
 
 DEADLINE_S = 60.0
+
+PLUS = 5
+"""hero_5 is a HeRo+ that looks along the room, 3 m long."""
 
 DARK = (0.15, 0.15, 0.15)
 """A light that is off, as the simulator shows it."""
@@ -97,6 +101,21 @@ class RobotApiTest(unittest.TestCase):
         self.assertLess(math.dist((1.0, -2.0, 0.5), robot.pose), 0.02)
         self.assertRegex(repr(robot), r"<hero_4: ready, Pose\(x_m=")
         wait_for(lambda: abs(robot.encoder.left_ticks) < 3, "ticks that set_odom zeroed")
+
+    def test_a_robot_of_another_model_is_read_as_what_it_is(self):
+        stock, plus = self.swarm[0], self.swarm[PLUS]
+        self.assertEqual(MODELS["hero"], stock.model)
+        self.assertEqual(MODELS["hero_plus"], plus.model)
+        self.assertTrue(0.2 < plus.distance < 2.6, plus.distance)
+
+        def measure_separation():
+            plus.drive(0.0, 2.0)
+            before, (left_m_s, right_m_s), after = plus.velocity, plus.wheel_speeds, plus.velocity
+            return before == after and after.angular_rad_s > 1.0 and (right_m_s - left_m_s) / after.angular_rad_s
+
+        separation_m = wait_for(measure_separation, "wheels that turn")
+        plus.stop()
+        self.assertAlmostEqual(0.065, separation_m)
 
     def test_goals_and_poses_may_be_in_a_frame_of_tf(self):
         robot, before = self.swarm[2], self.watch.pose(2)
