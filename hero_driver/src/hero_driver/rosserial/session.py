@@ -25,7 +25,6 @@ __all__ = [
     "SessionEnded",
     "SessionLimits",
     "SessionState",
-    "TimeRequested",
     "Topic",
     "TopicDeclared",
     "TopicKind",
@@ -120,10 +119,6 @@ class LogReceived(NamedTuple):
     log: Log
 
 
-class TimeRequested(NamedTuple):
-    """The robot asked for the time; the answer is among take_packets()."""
-
-
 class Problem(NamedTuple):
     """The robot sent something that cannot be used; text says what and why. Nothing else is affected."""
 
@@ -140,7 +135,6 @@ Event = Union[
     MessagesReceived,
     TopicDeclared,
     LogReceived,
-    TimeRequested,
     Problem,
     SessionEnded,
 ]
@@ -312,7 +306,7 @@ class Session:
                 due_s = now_s + TIME_WITHOUT_TOPICS_S
                 # Only the first time is it the handshake of a boot; a peer may answer each request like this.
                 self._ask_by(due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s)))
-            return TimeRequested()
+            return None
         if topic_id == packets.ID_LOG:
             log = payloads.decode_log(payload)
             if self.state is SessionState.ASKING or now_s - self._last_configured_s > UNCONFIGURED_S:

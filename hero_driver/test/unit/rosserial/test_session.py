@@ -34,7 +34,6 @@ from hero_driver.rosserial.session import (
     Session,
     SessionEnded,
     SessionLimits,
-    TimeRequested,
     TopicDeclared,
     TopicKind,
 )
@@ -66,9 +65,8 @@ def test_the_request_is_repeated_every_1_5_s_until_a_declaration():
 def test_nothing_is_asked_any_more_once_a_topic_is_declared():
     session = open_session()
     events = receive(session, HANDSHAKE, T0 + 0.06)
-    assert events[0] == TimeRequested()
-    assert [event.topic.info.topic_id for event in events[1:]] == [topic[1] for topic in STOCK_TOPICS]
-    assert all(type(event) is TopicDeclared for event in events[1:])
+    assert [event.topic.info.topic_id for event in events] == [topic[1] for topic in STOCK_TOPICS]
+    assert all(type(event) is TopicDeclared for event in events)
     session.take_packets()
     assert poll_until(session, T0 + 0.1, T0 + 5.0) == ([], [])
 
@@ -179,7 +177,7 @@ def test_time_requests_and_data_show_that_the_robot_is_configured():
 
 def test_a_time_request_is_answered_with_the_time_at_which_it_arrived():
     session = open_declared_session()
-    assert receive(session, TIME_REQUEST) == [TimeRequested()]
+    assert receive(session, TIME_REQUEST) == []
     assert session.take_packets() == [TIME_ANSWER]
 
 

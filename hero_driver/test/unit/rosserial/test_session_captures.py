@@ -5,7 +5,7 @@ from collections import Counter
 from conversation import T0, list_messages, list_requests, open_session, receive
 from vectors import FROM_ROBOT, HANDSHAKE, STOCK_TOPICS
 
-from hero_driver.rosserial.session import LogReceived, MessagesReceived, TimeRequested, TopicDeclared
+from hero_driver.rosserial.session import LogReceived, MessagesReceived, TopicDeclared
 
 SEGMENT_LENGTH = 1460
 
@@ -26,7 +26,7 @@ def test_a_whole_conversation_has_the_topics_data_and_logs_of_the_robot(read_cap
     events, request_times_s = run(session, read_capture("A.robot_to_server.bin"))
     assert request_times_s == []
     kinds = Counter(type(event) for event in events if type(event) is not MessagesReceived)
-    assert kinds == {LogReceived: 20, TimeRequested: 6, TopicDeclared: 24}
+    assert kinds == {LogReceived: 20, TopicDeclared: 24}
     declared = [event.topic.info[:4] for event in events if type(event) is TopicDeclared]
     assert declared == [topic[1:] for topic in STOCK_TOPICS]
     counts = Counter(topic.info.name for topic, _ in list_messages(events))
@@ -50,7 +50,7 @@ def test_a_robot_that_declared_nothing_is_asked_again_and_then_understood(read_c
     capture = read_capture("C_zero_topics.robot_to_server.bin")
     events, request_times_s = run(session, capture)
     assert len(request_times_s) == 1
-    assert {type(event) for event in events} == {LogReceived, TimeRequested}
+    assert {type(event) for event in events} == {LogReceived}
     assert session.undeclared_messages == 140
     assert session.topics == {}
 
