@@ -72,12 +72,14 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
             address if is_address else None, scheduler_file=None if is_address else address, timeout=DASK_TIMEOUT_S
         )
         client.wait_for_workers(1, timeout=DASK_TIMEOUT_S)
-        codes = client.run(check)
+        codes, threads = client.run(check), client.nthreads()
     except (OSError, ValueError, DaskTimeoutError) as error:
         text = "no Dask cluster with workers at %s (%s): start dask-scheduler and dask-worker"
         raise ExperimentError(text % (address, one_line(error))) from error
     own = check()
     for worker, code in sorted(codes.items()):
+        if threads[worker] > 1:  # they wait for each other, and would share streams of random numbers
+            raise ExperimentError("worker %s has %d threads: start it with --nthreads 1" % (worker, threads[worker]))
         if code != own:
             raise ExperimentError(
                 "worker %s runs other code (%s, here %s): update it and start it again" % (worker, code, own)

@@ -67,19 +67,40 @@ class ArrivalError(Exception):
     pass
 
 
-class ClusterWithoutWorkers:
+class Cluster:
+    """Stands for a cluster that arrives too late, or for one with a worker of some threads."""
+
+    threads = 0
+    code = "abc"
+
     def __init__(self, address, scheduler_file, timeout):
         pass
 
     def wait_for_workers(self, count, timeout):
-        raise ArrivalError("Only 0/1 workers arrived after 20s")
+        if not self.threads:
+            raise ArrivalError("Only 0/1 workers arrived after 20s")
+
+    def run(self, check):
+        return {"tcp://b:2": self.code}
+
+    def nthreads(self):
+        return {"tcp://b:2": self.threads}
+
+    def get_executor(self, **options):
+        return "executor"
 
 
-def test_a_dask_cluster_without_workers_is_named_with_the_remedy(monkeypatch):
-    stub = types.SimpleNamespace(Client=ClusterWithoutWorkers, TimeoutError=ArrivalError)
+def test_dask_clusters_that_cannot_be_used_are_refused_with_the_remedy(monkeypatch):
+    stub = types.SimpleNamespace(Client=Cluster, TimeoutError=ArrivalError)
     monkeypatch.setitem(sys.modules, "distributed", stub)
     with pytest.raises(ExperimentError, match="no Dask scheduler file no.json: start .* --scheduler-file no.json$"):
-        engines.open_dask("no.json", lambda: "")
-    told = "workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and dask-worker$"
-    with pytest.raises(ExperimentError, match=told):
-        engines.open_dask("tcp://a:1", lambda: "")
+        engines.open_dask("no.json", lambda: "abc")
+    with pytest.raises(ExperimentError, match="workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and dask-worker$"):
+        engines.open_dask("tcp://a:1", lambda: "abc")
+    monkeypatch.setattr(Cluster, "threads", 2)
+    with pytest.raises(ExperimentError, match="worker tcp://b:2 has 2 threads: start it with --nthreads 1$"):
+        engines.open_dask("tcp://a:1", lambda: "abc")
+    monkeypatch.setattr(Cluster, "threads", 1)
+    with pytest.raises(ExperimentError, match=r"worker tcp://b:2 runs other code \(abc, here abd\)"):
+        engines.open_dask("tcp://a:1", lambda: "abd")
+    assert engines.open_dask("tcp://a:1", lambda: "abc") == ("executor", 1)
