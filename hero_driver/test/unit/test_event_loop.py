@@ -115,3 +115,18 @@ def test_a_call_after_the_end_of_the_loop_does_no_harm(start):
     calls = []
     handler.loop.call_soon(lambda: calls.append("late"))
     assert calls == []
+
+
+def test_connections_notice_a_peer_that_vanished_and_delay_nothing():
+    with socket.socket() as near:
+        for timeout_s, idle_s in ((8.0, 4), (1.0, 1)):
+            EventLoop(TransportSettings("", 0, (), timeout_s))._set_options(near)
+            tcp = {
+                socket.TCP_NODELAY: 1,
+                socket.TCP_KEEPIDLE: idle_s,
+                socket.TCP_KEEPINTVL: 1,
+                socket.TCP_KEEPCNT: 3,
+                socket.TCP_USER_TIMEOUT: int(1000 * timeout_s),
+            }
+            assert {option: near.getsockopt(socket.IPPROTO_TCP, option) for option in tcp} == tcp
+            assert near.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1 and not near.getblocking()

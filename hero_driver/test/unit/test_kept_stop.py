@@ -35,6 +35,14 @@ def test_a_stop_that_is_kept_already_keeps_its_time(home):
     assert kept.read_since() == "2001-02-03 04:05:06"
 
 
+def test_drivers_of_several_names_keep_their_stops_side_by_side(home):
+    drivers = [KeptStop("/lab/hero_driver"), KeptStop("/hero_driver")]
+    for kept in drivers:
+        kept.write(True)
+    drivers[0].write(False)
+    assert [bool(kept.read_since()) for kept in drivers] == [False, True]
+
+
 @pytest.mark.parametrize("content", [b"", b"\xff\xfe"])
 def test_a_file_that_cannot_be_read_still_is_a_stop(home, content):
     kept = KeptStop("/hero_driver")

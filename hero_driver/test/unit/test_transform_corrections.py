@@ -58,6 +58,16 @@ def test_a_stamp_of_too_many_nanoseconds_is_normalized():
     assert robot.receive("/tf", bytes(odd), NOW_NS) == [("/tf", build_transform(NOW_NS, *pair))]
 
 
+@pytest.mark.parametrize("count", [0, 2])
+def test_a_message_whose_count_is_wrong_is_refused_or_empty(count):
+    robot = CorrectedRobot()
+    pair = ("hero_0/base_link", "hero_0/hat_link")
+    receive_transforms(robot, pair, stamp_ns=NOW_NS - NS_PER_S)
+    wrong = struct.pack("<I", count) + build_transform(NOW_NS, *pair)
+    assert robot.receive("/tf", wrong, NOW_NS) == []
+    assert list_pairs(receive_transforms(robot, pair)) == [pair]
+
+
 def test_several_transforms_in_one_message_come_out_one_by_one():
     pairs = [("hero_0/base_link", "hero_0/%s_link" % name) for name in ("left_wheel", "right_wheel", "hat")]
     robot = CorrectedRobot()

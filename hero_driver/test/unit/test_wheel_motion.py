@@ -82,6 +82,17 @@ def test_a_velocity_of_odometry_that_is_not_zero_is_a_turn(velocity):
     assert (wheels.readings, wheels.still_readings) == (2, 0)
 
 
+def test_wheels_go_on_by_odometry_whether_they_drive_or_turn():
+    for velocity in ((0.1, 0.0), (-0.1, 1.0), (0.0, -1.0)):
+        wheels = WheelMotion()
+        for _ in range(MOVES_KEPT):
+            wheels.read_velocity(*velocity)
+        assert wheels.go_on
+        for _ in range(MOVES_KEPT // 2):
+            wheels.read_velocity(*(0.4 * speed for speed in velocity))
+        assert not wheels.go_on, velocity
+
+
 @pytest.mark.parametrize("broken", [math.nan, math.inf])
 def test_counters_that_are_not_numbers_are_no_turn_of_a_wheel(broken):
     wheels = WheelMotion()
