@@ -17,8 +17,9 @@ from hero_swarm.experiments.batch import build_trial, load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
+from hero_swarm.fitting import infrared_fit
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body
-from hero_swarm.fitting.infrared_fit import fit_infrared
+from hero_swarm.fitting.infrared_fit import _list_readings, fit_infrared
 from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
 from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, measure_wheels, sample_times
 from hero_swarm.fitting.replay import Motors, build_errors
@@ -120,12 +121,21 @@ def test_hidden_infrared_constants_come_back_from_a_known_arena():
     assert ",beta_counts=-" in lines[-1]
 
 
-def test_infrared_sensors_that_saw_too_little_are_named():
+def test_infrared_sensors_that_saw_too_little_are_named(monkeypatch):
+    recording = record_scans(90.0)
+    readings = _list_readings(recording, WALLS, 2.0 / 3.0)
+    monkeypatch.setattr(infrared_fit, "_list_readings", lambda *_: [column[readings[0] != 3] for column in readings])
+    fit = fit_infrared([recording], WALLS, 2.0 / 3.0)
+    assert "alpha3_counts_m2" not in fit.values and len(fit.values) == 8
+    assert describe_fit(Fit("hero_4", fit.values, 0.0, 0.03, 0.01, fit), 4)[-2].endswith("as on the drawing: 3")
+
+
+def test_infrared_sensors_cannot_be_fitted_where_they_saw_too_little():
     recording = record_scans(90.0)
     without_scans = recording._replace(scans=recording.scans[:0])
     lost = recording._replace(others=(recording.others[0][:5],))  # where the other robot is then, nobody knows
     for own in (without_scans, lost):
-        with pytest.raises(ValueError, match="infrared sensor . saw .* things at 3 to 20 cm .*--raw"):
+        with pytest.raises(ValueError, match="infrared sensors saw .* things at most at 3 to 20 cm .*--raw"):
             fit_infrared([own], WALLS, 2.0 / 3.0)
 
 

@@ -47,22 +47,24 @@ class InfraredFit(NamedTuple):
 
 
 def fit_infrared(recordings: List[Recording], arena: Arena, end_share: float) -> InfraredFit:
-    """Return the sensors of one robot from the first share of each recording.
+    """Return the sensors of one robot from the first share of each recording; those that saw too little have no value.
 
-    Raises: ValueError if they saw too little.
+    Raises: ValueError if none saw enough.
     """
     tables = [_list_readings(recording, arena, end_share) for recording in recordings]
     sensors, bright, counts, is_held_out = (np.concatenate(columns) for columns in zip(*tables))
     seen = np.bincount(sensors[~is_held_out], minlength=BEAMS)
-    if seen.min() < _MIN_READINGS or not is_held_out.any():
-        text = "infrared sensor %d saw %d things at %g to %g cm in a recording with laser (--raw); %d are needed"
-        raise ValueError(
-            text % (seen.argmin(), seen.min(), 100.0 * _MIN_DISTANCE_M, 100.0 * _MAX_DISTANCE_M, _MIN_READINGS)
-        )
-    # The signal depends linearly on the eight alphas and on beta.
+    fitted_beams = (seen >= _MIN_READINGS).nonzero()[0]
+    if not len(fitted_beams) or not is_held_out.any():
+        limits_cm = 100.0 * _MIN_DISTANCE_M, 100.0 * _MAX_DISTANCE_M
+        text = "infrared sensors saw %d things at most at %g to %g cm in a recording with laser (--raw); %d are needed"
+        raise ValueError(text % (seen.max(), *limits_cm, _MIN_READINGS))
+    enough = np.isin(sensors, fitted_beams)
+    sensors, bright, counts, is_held_out = (array[enough] for array in (sensors, bright, counts, is_held_out))
+    # The signal depends linearly on the alphas and on beta.
     fixed = find_offset(bright, np.zeros(1))
-    terms = np.column_stack((bright[:, None] * np.eye(BEAMS)[sensors], find_offset(bright, np.ones(1)) - fixed))
-    drawn = np.append(np.full(BEAMS, ALPHA_COUNTS_M2), BETA_COUNTS)
+    terms = np.column_stack((bright[:, None] * (sensors[:, None] == fitted_beams), find_offset(bright, np.ones(1)) - fixed))
+    drawn = np.append(np.full(len(fitted_beams), ALPHA_COUNTS_M2), BETA_COUNTS)
     slopes_m = 2.0 * ALPHA_COUNTS_M2 * bright**1.5  # counts for each m that the distance is wrong
     sds = np.hypot(NOISE_COUNTS, slopes_m * _POSE_SD_M)
     fitted, own = drawn, ~is_held_out
@@ -71,7 +73,7 @@ def fit_infrared(recordings: List[Recording], arena: Arena, end_share: float) ->
         weights = np.sqrt(_FAR_SDS / np.maximum(off_sds, _FAR_SDS))[own] / sds[own]
         fitted = np.linalg.lstsq(terms[own] * weights[:, None], (counts - fixed)[own] * weights, rcond=None)[0]
     before, after = (float(np.median(np.abs(terms @ one + fixed - counts)[is_held_out])) for one in (drawn, fitted))
-    keys = ["alpha%d_counts_m2" % beam for beam in range(BEAMS)] + ["beta_counts"]
+    keys = ["alpha%d_counts_m2" % beam for beam in fitted_beams] + ["beta_counts"]
     return InfraredFit(dict(zip(keys, fitted.tolist())), before, after)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 from hero_sim.world.arena import Arena
+from hero_sim.world.range_sensors import BEAMS
 
 from .body_fit import fit_body
 from .infrared_fit import InfraredFit, fit_infrared
@@ -80,4 +81,7 @@ def describe_fit(fit: Fit, robot_id: int) -> List[str]:
     if fit.infrared is not None:
         errors_counts = fit.infrared.after_counts, fit.infrared.before_counts
         remarks.append("held-out infrared signals are %.1f counts off, before the fit %.1f" % errors_counts)
+        unseen = [str(beam) for beam in range(BEAMS) if "alpha%d_counts_m2" % beam not in fit.values]
+        if unseen:
+            remarks.append("infrared sensors that saw too little are as on the drawing: %s" % ", ".join(unseen))
     return ["# %s: %s" % (fit.name, remark) for remark in remarks] + ["robot=%d,%s" % (robot_id, values)]
