@@ -44,7 +44,8 @@ class FirstScriptsTest(unittest.TestCase):
             turned_rad = abs(math.remainder(pose[2] - yaw_rad, math.tau))
             return math.dist(pose[:2], (x_m, y_m)) > 0.03 or turned_rad > 0.3
 
-        wait_for(has_moved, "motion of hero_%d" % robot_id)
+        program = self.programs[SCRIPTS[robot_id]]
+        wait_for(has_moved, lambda: "motion of hero_%d: %s" % (robot_id, program.text()))
 
     def wait_until_stopped(self, *robot_ids):
         """Wait until the scripts have stopped their robots, themselves, and these are at rest."""

@@ -79,7 +79,7 @@ def start_monitor(*arguments, prefix=()):
     name = "__name:=monitor_" + uuid.uuid4().hex
     port = "_port:=%d" % OTHER_PORT
     return subprocess.Popen(
-        [*prefix, "rosrun", "hero_monitor", "monitor", name, port, *arguments],
+        [*prefix, find_program("hero_monitor", "monitor"), name, port, *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         start_new_session=True,
