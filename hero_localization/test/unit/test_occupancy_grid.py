@@ -207,9 +207,17 @@ def test_a_range_that_ends_at_another_robot_is_that_robot():
 
 def test_the_rim_of_the_map_cuts_off_only_what_is_beyond():
     ranges_m = {0: 0.1, 1: 0.15, 2: math.inf, 3: 0.12, 4: 0.2, 5: 0.0, 6: 0.07, 7: 0.18}
-    for x_m, y_m in ((0.0, 0.0), (0.19, -0.13), (-0.2, 0.2), (0.25, 0.0), (-0.1, -0.28), (0.45, 0.45)):
-        large, small = (scan(ranges_m, Pose(x_m, y_m, 0.7), grid=make_grid(half_m)) for half_m in (0.7, 0.2))
-        np.testing.assert_allclose(small.log_odds, large.log_odds[50:90, 50:90], atol=1e-5)
+    for left_m, low_m in ((-0.2, -0.2), (3.0, 2.0)):
+        for x_m, y_m in ((0.2, 0.2), (0.39, 0.07), (0.0, 0.4), (0.45, 0.2), (0.1, -0.08), (0.65, 0.65)):
+            large, small = (
+                scan(
+                    ranges_m,
+                    Pose(left_m + x_m, low_m + y_m, 0.7),
+                    grid=OccupancyGrid((left_m - more_m, low_m - more_m, left_m + 0.4 + more_m, low_m + 0.3 + more_m)),
+                )
+                for more_m in (0.5, 0.0)
+            )
+            np.testing.assert_allclose(small.log_odds, large.log_odds[50:80, 50:90], atol=1e-5)
     assert OccupancyGrid((0.0, 0.0, 0.101, 0.025)).log_odds.shape == (3, 11), "rows by y, the last ones beyond"
 
 
