@@ -5,8 +5,9 @@ Usage: debian_files.py SOURCES DEBIAN_DIR, with the packages below SOURCES. Sour
 
 import sys
 from email.utils import formatdate
+from functools import lru_cache
 from pathlib import Path
-from subprocess import DEVNULL, call
+from subprocess import check_output
 
 from catkin_pkg.topological_order import topological_order
 
@@ -73,15 +74,16 @@ def make_name(ros_name):
     return "ros-" + ros_name.replace("_", "-")
 
 
+@lru_cache(maxsize=None)
+def list_packages():
+    """Return the names of all packages of Debian."""
+    return frozenset(check_output(["apt-cache", "pkgnames"], universal_newlines=True).split())
+
+
 def find_known(key, *patterns):
     """Return those of the patterns, such as python3-*, that make the name of a Debian package of a rosdep key."""
     names = [pattern.replace("*", key.replace("_", "-")) for pattern in patterns]
-    return [
-        name
-        for name in names
-        if name not in OTHER_PROGRAMS
-        and call(["apt-cache", "show", name], stdout=DEVNULL, stderr=DEVNULL) == 0
-    ]
+    return [name for name in names if name not in OTHER_PROGRAMS and name in list_packages()]
 
 
 def find_packages(key, *patterns):
