@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.scale import SymmetricalLogTransform
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 
@@ -240,8 +241,10 @@ class Figures:
         self._label_rows(message_axes)
         message_axes.set_xlabel("message delay: arrival of odom minus its stamp (ms)")
         message_axes.set_title("box 25 to 75 %, whiskers 1 to 99 %, cross: maximum")
-        # Most delays are some ms, the longest may be a second: the scale is linear up to 100 ms, then logarithmic.
-        message_axes.set_xscale("symlog", linthresh=100.0, linscale=2.0)
+        # Most delays are some ms, the longest may be a second: the scale is linear up to 100 ms, then logarithmic. The
+        # scale symlog takes other names of these numbers in each version of matplotlib, and ignores those of the others.
+        scale = SymmetricalLogTransform(10.0, 100.0, 2.0)
+        message_axes.set_xscale("function", functions=(scale.transform, scale.inverted().transform))
         every = np.concatenate(list(messages.values()))
         low, high = min(-5.0, every.min() * 1.1), max(60.0, every.max() * 1.3)
         message_axes.set_xlim(low, high)
