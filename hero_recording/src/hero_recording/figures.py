@@ -241,8 +241,8 @@ class Figures:
         self._label_rows(message_axes)
         message_axes.set_xlabel("message delay: arrival of odom minus its stamp (ms)")
         message_axes.set_title("box 25 to 75 %, whiskers 1 to 99 %, cross: maximum")
-        # Most delays are some ms, the longest may be a second: the scale is linear up to 100 ms, then logarithmic. The
-        # scale symlog takes other names of these numbers in each version of matplotlib, and ignores those of the others.
+        # Most delays are some ms, the longest may be a second: the scale is linear up to 100 ms, then logarithmic.
+        # The scale symlog renamed its arguments in matplotlib 3.3, and ignored unknown ones before.
         scale = SymmetricalLogTransform(10.0, 100.0, 2.0)
         message_axes.set_xscale("function", functions=(scale.transform, scale.inverted().transform))
         every = np.concatenate(list(messages.values()))
