@@ -8,7 +8,15 @@ import multiprocessing
 import os
 import signal
 import threading
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
 
 from hero_node.texts import one_line
@@ -92,7 +100,7 @@ def compute(
 ) -> Iterator[Tuple[Task, Any]]:
     """Yield each task with function(*task), as they are done; a broken pool is replaced, and its tasks run again.
 
-    Raises: ExperimentError if pools keep breaking; whatever function raises.
+    Raises: ExperimentError if pools keep breaking, or the cluster ends; whatever function raises.
     """
     waiting: Deque[Task] = collections.deque(tasks)
     new_pools = 0
@@ -109,6 +117,9 @@ def compute(
                     % new_pools
                 ) from error
             waiting.extendleft(running.values())
+        except CancelledError as error:
+            text = "the Dask cluster ended: start it again, and then this; what is done is kept"
+            raise ExperimentError(text) from error
         finally:
             for future in running:
                 future.cancel()

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import types
+from concurrent.futures import Executor, Future
 
 import pytest
 
@@ -61,6 +62,19 @@ def test_without_dask_the_error_names_its_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ExperimentError, match="python3-distributed"):
         engines.open_dask("tcp://127.0.0.1:1", lambda: "")
+
+
+class EndedCluster(Executor):
+    def submit(self, function, *arguments):
+        future = Future()
+        future.cancel()
+        future.set_running_or_notify_cancel()
+        return future
+
+
+def test_a_cluster_that_ends_meanwhile_is_one_line():
+    with pytest.raises(ExperimentError, match="the Dask cluster ended: .* what is done is kept"):
+        list(engines.compute(EndedCluster, 1, square, [(1,)]))
 
 
 class ArrivalError(Exception):
