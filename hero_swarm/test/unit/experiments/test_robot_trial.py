@@ -50,6 +50,17 @@ def test_a_trial_ends_at_its_time_with_values_and_without_contact():
     assert METRICS["collisions"](poses[None], None)[0] == 0.0
 
 
+@pytest.mark.parametrize("radii_m, touching", [(0.036835, 0.0), ([0.06, 0.06, 0.036835], 1.0)])
+def test_collisions_are_counted_by_the_radii_of_the_robots(radii_m, touching):
+    experiment = parse_experiment(FILE.split("metrics")[0] + "metrics: [collisions]\n", "e.yaml", METRICS)
+    safety = SafetyFilter(ROBOTS)
+    safety.radii_m = radii_m
+    trial = RobotTrial(experiment, experiment.cells[0], 1, ["hero_0", "hero_1", "hero_2"], safety)
+    poses = np.array([(0.0, 0.0, 0.0), (0.11, 0.0, 0.0), (0.0, 0.11, 0.0)])
+    trial.step(0.0, poses, np.zeros(3))
+    assert trial.list_values() == (touching,)
+
+
 def test_a_trial_ends_when_its_condition_holds():
     trial, end_s, _ = drive(FILE + "until: {consensus_error: 0.25}\n")
     error_m, reached_s = trial.list_values()
