@@ -39,7 +39,7 @@ class LeaderFollowers(Behavior):
         robots, leads = np.arange(len(numbers)), np.maximum(numbers - 1, 0)
         ahead_m, left_m = near.forward_m[robots, leads], near.left_m[robots, leads]
         range_m = np.maximum(np.hypot(ahead_m, left_m), 1e-6)
-        speed = self.gain_1_s * (range_m - self.gap_m) / range_m * near.seen[robots, leads]
+        speed = self.gain_1_s * (range_m - self.gap_m) / range_m
         linear_m_s, angular_rad_s = steer(np.maximum(speed * ahead_m, 0.0), speed * left_m, self.max_linear_m_s)
         is_leader = numbers == 0
         return (

@@ -100,7 +100,7 @@ class PushToGoal(Behavior):
         push_m_s = 2.0 * np.maximum(2.0 * BODY_RADIUS_M + gap_m - range_m, 0.0) * near.seen / range_m
         forward_m_s = wanted[0] - (push_m_s * near.forward_m).sum(axis=1)
         left_m_s = wanted[1] - (push_m_s * near.left_m).sum(axis=1)
-        moves = sensed.objects.seen[:, 0] & sensed.is_known & (way.length_m > self.goal_radius_m)
+        moves = sensed.objects.seen[:, 0] & (way.length_m > self.goal_radius_m)
         linear_m_s, angular_rad_s = steer(forward_m_s, left_m_s, self.linear_m_s)
         return linear_m_s * moves, angular_rad_s * moves
 
