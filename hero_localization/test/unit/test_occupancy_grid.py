@@ -144,7 +144,7 @@ def scan(ranges_m, pose=CENTER, others_m=NONE, grid=None):
 
 def at(grid, x_m, y_m):
     """Return the log odds of the cell at a place from the center."""
-    column, row = (round((place - low) / grid.cell_m - 0.5) for place, low in zip((x_m, y_m), grid.origin_m))
+    column, row = (int(round((place - low) / grid.cell_m - 0.5)) for place, low in zip((x_m, y_m), grid.origin_m))
     return float(grid.log_odds[row, column])
 
 
