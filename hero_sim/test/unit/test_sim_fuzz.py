@@ -123,7 +123,7 @@ def test_any_flash_file_is_read_or_refused_with_file_and_remedy(path, script):
     [
         ("bounds_m: [0, 0, 1, 1]\nname: \x00\n", "special characters are not allowed"),
         ("name: x\n? [a]\n: 1\n", "unhashable key"),
-        ("name: x\nbounds_m: [0, 0, 1, [1]]\n", "bounds_m: [['0', '0', '1', ['1']]] is not a list"),
+        ("name: x\nbounds_m: [0, 0, 1, [1]]\n", "bounds_m: [['0', '0', '1', [...]]] is not a list"),
         ("bounds_m: &a [0, 0, 1, *a]\n", "recursive"),
         ("name: [a]\nbounds_m: [0, 0, 1, 1]\n", "name must be one line of text"),
         ('name: "\\e[2J"\nbounds_m: [0, 0, 1, 1]\n', "name must be one line of text"),
