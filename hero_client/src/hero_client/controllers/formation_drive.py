@@ -55,8 +55,8 @@ class FormationDrive:
                 forward_y + angular_rad_s * (x_m - self.pose.x_m) + GAIN_1_S * (y_m - at_y_m),
                 -pose.yaw_rad,
             )
-            angular_rad_s = clamp(across_m_s / AHEAD_M, MAX_ANGULAR_RAD_S)
-            commands.append(Velocity(clamp(along_m_s, MAX_LINEAR_M_S), angular_rad_s))
+            robot_angular_rad_s = clamp(across_m_s / AHEAD_M, MAX_ANGULAR_RAD_S)
+            commands.append(Velocity(clamp(along_m_s, MAX_LINEAR_M_S), robot_angular_rad_s))
         self.pose = Pose(
             self.pose.x_m + forward_x * period_s,
             self.pose.y_m + forward_y * period_s,
