@@ -28,10 +28,11 @@ from hero_client.values.object_sensing import (
     sense_sight,
 )
 from hero_client.values.sensing import Binary, Neighborhood, Neighbors, sense_binary, sense_neighbors
+from hero_node.texts import shorten
 
 __all__ = [
     "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Objects",
-    "ObjectsInSight", "Random", "Sensed", "Sight", "derive_seed", "sense",
+    "ObjectsInSight", "Random", "Sensed", "Sight", "decide", "derive_seed", "sense",
 ]  # fmt: skip
 
 VELOCITY, PULSES = DRIVES = ("velocity", "pulses")
@@ -152,6 +153,23 @@ def sense(
             read: Any = sense_binary if isinstance(sensor, Binary) else sense_neighbors
             readings[name] = read(poses, sensor, random)
     return Sensed(time_s, poses, readings)
+
+
+def decide(behavior: Behavior, sensed: Sensed, memory: Any, random: Random) -> Tuple[np.ndarray, np.ndarray, Any]:
+    """Return linear m/s and angular rad/s of all robots (R,), and the memory, as the behavior's step() gives them.
+
+    Raises: ValueError for other shapes.
+    """
+    command, robots = behavior.step(sensed, memory, random), len(sensed.numbers)
+    if not isinstance(command, tuple) or len(command) != 3:
+        text = "%s.step() must return linear_m_s, angular_rad_s, memory, not %s"
+        raise ValueError(text % (type(behavior).__name__, shorten(command)))
+    for name, values in zip(("linear_m_s", "angular_rad_s"), command):
+        if np.shape(values) not in ((), (robots,)):
+            text = "%s.step() gives %s of shape %s: it must be a number, or one for each of %d robots (%d,)"
+            raise ValueError(text % (type(behavior).__name__, name, np.shape(values), robots, robots))
+    linear_m_s, angular_rad_s = (np.broadcast_to(np.asarray(values, float), robots) for values in command[:2])
+    return linear_m_s, angular_rad_s, command[2]
 
 
 def derive_seed(seed: int, purpose: str) -> int:

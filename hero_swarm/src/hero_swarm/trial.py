@@ -18,7 +18,7 @@ from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena, MovableObject, measure_clearance
 
-from .behavior import PULSES, Behavior, Random, derive_seed, sense
+from .behavior import PULSES, Behavior, Random, decide, derive_seed, sense
 from .wheel_pulses import find_pulses, list_dead_zones
 
 __all__ = ["OPEN", "Trial", "scatter", "scatter_objects"]
@@ -137,7 +137,7 @@ class Trial:
             self._seen.popleft()
         sensed_poses = self._seen[0][1]
         sensed = sense(self.behavior, now_s, sensed_poses, self._random, self.things)
-        linear_m_s, angular_rad_s, self.memory = self.behavior.step(sensed, self.memory, self._random)
+        linear_m_s, angular_rad_s, self.memory = decide(self.behavior, sensed, self.memory, self._random)
         if self._filter is not None:
             safe = self._filter(sensed_poses, linear_m_s, angular_rad_s)
             linear_m_s, angular_rad_s = (values.ravel() for values in safe)

@@ -172,6 +172,24 @@ def test_a_world_of_a_batch_gives_the_same_bytes_as_alone():
     assert together.poses[0].tobytes() != alone.poses[0].tobytes()
 
 
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        ((np.zeros((6, 1)), 0.0, None), r"linear_m_s of shape \(6, 1\).*6 robots"),
+        ((0.0, np.zeros(3), None), r"angular_rad_s of shape \(3,\)"),
+        ((0.0, 0.0), "must return linear_m_s, angular_rad_s, memory, not"),
+        (None, "not None"),
+    ],
+)
+def test_a_step_that_gives_other_shapes_is_named(command, told):
+    class Crooked(Behavior):
+        def step(self, sensed, memory, random):
+            return command
+
+    with pytest.raises(ValueError, match=r"^Crooked.step\(\).*" + told):
+        Trial(Crooked(), SQUARE, 3, [3, 4]).step()
+
+
 def test_a_parameter_that_a_behavior_lacks_is_refused():
     assert VoronoiCoverage(width_m=3.0).width_m == 3.0
     with pytest.raises(TypeError, match="no parameter 'with_m'"):

@@ -10,7 +10,7 @@ import numpy as np
 
 from hero_client.values.object_sensing import NO_OBJECTS, Things
 
-from ..behavior import Random, derive_seed, sense
+from ..behavior import Random, decide, derive_seed, sense
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..safety import SafetyFilter
@@ -76,7 +76,7 @@ class RobotTrial:
             return None
         sensed = sense(self._behavior, time_s, poses[None], self._random, things)
         with report_place(self._label):
-            linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
+            linear_m_s, angular_rad_s, self._memory = decide(self._behavior, sensed, self._memory, self._random)
         linear_m_s, angular_rad_s = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         return linear_m_s[0], angular_rad_s[0]
 

@@ -15,7 +15,7 @@ from hero_client import Program, ProgramError, Swarm, read_parameters, run
 from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 
-from ..behavior import Behavior, Objects, Random, Sensed, sense
+from ..behavior import Behavior, Objects, Random, Sensed, decide, sense
 from ..behaviors import make_behavior
 from ..metrics import METRICS
 from ..safety import MODES, SafetyFilter
@@ -85,7 +85,7 @@ class BehaviorNode:
             poses, things = np.full_like(poses, np.nan), Things(np.full((1, 1, 3), np.nan), np.ones(1))
         now_s = rospy.get_time()
         sensed = sense(self._behavior, now_s - self._start_s, poses[None], self._random, things)
-        linear_m_s, angular_rad_s, self._memory = self._behavior.step(sensed, self._memory, self._random)
+        linear_m_s, angular_rad_s, self._memory = decide(self._behavior, sensed, self._memory, self._random)
         self._filter.radii_m = [robot.model.body_radius_m for robot in self._swarm]
         speeds = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         may_move = sensed.is_known & np.isfinite(linear_m_s) & np.isfinite(angular_rad_s)
