@@ -21,6 +21,7 @@ class Ros:
 
     def __init__(self, monkeypatch):
         self.now_s, self.requests, self.subscribers, self.unregistered = 100.0, [], {}, []
+        self.options = []
         self.connected, self.reporting = {A, B}, {A, B}
         self.known, self.is_master_there = [A], True
         for module, name, value in (
@@ -41,6 +42,7 @@ class Ros:
         self.now_s += duration_s
 
     def _make_publisher(self, topic, *arguments, **options):
+        self.options.append(options)
         name = topic.rpartition("/")[0]
         return SimpleNamespace(
             publish=lambda stopped: self.requests.append((name, stopped)),
@@ -49,6 +51,7 @@ class Ros:
         )
 
     def _make_subscriber(self, topic, kind, receive, **options):
+        self.options.append(options)
         name = topic.rpartition("/")[0]
         self.subscribers[name] = receive
         return SimpleNamespace(
@@ -101,6 +104,10 @@ def test_only_the_driver_itself_is_believed(ros):
     assert ros.drivers.read() is None and ros.drivers.count() == 0
     ros.report(A, (0, Robot.READY))
     assert [robot.namespace for robot in ros.drivers.read().robots] == ["/hero_0"] and ros.drivers.count() == 1
+
+
+def test_only_the_newest_report_and_request_wait_and_are_sent_at_once(ros):
+    assert ros.options == [{"queue_size": 1, "tcp_nodelay": True}] * 2
 
 
 def test_drivers_are_found_and_forgotten_when_they_have_gone(ros):

@@ -198,13 +198,16 @@ def test_a_server_gives_each_goal_its_own_limits_or_those_of_the_server(monkeypa
     for limits, expected in (({}, (0.02, 30.0)), ({"tolerance": 0.05}, (0.05, 30.0)), ({"timeout": 2.0}, (0.02, 2.0))):
         server._receive_action(Handle(**limits))
         assert put[-1][:4] == (Goal(0.3, 0.0), "map", *expected) and put[-1].handle is not None
-    server._receive_goal(PoseStamped())
-    assert put[-1] == (Goal(0.0, 0.0), "", 0.02, 30.0, None)
+    message = PoseStamped()
+    for z, yaw_rad in ((0.0, None), (1.0, math.pi)):
+        message.pose.orientation.z = z
+        server._receive_goal(message)
+        assert put[-1] == (Goal(0.0, 0.0, yaw_rad), "", 0.02, 30.0, None)
     for limits in ({"tolerance": -1.0}, {"timeout": math.nan}):
         handle = Handle(**limits)
         server._receive_action(handle)
         assert handle.ends[0][0] == "set_rejected" and "tolerance and timeout" in handle.ends[0][1].reason
-    assert len(put) == 4 and logged == ["logerr"] * 2
+    assert len(put) == 5 and logged == ["logerr"] * 2
     logged.clear()
     for outcome, end, level in (
         ((True, False, "", 0.004, 2.0), "set_succeeded", "loginfo"),

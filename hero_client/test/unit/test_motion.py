@@ -1,6 +1,7 @@
 """The frame of every motion: its limits in time and space, one by one."""
 
 import math
+import random
 
 import pytest
 
@@ -16,7 +17,7 @@ from hero_client.controllers.motion import (
 )
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import STOP, Pose, Velocity
+from hero_node.geometry import STOP, Pose, Velocity, transform_pose
 
 HERE = Pose(0.0, 0.0, 0.0)
 FREE = [math.inf] * 8
@@ -212,3 +213,18 @@ def test_a_detour_that_comes_nearer_now_and_then_goes_on():
             x_m = nearer_m if index >= 0.9 * PROGRESS_S / STEP_S else 0.0
             controller.step(Pose(x_m, 0.0, 0.1 * (index % 2)), FREE, STEP_S * index)
         assert (controller.state is State.ACTIVE) == goes_on
+
+
+def test_a_motion_is_the_same_wherever_its_frame_begins():
+    rng = random.Random(4)
+    for trial in range(60):
+        origin = Pose(*(rng.uniform(-3.0, 3.0) for _ in range(3)))
+        pose = Pose(*(rng.uniform(-0.5, 0.5) for _ in range(2)), rng.uniform(-3.0, 3.0))
+        goal = Pose(*(rng.uniform(-0.5, 0.5) for _ in range(2)), rng.uniform(-3.0, 3.0))
+        ranges = [rng.choice((math.inf, math.nan, 0.06, 0.12, 0.17)) for _ in range(8)]
+        commands = []
+        for here, there in ((pose, goal), (transform_pose(origin, pose), transform_pose(origin, goal))):
+            place = Goal(there.x_m, there.y_m, there.yaw_rad if trial % 2 else None)
+            controller = GoToGoalController(place, 0.0, avoid=trial % 3 > 0)
+            commands.append(controller.step(here, ranges, 0.0))
+        assert commands[1] == pytest.approx(commands[0], abs=1e-9)

@@ -62,6 +62,13 @@ def test_a_beam_ends_on_the_round_surface_of_a_body_beside_its_axis():
     assert not sense_binary(poses, Binary(range_m=surface_m - 1e-6))[0]
 
 
+def test_a_body_that_touches_the_sensor_is_seen_from_any_side():
+    for left_m, ahead_m in ((BODY_RADIUS_M, 0.0), (-BODY_RADIUS_M, 0.0), (0.0, -BODY_RADIUS_M), (0.0, BODY_RADIUS_M)):
+        for sensor in (Binary(), Binary(range_m=0.0), Binary(half_angle_rad=0.1, range_m=0.0)):
+            poses = np.array([[(0.0, 0.0, 0.0), (BODY_RADIUS_M + ahead_m, left_m, 0.0)]])
+            assert sense_binary(poses, sensor)[0], (left_m, ahead_m, sensor)
+
+
 def test_noise_of_the_bearing_turns_what_is_sensed_and_keeps_its_range():
     sensed = sense_neighbors(pair(0.5, 0.3), Neighbors(bearing_noise_rad=0.1), Fixed(1.0))
     assert sensed.range_m[0, 1] == pytest.approx(0.5)

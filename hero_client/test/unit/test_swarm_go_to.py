@@ -18,6 +18,7 @@ from hero_client.controllers.swarm_go_to import (
     DOCKING_M,
     NUDGE_RAD,
     PATIENCE_S,
+    PROGRESS_M,
     SwarmGoToController,
     _Jam,
 )
@@ -78,7 +79,7 @@ def test_a_jam_is_left_to_the_side_for_two_seconds_and_then_judged_anew():
         [PATIENCE_S, PATIENCE_S + ASIDE_S], abs=0.21
     )
     assert sum(aside[: begins[1]]) * STEP_S == pytest.approx(ASIDE_S, abs=0.11)
-    for nearer_m, is_jam in ((0.009, True), (0.011, False)):
+    for nearer_m, is_jam in ((0.009, True), (PROGRESS_M, True), (0.011, False)):
         jam = _Jam()
         for index in range(60):
             jam.look(1.0 if index < 30 else 1.0 - nearer_m, STEP_S)

@@ -25,7 +25,7 @@ PROGRESS_S = 30.0
 """After so long without coming nearer, a robot that goes around obstacles is in a dead end."""
 
 PROGRESS_M = 0.01
-"""So much nearer counts as nearer."""
+"""Nearer by more than this counts as nearer."""
 
 
 class Goal(NamedTuple):

@@ -37,7 +37,7 @@ ASIDE_S = 2.0
 """For so long, then it tries again."""
 
 PROGRESS_M = 0.01
-"""So much nearer counts as nearer."""
+"""Nearer by more than this counts as nearer."""
 
 
 class SwarmGoToController:
@@ -122,8 +122,10 @@ class SwarmGoToController:
 class _Jam:
     """Whether one robot makes progress towards its goal."""
 
+    angle_rad: float
+    """To the goal, at which it goes aside."""
+
     def __init__(self) -> None:
-        self.angle_rad = 0.0
         self._min_distance_m = math.inf
         self._waited_s = 0.0
 
