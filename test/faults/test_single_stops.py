@@ -41,7 +41,7 @@ def test_a_single_stop_of_a_program_that_dies_or_hangs_then_is_enough(start_driv
         ]
         for part, robot in robots.items():
             wait_for(lambda robot=robot: len(robot.velocities) > REGULAR_COMMANDS, part + " to drive its robot")
-        assert list_moving(robots) == list(PARTS)
+        wait_for(lambda: list_moving(robots) == list(PARTS), "all robots to move")
         for program in programs:
             program.process.stdin.write("\n")
             program.process.stdin.flush()

@@ -11,11 +11,12 @@ import unittest
 
 import rospy
 import rostest
+from nav_msgs.msg import Odometry
 
 from hero_test.command_watch import CommandWatch
 from hero_test.example_program import ExampleProgram
 from hero_test.swarm_watch import SwarmWatch
-from hero_test.waiting import wait_for
+from hero_test.waiting import TIMEOUT_S, wait_for
 
 ROBOTS = range(10)
 SCRIPTS = ["move", "read_sensors", "drive_a_square", "avoid", "keep_distance"]
@@ -28,7 +29,9 @@ class FirstScriptsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.watch, cls.commands = SwarmWatch(ROBOTS), CommandWatch(ROBOTS)
-        cls.watch.wait_until_complete(60.0)
+        cls.watch.wait_until_complete()
+        for robot_id in ROBOTS:  # scripts wait 2 s for their robots, which all join the driver meanwhile
+            rospy.wait_for_message("/hero_%d/odom" % robot_id, Odometry, TIMEOUT_S)
         cls.starts = {robot_id: cls.watch.pose(robot_id) for robot_id in ROBOTS}
         cls.programs = {}
         for robot_id, name in enumerate(SCRIPTS):
