@@ -80,11 +80,16 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
             address if is_address else None, scheduler_file=None if is_address else address, timeout=DASK_TIMEOUT_S
         )
         client.wait_for_workers(1, timeout=DASK_TIMEOUT_S)
-        codes, threads = client.run(check), client.nthreads()
+        threads = client.nthreads()
     except (OSError, ValueError, DaskTimeoutError) as error:
         text = "no Dask cluster with workers at %s (%s): start dask-scheduler and dask-worker"
         raise ExperimentError(text % (address, one_line(error))) from error
     own = check()
+    try:
+        codes = client.run(check)
+    except Exception as error:  # Dask passes on what a worker raises, and for a missing module a plain Exception
+        text = "workers at %s cannot run this (%s): start them in the same folder, in a terminal where `run` works"
+        raise ExperimentError(text % (address, one_line(error))) from error
     for worker, code in sorted(codes.items()):
         if threads[worker] > 1:  # they wait for each other, and would share streams of random numbers
             raise ExperimentError("worker %s has %d threads: start it with --nthreads 1" % (worker, threads[worker]))
@@ -120,6 +125,12 @@ def compute(
         except CancelledError as error:
             text = "the Dask cluster ended: start it again, and then this; what is done is kept"
             raise ExperimentError(text) from error
+        except Exception as error:
+            # Dask's own errors, without importing it for a pool: above all KilledWorker.
+            if not type(error).__module__.startswith("distributed."):
+                raise
+            text = "Dask gave up a batch (out of memory? use a smaller --batch; what is done is kept): %s"
+            raise ExperimentError(text % one_line(error)) from error
         finally:
             for future in running:
                 future.cancel()

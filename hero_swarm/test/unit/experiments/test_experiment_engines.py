@@ -77,6 +77,22 @@ def test_a_cluster_that_ends_meanwhile_is_one_line():
         list(engines.compute(EndedCluster, 1, square, [(1,)]))
 
 
+class KilledWorker(Exception):  # noqa: N818 - as Dask names it
+    __module__ = "distributed.scheduler"
+
+
+class KillingCluster(Executor):
+    def submit(self, function, *arguments):
+        future = Future()
+        future.set_exception(KilledWorker("all those workers died\nwhile running it"))
+        return future
+
+
+def test_a_batch_that_dask_gives_up_is_one_line():
+    with pytest.raises(ExperimentError, match="Dask gave up a batch .*: all those workers died while running it$"):
+        list(engines.compute(KillingCluster, 1, square, [(1,)]))
+
+
 class ArrivalError(Exception):
     pass
 
@@ -95,6 +111,8 @@ class Cluster:
             raise ArrivalError("Only 0/1 workers arrived after 20s")
 
     def run(self, check):
+        if not self.code:
+            raise Exception("ModuleNotFoundError(hero_swarm)")  # as Dask raises it
         return {"tcp://b:2": self.code}
 
     def nthreads(self):
@@ -109,7 +127,7 @@ def test_dask_clusters_that_cannot_be_used_are_refused_with_the_remedy(monkeypat
     monkeypatch.setitem(sys.modules, "distributed", stub)
     with pytest.raises(ExperimentError, match="no Dask scheduler file no.json: start .* --scheduler-file no.json$"):
         engines.open_dask("no.json", lambda: "abc")
-    with pytest.raises(ExperimentError, match="workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and dask-worker$"):
+    with pytest.raises(ExperimentError, match="workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and .*worker$"):
         engines.open_dask("tcp://a:1", lambda: "abc")
     monkeypatch.setattr(Cluster, "threads", 2)
     with pytest.raises(ExperimentError, match="worker tcp://b:2 has 2 threads: start it with --nthreads 1$"):
@@ -118,3 +136,6 @@ def test_dask_clusters_that_cannot_be_used_are_refused_with_the_remedy(monkeypat
     with pytest.raises(ExperimentError, match=r"worker tcp://b:2 runs other code \(abc, here abd\)"):
         engines.open_dask("tcp://a:1", lambda: "abd")
     assert engines.open_dask("tcp://a:1", lambda: "abc") == ("executor", 1)
+    monkeypatch.setattr(Cluster, "code", "")
+    with pytest.raises(ExperimentError, match=r"at tcp://a:1 cannot run this \(ModuleNotFoundError.*: start them"):
+        engines.open_dask("tcp://a:1", lambda: "abc")
