@@ -241,3 +241,41 @@ def test_many_threads_may_offer_at_once_and_nothing_is_lost_uncounted():
         thread.join()
     taken += [name for name, _ in take(queue, 0.0) if name == LED]
     assert len(taken) + queue.dropped == 2000
+
+
+def test_a_motion_may_be_as_old_as_the_limit_and_a_cleared_queue_is_new():
+    queue = make_queue()
+    offer(queue, VELOCITY, FAST, 0.0)
+    assert take(queue, 2.0) == [(VELOCITY, FAST)]
+    queue.discard_motion(10.0)
+    queue.clear()
+    offer(queue, VELOCITY, SLOW, 2.0)
+    assert take(queue, 2.0) == [(VELOCITY, SLOW)]
+    assert queue.due_in_s(True, 2.0) is None
+
+
+def test_the_time_to_come_back_is_that_of_the_topic_which_is_due_first():
+    queue = make_queue()
+    for name, now_s in ((VELOCITY, 0.0), (POSITION, 0.03)):
+        offer(queue, name, FAST, now_s)
+        take(queue, now_s)
+    for name in (VELOCITY, POSITION):
+        offer(queue, name, SLOW, 0.03)
+    assert queue.due_in_s(True, 0.03) == pytest.approx(0.03)
+    assert queue.due_in_s(False, 0.03) == pytest.approx(0.03)
+    assert queue.due_in_s(False, 0.055) == RETRY_S == 0.01
+    assert queue.due_in_s(True, 0.055) == pytest.approx(0.005)
+    queue.offer(LED, bytes(16))
+    assert queue.due_in_s(True, 0.03) == RETRY_S
+
+
+def test_motion_and_a_stop_of_one_time_do_not_wait_for_each_other():
+    for offset_s, taken in ((0.0, [(POSITION, ZERO_TWIST), (VELOCITY, FAST)]), (0.001, [(POSITION, ZERO_TWIST)])):
+        queue = make_queue()
+        offer(queue, POSITION, ZERO_TWIST, 0.0)
+        offer(queue, VELOCITY, FAST, offset_s)
+        assert take(queue, 0.01) == taken
+
+
+def test_one_robots_window_and_the_commands_that_wait_for_it_are_bounded():
+    assert (QUEUE_LENGTH, IN_FLIGHT_MAX) == (50, 2048), "docs/robot_interface.md"

@@ -272,6 +272,50 @@ def test_after_a_pause_of_the_driver_a_command_that_waited_is_forgotten():
     assert [speed for _, speed in robot.list_speeds()] == [0.05]
 
 
+def test_a_tuning_is_over_when_the_robot_has_not_logged_for_a_second():
+    with Clock().is_the_drivers() as clock:
+        commands = CommandedRobot(clock).bridge.commands
+        commands.note_tuning(True)
+        assert commands.tunes(clock.now_s + 0.99) and not commands.tunes(clock.now_s + 1.0)
+        commands.note_tuning(False)
+        assert not commands.tunes(clock.now_s)
+
+
+@pytest.mark.parametrize(("turn_s", "warnings"), [(0.2, 1), (0.984375, 1), (1.0, 0), (1.5, 0)])
+def test_programs_take_turns_if_one_commands_again_within_a_second(turn_s, warnings):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        for node in ("/first", "/second", "/first"):
+            robot.publish_velocity(0.1, node=node)
+            clock.run(turn_s)
+    expected = "hero_1 is commanded by /first and /second at once and obeys the newest command: end one of them"
+    assert robot.lines == [expected] * warnings
+
+
+@pytest.mark.parametrize(
+    ("gone_s", "other", "stops"),
+    [(0.5, None, True), (3.6, None, True), (4.1, None, False), (0.5, VELOCITY, False), (0.5, POSITION, True)],
+)
+def test_a_robot_is_stopped_when_the_program_that_moves_it_ends(gone_s, other, stops):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        commands = robot.bridge.commands
+        commands._loop, stopped = clock, []
+        robot.stop_robot = stopped.append
+        robot.publish_velocity(0.1)
+        clock.run(gone_s)
+        commands._lose_sender(VELOCITY, "/cmd_vel")
+        clock.run(0.3)
+        assert stopped == [], "another topic's publisher"
+        commands._lose_sender(VELOCITY, VELOCITY)
+        if other is not None:
+            robot.publish_velocity(0.1, name=other, node="/other")
+        clock.run(0.24)
+        assert stopped == []
+        clock.run(0.02)
+        assert stopped == ["/hero_1"] * stops
+
+
 def test_motion_counts_until_the_firmware_has_ended_it():
     commanders = Commanders(WheelMotion())
     commanders.note_command(POSITION, "a", "sender", "/other", True, 100.0)
@@ -289,3 +333,98 @@ def test_a_forgiven_pause_never_puts_the_last_command_into_the_future():
     assert not commander.has_fallen_silent(0.4, 1.3) and commander.has_fallen_silent(0.4, 1.5)
     commander.forgive_pause(0.5, 1.6)
     assert commander.commanded_s == 1.0, "once between two commands"
+
+
+def make_commander(intervals_s):
+    """Return a commander of these intervals between its commands, and when its last one came."""
+    commander, now_s = Commander("sender", "/program", VELOCITY), 0.0
+    for interval_s in (8.0, *intervals_s):
+        now_s += interval_s
+        commander.note_command(True, now_s)
+    return commander, now_s
+
+
+def test_six_commands_are_regular_and_eight_intervals_tell_the_period():
+    for intervals_s, period_s in (
+        ([0.25] * 4, None),
+        ([0.25] * 5, 0.25),
+        ([0.5, *[0.25] * 7], 0.5),
+        ([0.5, *[0.25] * 8], 0.25),
+        ([4.0] * 5, 4.0),
+        ([4.25] * 9, None),
+    ):
+        assert make_commander(intervals_s)[0].find_period_s() == period_s, intervals_s
+
+
+def test_silence_counts_from_the_limit_and_from_four_periods_on():
+    for period_s, silence_s, is_silent in (
+        (0.25, 1.0, True),
+        (0.25, 0.96875, False),
+        (0.0625, 0.5, True),
+        (0.0625, 0.46875, False),
+    ):
+        commander, now_s = make_commander([period_s] * 6)
+        assert commander.has_fallen_silent(0.5, now_s + silence_s) == is_silent, (period_s, silence_s)
+    assert not make_commander([0.25] * 4)[0].has_fallen_silent(0.5, 1000.0)
+
+
+def test_what_a_program_does_after_a_silence_tells_its_period_anew():
+    commander, now_s = make_commander([0.125] * 8)
+    commander.note_command(True, now_s + 0.5)
+    assert commander.find_period_s() is None
+    commander, now_s = make_commander([0.125] * 8)
+    commander.note_command(True, now_s + 0.46875)
+    assert commander.find_period_s() == 0.46875
+
+
+def test_a_look_after_more_than_0_2_s_does_not_count_that_time_as_silence():
+    for pause_s, is_forgiven in ((0.2, False), (0.203125, True)):
+        commanders = Commanders(WheelMotion())
+        commander = commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", True, 0.0)
+        commanders.find_silent(STOP_S, 0.0)
+        commanders.find_silent(STOP_S, pause_s)
+        assert commander.commanded_s == is_forgiven * pause_s
+
+
+def test_a_zero_is_missed_unless_two_readings_after_it_show_rest():
+    for readings, still, after_s, is_missed in (
+        (0, 0, 0.5, True),
+        (5, 0, 0.5, True),
+        (5, 1, 0.5, True),
+        (5, 2, 0.5, False),
+        (5, 0, 0.49, False),
+    ):
+        wheels = WheelMotion()
+        wheels.read_ticks(0.0, 0.0)
+        commanders = Commanders(wheels)
+        for moves in (True, False):
+            commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", moves, 0.0)
+        for number in range(readings):
+            wheels.read_ticks(-100.0 * min(number, readings - still - 1), 0.0)
+        assert commanders.is_zero_missed(after_s) == is_missed, (readings, still, after_s)
+        assert not commanders.is_zero_missed(after_s + 1.0) or after_s < 0.5, "said once"
+
+
+def test_a_zero_is_not_missed_without_readings_motion_or_if_motion_follows():
+    for commands, has_readings in (((True, False), False), ((False,), True), ((True, False, True), True)):
+        wheels = WheelMotion()
+        if has_readings:
+            wheels.read_ticks(0.0, 0.0)
+        commanders = Commanders(wheels)
+        for moves in commands:
+            commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", moves, 0.0)
+        assert not commanders.is_zero_missed(9.0)
+
+
+def test_a_rival_keeps_its_robot_for_half_a_second_of_silence():
+    for silence_s, node, has_more in (
+        (0.46875, "/other", False),
+        (0.5, "/other", True),
+        (0.46875, "/program", True),
+    ):
+        commanders = Commanders(WheelMotion())
+        for number in range(8):
+            commanders.note_command(POSITION, "a", "sender", node, True, 0.125 * number)
+        now_s = 0.875 + silence_s
+        stopper = commanders.note_command(VELOCITY, "b", "another", "/program", False, now_s)
+        assert commanders.has_more_to_stop(stopper, now_s) == has_more, (silence_s, node)

@@ -216,6 +216,9 @@ def test_wheels_of_calibrated_robots_are_read_from_their_files(tmp_path):
     wheels = settings.find_geometry("hero_3", "hero")
     assert wheels.wheel_diameter_m == pytest.approx(0.04925) and wheels.wheel_separation_m == 0.0641
     assert wheels.diameter_ratio == pytest.approx(0.0495 / 0.049) and wheels.ticks_per_turn == 288.0
+    (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nwheels_m: [0.01, 0.01, 1.0]\nticks_per_turn: 1\n")
+    wheels = read_config({"calibration_folder": str(tmp_path)}).correction_settings.find_geometry("hero_3", "hero")
+    assert (wheels.wheel_diameter_m, wheels.wheel_separation_m, wheels.ticks_per_turn) == (0.01, 1.0, 1.0)
     (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nmodel: hero_plus\nwheels_m: [0.05, 0.05, 0.0641]\n")
     wheels = read_config({"calibration_folder": str(tmp_path)}).correction_settings
     assert wheels.own_wheels["hero_3"].model == "hero_plus"
@@ -239,6 +242,9 @@ def test_hero_plus_has_its_own_wheels_and_keeps_its_ticks_when_calibrated(tmp_pa
     [
         "[0.049, 0.0495]",
         "[0.049, 0.0495, .nan]",
+        "[0.049, 0.049, 1.001]",
+        "[0.0099, 0.0099, 0.06]",
+        "[0.049, 0.049, 0.06]\nticks_per_turn: 0.9",
         "[49, 49.5, 63]",
         "no",
         "{",

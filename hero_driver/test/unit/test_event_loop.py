@@ -1,5 +1,7 @@
 """A real loop with real connections: what it reads, and how it ends."""
 
+import contextlib
+import errno
 import os
 import socket
 import struct
@@ -7,7 +9,7 @@ import threading
 
 import pytest
 
-from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
+from hero_driver.transport import EventLoop, LinkHandler, NoAnswerError, TransportSettings, event_loop
 
 DEADLINE_S = 60.0
 
@@ -130,3 +132,229 @@ def test_connections_notice_a_peer_that_vanished_and_delay_nothing():
             }
             assert {option: near.getsockopt(socket.IPPROTO_TCP, option) for option in tcp} == tcp
             assert near.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1 and not near.getblocking()
+
+
+class Notes(Handler):
+    """Notes also what the loop says of bugs and of the network."""
+
+    def __init__(self):
+        super().__init__()
+        self.bugs, self.warnings, self.resumed = [], [], []
+        self.refusal = None
+
+    def open_link(self, link):
+        if isinstance(self.refusal, Exception):
+            raise self.refusal
+        return self.refusal
+
+    def resume(self, now_s):
+        self.resumed.append(now_s)
+
+    def report_bug(self, error):
+        self.bugs.append(error)
+
+    def warn_network(self, text):
+        self.warnings.append(text)
+
+
+@pytest.fixture(name="still_loop")
+def make_still_loop():
+    """Give a loop that a test turns by hand, and its handler."""
+    loop, handler = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0)), Notes()
+    loop.open(handler)
+    loop._thread_id = threading.get_ident()
+    yield loop, handler
+    loop._close_all()
+
+
+class Stub:
+    """A reader, or a socket, of which a test says what it does."""
+
+    def __init__(self, **methods):
+        self.__dict__.update(methods)
+
+
+def connect(loop):
+    """Return both ends of a connection that the loop has taken; its own is None if it was closed."""
+    far = socket.create_connection(loop.listening)
+    before = set(loop._links)
+    loop._run_once()
+    return next((link for number, link in loop._links.items() if number not in before), None), far
+
+
+@pytest.mark.parametrize(("file_limit", "last"), [(100, 74), (256, 191), (260, 195), (1024, 959)])
+def test_the_last_files_are_kept_for_others_than_robots(still_loop, file_limit, last):
+    loop, handler = still_loop
+    taken, closed, later = [], [], []
+    loop._file_limit, listener = file_limit, loop._listener
+    loop._add_link = lambda sock, address, on_close: taken.append((sock.fileno(), str(address)))
+    loop.call_later = lambda delay_s, call: later.append((delay_s, call))
+    for number in (last, last + 1):
+        sock = Stub(fileno=lambda number=number: number, close=lambda: closed.append("refused"))
+        loop._listener = Stub(
+            accept=lambda sock=sock: (sock, ("10.0.0.1", 5, 0, 0)), fileno=listener.fileno
+        )
+        loop._accept()
+    assert taken == [(last, "10.0.0.1:5")] and closed == ["refused"]
+    assert handler.warnings == [
+        "cannot take more connections (Too many open files); raise the limit of open files (ulimit -n) and start again;"
+        " connected robots are not affected"
+    ]
+    ((delay_s, resume),) = later
+    assert delay_s == 0.5 and listener.fileno() not in loop._serves
+    resume()
+    assert listener.fileno() in loop._serves
+    loop._listener = listener
+
+
+@pytest.mark.parametrize(
+    ("error", "warnings"), [(errno.EMFILE, 1), (errno.ENFILE, 1), (errno.ENETDOWN, 1), (errno.EAGAIN, 0)]
+)
+def test_an_accept_that_fails_is_said_with_a_remedy_if_there_is_one(still_loop, error, warnings):
+    loop, handler = still_loop
+    listener = loop._listener
+
+    def accept():
+        raise OSError(error, os.strerror(error))
+
+    loop._listener = Stub(accept=accept, fileno=listener.fileno)
+    loop._accept()
+    assert len(handler.warnings) == warnings
+    assert all(("ulimit" in text) == (error != errno.ENETDOWN) for text in handler.warnings)
+    loop._listener = listener
+
+
+def test_calls_and_timers_run_in_order_and_one_that_fails_harms_no_other(still_loop, monkeypatch):
+    loop, handler = still_loop
+    now_s, ran = [1000.0], []
+    monkeypatch.setattr(event_loop.time, "monotonic", lambda: now_s[0])
+    loop._timers.clear()
+    loop.call_later(0.2, lambda: ran.append("later"))
+    loop.call_later(0.1, lambda: ran.append("first"))
+    loop.call_later(0.1, lambda: ran.append("second"))
+    loop.call_later(0.1, lambda: ran.append(1 / 0))
+    loop._turned_s = now_s[0] + 0.2
+    for after_s, expected in ((0.099, []), (0.1001, ["first", "second"]), (0.2001, ["first", "second", "later"])):
+        now_s[0] = 1000.0 + after_s
+        loop.call_soon(lambda: ran.append("soon"))
+        loop._run_once()
+        assert [name for name in ran if name != "soon"] == expected
+    assert ran.count("soon") == 3 and [type(error) for error in handler.bugs] == [ZeroDivisionError]
+
+
+@pytest.mark.parametrize(("pause_s", "is_pause"), [(0.9, False), (1.1, True)])
+def test_a_pause_of_more_than_a_second_is_told_to_all_who_read(still_loop, monkeypatch, pause_s, is_pause):
+    loop, handler = still_loop
+    now_s, told = [1000.0], []
+    monkeypatch.setattr(event_loop.time, "monotonic", lambda: now_s[0])
+    monkeypatch.setattr(event_loop.time, "clock_gettime", lambda clock: now_s[0])
+    loop._readers.add(Stub(resume=lambda: told.append("reader"), close=lambda: None))
+    loop._look_for_pause()
+    assert not handler.resumed and not loop.has_resumed_within(1e9), "the first look"
+    now_s[0] += pause_s
+    loop._look_for_pause()
+    assert (handler.resumed, told) == (([now_s[0]], ["reader"]) if is_pause else ([], []))
+    now_s[0] += 0.5
+    assert loop.has_resumed_within(0.6) == is_pause and not loop.has_resumed_within(0.5)
+
+
+def test_a_connection_that_is_refused_or_meets_a_bug_is_closed(still_loop):
+    loop, handler = still_loop
+    for refusal, reason in (("no room", "no room"), (KeyError("ours"), "a bug of the driver")):
+        handler.refusal = refusal
+        link, far = connect(loop)
+        assert link is None and handler.endings.pop() == reason
+        assert far.recv(1) == b""
+        far.close()
+    assert len(handler.bugs) == 1
+
+
+def test_a_bug_with_the_data_of_one_robot_closes_its_connection_only(still_loop):
+    loop, handler = still_loop
+    (bad, bad_far), (good, good_far) = connect(loop), connect(loop)
+    handler.receive_data = lambda link, data, now_s: {good: handler.reads}[link].append(data)
+    for far in (bad_far, good_far):
+        far.sendall(b"data")
+    loop._run_once()
+    assert handler.endings == ["a bug of the driver"] and handler.reads == [b"data"]
+    assert bad.closed and not good.closed and len(handler.bugs) == 1
+    for far in (bad_far, good_far):
+        far.close()
+
+
+def test_a_socket_that_breaks_before_it_is_served_is_given_back(still_loop):
+    loop, handler = still_loop
+    near, far = socket.socketpair()
+    far.close()
+    given_back = []
+    loop._add_link(near, "10.0.0.7:11411", lambda: given_back.append(near.fileno()))
+    assert given_back == [-1] and not loop._links
+    assert handler.warnings[0].startswith("connection of 10.0.0.7:11411 broke at once: ")
+
+
+def test_what_did_not_fit_is_sent_when_the_peer_reads(still_loop):
+    loop, _ = still_loop
+    link, far = connect(loop)
+    link._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
+    sent = 0
+    while not link.is_full:
+        link.send_packet(bytes(1000))
+        sent += 1000
+    received = 0
+    far.setblocking(False)
+    while received < sent:
+        with contextlib.suppress(BlockingIOError):
+            received += len(far.recv(1 << 20))
+        loop._timers.clear()
+        loop.call_later(0.0, lambda: None)
+        loop._run_once()
+    assert received == sent and not link.is_full
+    far.close()
+
+
+def test_a_reader_is_read_until_it_ends_or_fails(still_loop):
+    loop, handler = still_loop
+    for answers, bugs in (([True, False], 0), ([True, None], 1)):
+        near, far = socket.socketpair()
+        far.sendall(b"data")
+        closed = threading.Event()
+
+        def read(answers=answers):
+            answer = answers.pop(0)
+            return {}[answer] if answer is None else answer
+
+        reader = Stub(fileno=near.fileno, read=read, resume=lambda: None, close=closed.set)
+        loop._watch_reader(reader)
+        for is_closed in (False, True):
+            loop._run_once()
+            assert closed.is_set() == is_closed == (reader not in loop._readers)
+        assert len(handler.bugs) == bugs
+        near.close()
+        far.close()
+
+
+def test_the_loop_waits_for_its_next_timer_and_not_at_all_for_calls(still_loop, monkeypatch):
+    loop, _ = still_loop
+    now_s, timeouts, epoll = 1000.0, [], loop._epoll
+    monkeypatch.setattr(event_loop.time, "monotonic", lambda: now_s)
+    monkeypatch.setattr(loop, "_epoll", Stub(poll=lambda timeout_s: timeouts.append(timeout_s) or ()))
+    loop._turned_s = now_s
+    loop._timers.clear()
+    loop._run_once()
+    loop.call_later(0.25, lambda: None)
+    loop.call_later(0.5, lambda: None)
+    loop._run_once()
+    loop.call_soon(lambda: None)
+    loop._run_once()
+    loop._turned_s = now_s + 1.0
+    loop._run_once()
+    assert timeouts == [None, 0.25, 0.0, 0.0]
+    loop._epoll = epoll
+
+
+def test_a_loop_that_does_not_run_answers_nobody():
+    loop = EventLoop(TransportSettings("", 0, (), 1.0))
+    with pytest.raises(NoAnswerError, match="the driver did not answer within 0.0 s"):
+        loop.ask(lambda answer: answer("late"), 0.0)
+    assert loop._calls.waiting
+    loop._close_all()

@@ -44,10 +44,11 @@ class Driver:
 
     def __init__(self, monkeypatch, **parameters):
         self.now_s, self.later, self.soon, self.lines, self.changes = 100.0, [], [], [], 0
+        self.keys = []  # of throttled lines
         for module in (gateway_module, stop_delivery):
             monkeypatch.setattr(module.time, "monotonic", lambda: self.now_s)
         log = SimpleNamespace(
-            log_throttled=lambda level, key, text, *others, **more: self.lines.append((level, text)),
+            log_throttled=self.log_throttled,
             log=lambda level, text: self.lines.append((level, text)),
         )
         loop = SimpleNamespace(
@@ -65,6 +66,10 @@ class Driver:
 
     def note_change(self):
         self.changes += 1
+
+    def log_throttled(self, level, key, text, *others, **more):
+        self.lines.append((level, text))
+        self.keys.append(key)
 
     def connect(self, host=HOST, port=50000):
         link = Link(self.gateway, host, port)
@@ -296,3 +301,65 @@ def test_a_bug_is_reported_with_its_place_and_costs_one_connection(driver):
     assert level == "fatal" and "please report it: KeyError: 'ours'" in text and "test_gateway_rules" in text
     driver.gateway.warn_network("too many open files")
     assert driver.lines[-1] == ("warn", "too many open files")
+
+
+def test_lines_that_differ_in_cause_address_or_robot_are_throttled_apart(driver):
+    def list_keys(*acts):
+        driver.keys.clear()
+        for act in acts:
+            act()
+        return driver.keys
+
+    gateway = driver.gateway
+    for acts in (
+        [lambda error=error: gateway.report_bug(error) for error in (KeyError("a"), ValueError("a"))],
+        [lambda text=text: gateway.warn_network(text) for text in ("too many files", "a robot broke")],
+        [lambda host=host: driver.connect(host).close("late") for host in (HOST, OTHER_HOST)],
+        [lambda reason=reason: driver.connect().close(reason) for reason in ("closed by it", "silent for 6 s")],
+        [lambda number=number: driver.join(number=number, port=number) for number in (1, 2)],
+        [lambda number=number: gateway.bridges["/hero_%d" % number] and close(driver, number) for number in (1, 2)],
+        [lambda number=number: warn_twice(driver, number) for number in (3, 4)],
+    ):
+        keys = list_keys(*acts)
+        assert len(set(keys)) == len(keys) >= 2, keys
+        assert all(len(key) < 150 for key in keys)
+
+
+def close(driver, number):
+    driver.gateway.find_peer("/hero_%d" % number).link.close("closed by the robot")
+
+
+def warn_twice(driver, number):
+    peer = driver.gateway.peers[driver.join(number=number, port=number)]
+    for text in ("one thing", "another thing"):
+        driver.gateway.warn_robot(peer, text + "." * 500)
+
+
+def test_the_fleet_is_looked_at_every_0_1_s_and_commanders_every_0_05_s(driver):
+    driver.gateway.open()
+    looks = {"_poll_fleet": [], "_poll_commanders": []}
+    for _ in range(30):
+        for due_s, call in driver.later:
+            looks[call.__name__] += [due_s] * (due_s not in looks[call.__name__])
+        driver.run(0.05)
+    for name, period_s in (("_poll_fleet", 0.1), ("_poll_commanders", 0.05)):
+        times_s = looks[name]
+        assert len(times_s) > 5
+        assert [after - before for before, after in zip(times_s, times_s[1:])] == pytest.approx(
+            [period_s] * (len(times_s) - 1)
+        )
+
+
+def test_the_end_waits_two_seconds_for_wheels_that_turn(driver):
+    driver.join(declarations=STOCK_DECLARATIONS)
+    answers = []
+    driver.gateway.stop_and_wait(answers.append)
+    (peer,) = driver.gateway.peers.values()
+    for after_s, expected in ((1.95, []), (0.1, [None])):
+        end_s = driver.now_s + after_s
+        while driver.now_s < end_s:
+            peer.wheels.read_ticks(1000.0 * driver.now_s, 0.0)
+            driver.run(0.025)
+        assert answers == expected
+    (line,) = [text for level, text in driver.lines if level == "error" and "the driver ends" in text]
+    assert line.endswith("hero_0 (its wheels turn)")

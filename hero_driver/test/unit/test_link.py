@@ -50,6 +50,9 @@ class Owner:
     def call_soon(self, call):
         self.calls.append(call)
 
+    def close_link(self, link, reason):
+        self.reason = reason
+
 
 class NarrowSocket:
     """Takes a few bytes of each write, or none."""
@@ -74,7 +77,7 @@ def test_what_is_unsent_is_counted_by_what_the_socket_took():
     link = Link(Owner(), sock, Address("127.0.0.1", 1))
     packet = bytes(range(200))
     link.send_packet(packet)
-    assert link._unsent_length == 190
+    assert (link._unsent_length, link.handed_length) == (190, 200)
     for left in (190, 170, 140, 140):
         link.flush()
         assert link._unsent_length == left
@@ -113,3 +116,40 @@ def test_a_link_that_is_discarded_frees_its_socket_and_what_waits(pair):
         assert link.closed and not link.is_full
         assert near.fileno() == -1
     assert far.recv(1) == b"", "the robot does not see the end"
+
+
+def test_what_waits_is_unacknowledged_until_the_end(pair):
+    _, far = pair
+    link = Link(Owner(), far, Address("127.0.0.1", 1))
+    assert link.read_unacknowledged_length() == 0, "answers have acknowledged it"
+    for kept, length in ((b"12345", 5), (b"1234567", 12)):
+        link._keep(kept)
+        assert link.read_unacknowledged_length() == length
+    link.discard()
+    assert link.read_unacknowledged_length() == 0
+    link.send_packet(b"late")
+    assert link.handed_length == 0 and not link.is_full
+
+
+@pytest.mark.parametrize("packets", [[65536], [65535, 1], [1, 65535]])
+def test_64_kib_may_wait_for_a_peer_and_not_a_byte_more(packets):
+    owner = Owner()
+    link = Link(owner, NarrowSocket(), Address("127.0.0.1", 1))
+    for length in packets:
+        link.send_packet(bytes(length))
+    assert owner.calls == [] and link.is_full
+    link.send_packet(b"1")
+    (close,) = owner.calls
+    close()
+    assert owner.reason == "it does not read: 65536 bytes wait for it"
+    assert link._unsent_length == 65536
+
+
+def test_a_socket_that_breaks_when_it_is_written_is_closed_with_the_reason():
+    owner, sock = Owner(), NarrowSocket()
+    sock.send = lambda data: (_ for _ in ()).throw(BrokenPipeError(32, "Broken pipe"))
+    link = Link(owner, sock, Address("127.0.0.1", 1))
+    link.send_packet(b"packet")
+    (close,) = owner.calls
+    close()
+    assert owner.reason == "write failed: Broken pipe" and not link.is_full

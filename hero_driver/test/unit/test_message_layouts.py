@@ -329,3 +329,16 @@ def test_numbers_of_messages_begin_anew_after_the_largest():
         rewritten = make_writer().rewrite(payload, seq, NOW_NS, None)
         for written in (message_layouts.restamp(payload, seq, NOW_NS), rewritten):
             assert struct.unpack_from("<I", written) == (expected,)
+
+
+def test_the_speed_of_odometry_is_of_all_three_axes_each():
+    twist = slice(-48 - 288, -288)
+    for index in range(6):
+        components = [0.0] * 6
+        components[index] = -0.5
+        payload = bytearray(build_odometry(NOW_NS))
+        payload[twist] = struct.pack("<6d", *components)
+        expected = (0.5, 0.0) if index < 3 else (0.0, 0.5)
+        assert message_layouts.read_odometry_velocity(bytes(payload)) == expected
+    assert message_layouts.read_odometry_velocity(bytes(payload[-680:])) == (0.0, 0.5)
+    assert message_layouts.read_odometry_velocity(bytes(payload[-679:])) is None

@@ -265,6 +265,15 @@ def test_where_the_master_cannot_be_asked_all_that_is_latched_is_old(bench):
     assert bench.old == [b"first"]
 
 
+def test_a_message_that_came_through_rospy_has_its_sender_too():
+    loop = SimpleNamespace(has_resumed_within=lambda duration_s: False)
+    senders = []
+    subscriber = RawSubscriber(lambda payload: senders.append((payload, subscriber.last_sender)), loop)
+    connection = SimpleNamespace(is_latched=False)
+    subscriber.take(connection, b"first")
+    assert senders == [(b"first", connection)] and not subscriber.is_old
+
+
 def test_what_a_publisher_sent_while_the_driver_did_not_run_is_old(bench):
     publisher, _, _ = bench.publish_adopted()
     pauses, goes_on = threading.Event(), threading.Event()

@@ -149,3 +149,13 @@ def test_an_odometry_message_cut_short_is_refused_when_its_reading_comes():
     robot.receive("/hero_0/encoder", build_encoder(NOW_NS, 1.0, 1.0), NOW_NS)
     assert list_payloads(robot.outputs, "/hero_0/odom") == []
     assert robot.corrections.refused == 1
+
+
+@pytest.mark.parametrize(("apart_ms", "belong"), [(10, True), (-10, True), (11, False), (-11, False)])
+def test_odometry_and_a_reading_up_to_10_ms_apart_are_of_one_burst(apart_ms, belong):
+    for encoder_ms, next_ms, waits in ((apart_ms, 34, belong), (0, apart_ms, not belong)):
+        robot = CorrectedRobot()
+        robot.receive("/hero_0/odom", build_odometry(NOW_NS), NOW_NS)
+        robot.receive("/hero_0/encoder", build_encoder(NOW_NS + encoder_ms * MS, 0.0, 0.0), NOW_NS)
+        robot.receive("/hero_0/odom", build_odometry(NOW_NS + next_ms * MS), NOW_NS + 34 * MS)
+        assert len(list_payloads(robot.outputs, "/hero_0/odom")) == 2 - waits

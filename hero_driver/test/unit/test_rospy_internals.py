@@ -26,7 +26,7 @@ def make_rosout_publisher(monkeypatch):
     logger, publisher = logging.getLogger("rosout"), Publisher()
     handlers, logger.handlers = logger.handlers, [rosout.RosOutHandler()]
     monkeypatch.setattr(rosout, "_rosout_pub", publisher)
-    monkeypatch.setattr(rospy_internals.rospy.Time, "now", staticmethod(rospy_internals.rospy.Time))
+    monkeypatch.setattr(rospy_internals.rospy.Time, "now", staticmethod(lambda: rospy_internals.rospy.Time(7)))
     yield publisher
     logger.handlers = handlers
 
@@ -36,6 +36,9 @@ def test_a_log_line_holds_no_names_of_topics_and_is_published_once(rosout_publis
     logging.getLogger("rosout").error("a line about %s", "hero_3")
     [line] = rosout_publisher.lines
     assert (line.msg, line.level, line.topics) == ("a line about hero_3", line.ERROR, [])
+    assert line.header.stamp.secs == 7
+    logging.getLogger("rosout").error("another line")
+    assert [line.msg for line in rosout_publisher.lines] == ["a line about hero_3", "another line"]
 
 
 def test_only_rospys_own_handler_of_log_lines_is_replaced(rosout_publisher):

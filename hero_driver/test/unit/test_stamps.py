@@ -124,3 +124,12 @@ def test_any_stamp_and_any_clock_give_a_stamp(stamps_ns, arrivals_ns):
     stamps = make_filter()
     for stamp_ns, arrival_ns in zip(stamps_ns, arrivals_ns):
         assert stamps.correct(TOPIC, stamp_ns, arrival_ns) >= 0
+
+
+@pytest.mark.parametrize(("ahead_ns", "follows_arrival"), [(51 * MS, False), (51 * MS + 1, True)])
+def test_ros_time_went_back_where_no_stamp_that_passed_is_so_far_ahead(ahead_ns, follows_arrival):
+    stamps = make_filter()
+    stamps.correct(TOPIC, NOW_NS, NOW_NS)
+    arrival_ns = NOW_NS - ahead_ns
+    assert stamps.correct(TOPIC, arrival_ns, arrival_ns) == (arrival_ns if follows_arrival else NOW_NS + 1000)
+    assert stamps.corrected == (not follows_arrival)

@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 from hero_driver.commands.stop_progress import StopState
 from hero_driver.corrections.message_layouts import MD5SUMS
 from hero_driver.rosserial.errors import RosserialError
-from hero_driver.stop_delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, encode_stop, is_light
+from hero_driver.stop_delivery import (
+    BURST_LIGHTS,
+    LIGHT_MD5,
+    LIGHT_TYPE,
+    describe_doubt,
+    encode_stop,
+    is_light,
+)
 
 phases = st.floats(0.0, 0.051)
 networks = st.floats(0.0, 0.05)
@@ -280,3 +287,47 @@ def test_a_robot_that_only_motor_commands_reach_is_stopped_by_them():
     assert stop_by((1, motor), (9, twist), light) == stop_by((1, motor), light) == b"1,"
     assert stop_by((1, motor), light, with_burst=True) == b"4," * BURST_LIGHTS + b"1,"
     assert stop_by((1, "nav_msgs/Odometry"), light) == b""
+
+
+def test_a_robot_that_was_released_is_stopped_again_as_the_first_time():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, has_readings=True)
+        for _ in range(2):
+            robot.publish_velocity(0.1)
+            clock.run(1.0)
+            stop(robot)
+            clock.run(CONFIRMED_S)
+            assert robot.peer.stop.state is StopState.AT_REST and not robot.motors.is_turning
+            robot.stopped = False
+            clock.run(1.0)
+            assert robot.peer.stop is None and not robot.stops._peers
+
+
+def test_why_a_robot_may_still_move_is_said_in_words():
+    for is_closed, state, text in (
+        (True, StopState.MOVING, "its connection ended"),
+        (False, StopState.MOVING, "its wheels turn"),
+        (False, StopState.UNCONFIRMED, "it sends no readings of its wheels"),
+        (False, StopState.STOPPING, "it does not answer"),
+        (False, None, "it does not answer"),
+    ):
+        progress = None if state is None else SimpleNamespace(state=state)
+        peer = SimpleNamespace(link=SimpleNamespace(closed=is_closed), stop=progress)
+        assert describe_doubt(peer) == text
+
+
+def test_a_stop_without_a_loop_reads_and_advances_until_all_rest():
+    with Clock().is_the_drivers() as clock:
+        clock.sleep = clock.run
+        robot = CommandedRobot(clock, has_readings=True)
+        robot.publish_velocity(0.1)
+        clock.run(1.0)
+        robot.stopped, began_s, reads = True, clock.now_s, []
+        assert robot.stops.stop_without_loop([robot.peer], began_s + 2.0, reads.append) == []
+        assert clock.now_s - began_s < CONFIRMED_S and not robot.motors.is_turning
+        assert set(map(id, reads)) == {id(robot.peer)}
+        robot.motors.is_pushed = True
+        began_s = clock.now_s
+        robot.peer.stop = None
+        assert robot.stops.stop_without_loop([robot.peer], began_s + 2.0, reads.append) == [robot.peer]
+        assert 2.0 <= clock.now_s - began_s < 2.03

@@ -11,7 +11,7 @@ from hero_driver.commands.stop_progress import (
     StopProgress,
     StopState,
 )
-from hero_driver.corrections.wheel_motion import WheelMotion
+from hero_driver.corrections.wheel_motion import REST_READINGS, WheelMotion
 
 READING_S = 0.034
 READ_CYCLE_S = 0.051
@@ -210,3 +210,154 @@ def test_a_stop_that_is_requested_again_is_sent_as_often_as_the_first():
     assert renewed_s[0] < began_s + 2 * STEP_S
     assert all(later - earlier < 1.0 for earlier, later in zip(renewed_s, renewed_s[1:]))
     assert renewed_s[-1] > began_s + 1.0
+
+
+def make_progress(readings=100):
+    """Return the stop, begun at 0.0, of wheels that have given so many readings of motion."""
+    wheels = WheelMotion()
+    turn(wheels, readings)
+    return StopProgress(0.0, wheels), wheels
+
+
+def turn(wheels, readings):
+    for _ in range(readings):
+        wheels.read_ticks(wheels._left_ticks + 50.0, 0.0)
+
+
+def rest(wheels, readings):
+    for _ in range(readings):
+        wheels.read_ticks(wheels._left_ticks, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("elapsed_s", "was_burst", "interval_s"),
+    [
+        (0.0, False, 0.025),
+        (0.49, True, 0.15),
+        (0.5, False, 0.25),
+        (0.5, True, 0.25),
+        (4.99, False, 0.25),
+        (5.0, False, 1.0),
+        (5.0, True, 1.0),
+    ],
+)
+def test_the_longer_wheels_turn_the_rarer_are_the_stops(elapsed_s, was_burst, interval_s):
+    stop, wheels = make_progress()
+    stop.note_sent(was_burst, elapsed_s)
+    turn(wheels, 1)
+    assert not stop.is_due(True, elapsed_s + 0.99 * interval_s)
+    assert stop.is_due(True, elapsed_s + interval_s)
+    assert not stop.is_due(False, elapsed_s + interval_s), "what is not acknowledged is not followed by more"
+
+
+@pytest.mark.parametrize(
+    ("readings", "after_s", "state"),
+    [
+        (28, 9.0, StopState.STOPPING),
+        (29, 9.0, StopState.MOVING),
+        (40, 28 * READING_S, StopState.STOPPING),
+        (29, 29 * READING_S, StopState.MOVING),
+    ],
+)
+def test_wheels_move_on_after_29_readings_and_the_time_that_these_take(readings, after_s, state):
+    stop, wheels = make_progress()
+    stop.note_sent(False, 0.0)
+    stop.is_due(True, 0.0)
+    turn(wheels, readings)
+    stop.is_due(True, after_s)
+    assert stop.state is state
+
+
+@pytest.mark.parametrize(
+    ("readings", "after_s", "needs_burst"),
+    [(23, 9.0, False), (24, 23 * READING_S, False), (24, 24 * READING_S, True)],
+)
+def test_a_burst_is_needed_after_24_readings_and_their_time(readings, after_s, needs_burst):
+    stop, wheels = make_progress()
+    stop.note_sent(True, 0.0)
+    assert not stop.needs_burst(False, 9.0), "none is acknowledged yet"
+    stop.is_due(True, 0.0)
+    turn(wheels, readings)
+    assert stop.needs_burst(False, after_s) == needs_burst
+    assert stop.needs_burst(True, 0.0), "where it is known that the robot tunes itself"
+    stop.note_sent(True, 10.0)
+    turn(wheels, readings)
+    assert not stop.needs_burst(False, 20.0), "each one has its time"
+
+
+@pytest.mark.parametrize(
+    ("script", "is_at_rest"),
+    [
+        ([4, 5], True),
+        ([3, 5], False),
+        ([4, 4], False),
+        ([3, 4, 1, 1], False),
+        ([3, 4, 1, 5], True),
+        ([4, 4, 1, 1], True),
+    ],
+)
+def test_five_readings_of_rest_after_the_fourth_stop_confirm_it(script, is_at_rest):
+    stop, wheels = make_progress()
+    for stops, readings in zip(script[::2], script[1::2]):
+        for _ in range(stops):
+            stop.note_sent(False, 0.0)
+        rest(wheels, readings)
+    stop.is_due(True, 0.1)
+    assert (stop.state is StopState.AT_REST) == is_at_rest
+    assert stop.is_due(True, 60.0) != is_at_rest
+
+
+def test_wheels_that_turned_though_at_rest_rest_again_after_29_readings():
+    stop, wheels = make_progress()
+    for _ in range(4):
+        stop.note_sent(False, 0.0)
+    rest(wheels, REST_READINGS)
+    stop.is_due(True, 0.0)
+    assert stop.state is StopState.AT_REST
+    turn(wheels, 2)
+    assert stop.is_due(True, 50.0), "at once"
+    assert stop.state is StopState.MOVING
+    stop.note_sent(False, 50.0)
+    assert stop.is_due(True, 50.03), "and as often as the first time"
+    for readings, state in ((28, StopState.MOVING), (1, StopState.AT_REST)):
+        rest(wheels, readings)
+        stop.is_due(True, 50.1)
+        assert stop.state is state
+    turn(wheels, 2)
+    stop.is_due(True, 60.0)
+    rest(wheels, 29)
+    stop.is_due(True, 60.1)
+    assert stop.state is StopState.AT_REST
+
+
+@pytest.mark.parametrize(("readings", "after_s"), [(0, 1.0), (20, 2.0)])
+def test_a_stop_without_a_new_reading_is_unconfirmed_if_it_is_acknowledged(readings, after_s):
+    for is_acknowledged in (True, False):
+        stop, _ = make_progress(readings)
+        stop.note_sent(False, 0.0)
+        stop.is_due(is_acknowledged, 0.99 * after_s)
+        assert stop.state is StopState.STOPPING
+        stop.is_due(is_acknowledged, after_s)
+        assert stop.state is (StopState.UNCONFIRMED if is_acknowledged else StopState.STOPPING)
+        assert stop.is_due(True, 5.0) and not stop.is_due(True, 5.01)
+
+
+def test_a_robot_without_readings_gets_six_stops():
+    stop, _ = make_progress(0)
+    assert stop.is_due(False, 0.0), "the first one at once"
+    for number in range(6):
+        assert stop.is_due(True, number * 0.03)
+        stop.note_sent(False, number * 0.03)
+    assert not stop.is_due(True, 0.3)
+
+
+def test_a_stop_that_is_requested_again_waits_for_the_burst_before_it():
+    stop, wheels = make_progress()
+    stop.note_sent(True, 0.0)
+    stop.renew(0.125)
+    assert not stop.is_due(True, 0.149) and stop.is_due(True, 0.15)
+    stop.note_sent(False, 6.0)
+    stop.renew(6.01)
+    assert stop.is_due(True, 6.01)
+    stop.note_sent(False, 6.01)
+    assert stop.is_due(True, 6.04), "its time begins anew"

@@ -320,3 +320,64 @@ def test_after_any_pause_no_more_than_the_longest_gap_is_believed(pause_s):
     odometry.integrate(left + jump, right + jump, START_S + pause_s)
     assert (odometry.x_m, odometry.y_m, odometry.yaw_rad) == before
     assert odometry.resets == 1
+
+
+METERS = WheelGeometry(wheel_diameter_m=1.0 / math.pi, wheel_separation_m=1.0, ticks_per_turn=1.0)
+"""One tick is one meter."""
+
+
+@pytest.mark.parametrize(("elapsed_s", "limit_m"), [(-5.0, 0.2), (0.125, 0.2), (0.5, 0.5), (10.0, 10.0), (16.0, 10.0)])
+def test_a_step_is_believed_up_to_the_distance_of_the_fastest_wheel(elapsed_s, limit_m):
+    beyond_m = 1.001 * limit_m
+    for left_m, right_m, is_believed in (
+        (limit_m, limit_m, True),
+        (-limit_m, -limit_m, True),
+        (limit_m, -limit_m, True),
+        (-limit_m, limit_m, True),
+        (beyond_m, limit_m, False),
+        (-beyond_m, 0.0, False),
+        (limit_m, beyond_m, False),
+        (0.0, -beyond_m, False),
+    ):
+        odometry = make_odometry(METERS)
+        assert not odometry.integrate(0.0, 0.0, START_S)
+        assert odometry.integrate(left_m, right_m, START_S + elapsed_s) == is_believed
+        assert odometry.resets == (not is_believed)
+
+
+@pytest.mark.parametrize(
+    ("elapsed_s", "is_known"), [(0.5, True), (1.0, True), (1.25, False), (0.0, False), (-0.5, False)]
+)
+def test_two_readings_tell_a_velocity_up_to_a_second_apart(elapsed_s, is_known):
+    odometry = make_odometry(METERS)
+    odometry.integrate(0.0, 0.0, START_S - 0.5)
+    odometry.integrate(0.0, 0.0, START_S)
+    odometry.integrate(0.0, 0.1, START_S + elapsed_s)
+    velocity = (0.05 / (elapsed_s + 0.5), 0.1 / (elapsed_s + 0.5)) if is_known else (0.0, 0.0)
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == pytest.approx(velocity)
+
+
+def test_counters_within_five_ticks_of_zero_look_like_a_reboot():
+    for before, after, looks_reset in (
+        ((21.0, 0.0), (5.0, -5.0), True),
+        ((0.0, -21.0), (-5.0, 5.0), True),
+        ((20.0, -20.0), (0.0, 0.0), False),
+        ((21.0, 21.0), (6.0, 0.0), False),
+        ((21.0, 21.0), (0.0, -6.0), False),
+    ):
+        odometry = make_odometry()
+        assert not odometry.looks_reset(0.0, 0.0)
+        odometry.integrate(*before, START_S)
+        assert odometry.looks_reset(*after) == looks_reset, (before, after)
+
+
+def test_six_equal_readings_end_the_velocity_and_a_set_pose_at_once():
+    odometry = make_odometry()
+    ticks = drive(odometry, 0.1, 0.2, 20)
+    for number in range(5):
+        assert odometry.linear_m_s > 0.0 and odometry.angular_rad_s > 0.0
+        odometry.integrate(*ticks, START_S + (21 + number) * PERIOD_S)
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
+    drive(odometry, 0.1, 0.2, 2, ticks, START_S + 27 * PERIOD_S)
+    odometry.set_pose(Pose(0.0, 0.0, 0.0))
+    assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)

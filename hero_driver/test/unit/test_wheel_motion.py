@@ -52,7 +52,7 @@ def test_settled_wheels_may_move_by_two_ticks_and_not_by_three():
         assert wheels.still_readings == 0, "once they turn, two are a turn again"
 
 
-@pytest.mark.parametrize(("later_ticks", "go_on"), [(12, True), (6, True), (4, False)])
+@pytest.mark.parametrize(("later_ticks", "go_on"), [(12, True), (5, True), (4.9, False)])
 def test_wheels_go_on_if_they_did_not_slow_down_by_half(later_ticks, go_on):
     wheels, left_ticks = WheelMotion(), 0.0
     wheels.read_ticks(left_ticks, 0.0)
@@ -73,13 +73,15 @@ def test_counters_that_are_set_to_zero_are_no_turn():
     assert wheels.still_readings == REST_READINGS
 
 
-@pytest.mark.parametrize("velocity", [(0.01, 0.0), (0.0, 0.2), (math.nan, 0.0)])
+@pytest.mark.parametrize("velocity", [(0.0021, 0.0), (-0.0021, 0.0), (0.0, 0.051), (0.0, -0.051), (math.nan, 0.0)])
 def test_a_velocity_of_odometry_that_is_not_zero_is_a_turn(velocity):
     wheels = WheelMotion()
-    wheels.read_velocity(0.0, 0.0)
-    assert wheels.still_readings == 1
+    for noise in ((0.0, 0.0), (0.002, -0.05), (-0.002, 0.05)):
+        wheels.read_velocity(*noise)
+    assert wheels.still_readings == 3
+    assert wheels.go_on, "noise is no motion that slows down"
     wheels.read_velocity(*velocity)
-    assert (wheels.readings, wheels.still_readings) == (2, 0)
+    assert (wheels.readings, wheels.still_readings) == (4, 0)
 
 
 def test_wheels_go_on_by_odometry_whether_they_drive_or_turn():
@@ -100,3 +102,34 @@ def test_counters_that_are_not_numbers_are_no_turn_of_a_wheel(broken):
     assert wheels.readings == 0
     read_all(wheels, [(5.0, 7.0), (5.0, broken), (5.0, 7.0)])
     assert (wheels.readings, wheels.still_readings) == (2, 1)
+
+
+def test_either_wheel_may_tremble_by_one_tick_either_way_and_not_more():
+    for left_ticks, right_ticks, is_still in (
+        (1.0, -1.0, True),
+        (-1.0, 1.0, True),
+        (1.1, 0.0, False),
+        (-1.1, 0.0, False),
+        (0.0, 1.1, False),
+        (0.0, -1.1, False),
+    ):
+        wheels = WheelMotion()
+        read_all(wheels, [(0.0, 0.0), (left_ticks, right_ticks)])
+        assert wheels.still_readings == is_still, (left_ticks, right_ticks)
+
+
+def test_wheels_that_rest_for_five_readings_do_not_go_on():
+    wheels = WheelMotion()
+    read_all(wheels, [(-100.0 * step, 100.0 * step) for step in range(25)])
+    for still in range(1, 7):
+        wheels.read_ticks(-2400.0, 2400.0)
+        assert wheels.go_on == (still < 5)
+
+
+def test_readings_without_a_turn_count_to_how_wheels_slow_down():
+    wheels, left_ticks = WheelMotion(), 0.0
+    wheels.read_ticks(left_ticks, 0.0)
+    for step_ticks in [10.0] * 12 + [0.0, 0.0, 10.0, 0.0, 10.0, 0.0, 10.0, 0.0, 10.0, 0.0, 10.0, 0.0]:
+        left_ticks += step_ticks
+        wheels.read_ticks(left_ticks, 0.0)
+    assert wheels.still_readings == 1 and not wheels.go_on

@@ -86,6 +86,14 @@ def test_a_zero_topic_handshake_is_asked_again_after_200_ms():
     assert request_times_s == pytest.approx([T0 + 0.26])
 
 
+def test_only_the_time_request_of_a_boot_is_followed_after_200_ms():
+    session = open_session(silence_timeout_s=60.0)
+    request_times_s, _ = poll_until(session, T0 + 0.05, T0 + 1.55)
+    receive(session, TIME_REQUEST, T0 + 1.6)
+    again_s, _ = poll_until(session, T0 + 1.6, T0 + 2.4, 0.01)
+    assert request_times_s + again_s == pytest.approx([T0 + 1.5, T0 + 2.0])
+
+
 def test_undeclared_data_is_answered_by_at_most_two_requests_a_second():
     session = open_session()
     request_times_s = []

@@ -268,3 +268,10 @@ def test_arbitrary_declarations_are_taken_or_refused_in_one_line(
         assert session.topics == {}
     else:
         assert event.topic == session.topics[topic_id]
+
+
+def test_a_name_and_a_type_may_have_128_characters():
+    session = open_session()
+    name, message_type = "/hero_0/" + "x" * 120, "geometry_msgs/" + "T" * 114
+    (event,) = receive(session, build_declaration(1, 120, name, message_type, TWIST_MD5))
+    assert isinstance(event, TopicDeclared) and len(name) == len(message_type) == 128
