@@ -129,13 +129,15 @@ def run_pytest(paths, *plugins, options=()):
 def find_reached_lines(package, paths, state):
     """Return what each test executes, and the modules of others that the tests import."""
     state_hash = hash_files([*paths, *sorted((ROOT / package / "test" / "unit").rglob("*.py"))])
-    kept = state / "reached.json"
+    kept, log = state / "reached.json", state / "tests.log"
     if kept.is_file():
         reached = json.loads(kept.read_text(encoding="utf-8"))
         if reached["hash"] == state_hash:
             return reached
 
     def measure():
+        with open(log, "wb") as file:
+            os.dup2(file.fileno(), 1)
         plugin = ReachedLines(map(str, paths))
         code = run_pytest([ROOT / package / "test" / "unit"], plugin)
         imported = [
@@ -144,12 +146,14 @@ def find_reached_lines(package, paths, state):
             if getattr(module, "__file__", None) and not str(Path(module.__file__).resolve()).startswith(str(ROOT))
         ]
         reached = {"hash": state_hash, "tests": plugin.tests, "imported": imported}
-        kept.write_text(json.dumps(reached), encoding="utf-8")
+        sys.stdout.flush()
+        if code == 0:
+            kept.write_text(json.dumps(reached), encoding="utf-8")
         return code
 
     _, status = os.waitpid(fork(measure), 0)
     if status:
-        sys.exit(f"mutants: the unit tests of {package} fail as they are: script/test {package}")
+        sys.exit(f"mutants: the unit tests of {package} fail as they are: {log}")
     return json.loads(kept.read_text(encoding="utf-8"))
 
 
@@ -163,11 +167,15 @@ def list_mutants(paths, reached):
             for line in lines:
                 tests_by_line.setdefault((path, line), set()).add(test)
     texts = {path: path.read_text(encoding="utf-8") for path in paths}
+    files = {test: test.partition("::")[0] for test in durations}
+    test_texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in set(files.values())}
     pure = set(sources.list_pure_modules())
     mutants = []
     for path, text in texts.items():
         users = [other for other, its_text in texts.items() if other == path or path.stem in its_text]
         importing = set().union(*(tests_by_path.get(str(user), ()) for user in users))
+        # A test that only compares constants executes no line of the module.
+        importing.update(test for test, file in files.items() if path.stem in test_texts[file])
         keys = {}
         for index, mutation in enumerate(list_mutations(ast.parse(text))):
             lines = range(mutation.first_line, mutation.last_line + 1)

@@ -128,6 +128,12 @@ class FakeLink:
     def read_infrared_counts(self):
         return [5.0] * 8
 
+    def read_distance(self):
+        return 0.7
+
+    def read_neighbors(self):
+        return ["neighbor"]
+
     def find_localized(self, frame, timeout_s):
         if isinstance(self.localized, Exception):
             raise self.localized

@@ -63,6 +63,7 @@ class Ros:
             raise NodeError("no ROS master")
         if call == "getPublishedTopics":
             others = [["/lab/driver/robots", "std_msgs/String"], ["/lab/driver/robot_list", RobotArray._type]]
+            others.append(["/hero_0/robots", RobotArray._type])  # declared by a robot
             return [[name + "/robots", RobotArray._type] for name in self.known] + others
         return [
             [[name + "/robots", [name]] for name in self.known],

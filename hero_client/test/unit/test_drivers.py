@@ -96,6 +96,6 @@ def test_usual_numbers_stay_what_they_are():
 
 def test_the_states_of_tables_are_those_of_the_messages():
     names = ("JOINING", "READY", "AWAY", "REFUSED")
-    assert [STATES[getattr(Robot, name)] for name in names] == list(names)
+    assert {getattr(Robot, name): name for name in names} == STATES
     names = ("NOT_STOPPED", "STOPPING", "AT_REST", "MOVING", "UNCONFIRMED")
     assert [getattr(Robot, name) for name in names] == list(STOP_STATES)

@@ -6,6 +6,7 @@ import pytest
 from linkless_robot import make_robot
 
 from hero_client.robots.light import MIN_BLINK_PERIOD_S, REPEAT_PERIOD_S
+from hero_client.values.colors import COLORS, parse_color
 
 RED, GREEN, OFF = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)
 
@@ -50,3 +51,15 @@ def test_a_light_blinks_until_the_next_color_or_the_end():
     for ask in (robot.blink, robot.led):
         with pytest.raises(ValueError, match="no color 'rad'"):
             ask("rad")
+
+
+def test_colors_are_the_mixtures_that_their_names_say():
+    mixed = {}
+    for name, parts in zip(COLORS, ("", "r", "g", "b", "rg", "rb", "gb", "rgb")):
+        mixed[name] = tuple(float(part in parts) for part in "rgb")
+    assert {**mixed, "orange": (1.0, 0.4, 0.0)} == COLORS
+    assert list(mixed) == ["off", "red", "green", "blue", "yellow", "magenta", "cyan", "white"]
+    assert parse_color([0, 1, 0.5]) == (0.0, 1.0, 0.5)
+    for wrong in ((0.0, -0.01, 0.0), (0.0, 0.0, 1.01), (math.nan, 0.0, 0.0), (1.0, 1.0), (1.0,) * 4, "rgb", 3, None):
+        with pytest.raises(ValueError, match="color"):
+            parse_color(wrong)

@@ -143,8 +143,12 @@ def test_wheels_that_a_pause_of_the_program_stopped_have_their_time_anew():
 
 def test_a_frozen_pose_is_told_from_blocked_wheels():
     frozen, held = Steady(0.1, 0.0), Steady(0.1, 0.0)
-    ended_s = step_until_end(frozen, lambda now_s: HERE, 9.0, odometry=lambda now_s: Pose(0.01 * now_s, 0.0, 0.0))
-    assert ended_s < FROZEN_S + 0.2
+
+    def freeze_after_a_second(now_s):
+        return Pose(0.1 * min(now_s, 1.0), 0.0, 0.0)
+
+    ended_s = step_until_end(frozen, freeze_after_a_second, 9.0, odometry=lambda now_s: Pose(0.1 * now_s, 0.0, 0.0))
+    assert ended_s == pytest.approx(1.0 + FROZEN_S, abs=0.2)
     assert "its wheels turn, but its pose stays the same" in frozen.reason
     assert step_until_end(held, lambda now_s: HERE, 9.0, odometry=lambda now_s: HERE) < STALL_S + 0.2
     assert "its wheels do not turn" in held.reason

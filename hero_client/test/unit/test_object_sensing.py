@@ -28,15 +28,19 @@ def test_a_beam_tells_what_it_touches_first():
     assert len({NOTHING, OBJECT, ROBOT}) == 3
     assert sense([(0, 0, 0)], []) == [NOTHING]
     assert sense([(0, 0, 0)], [(1, 0.049, 0)]) == [OBJECT]
-    assert sense([(0, 0, 0)], [(1, 0.051, 0), (-1, 0, 0)]) == [NOTHING]
+    assert sense([(0, 0, 0)], [(1, 0.051, 0), (1, -0.051, 0), (-1, 0, 0)]) == [NOTHING]
     assert sense([(0, 0, 0), (2, 0, 0)], [(1, 0, 0)]) == [OBJECT, NOTHING]
-    assert sense([(0, 0, 0), (0.5, 0, 0)], [(1, 0, 0)])[0] == ROBOT
+    for objects in ([(1, 0, 0)], []):
+        assert sense([(0, 0, 0), (0.5, 0, 0)], objects)[0] == ROBOT
 
 
 def test_a_beam_ends_at_its_range_from_the_rim():
     gap_m = 1.0 - BODY_RADIUS_M - 0.05
     assert sense([(0, 0, 0)], [(1, 0, 0)], Sight(gap_m + 0.001)) == [OBJECT]
     assert sense([(0, 0, 0)], [(1, 0, 0)], Sight(gap_m - 0.001)) == [NOTHING]
+    gap_m = 0.5 - 2.0 * BODY_RADIUS_M
+    assert sense([(0, 0, 0), (0.5, 0, 0)], [(1, 0, 0)], Sight(gap_m + 0.001))[0] == ROBOT
+    assert sense([(0, 0, 0), (0.5, 0, 0)], [(1, 0, 0)], Sight(gap_m - 0.001))[0] == NOTHING
 
 
 def test_robots_without_a_pose_see_nothing_and_are_not_seen():

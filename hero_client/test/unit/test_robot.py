@@ -63,6 +63,15 @@ def test_topics_that_few_read_are_subscribed_to_and_waited_for():
     assert link.subscribed == ["laser"] and link.waited == [("laser", 5.0, 1)]
     link.silent_s["laser"] = 0.2
     assert robot.infrared_counts == [5.0] * 8 and len(link.waited) == 1
+    for topic in ("distance", "neighbors"):
+        with pytest.raises(StaleDataError, match=topic):
+            getattr(robot, topic)
+        link.silent_s[topic] = 0.2
+        assert link.subscribed[-1] == topic
+    assert robot.distance == 0.7 and robot.neighbors == ["neighbor"]
+    link.silent_s["neighbors"] = 1.1
+    with pytest.raises(StaleDataError, match="came 1.1 s ago: does `rosrun hero_swarm neighbors` run"):
+        assert robot.neighbors
     link.silent_s["laser"] = 1.1
     with pytest.raises(StaleDataError, match="the last message on /hero_3/laser came 1.1 s ago"):
         assert robot.infrared_counts

@@ -44,12 +44,13 @@ def make_time(monkeypatch):
 
 def test_messages_age_and_the_next_ones_are_counted(monkeypatch, time):
     subscribed = []
-    monkeypatch.setattr(
-        robot_topics.rospy,
-        "Subscriber",
-        lambda name, *arguments, **options: subscribed.append(name)
-        or SimpleNamespace(unregister=lambda: subscribed.append("left")),
-    )
+
+    def subscribe(name, *arguments, queue_size, tcp_nodelay, callback_args):
+        assert (queue_size, tcp_nodelay, callback_args) == (1, True, "odom"), "only the newest counts, and at once"
+        subscribed.append(name)
+        return SimpleNamespace(unregister=lambda: subscribed.append("left"))
+
+    monkeypatch.setattr(robot_topics.rospy, "Subscriber", subscribe)
     messages = NewestMessages("/hero_0")
     for _ in range(2):
         messages.subscribe("odom", object)

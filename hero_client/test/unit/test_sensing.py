@@ -54,6 +54,13 @@ def test_range_counts_from_the_front_rim_to_the_surface():
     assert not sense_binary(pair(0.4 + 2.0 * BODY_RADIUS_M + 1e-6, 0.0), sensor)[0]
 
 
+def test_a_cone_ends_at_its_range_too():
+    far_m = 0.4 + 2.0 * BODY_RADIUS_M
+    for off_m, is_seen in ((-1e-6, True), (1e-6, False)):
+        cone = Binary(half_angle_rad=0.3, range_m=0.4)
+        assert sense_binary(pair(far_m + off_m, 0.0), cone)[0] == is_seen
+
+
 def test_a_beam_ends_on_the_round_surface_of_a_body_beside_its_axis():
     left_m = 0.8 * BODY_RADIUS_M
     poses = np.array([[(0.0, 0.0, 0.0), (1.0, left_m, 0.0)]])
@@ -129,6 +136,12 @@ def test_a_sensor_without_settings_has_no_noise_and_sees_through_bodies():
     assert nothing.average(np.ones((3, 3))).tolist() == [0.0] * 3
     worlds = np.concatenate((line, line))
     assert sense_neighbors(worlds, Neighbors()).rows.tolist() == [[0, 1, 2]] * 3 + [[3, 4, 5]] * 3
+
+
+def test_what_a_sensor_does_not_have_draws_no_random_numbers():
+    poses = pair(0.5, 0.0)
+    assert sense_binary(poses, Binary(), object())[0]
+    assert sense_neighbors(poses, Neighbors(), object()).counts.tolist() == [1, 1]
 
 
 def test_a_body_between_two_robots_hides_them_from_each_other():

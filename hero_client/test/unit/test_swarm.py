@@ -185,6 +185,10 @@ def test_of_many_robots_that_are_not_ready_some_are_named():
     assert swarm.now_s == pytest.approx(101.5)
     steps = wait_for_all(swarm.robots, 0.03)
     assert [next(steps), steps.send(True)] == [0.02, 0.02], "polls, of which the last one comes after the time"
+    started_s = swarm.now_s
+    with pytest.raises(RobotNotReadyError, match="after 10 s"):
+        swarm.wait_until_ready()
+    assert swarm.now_s - started_s == pytest.approx(10.0)
     for link in swarm.links:
         link.ready_s = 0.0
     assert swarm.wait_until_ready() is swarm

@@ -14,8 +14,10 @@ from hero_client.apps.joystick_teleop import DRAIN_S, SILENCE_S, JoystickMapping
 from hero_client.apps.keyboard_teleop import PERIOD_S, KeyboardTeleop
 from hero_client.apps.robot_choice import ChoiceButtons, RobotChoice
 from hero_client.apps.teleop_output import PAUSE_S, TeleopOutput
+from hero_client.controllers.formation_drive import FormationDrive
 from hero_client.ros.stop_status import StopStatus
 from hero_node.errors import ProgramError
+from hero_node.geometry import Pose, Velocity
 
 MAPPING = JoystickMapping(0.1, 2.0, 1, 0, 4, 1)
 
@@ -310,3 +312,30 @@ def test_a_program_with_a_keyboard_ends_and_reads_as_it_should(shown, monkeypatc
     assert (0.1, 0.0) in run([["w"], ["w"], []])
     assert run([["\x04", "w"], ["w"]]) == [] and shown[-1] == "checked"
     assert run([[], ["w"], [], []], {1: 2.0 * PAUSE_S}) == [], "typed while it stood still"
+    assert (0.0, 1.0) in run([[], ["w"], [], ["a"], []], {1: 2.0 * PAUSE_S}), "typed after it"
+
+
+def test_a_formation_is_one_body_until_a_press_or_another_choice(shown):
+    swarm = make_swarm(0, 1, 2)
+    swarm.links[1].pose = Pose(0.1, 0.0, 1.0)
+    teleop = JoystickTeleop(swarm, MAPPING, frame="world")
+    poses = [robot.pose_in("world") for robot in swarm]
+
+    def use(*pressed):
+        push(teleop, 4, *pressed)
+        teleop.step(swarm.now_s)
+        return [velocities(link) for link in swarm.links]
+
+    alone, stop = (0.1, 0.0), (0.0, 0.0)
+    body = [tuple(each) for each in FormationDrive(poses).step(poses, Velocity(*alone), 0.1)]
+    assert use() == [[alone]] * 3
+    assert use(0) == [[stop, each] for each in body] and alone not in body
+    assert [link.colors[-1][1] for link in swarm.links] == [(0.0, 1.0, 1.0)] * 3
+    use(0)
+    swarm.links[2].silent_s["odom"] = 2.0
+    assert use() == [[stop]] * 3, "a pose is not known"
+    swarm.links[2].silent_s["odom"] = 0.1
+    assert use(0) == [[stop, alone]] * 3 and swarm.links[0].colors[-1][1] == (0.0, 0.0, 0.0)
+    use()
+    assert use(0) == [[stop, each] for each in body], "a body of its own each time"
+    assert use(5) == [[stop, alone], [stop], [stop]] and use(0) == [[alone], [], []], "one robot is no formation"
