@@ -4,7 +4,7 @@ Publishes only; called by the simulator's thread after a physics step, so nothin
 Frame of everything: `world`, the arena's own.
 """
 
-from typing import List
+from typing import List, Optional
 
 import rospy
 from geometry_msgs.msg import Point, TransformStamped
@@ -13,7 +13,6 @@ from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from hero_msgs.msg import ObjectPose, ObjectPoses
 from hero_node.geometry import Pose
 
 from .robot.firmware import Firmware
@@ -37,7 +36,7 @@ class GroundTruth:
         self._clock = rospy.Publisher("/clock", Clock, queue_size=10) if with_clock else None
         self._markers = rospy.Publisher("~markers", MarkerArray, queue_size=2)
         self._arena = rospy.Publisher("~arena", MarkerArray, queue_size=1, latch=True)
-        self._objects = rospy.Publisher("~objects", ObjectPoses, queue_size=2)
+        self._objects: Optional[rospy.Publisher] = None
         self._object_markers = rospy.Publisher("~object_markers", MarkerArray, queue_size=1, latch=True)
         self._drawn: List[List[float]] = []
         self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True) if with_tf else None
@@ -91,6 +90,10 @@ class GroundTruth:
         poses = self._swarm.world.object_poses[0].tolist()
         if not poses:
             return
+        from hero_msgs.msg import ObjectPose, ObjectPoses  # takes 20 ms, and few arenas have objects
+
+        if self._objects is None:
+            self._objects = rospy.Publisher("~objects", ObjectPoses, queue_size=2)
         message = ObjectPoses(objects=[ObjectPose("object_%d" % index, *pose) for index, pose in enumerate(poses)])
         message.header.stamp, message.header.frame_id = stamp, FRAME
         self._objects.publish(message)

@@ -16,7 +16,6 @@ import rosgraph
 import rosgraph.network
 import rospy
 
-from hero_msgs.msg import RobotArray
 from hero_node.command_line import call
 from hero_node.errors import NodeError
 from hero_node.ros.master import find_running_node
@@ -97,7 +96,7 @@ def wait_for_driver(name: str) -> bool:
     rospy.loginfo("waiting for the driver %s", name)
     while not rospy.is_shutdown():
         with suppress(rospy.ROSException):
-            rospy.wait_for_message(name + "/robots", RobotArray, DRIVER_WAIT_S)
+            rospy.wait_for_message(name + "/robots", rospy.AnyMsg, DRIVER_WAIT_S)
             return True
     return False
 
