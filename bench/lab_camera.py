@@ -14,8 +14,6 @@ import numpy as np
 from hero_localization.prints.boards import Board, draw_board
 from hero_localization.prints.tag_images import draw_tag
 
-__all__ = ["LENS_A", "LENS_B", "LabCamera", "LabLens", "LabTag"]
-
 SAMPLES = 4
 MOMENTS = 5
 MAX_RADIUS, RADIUS_STEP = 1.6, 1e-4

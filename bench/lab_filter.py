@@ -13,8 +13,6 @@ from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilte
 from hero_node.geometry import Pose, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
 
-__all__ = ["measure_ages", "measure_uncertainty"]
-
 AGES_S = (0.0, 0.008, 0.02, 0.05, 0.1, 0.15, 0.2)
 AGE_ROBOTS, AGE_S = 6, 12.0
 COVER_ROBOTS, SEEN_S, COVERED_S = 20, 1.0, 10.0

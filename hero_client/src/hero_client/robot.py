@@ -25,8 +25,6 @@ from .robots.robot_base import COMMAND_S, BaseRobot
 from .ros.ros_link import RosLink
 from .values.errors import StaleDataError
 
-__all__ = ["Robot"]
-
 
 class Robot(BaseRobot):
     """One robot by the number in its name: Robot(3) is /hero_3.

@@ -18,8 +18,6 @@ from .ros.stop_status import StopStatus
 from .values.background_motion import Sleep
 from .values.errors import RobotNotReadyError
 
-__all__ = ["Swarm", "open_swarm"]
-
 POLL_PERIOD_S = 0.02
 """Between two looks whether robots have joined."""
 

@@ -1,7 +1,5 @@
 """Errors of a camera, its detector and its calibration."""
 
-__all__ = ["CalibrationError", "DetectorError", "FrameSourceError", "LocalizationError", "SettingsError"]
-
 
 class LocalizationError(Exception):
     """One line: the thing, its value, the remedy."""

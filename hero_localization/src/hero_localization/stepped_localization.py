@@ -19,8 +19,6 @@ from .filter.pose_filter import Estimate, Measurement, PoseFilter, make_covarian
 from .filter.swarm_localizer import PUBLISH_RATE_HZ
 from .mapping.swarm_map import SwarmMap
 
-__all__ = ["CameraModel", "StepLocalization"]
-
 
 class CameraModel(NamedTuple):
     """Errors and timing of a simulated camera; it takes an image with each reading of odometry, 29 in a second."""

@@ -28,8 +28,6 @@ from .serving.access import Access
 from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits, TokenAttempts
 from .serving.server import ignore_request
 
-__all__ = ["LiveView"]
-
 WAITING_MAX = 20_000
 """Messages between two turns of the server; the oldest are dropped."""
 

@@ -3,8 +3,6 @@
 from abc import ABC, abstractmethod
 from typing import Iterator
 
-__all__ = ["Clock"]
-
 
 class Clock(ABC):
     """A time in seconds, and waits. Program, Robot and Swarm are clocks: a loop needs no other time."""

@@ -16,20 +16,6 @@ from typing import IO, Callable, NoReturn, Optional, Sequence, Type
 
 from .texts import make_printable
 
-__all__ = [
-    "FAILED",
-    "INTERRUPTED",
-    "OUTPUT_ERRORS",
-    "PIPE_CLOSED",
-    "WRONG_ARGUMENTS",
-    "call",
-    "check_node_arguments",
-    "find_line",
-    "print_error",
-    "run",
-    "say",
-]
-
 FAILED = 1
 INTERRUPTED = 128 + signal.SIGINT
 PIPE_CLOSED = 128 + signal.SIGPIPE

@@ -1,7 +1,5 @@
 """Errors of nodes and programs. The text is one line: what, why, and what to do. Pure."""
 
-__all__ = ["HeroError", "NodeError", "ProgramError"]
-
 
 class HeroError(Exception):
     """The base of all errors. A program that does not catch it prints its text and ends with 1."""

@@ -3,8 +3,6 @@
 import resource
 import sys
 
-__all__ = ["raise_file_limit"]
-
 
 def raise_file_limit() -> int:
     """Raise the limit of open files to what needs no privileges; return it."""

@@ -3,20 +3,6 @@
 import math
 from typing import Any, NamedTuple
 
-__all__ = [
-    "STOP",
-    "Pose",
-    "Velocity",
-    "clamp",
-    "find_frame",
-    "invert_pose",
-    "measure_distance",
-    "pose_of",
-    "transform_pose",
-    "wrap_angle",
-    "yaw_of",
-]
-
 
 class Pose(NamedTuple):
     """A position and a heading in the plane; the frame is that of its source."""

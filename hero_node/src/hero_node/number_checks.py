@@ -5,8 +5,6 @@ import sys
 from numbers import Real
 from typing import Any
 
-__all__ = ["check_finite", "check_speed", "is_finite", "is_number", "is_whole_number"]
-
 LARGEST = sys.float_info.max
 """Larger ints cannot become floats."""
 

@@ -7,8 +7,6 @@ import yaml
 
 from .parameters import Parameter
 
-__all__ = ["make_list", "write_default"]
-
 LINE_LENGTH = 120
 
 

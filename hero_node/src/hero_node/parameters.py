@@ -11,22 +11,6 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Seq
 from .errors import ProgramError
 from .number_checks import is_number
 
-__all__ = [
-    "Parameter",
-    "check_number",
-    "check_parameters",
-    "choice",
-    "flag",
-    "make_error",
-    "number",
-    "parse_poses",
-    "parse_robot_ids",
-    "robot_ids",
-    "robot_ids_option",
-    "whole_number",
-    "words",
-]
-
 ALL_ROBOTS = "all"
 
 MAX_ROBOTS_IN_RANGE = 1000

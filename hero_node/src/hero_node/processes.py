@@ -4,8 +4,6 @@ import signal
 import subprocess
 from contextlib import suppress
 
-__all__ = ["end_process"]
-
 TERM_TIMEOUT_S = 2.0
 
 

@@ -12,8 +12,6 @@ import time
 from contextlib import contextmanager, suppress
 from typing import IO, Iterator
 
-__all__ = ["lock_file", "replace_file", "write_file"]
-
 LOCK_TIMEOUT_S = 10.0
 """Writers hold a lock for milliseconds; one that is suspended meanwhile must not block the others for ever."""
 

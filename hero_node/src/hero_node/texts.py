@@ -3,8 +3,6 @@
 import reprlib
 from typing import Any, Sequence
 
-__all__ = ["NAMES_SHOWN", "list_names", "make_printable", "one_line", "shorten"]
-
 NAMES_SHOWN = 10
 
 _SHORT = reprlib.Repr()

@@ -2,8 +2,6 @@
 
 from typing import Dict
 
-__all__ = ["BUCKETS_MAX", "TokenBucket", "TokenBuckets"]
-
 BUCKETS_MAX = 1000
 """Names whose buckets are remembered."""
 

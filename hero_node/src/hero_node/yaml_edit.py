@@ -6,8 +6,6 @@ import yaml
 
 from .yaml_text import YamlError, parse_yaml
 
-__all__ = ["dump_yaml", "replace_values"]
-
 
 class _Edit(NamedTuple):
     """Replacement of the characters from start to end by text."""

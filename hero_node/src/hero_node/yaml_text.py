@@ -9,8 +9,6 @@ import yaml
 from .errors import ProgramError
 from .texts import one_line
 
-__all__ = ["MAX_CHARACTERS", "YamlError", "parse_yaml", "read_calibrations", "read_text"]
-
 T = TypeVar("T")
 
 MAX_CHARACTERS = 500_000

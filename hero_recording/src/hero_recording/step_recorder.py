@@ -15,8 +15,6 @@ from hero_sim.stepped.topics import LATCHED, StepTopics
 from .errors import RecordingError, explain_write_errors
 from .optional import import_optional
 
-__all__ = ["StepRecorder"]
-
 
 class StepRecorder:
     """A bag that is open until close()."""

@@ -20,8 +20,6 @@ from .world.body import Body
 from .world.robot_errors import SERVO_CENTER_US, RobotErrors
 from .world.shared_readings import SharedReadings
 
-__all__ = ["build_simulator", "build_swarm"]
-
 BOOT_SPREAD_MS = 200
 """Robots that are started together come up within this time of each other."""
 

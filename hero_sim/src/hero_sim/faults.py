@@ -12,8 +12,6 @@ from .robot_constants import MAX_ID
 if TYPE_CHECKING:
     from .simulator import Simulator
 
-__all__ = ["KINDS", "MAX_DURATION_S", "Fault", "FaultInjector", "parse_fault"]
-
 MAX_DURATION_S = 1e9
 """Some thirty years."""
 

@@ -20,8 +20,6 @@ from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robot
 from .scene_markers import make_markers, rotate_about_z
 from .simulator import Simulator
 
-__all__ = ["GroundTruth"]
-
 POSE_PERIOD_MS = 50
 MARKER_PERIOD_MS = 100
 """Simulated time between two publications."""

@@ -26,8 +26,6 @@ from .stepped.robot import StepRobot
 from .stepped.step_clock import StepMotion
 from .stepped.swarm import StepSwarm, StepWorld
 
-__all__ = ["main"]
-
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run a script with its arguments; return its exit status."""

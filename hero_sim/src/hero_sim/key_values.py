@@ -4,8 +4,6 @@ from typing import Dict, Mapping, Tuple
 
 from .errors import OptionError
 
-__all__ = ["parse_values"]
-
 
 def parse_values(name: str, text: str, limits: Mapping[str, Tuple[float, float]]) -> Dict[str, float]:
     """Return the values in text; limits are the least and the most of each key.

@@ -15,8 +15,6 @@ from .robot.servo_pins import CORE_2
 from .simulator import Simulator
 from .world.robot_errors import describe_errors
 
-__all__ = ["build_parser", "check_options", "main", "parse_options", "simulate"]
-
 DEFAULT_PORT = 11411
 """The port that stock robots connect to."""
 

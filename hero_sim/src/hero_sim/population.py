@@ -20,11 +20,6 @@ from .world.arena_file import load_arena
 from .world.robot_errors import RobotErrors, draw_errors, read_known, set_known
 from .world.world import World
 
-__all__ = [
-    "SERVO_TIMINGS", "Rngs", "build_errors", "build_radios", "build_world", "check_population", "draw_servo_timing",
-    "place_worlds",
-]  # fmt: skip
-
 MAX_ROBOTS = 1000
 
 _DRAWN = "drawn"

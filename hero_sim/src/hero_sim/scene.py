@@ -9,8 +9,6 @@ from .robot_constants import BODY_RADIUS_M
 from .world.arena import Arena
 from .world.pushing.shapes import Body, Disc
 
-__all__ = ["FRAME", "START_S", "Shape", "draw_arena", "draw_objects", "draw_robot"]
-
 FRAME = "world"
 
 START_S = 1600000000

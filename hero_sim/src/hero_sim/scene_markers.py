@@ -9,8 +9,6 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from .scene import FRAME, Shape
 
-__all__ = ["make_markers", "rotate_about_z"]
-
 
 def rotate_about_z(angle_rad: float) -> Quaternion:
     """Return the rotation by an angle about z."""

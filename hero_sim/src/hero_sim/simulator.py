@@ -12,8 +12,6 @@ from .robot_constants import RECEIVE_WINDOW_LENGTH
 from .swarm import Swarm
 from .world.world import STEP_MS
 
-__all__ = ["Simulator"]
-
 _MAX_WAIT_S = 0.05
 """Limits the delay of a stop by a signal or another thread."""
 

@@ -12,8 +12,6 @@ import numpy as np
 from .robot.firmware import Firmware
 from .world.world import STEP_MS, World
 
-__all__ = ["Swarm"]
-
 
 class Swarm:
     """All robots, in the order of their places in the world.

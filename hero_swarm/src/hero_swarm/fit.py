@@ -12,8 +12,6 @@ from hero_sim.world.arena_file import load_arena
 from .experiments.errors import ExperimentError
 from .fitting.robot_fit import describe_fit, fit_robot
 
-__all__ = ["main"]
-
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""

@@ -8,8 +8,6 @@ from hero_node.errors import HeroError
 
 from .experiments.runner import open_folder, parse_options, run_experiment
 
-__all__ = ["main"]
-
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""

@@ -14,8 +14,6 @@ import numpy as np
 from hero_client.controllers.half_planes import nearest_allowed_all
 from hero_client.values.robot_constants import BODY_RADIUS_M
 
-__all__ = ["MODES", "OFF", "ROBOTS", "SafetyFilter"]
-
 OFF, FENCE, ROBOTS = "off", "fence", "fence and robots"
 MODES = (OFF, FENCE, ROBOTS)
 

@@ -20,8 +20,6 @@ from .experiments.errors import ExperimentError
 from .experiments.experiment_file import Cell, Experiment
 from .experiments.runner import read_experiment
 
-__all__ = ["main", "show_run"]
-
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""

@@ -4,8 +4,6 @@ from typing import Any, Tuple
 
 import numpy as np
 
-__all__ = ["steer"]
-
 
 def steer(
     forward_m_s: Any, left_m_s: Any, max_linear_m_s: float, lookahead_m: float = 0.06, max_angular_rad_s: float = 2.5

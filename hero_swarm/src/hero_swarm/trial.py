@@ -21,8 +21,6 @@ from hero_sim.world.arena import Arena, MovableObject, measure_clearance
 from .behavior import PULSES, Behavior, Random, decide, derive_seed, sense
 from .wheel_pulses import find_pulses, list_dead_zones
 
-__all__ = ["OPEN", "Trial", "scatter", "scatter_objects"]
-
 OPEN = Arena("open", np.empty((0, 4)), np.empty((0, 3)), (), np.array([-50.0, -50.0, 50.0, 50.0]))
 """A plane without walls."""
 

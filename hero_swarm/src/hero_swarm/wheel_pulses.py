@@ -11,8 +11,6 @@ import numpy as np
 from hero_sim.world.kinematics import split_to_wheels
 from hero_sim.world.robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
-__all__ = ["find_pulses", "list_dead_zones"]
-
 
 def list_dead_zones(errors: RobotErrors) -> np.ndarray:
     """Return the dead zones of simulated robots that are calibrated: see find_pulses()."""

@@ -1,7 +1,5 @@
 """Texts at which no reader of YAML may break or hang: it refuses each in one line."""
 
-__all__ = ["make_bad_yaml"]
-
 
 def make_bad_yaml(key):
     """Return texts, bytes; those that are YAML have this key."""

@@ -20,8 +20,6 @@ from hero_node.yaml_text import YamlError, parse_yaml
 
 from ..values.assignment import assign_rows
 
-__all__ = ["FormationError", "Point", "assign_goals", "place_formation"]
-
 Point = Tuple[float, float]
 
 SHAPES = ("circle", "grid", "line", "points")

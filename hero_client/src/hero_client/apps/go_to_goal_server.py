@@ -17,8 +17,6 @@ from ..controllers.motion import DEFAULT_TIMEOUT_S
 from ..robot import Robot
 from . import goals
 
-__all__ = ["GoToGoalServer"]
-
 CLOSE_TIMEOUT_S = 1.0
 """Giving up a goal takes 0.2 s."""
 

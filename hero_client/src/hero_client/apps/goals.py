@@ -17,21 +17,6 @@ from ..controllers.go_to_goal import Goal, GoToGoalController
 from ..controllers.motion import State
 from ..robots.robot_base import BaseRobot
 
-__all__ = [
-    "FEEDBACK_PERIOD_S",
-    "MAX_COORDINATE_M",
-    "MAX_FRAME_LENGTH",
-    "MAX_QUEUED_GOALS",
-    "REPLACED",
-    "GoalListener",
-    "GoalOutcome",
-    "GoalQueue",
-    "GoalRequest",
-    "InvalidGoalError",
-    "check_limits",
-    "read_goal",
-]
-
 FEEDBACK_PERIOD_S = 0.5
 
 MAX_QUEUED_GOALS = 100

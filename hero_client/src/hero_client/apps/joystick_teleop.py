@@ -20,8 +20,6 @@ from ..swarm import REPORT_PERIOD_S, Swarm
 from .robot_choice import ChoiceButtons, RobotChoice
 from .teleop_output import PauseDetector, TeleopOutput
 
-__all__ = ["JoystickMapping", "JoystickTeleop"]
-
 STEP_HZ = 10.0
 
 SILENCE_S = 0.5

@@ -11,8 +11,6 @@ from typing import IO, Any, List, Optional, Tuple
 
 from hero_node.errors import ProgramError
 
-__all__ = ["ARROWS", "RELEASE_KEY", "STOP_ALL_KEYS", "Keyboard", "NoTerminalError", "open_terminal", "split_keys"]
-
 ARROWS = {
     "\x1b[A": "up",
     "\x1b[B": "down",

@@ -21,8 +21,6 @@ from ..values.robot_constants import MAX_LINEAR_M_S
 from .keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard
 from .teleop_output import PauseDetector, TeleopOutput
 
-__all__ = ["MAX_ANGULAR_RAD_S", "MIN_ANGULAR_RAD_S", "MIN_LINEAR_M_S", "KeyDrive", "KeyboardTeleop"]
-
 PERIOD_S = 0.1
 """Between two commands; the robot takes one every 50 ms at most."""
 

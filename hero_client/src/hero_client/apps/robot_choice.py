@@ -2,8 +2,6 @@
 
 from typing import Any, List, NamedTuple, Sequence, Set
 
-__all__ = ["ChoiceButtons", "RobotChoice"]
-
 CHOSEN_COLOR = "white"
 FORMATION_COLOR = "cyan"
 

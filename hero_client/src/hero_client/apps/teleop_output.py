@@ -2,8 +2,6 @@
 
 from hero_node.geometry import STOP, Velocity
 
-__all__ = ["PauseDetector", "TeleopOutput"]
-
 PAUSE_S = 0.5
 """A teleoperation takes a step every 0.05 to 0.1 s; after more than this it, or its PC, was suspended or too busy."""
 

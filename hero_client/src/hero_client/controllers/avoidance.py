@@ -12,19 +12,6 @@ from hero_node.geometry import STOP, Velocity, clamp, wrap_angle
 from ..values.readings import Obstacle
 from ..values.robot_constants import BODY_RADIUS_M, MIN_RANGE_M
 
-__all__ = [
-    "DETOUR",
-    "WANDER",
-    "DetourLaw",
-    "WanderLaw",
-    "WanderMemory",
-    "bend_around",
-    "find_in_path",
-    "shorten_for_body",
-    "split_sectors",
-    "wander",
-]
-
 
 def shorten_for_body(ranges: Sequence[float], body_radius_m: float) -> List[float]:
     """Return ranges at which the laws, made for the stock body, keep a robot with another body as far away."""

@@ -9,8 +9,6 @@ from typing import List, Sequence, Tuple
 
 from hero_node.geometry import Pose, Velocity, clamp
 
-__all__ = ["FormationDrive"]
-
 AHEAD_M = 0.04
 GAIN_1_S = 1.5
 MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S = 0.15, 2.5

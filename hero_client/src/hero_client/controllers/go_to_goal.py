@@ -14,8 +14,6 @@ from .avoidance import bend_around
 from .motion import AIM_SHARE, DEFAULT_TIMEOUT_S, MotionController
 from .unicycle import GoToLaw, GoToPoseLaw, go_to_point, go_to_pose
 
-__all__ = ["DEFAULT_TOLERANCE_M", "GoToGoalController", "Goal", "make_goal"]
-
 DEFAULT_TOLERANCE_M = 0.01
 
 FREE_S = 1.5

@@ -7,8 +7,6 @@ Hildreth's procedure, dual coordinate ascent on the quadratic program (C. Hildre
 
 import numpy as np
 
-__all__ = ["nearest_allowed_all"]
-
 _SWEEPS = 16
 
 

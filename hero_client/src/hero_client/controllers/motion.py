@@ -17,8 +17,6 @@ from ..values.robot_constants import BODY_RADIUS_M
 from .avoidance import find_in_path, shorten_for_body
 from .pose_check import PoseCheck
 
-__all__ = ["DEFAULT_TIMEOUT_S", "SILENT_STEPS", "MotionController", "State"]
-
 DEFAULT_TIMEOUT_S = 120.0
 
 SETTLE_S = 0.5

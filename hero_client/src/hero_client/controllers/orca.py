@@ -20,16 +20,6 @@ from hero_node.geometry import Pose, Velocity
 
 from ..values.robot_constants import BODY_RADIUS_M
 
-__all__ = [
-    "AvoidanceLaw",
-    "avoid_others",
-    "avoid_sensed",
-    "half_plane",
-    "nearest_allowed",
-    "steer",
-    "steered_point",
-]
-
 _TINY = 1e-9
 
 _SLACK_HALVINGS = 12

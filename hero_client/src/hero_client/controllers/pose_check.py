@@ -10,8 +10,6 @@ from typing import Deque, Optional, Tuple
 
 from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
-__all__ = ["PoseCheck"]
-
 DRIVE_M = 0.04
 """Headings are compared over drives of this length: measured poses are a few millimeters off."""
 

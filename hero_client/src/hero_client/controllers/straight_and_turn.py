@@ -7,8 +7,6 @@ from hero_node.geometry import Pose, Velocity, clamp, wrap_angle
 
 from .motion import DEFAULT_TIMEOUT_S, MotionController
 
-__all__ = ["ForwardController", "TurnController"]
-
 TOLERANCE_M = 0.005
 TOLERANCE_RAD = 0.03
 

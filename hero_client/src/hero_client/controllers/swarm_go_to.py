@@ -11,16 +11,6 @@ from .motion import AIM_SHARE
 from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
 from .unicycle import GoToLaw, go_to_point
 
-__all__ = [
-    "ASIDE_S",
-    "DOCKING_M",
-    "NUDGE_RAD",
-    "PATIENCE_S",
-    "PROGRESS_M",
-    "SPEED_GAIN",
-    "SwarmGoToController",
-]
-
 DOCKING_M = 0.05
 """Nearer to its goal than this a robot steers its center there, no longer the point in front of the axle."""
 

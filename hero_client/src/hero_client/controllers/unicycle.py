@@ -8,18 +8,6 @@ from typing import NamedTuple
 
 from hero_node.geometry import STOP, Pose, Velocity, clamp, measure_distance, wrap_angle
 
-__all__ = [
-    "FOLLOW",
-    "GO_TO",
-    "SMOOTH",
-    "FollowLaw",
-    "GoToLaw",
-    "GoToPoseLaw",
-    "follow",
-    "go_to_point",
-    "go_to_pose",
-]
-
 
 class GoToLaw(NamedTuple):
     """Gains and limits of going to a point: as quickly as its motors (0.5 s to a new speed) follow without swinging."""

@@ -10,8 +10,6 @@ from ..values.errors import FrameError, StaleDataError
 from .robot_base import BaseRobot
 from .swarm_base import AnyRobot, BaseSwarm
 
-__all__ = ["CommonFrame"]
-
 POLL_HZ = 10.0
 
 

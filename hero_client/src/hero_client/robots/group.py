@@ -12,11 +12,6 @@ from hero_node.texts import list_names
 from ..values.background_motion import SEND_TIME_S, BackgroundMotion, FullWait, Sleep, Steps, run_steps
 from ..values.errors import RobotNotReadyError
 
-__all__ = [
-    "POLL_PERIOD_S", "READY_TIMEOUT_S", "REPEAT_PERIOD_S", "Group", "Member", "check_robot_id", "stop_after",
-    "wait_for_all",
-]  # fmt: skip
-
 REPEAT_PERIOD_S = 0.1
 """Between the commands of a motion: well within the robot's watchdog of about 2 s."""
 

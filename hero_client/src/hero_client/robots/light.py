@@ -7,8 +7,6 @@ from ..values.background_motion import BackgroundMotion, Steps
 from ..values.colors import COLORS, Color, parse_color
 from ..values.robot_link import RobotLink
 
-__all__ = ["Light"]
-
 REPEAT_PERIOD_S = 5.0
 """Between two messages of the same color: the robot's light goes dark 15 s after the last one."""
 

@@ -25,8 +25,6 @@ from ..values.sensing import Neighbor
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .light import Light
 
-__all__ = ["BaseRobot"]
-
 NEXT_ODOM_S = 5.0
 """The next odometry comes within 0.1 s, on a busy machine within a second."""
 

@@ -23,8 +23,6 @@ from ..values.robot_link import MAP
 from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .robot_base import BaseRobot
 
-__all__ = ["REPORT_PERIOD_S", "AnyRobot", "BaseSwarm"]
-
 REPORT_PERIOD_S = 5.0
 """Between two lines on what is waited for."""
 

@@ -21,10 +21,8 @@ from hero_node.errors import NodeError, ProgramError
 from hero_node.ros.master import ask_master
 from hero_node.texts import list_names
 
-from ..values.robot_states import STATES, STOP_STATES
+from ..values.robot_states import STATES
 from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
-
-__all__ = ["STATES", "STOP_STATES", "USUAL_TOPIC", "Drivers", "share_drivers"]
 
 USUAL_TOPIC = "/hero_driver/robots"
 SUFFIX = "/robots"

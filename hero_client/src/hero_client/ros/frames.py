@@ -15,8 +15,6 @@ from hero_node.texts import one_line
 
 from ..values.errors import FrameError
 
-__all__ = ["FrameListener", "share_frames"]
-
 POLL_PERIOD_S = 0.02
 
 

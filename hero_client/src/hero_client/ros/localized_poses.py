@@ -16,8 +16,6 @@ from hero_node.ros.master import ask_master
 from ..values.errors import FrameError, StaleDataError
 from ..values.readings import FRESH_S, is_plausible
 
-__all__ = ["MAX_POSITION_SD_M", "TOPIC", "LocalizedPoses", "PoseListener", "share_poses"]
-
 TOPIC = "/localization/poses"
 
 MAX_POSITION_SD_M = 0.05

@@ -16,8 +16,6 @@ from hero_node.geometry import Pose, measure_distance, wrap_angle
 
 from ..values.readings import Obstacle, find_nearest, is_plausible, read_pose, read_ranges
 
-__all__ = ["NewestMessage", "RateMeter", "RobotListener", "RobotTrack"]
-
 RATE_WINDOW_S = 3.0
 """Long enough that 5 Hz reads steadily, short enough to see a robot fall silent."""
 

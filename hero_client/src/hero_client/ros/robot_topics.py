@@ -9,8 +9,6 @@ import rospy
 
 from ..values.errors import StaleDataError
 
-__all__ = ["CommandTopic", "NewestMessages"]
-
 CONNECT_S = 3.0
 """A driver that has the robot connects to a new publisher within this time, mostly within 0.1 s; a command before
 waits."""

@@ -28,8 +28,6 @@ from .frames import share_frames
 from .localized_poses import share_poses
 from .robot_topics import CommandTopic, NewestMessages
 
-__all__ = ["RosLink"]
-
 SERVICE_TIMEOUT_S = 2.0
 
 END_TIMEOUT_S = 3.0

@@ -8,8 +8,6 @@ from typing import List, NamedTuple, Optional, Sequence, Set
 from hero_msgs.msg import Robot, RobotArray
 from hero_node.texts import list_names
 
-__all__ = ["TIME_LIMIT_S", "DriverReply", "StopRequest", "StopStatus", "paint"]
-
 TIME_LIMIT_S = 1.4
 """Then users are shown which robots did not stop, on any screen within 1.5 s. A driver reports once per second, and
 each change within 0.1 s."""

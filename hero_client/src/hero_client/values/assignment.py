@@ -8,8 +8,6 @@ from typing import List
 
 import numpy as np
 
-__all__ = ["assign_rows"]
-
 
 def assign_rows(costs: np.ndarray) -> List[int]:
     """Return for each row its column, no column twice.

@@ -4,8 +4,6 @@ from abc import abstractmethod
 from concurrent.futures import Future
 from typing import Callable, Generator
 
-__all__ = ["SEND_TIME_S", "BackgroundMotion", "FullWait", "Sleep", "Steps", "run_steps"]
-
 SEND_TIME_S = 0.1
 """rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 

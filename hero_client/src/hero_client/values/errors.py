@@ -2,15 +2,6 @@
 
 from hero_node.errors import HeroError
 
-__all__ = [
-    "FrameError",
-    "GoalError",
-    "RobotError",
-    "RobotNotReadyError",
-    "StaleDataError",
-    "StoppedError",
-]
-
 
 class FrameError(HeroError):
     """No pose of a robot in a frame: it was never measured, or tf has no transform; the text names both."""

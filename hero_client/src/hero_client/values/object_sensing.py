@@ -11,19 +11,6 @@ import numpy as np
 from .robot_constants import BODY_RADIUS_M
 from .sensing import look_at
 
-__all__ = [
-    "NOTHING",
-    "NO_OBJECTS",
-    "OBJECT",
-    "ROBOT",
-    "Objects",
-    "ObjectsInSight",
-    "Sight",
-    "Things",
-    "sense_objects",
-    "sense_sight",
-]  # fmt: skip
-
 NOTHING, OBJECT, ROBOT = 0, 1, 2
 """Values of a Sight."""
 

@@ -8,19 +8,6 @@ from typing import Any, List, NamedTuple, Optional, Sequence
 
 from hero_node.geometry import Pose, pose_of, wrap_angle
 
-__all__ = [
-    "FRESH_S",
-    "MAX_POSITION_M",
-    "MAX_RANGES",
-    "Obstacle",
-    "find_nearest",
-    "finite",
-    "front_first",
-    "is_plausible",
-    "read_pose",
-    "read_ranges",
-]
-
 FRESH_S = 1.0
 """Older data count as missing. Odometry comes 29 times a second and proximity 5 times, but Wi-Fi makes gaps: in each
 recording of real robots the longest one lasted 0.15 to 1.3 s."""

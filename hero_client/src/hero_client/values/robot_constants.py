@@ -2,11 +2,6 @@
 
 from typing import NamedTuple
 
-__all__ = [
-    "BODY_RADIUS_M", "HERO", "MAX_ANGULAR_RAD_S", "MAX_LINEAR_M_S", "MIN_RANGE_M", "MODELS", "WHEEL_SEPARATION_M",
-    "RobotModel",
-]  # fmt: skip
-
 BODY_RADIUS_M = 0.036835
 """The firmware adds it to what its infrared sensors measure, so ranges count from the robot's center."""
 

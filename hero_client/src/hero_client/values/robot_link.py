@@ -9,8 +9,6 @@ from .background_motion import BackgroundMotion, Steps
 from .robot_constants import RobotModel
 from .sensing import Neighbor
 
-__all__ = ["MAP", "RobotLink"]
-
 MAP = "map"
 """The frame in which hero_localization gives poses (REP 105)."""
 

@@ -12,17 +12,6 @@ import numpy as np
 
 from .robot_constants import BODY_RADIUS_M
 
-__all__ = [
-    "Binary",
-    "Neighbor",
-    "Neighborhood",
-    "Neighbors",
-    "list_neighbors",
-    "look_at",
-    "sense_binary",
-    "sense_neighbors",
-]
-
 
 class Binary(NamedTuple):
     """A sensor in the front rim that tells whether a beam or cone straight ahead touches another body."""

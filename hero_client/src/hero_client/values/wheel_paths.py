@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["follow_wheels"]
-
 
 def follow_wheels(rolled_m: np.ndarray, separation_m: float) -> np.ndarray:
     """Return poses (K, 3) from 0, 0, 0 for how far the left and right wheel have rolled (K, 2); yaw is not wrapped."""

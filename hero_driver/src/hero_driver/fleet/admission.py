@@ -7,8 +7,6 @@ from typing import Counter, Optional, Tuple, Union
 
 from hero_node.token_bucket import TokenBuckets
 
-__all__ = ["GARBAGE_BURST_LENGTH", "GARBAGE_PER_S", "NEW_ROBOTS_PER_S", "Admission", "AdmissionLimits", "RateLimit"]
-
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
 
 GARBAGE_BURST_LENGTH = 65536

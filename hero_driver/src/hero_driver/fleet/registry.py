@@ -13,8 +13,6 @@ from typing import Any, Dict, List, Optional
 
 from .namespaces import Identity
 
-__all__ = ["Decision", "FleetRegistry", "RobotEvent", "RobotRecord", "RobotState", "Verdict"]
-
 ALIVE_S = 3.0
 """A robot that sent something within this time is connected: stock robots speak at least every 2.5 s."""
 

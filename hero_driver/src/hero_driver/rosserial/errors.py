@@ -4,8 +4,6 @@ What a peer does wrong is an event or a counter (see packets.PacketReader and se
 functions raise PayloadError so that the session can turn it into such an event.
 """
 
-__all__ = ["PacketTooLongError", "PayloadError", "RosserialError", "TopicIdError"]
-
 
 class RosserialError(Exception):
     """Base of everything that the rosserial core raises."""

@@ -13,29 +13,6 @@ from zlib import adler32
 
 from .errors import PacketTooLongError, TopicIdError
 
-__all__ = [
-    "DEFAULT_MAX_PAYLOAD_LENGTH",
-    "FIRST_TOPIC_ID",
-    "HEADER_LENGTH",
-    "ID_LOG",
-    "ID_PARAMETER_REQUEST",
-    "ID_PUBLISHER",
-    "ID_SERVICE_CLIENT_PUBLISHER",
-    "ID_SERVICE_CLIENT_SUBSCRIBER",
-    "ID_SERVICE_SERVER_PUBLISHER",
-    "ID_SERVICE_SERVER_SUBSCRIBER",
-    "ID_SUBSCRIBER",
-    "ID_TIME",
-    "ID_TX_STOP",
-    "MAX_PAYLOAD_LENGTH",
-    "OVERHEAD_LENGTH",
-    "Bytes",
-    "Packet",
-    "PacketReader",
-    "encode_packet",
-    "sum_bytes",
-]
-
 Bytes = Union[bytes, bytearray, memoryview]
 
 SYNC = b"\xff\xfe"

@@ -10,24 +10,6 @@ from typing import NamedTuple
 from .errors import PayloadError
 from .packets import Bytes
 
-__all__ = [
-    "LOG_DEBUG",
-    "LOG_ERROR",
-    "LOG_FATAL",
-    "LOG_INFO",
-    "LOG_WARN",
-    "Log",
-    "TopicInfo",
-    "WireTime",
-    "decode_log",
-    "decode_time",
-    "decode_topic_info",
-    "encode_log",
-    "encode_time",
-    "encode_topic_info",
-    "split_seconds",
-]
-
 _UINT16 = struct.Struct("<H")
 _UINT32 = struct.Struct("<I")
 _INT32 = struct.Struct("<i")

@@ -16,20 +16,6 @@ from .errors import PacketTooLongError, PayloadError, TopicIdError
 from .packets import Bytes, PacketReader, encode_packet
 from .payloads import Log, TopicInfo
 
-__all__ = [
-    "Event",
-    "LogReceived",
-    "MessagesReceived",
-    "Problem",
-    "Session",
-    "SessionEnded",
-    "SessionLimits",
-    "SessionState",
-    "Topic",
-    "TopicDeclared",
-    "TopicKind",
-]
-
 REQUEST_INTERVAL_S = 1.5
 """Between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
 

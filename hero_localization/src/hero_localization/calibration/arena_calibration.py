@@ -14,15 +14,6 @@ from ..errors import CalibrationError
 from ..tracking.tag_corners import TagCorners
 from ..tracking.tag_pose import ReferenceTag, TagPose, fit_squares
 
-__all__ = [
-    "MIN_TAGS",
-    "ArenaCalibration",
-    "average_tags",
-    "calibrate_arena",
-    "fit_references",
-    "measure_residuals",
-]
-
 MIN_TAGS = 4
 MIN_EXTENT_M = 0.3
 """Tags in a row leave the camera free to swing about it."""

@@ -10,8 +10,6 @@ from ..camera.camera_model import Intrinsics
 from ..errors import CalibrationError
 from ..prints.boards import Board, create_board, list_board_corners
 
-__all__ = ["BoardView", "LensCalibration", "calibrate_lens", "find_board", "is_mirrored"]
-
 MIN_VIEWS = 8
 JACKKNIFE_GROUPS = 6
 MIN_CORNERS = 12

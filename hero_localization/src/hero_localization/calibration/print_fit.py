@@ -16,8 +16,6 @@ import numpy as np
 from ..prints.tag_images import draw_tag
 from ..tracking.tag_corners import TagCorners
 
-__all__ = ["refine_corners"]
-
 SAMPLES = 4
 """Along each side of a pixel."""
 CELL_TEXELS = 16

@@ -14,8 +14,6 @@ from hero_node.geometry import Pose, wrap_angle
 from ..errors import CalibrationError
 from ..filter.heading_check import is_upside_down
 
-__all__ = ["CALIBRATION_DRIVE", "RobotCalibration", "calibrate_robot"]
-
 CALIBRATION_DRIVE = (
     (0.5, 0.0, 0.0),
     (2.6, 0.0, 2.5),

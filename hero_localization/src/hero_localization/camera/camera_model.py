@@ -11,8 +11,6 @@ import numpy as np
 
 from ..errors import CalibrationError
 
-__all__ = ["Camera", "Intrinsics"]
-
 _MAX_ROUNDS = 50
 _ROUNDING = 1e-10
 """Normalized image coordinates: a ten millionth of a pixel."""

@@ -9,8 +9,6 @@ import os
 import struct
 from typing import Dict, List, NamedTuple, Optional
 
-__all__ = ["POWER_LINES_HZ", "ControlPort", "DeviceControls", "apply_controls"]
-
 GET_CONTROL, SET_CONTROL = 0xC008561B, 0xC008561C
 """VIDIOC_G_CTRL, VIDIOC_S_CTRL: of a struct v4l2_control, id and value."""
 _CONTROL = struct.Struct("=Ii")

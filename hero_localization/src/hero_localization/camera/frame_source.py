@@ -18,8 +18,6 @@ from ..errors import FrameSourceError
 from .camera_model import Intrinsics
 from .device_controls import ControlPort, DeviceControls, apply_controls
 
-__all__ = ["DeviceSource", "Frame", "FrameSource", "LiveSource", "Newest", "TopicSource", "VideoSource", "open_source"]
-
 T = TypeVar("T")
 
 _DEPTHS = {"mono8": 1, "8UC1": 1, "bgr8": 3, "8UC3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}

@@ -6,8 +6,6 @@ from hero_node.yaml_text import YamlError, parse_yaml, read_text
 from ..errors import CalibrationError
 from .camera_model import Intrinsics
 
-__all__ = ["load_lens"]
-
 
 def load_lens(path: str) -> Intrinsics:
     """Return the intrinsics in a file of camera_calibration. Raises: CalibrationError."""

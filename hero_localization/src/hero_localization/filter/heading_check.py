@@ -6,8 +6,6 @@ from typing import Deque, Optional, Tuple
 
 from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
-__all__ = ["HeadingCheck", "is_upside_down"]
-
 MIN_DRIVE_M = 0.04
 """Poses are a millimeter off: over this distance, a direction is right to 2 degrees."""
 MAX_TURN_RAD = 0.15

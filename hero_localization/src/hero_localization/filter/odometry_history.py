@@ -10,8 +10,6 @@ from hero_node.geometry import Pose, invert_pose, measure_distance, transform_po
 
 from .stamped_history import StampedHistory, interpolate_pose
 
-__all__ = ["Odometry", "OdometryHistory"]
-
 KEPT_S = 3.0
 """Older poses than this come too late to be used: a camera with its driver delays by 0.05 to 0.3 s."""
 

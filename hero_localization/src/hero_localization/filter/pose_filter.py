@@ -22,8 +22,6 @@ from hero_node.geometry import Pose, invert_pose, measure_distance, transform_po
 
 from .odometry_history import Odometry, OdometryHistory
 
-__all__ = ["Estimate", "Measurement", "Outcome", "PoseFilter", "make_covariance"]
-
 DISTANCE_SCALE_SD = 0.012
 YAW_SCALE_SD_RAD_M = 0.065
 TURN_SCALE_SD = 0.014

@@ -6,8 +6,6 @@ from typing import Callable, Generic, List, Optional, TypeVar
 
 from hero_node.geometry import Pose, wrap_angle
 
-__all__ = ["StampedHistory", "interpolate_pose"]
-
 T = TypeVar("T")
 
 

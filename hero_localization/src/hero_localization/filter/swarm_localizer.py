@@ -13,8 +13,6 @@ from .heading_check import HeadingCheck, is_upside_down
 from .loss_lines import LossLines
 from .pose_filter import Estimate, Measurement, Outcome, PoseFilter
 
-__all__ = ["PUBLISH_RATE_HZ", "LocalizedRobot", "RobotState", "SwarmLocalizer"]
-
 LOST_S = 1.0
 """A robot whose pose was not measured for so long is lost: its pose follows its odometry alone."""
 

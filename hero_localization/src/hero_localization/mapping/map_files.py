@@ -10,8 +10,6 @@ from hero_node.safe_file import replace_file, write_file
 
 from .occupancy_grid import OccupancyGrid
 
-__all__ = ["save_map"]
-
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 """Gray of a pixel, as map_saver writes it."""
 

@@ -13,8 +13,6 @@ from scipy import ndimage
 from hero_client.values.robot_constants import BODY_RADIUS_M, MIN_RANGE_M
 from hero_node.geometry import Pose
 
-__all__ = ["OccupancyGrid"]
-
 BEAMS = 8
 CONE_RAD = 0.21
 """Half of what a sensor sees (assumed, as in the simulator)."""

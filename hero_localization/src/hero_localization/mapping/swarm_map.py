@@ -10,8 +10,6 @@ from hero_node.geometry import Pose
 from ..filter.stamped_history import StampedHistory, interpolate_pose
 from .occupancy_grid import OccupancyGrid
 
-__all__ = ["SwarmMap"]
-
 KEPT_S = 2.0
 MAX_WAITING = 20
 """Scans of a robot that wait for its pose: four seconds of them."""

@@ -16,8 +16,6 @@ from hero_node.geometry import Pose
 
 from ..filter.pose_filter import Measurement
 
-__all__ = ["OdometryInput", "PoseInput"]
-
 _HEADER = struct.Struct("<3I")
 _LENGTH = struct.Struct("<I")
 _POSE = struct.Struct("<7d")

@@ -15,8 +15,6 @@ from hero_node.geometry import Pose
 
 from ..filter.swarm_localizer import LocalizedRobot
 
-__all__ = ["Outputs", "make_robot_pose", "name_status"]
-
 
 class Outputs:
     """Publishers of one common frame: ~poses, /hero_N/pose, /tf and /diagnostics."""

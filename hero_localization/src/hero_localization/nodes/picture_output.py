@@ -13,8 +13,6 @@ from ..camera.frame_source import Frame
 from ..tracking.floor_view import FloorView
 from ..tracking.tracker import Tracker
 
-__all__ = ["PictureOutput"]
-
 PERIOD_S = 0.2
 JPEG_QUALITY = 75
 

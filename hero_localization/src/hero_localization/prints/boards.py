@@ -5,8 +5,6 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-__all__ = ["Board", "create_board", "draw_board", "list_board_corners"]
-
 
 class Board(NamedTuple):
     """A chessboard with markers in its white squares; by default it fits A4 and letter paper.

@@ -19,8 +19,6 @@ from hero_node.safe_file import replace_file
 from ..errors import LocalizationError
 from .tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
 
-__all__ = ["Sheet", "draw_page", "list_sheets", "parse_options", "split_pages"]
-
 PAPERS_MM = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 EDGE_MM = 12.0
 """Unprintable margin."""

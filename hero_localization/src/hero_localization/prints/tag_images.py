@@ -8,8 +8,6 @@ from typing import Dict, NamedTuple
 
 import numpy as np
 
-__all__ = ["DEFAULT_SIZE_M", "FAMILIES", "REFERENCE_SIZE_M", "Family", "draw_tag"]
-
 DEFAULT_SIZE_M = 0.040
 """Side of the black square of robots' tags, unless a file or an option names another."""
 REFERENCE_SIZE_M = 0.1

@@ -8,8 +8,6 @@ import numpy as np
 from ..prints.boards import Board, draw_board
 from .view import CameraOptions, View
 
-__all__ = ["BoardRenderer", "list_board_places"]
-
 TEXEL_M = 0.00025
 
 Vector = Tuple[float, float, float]

@@ -6,8 +6,6 @@ import numpy as np
 
 from .view import CameraOptions
 
-__all__ = ["Frame", "list_frames"]
-
 
 class Frame(NamedTuple):
     """One image that arrives."""

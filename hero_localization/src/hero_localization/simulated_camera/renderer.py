@@ -17,8 +17,6 @@ from hero_sim.world.arena import Arena
 from ..prints.tag_images import draw_tag
 from .view import CIRCLE, CameraOptions, PrintedTag, View, hand_outlines, tag_corners
 
-__all__ = ["CameraRenderer"]
-
 FLOOR, WALL, OBSTACLE, BODY, TOP, PAPER, SKIN = 150.0, 70.0, 60.0, 45.0, 205.0, 225.0, 185.0
 """Shades, of 255."""
 BLACK, WHITE = 25.0, 225.0

@@ -8,8 +8,6 @@ from typing import List, NamedTuple, Tuple
 import cv2
 import numpy as np
 
-__all__ = ["CIRCLE", "CameraOptions", "PrintedTag", "View", "hand_outlines", "tag_corners"]
-
 _ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 CIRCLE = np.column_stack((np.cos(_ANGLES_RAD), np.sin(_ANGLES_RAD)))
 """Points of the unit circle, (24, 2)."""

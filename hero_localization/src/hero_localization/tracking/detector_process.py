@@ -20,8 +20,6 @@ from .detectors import create_detector, create_fine_detectors
 from .tag_corners import TagCorners
 from .tag_search import TagSearch
 
-__all__ = ["DetectorProcess"]
-
 ANSWER_S = 60.0
 """Long enough for a search of the whole image on a machine that is busy with much else."""
 END_S = 5.0

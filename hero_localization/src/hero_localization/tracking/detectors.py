@@ -16,15 +16,6 @@ from ..errors import DetectorError
 from ..prints.tag_images import FAMILIES, draw_tag
 from .tag_corners import TagCorners
 
-__all__ = [
-    "BACKENDS",
-    "DEFAULT_BACKEND",
-    "TagDetector",
-    "create_detector",
-    "create_fine_detectors",
-    "find_print_mistake",
-]
-
 _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 """Minimum contrast of black and white, of 255: false detections of 16h5 in noise and floor textures stay below."""
 

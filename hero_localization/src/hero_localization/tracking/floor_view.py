@@ -10,8 +10,6 @@ from ..camera.camera_model import Camera
 from ..errors import SettingsError
 from .tag_corners import TagCorners
 
-__all__ = ["FloorView"]
-
 MAX_SIDE_PX = 1280
 
 STEP_PX = 8

@@ -4,8 +4,6 @@ from typing import Dict, Mapping
 
 from hero_node.geometry import Pose, measure_distance
 
-__all__ = ["find_moved_references"]
-
 MOVED_M = 0.005
 """A camera turned by a tenth of a degree shifts everything by 4 mm."""
 

@@ -23,17 +23,6 @@ from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
 from .detectors import DEFAULT_BACKEND
 from .tag_pose import DEFAULT_HEIGHT_M, MountedTag, ReferenceTag, TagLayout
 
-__all__ = [
-    "DEFAULT_PATH",
-    "Settings",
-    "describe_camera",
-    "describe_lens",
-    "describe_pose",
-    "find_change_s",
-    "load",
-    "update",
-]
-
 DEFAULT_PATH = "~/hero_localization/camera.yaml"
 
 

@@ -5,8 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-__all__ = ["TagCorners"]
-
 
 class TagCorners(NamedTuple):
     """A tag in an image."""

@@ -15,19 +15,6 @@ from ..camera.camera_model import Camera
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
 from .tag_corners import TagCorners
 
-__all__ = [
-    "DEFAULT_HEIGHT_M",
-    "MountedTag",
-    "ReferenceTag",
-    "Sighting",
-    "Sightings",
-    "TagLayout",
-    "TagPose",
-    "find_smallest_side",
-    "fit_squares",
-    "locate",
-]
-
 DEFAULT_HEIGHT_M = 0.076
 
 CORNER_PX = 0.1

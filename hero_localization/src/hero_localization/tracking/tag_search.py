@@ -14,8 +14,6 @@ import numpy as np
 from .detectors import TagDetector
 from .tag_corners import TagCorners
 
-__all__ = ["FINE_BELOW_PX", "TagSearch"]
-
 FINE_BELOW_PX, FINEST_BELOW_PX = 36.0, 20.0
 """In an image at half its size, tags of less than this are missed with blur and gamma; at full size, some below
 the second."""

@@ -14,8 +14,6 @@ from .settings import Settings
 from .tag_corners import TagCorners
 from .tag_pose import Sightings, find_smallest_side, locate
 
-__all__ = ["Problem", "Tracker"]
-
 RATE_FRAMES = 30
 
 KEPT_S = 2.0

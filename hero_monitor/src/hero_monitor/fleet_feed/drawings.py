@@ -11,8 +11,6 @@ from hero_node.geometry import Pose
 
 from .page_state import encode_color, encode_pose, shorten
 
-__all__ = ["Drawings"]
-
 SILENT_S = 2.0
 """Behaviors draw about eight times a second; one that is silent for so long has ended."""
 

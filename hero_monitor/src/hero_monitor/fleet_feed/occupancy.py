@@ -11,8 +11,6 @@ from hero_client.values.readings import read_pose
 
 from .page_state import encode_pose
 
-__all__ = ["encode_grid"]
-
 MAX_CELLS, MAX_CELL_M = 1000000, 10.0
 UNKNOWN, FREE, OCCUPIED = range(3)
 OCCUPIED_PERCENT = 65

@@ -19,8 +19,6 @@ import rosgraph.network
 
 from hero_node.ros.master import MASTER_TIMEOUT_S, SUCCESS, LimitedTransport
 
-__all__ = ["Source", "Stream", "StreamSet", "open_stream"]
-
 READ_LENGTH = 65536
 READS_MAX = 200
 """Reads of one publisher at a time, so that none keeps others waiting."""

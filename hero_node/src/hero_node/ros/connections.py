@@ -14,8 +14,6 @@ from rospy.impl import tcpros_base
 
 from .handshakes import ConnectionLimit, HandshakeReader
 
-__all__ = ["REASON_LENGTH_MAX", "XMLRPC_CONNECTIONS_MAX", "limit_xmlrpc_connections", "open_tcpros_server"]
-
 XMLRPC_CONNECTIONS_MAX = 256
 """Calls of the master and of other nodes, each with a thread for as long as it is open: they stay open between calls,
 one of each node at most, and are opened again when they were closed meanwhile."""

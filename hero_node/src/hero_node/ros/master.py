@@ -14,8 +14,6 @@ import rospy
 
 from ..errors import NodeError
 
-__all__ = ["MASTER_TIMEOUT_S", "SUCCESS", "LimitedTransport", "ask_master", "check_master", "find_running_node"]
-
 MASTER_TIMEOUT_S = 3.0
 """A master answers within milliseconds, under load within a second."""
 

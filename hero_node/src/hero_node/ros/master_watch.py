@@ -13,8 +13,6 @@ from rospy.impl.registration import get_service_manager, get_topic_manager
 from ..errors import NodeError
 from .master import LimitedTransport, ask_master
 
-__all__ = ["MasterWatch"]
-
 SENTINEL = "~get_loggers"
 """A service that rospy registers when a node starts, and not again: what the node registers later does not tell."""
 

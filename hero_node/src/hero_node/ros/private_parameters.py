@@ -13,8 +13,6 @@ import rospy
 from ..errors import ProgramError
 from ..parameters import check_parameters
 
-__all__ = ["delete_own_parameters", "read_parameters"]
-
 
 def _list_own() -> List[str]:
     """Return the parameters that are given on the command line (_name:=value)."""

@@ -23,8 +23,6 @@ from ..errors import HeroError
 from .private_parameters import delete_own_parameters
 from .ros_node import start_ros_node
 
-__all__ = ["Program", "run"]
-
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 SHUTDOWN_WAIT_S = 1.0

@@ -6,8 +6,6 @@ import rospy
 
 from ..clock import Clock
 
-__all__ = ["ROS_CLOCK"]
-
 
 class _RosClock(Clock):
     """This machine's monotonic time."""

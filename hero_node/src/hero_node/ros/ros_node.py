@@ -17,8 +17,6 @@ from ..texts import one_line
 from .connections import limit_xmlrpc_connections, open_tcpros_server
 from .master import SUCCESS, LimitedTransport, check_master, find_running_node
 
-__all__ = ["end_ros_node", "end_without_delay", "init_ros_node", "limit_master_calls", "start_ros_node"]
-
 
 class NodeMaster(rospy.core._LockedServerProxy):
     """The ROS master, as rospy calls it for all topics and services of the node."""

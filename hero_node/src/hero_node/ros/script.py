@@ -18,9 +18,6 @@ from .master import check_master
 from .ros_clock import ROS_CLOCK
 from .ros_node import start_ros_node
 
-__all__ = ["rate", "run_script", "start_node"]
-
-
 _START = threading.Lock()
 """Threads of a script may open robots at the same time."""
 

@@ -15,8 +15,6 @@ from typing import List, Optional, Tuple
 from ..errors import OptionError
 from ..robot_constants import RECEIVE_WINDOW_LENGTH
 
-__all__ = ["LinkHandler", "TcpLink"]
-
 _READ_LENGTH = 65536
 
 _MAX_UNSENT = 1 << 20

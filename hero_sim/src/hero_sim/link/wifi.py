@@ -10,8 +10,6 @@ from typing import Deque, Dict, NamedTuple, Tuple
 
 import numpy as np
 
-__all__ = ["PROFILES", "Radio", "WifiProfile"]
-
 
 class WifiProfile(NamedTuple):
     """Quality of a network; times in ms, each drawn at random."""

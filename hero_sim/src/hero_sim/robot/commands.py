@@ -19,8 +19,6 @@ from .models import HERO, RobotModel
 from .motor_control import Controller, MotorControl
 from .sensing import Sensing
 
-__all__ = ["CommandTable"]
-
 PULSES_US = 500
 """Time that writing pulses blocks the loop (MotorDriver.ino: measured as 500 us per cmd_motor)."""
 

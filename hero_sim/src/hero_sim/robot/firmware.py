@@ -26,8 +26,6 @@ from .motor_control import MotorControl
 from .sensing import Sensing
 from .servo_pins import ServoPins
 
-__all__ = ["Firmware"]
-
 BOOT_MS = 518
 """From power-on to the attempt to connect (Wi-Fi that is there at once)."""
 

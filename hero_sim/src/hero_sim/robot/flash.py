@@ -11,8 +11,6 @@ from typing import Any, Optional, Sequence
 from ..errors import CommandError, OptionError
 from ..robot_constants import MAX_PARAMETER
 
-__all__ = ["Flash"]
-
 _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centers_us": 2, "velocity_pid": 6, "position_pid": 6}
 
 _ERASED_PID = [-1.0] * 6

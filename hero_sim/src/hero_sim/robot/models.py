@@ -13,8 +13,6 @@ from ..world.robot_errors import RobotErrors
 from . import declarations
 from .declarations import DECLARATIONS, Declaration
 
-__all__ = ["HERO", "MODELS", "RobotModel", "build_body", "parse_models"]
-
 
 class RobotModel(NamedTuple):
     """Properties of a model of robots."""

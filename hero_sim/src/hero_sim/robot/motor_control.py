@@ -28,8 +28,6 @@ from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
 from .servo_pins import ServoPins
 from .wheel_odometry import WheelOdometry
 
-__all__ = ["Controller", "MotorControl"]
-
 CONTROL_MS = 21
 """Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
 

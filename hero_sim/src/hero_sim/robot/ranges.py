@@ -4,8 +4,6 @@ import numpy as np
 
 from ..robot_constants import BODY_RADIUS_M
 
-__all__ = ["FACTORY_CALIBRATION_COUNTS_M2", "calibrate", "convert_to_ranges"]
-
 FACTORY_CALIBRATION_COUNTS_M2 = 0.5
 """The firmware's calibration of every sensor until the robot is calibrated."""
 

@@ -22,8 +22,6 @@ from .models import HERO, RobotModel
 from .ranges import convert_to_ranges
 from .wheel_odometry import WheelOdometry
 
-__all__ = ["Sensing"]
-
 CYCLE_MS = 34
 """Between two odoms: 1000/30 + 1."""
 

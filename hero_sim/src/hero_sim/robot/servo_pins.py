@@ -8,8 +8,6 @@ Source: core_esp8266_waveform_pwm.cpp and Servo.cpp of the cores.
 
 from typing import Optional
 
-__all__ = ["CORE_2", "CORE_3", "ServoPins"]
-
 CORE_2, CORE_3 = "core2", "core3"
 
 PERIOD_US = 20000

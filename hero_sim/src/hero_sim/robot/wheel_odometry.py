@@ -13,8 +13,6 @@ from hero_node.geometry import Pose
 from ..robot_constants import TICK_M
 from ..world.kinematics import join_wheels
 
-__all__ = ["WheelOdometry"]
-
 FILTER_FIRST_ERROR = 1.0
 FILTER_PROCESS_NOISE_S_M = 10.0
 """Kalman filter in front of the speeds, with errors in units of a measurement's. They reproduce to five digits the

@@ -17,8 +17,6 @@ from hero_node.geometry import Pose, Velocity, find_frame
 
 from .step_clock import StepClock, StepMotion
 
-__all__ = ["StepLink"]
-
 WORLD = "world"
 
 

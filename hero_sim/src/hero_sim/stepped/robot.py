@@ -9,8 +9,6 @@ from hero_node.geometry import Pose
 from .link import StepLink
 from .step_clock import StepClock
 
-__all__ = ["StepRobot"]
-
 
 class StepRobot(BaseRobot):
     """One robot of a StepSwarm; time passes while the program waits, in sleep() or in a motion."""

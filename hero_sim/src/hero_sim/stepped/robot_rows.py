@@ -41,8 +41,6 @@ from .rules.tick_odometry import TickOdometryRows
 from .rules.wheel_controllers import WheelControllers
 from .rules.wheel_encoders import WheelEncoders
 
-__all__ = ["Hook", "RobotRows"]
-
 _LIMITS = np.array([[MAX_LINEAR_M_S], [MAX_ANGULAR_RAD_S]])
 
 Hook = Callable[[np.ndarray], None]

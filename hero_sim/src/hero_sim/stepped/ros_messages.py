@@ -11,11 +11,6 @@ from hero_node.geometry import Pose
 
 from ..scene import Shape
 
-__all__ = [
-    "FLOAT", "LASER_SCAN", "MARKER_ARRAY", "ODOMETRY", "TF_MESSAGE", "TWIST", "MessageType", "encode_markers",
-    "encode_odometry", "encode_scan", "encode_transforms", "encode_twist",
-]  # fmt: skip
-
 
 class MessageType(NamedTuple):
     """Name, md5 sum and full definition of a type of message."""

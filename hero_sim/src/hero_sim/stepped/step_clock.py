@@ -15,8 +15,6 @@ from hero_node.errors import HeroError
 
 from .robot_rows import RobotRows
 
-__all__ = ["StepClock", "StepMotion"]
-
 _ROUNDING_MS = 1e-6
 """Sums of seconds are this exact."""
 

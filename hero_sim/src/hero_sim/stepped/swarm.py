@@ -26,8 +26,6 @@ from .robot_rows import RobotRows
 from .step_clock import StepClock, StepMotion
 from .swarm_log import SwarmLog
 
-__all__ = ["StepSwarm", "StepWorld"]
-
 LOG_PERIOD_S = 0.05
 
 IDEAL = "ideal"

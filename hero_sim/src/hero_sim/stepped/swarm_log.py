@@ -6,8 +6,6 @@ import numpy as np
 
 from .robot_rows import RobotRows
 
-__all__ = ["SwarmLog"]
-
 
 class SwarmLog:
     """Rows (T) of W worlds with N robots each; every array is stacked when it is asked for.

@@ -29,8 +29,6 @@ from .ros_messages import (
     encode_twist,
 )
 
-__all__ = ["LATCHED", "Receive", "StepTopics"]
-
 MARKERS, OBJECTS, ARENA = "/hero_sim/markers", "/hero_sim/object_markers", "/hero_sim/arena"
 MARKER_PERIOD_MS = 100
 LATCHED = ("/tf_static", ARENA)

@@ -15,8 +15,6 @@ from ..robot_constants import BODY_RADIUS_M
 from .pushing.pushed_body import PushedBody
 from .pushing.shapes import Shape, touch_circle
 
-__all__ = ["Arena", "MovableObject", "build_default", "is_free", "measure_clearance", "outline", "place_robots"]
-
 START_GAP_M = 0.05
 """Free space kept around a robot that is placed at random."""
 

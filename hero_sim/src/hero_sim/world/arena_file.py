@@ -19,8 +19,6 @@ from .arena import Arena, MovableObject, is_free, outline
 from .map_file import build_map_arena
 from .pushing.shapes import Disc, Polygon, Shape
 
-__all__ = ["SHIPPED", "load_arena"]
-
 SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
 """Arenas that come with the simulator; --arena takes these names too."""
 

@@ -13,8 +13,6 @@ from .kinematics import join_wheels
 from .shared_readings import SharedReadings
 from .world import World, drive_servos
 
-__all__ = ["Body"]
-
 
 class Body:
     """One robot's wheels, servos, infrared sensors and place.

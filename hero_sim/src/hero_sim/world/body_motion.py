@@ -13,9 +13,6 @@ from .contacts import Contacts
 from .kinematics import find_heading, follow_arcs, join_wheels
 from .pushing.pushing import Place, Pushing
 
-__all__ = ["BodyMotion"]
-
-
 _PASSES = 4
 """In which robots leave objects and each other: between an object and other robots one has no better place."""
 

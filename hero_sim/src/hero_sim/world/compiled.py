@@ -10,8 +10,6 @@ from typing import Any, Callable
 
 import numpy as np
 
-__all__ = ["Loop", "compile_loop", "is_compiled"]
-
 Loop = Callable[..., None]
 
 COMPILED_ROWS = 50

@@ -14,8 +14,6 @@ import numpy as np
 from .arena import Arena, list_obstacles, measure_clearance, square_length
 from .compiled import compile_loop
 
-__all__ = ["Contacts"]
-
 _PASSES = 100
 _SETTLED_M = 2e-5
 """A world whose pushes change by less in one pass is solved; few need more than five passes."""

@@ -12,8 +12,6 @@ import numpy as np
 
 from ..robot_constants import WHEEL_SEPARATION_M
 
-__all__ = ["find_heading", "follow_arcs", "join_wheels", "split_to_wheels"]
-
 # Half pi in two parts, of which the first, with 33 bits, gives exact products with small whole numbers.
 _HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
 _HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")

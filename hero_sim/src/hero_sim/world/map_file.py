@@ -10,8 +10,6 @@ import numpy as np
 
 from .arena import Arena
 
-__all__ = ["build_map_arena"]
-
 _MAX_CELLS = 4_000_000
 
 

@@ -4,8 +4,6 @@ from typing import Tuple
 
 import numpy as np
 
-__all__ = ["draw_normal"]
-
 
 def draw_normal(rng: np.random.RandomState, shape: Tuple[int, ...]) -> np.ndarray:
     """Return standard normal numbers, rounded to single precision.

@@ -14,11 +14,6 @@ from ..robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
 from .noise import draw_normal
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
-__all__ = [
-    "KINDS", "MAX_WHEEL_M_S", "SERVO_CENTER_US", "SERVO_GAIN_M_S_US", "RobotErrors", "describe_errors",
-    "draw_errors", "read_known", "set_known",
-]  # fmt: skip
-
 SERVO_CENTER_US = 1500.0
 SERVO_DEAD_ZONE_US = 30.0
 SERVO_FULL_M_S = 0.25

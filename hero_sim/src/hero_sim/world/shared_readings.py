@@ -9,8 +9,6 @@ import numpy as np
 
 from .world import STEP_MS, World
 
-__all__ = ["SharedReadings"]
-
 
 class SharedReadings:
     """The infrared readings of all robots in a world.

@@ -28,8 +28,6 @@ from .range_sensors import (
 )
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 
-__all__ = ["STEP_MS", "View", "World", "drive_servos"]
-
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
 
@@ -66,7 +64,8 @@ class View(NamedTuple):
 
 
 def drive_servos(
-    pulses_us: Any, centers_us: Any, dead_zones_us: Any, gains_m_s_us: Any, least: Any = np.minimum, most: Any = np.maximum
+    pulses_us: Any, centers_us: Any, dead_zones_us: Any, gains_m_s_us: Any, least: Any = np.minimum,
+    most: Any = np.maximum,
 ) -> Any:
     """Return the wheel speeds (m/s) that pulses stand for: arrays, or with Python's min and max single numbers."""
     beyond_us = pulses_us - centers_us

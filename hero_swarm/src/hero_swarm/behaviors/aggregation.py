@@ -7,8 +7,6 @@ import numpy as np
 
 from ..behavior import PULSES, Behavior, Binary, Command, Random, Sensed
 
-__all__ = ["Aggregation"]
-
 
 class Aggregation(Behavior):
     """Aggregation by one bit (Gauci et al. 2014, doi 10.1177/0278364914525244)."""

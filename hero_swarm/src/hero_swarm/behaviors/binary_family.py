@@ -13,8 +13,6 @@ from hero_sim.world.kinematics import join_wheels
 
 from ..behavior import PULSES, VELOCITY, Behavior, Binary, Command, Random, Sensed
 
-__all__ = ["CyclicPursuit", "Dispersal", "EvolvedAggregation", "Milling", "WallFollowing"]
-
 
 class WheelGenome(Behavior):
     """Wheel speeds of the left and right wheel, as shares of wheel_m_s: with nothing seen (0) and a robot seen (1)."""

@@ -7,8 +7,6 @@ import numpy as np
 from ..behavior import Behavior, Command, Neighbors, Random, Sensed
 from ..steering import steer
 
-__all__ = ["Formation", "LeaderFollowers", "Rendezvous"]
-
 
 class Rendezvous(Behavior):
     """Robots meet: each drives to the mean place of its neighbors (Olfati-Saber, Fax, Murray, Proc. IEEE 2007)."""

@@ -7,8 +7,6 @@ import numpy as np
 from ..behavior import Behavior, Command, Random, Sensed
 from ..steering import steer
 
-__all__ = ["VoronoiCoverage"]
-
 
 class VoronoiCoverage(Behavior):
     """Each robot drives to the middle of the points that are nearer to it than to any other (Lloyd's algorithm).

@@ -7,8 +7,6 @@ import numpy as np
 from ..behavior import Behavior, Command, Neighbors, Random, Sensed
 from ..steering import steer
 
-__all__ = ["Flocking"]
-
 
 class Flocking(Behavior):
     """Robots drive together in one direction (C. Reynolds, Flocks, Herds, and Schools, SIGGRAPH 1987).

@@ -11,8 +11,6 @@ from hero_sim.world.kinematics import join_wheels
 from ..behavior import Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
 from ..steering import steer
 
-__all__ = ["BoxPushing", "CooperativeTransport", "ObjectClustering"]
-
 Velocity = Tuple[np.ndarray, np.ndarray]
 """Forward and left (R,), m/s."""
 

@@ -7,8 +7,6 @@ import numpy as np
 from ..behavior import Behavior, Command, Neighbors, Random, Sensed
 from ..steering import steer
 
-__all__ = ["Dispersion", "Segregation"]
-
 
 class Dispersion(Behavior):
     """Robots repel each other until all are spacing_m apart (A. Howard et al., DARS 2002)."""

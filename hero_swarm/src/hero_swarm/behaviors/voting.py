@@ -6,8 +6,6 @@ import numpy as np
 
 from ..behavior import Behavior, Command, Neighbors, Random, Sensed
 
-__all__ = ["Majority", "Voter"]
-
 
 class Voter(Behavior):
     """A robot takes over the opinion of a neighbor drawn by lot (G. Valentini et al., AAMAS 2014, without qualities).

@@ -26,21 +26,6 @@ from .results_folder import Run
 from .starts import place_all, place_objects
 from .streams import Stream, open_stream
 
-__all__ = [
-    "METRICS_ENDING",
-    "POSES_ENDING",
-    "SAMPLE_S",
-    "BatchResult",
-    "build_trial",
-    "compute_batch",
-    "list_sources",
-    "load_cell_arena",
-    "load_checked",
-    "place_cell",
-    "read_cell_errors",
-    "take_values",
-]
-
 SAMPLE_S = 1.0
 """Between two samples of the metrics."""
 

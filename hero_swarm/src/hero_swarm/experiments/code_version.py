@@ -10,8 +10,6 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-__all__ = ["describe_machine", "hash_code"]
-
 PACKAGES = ("hero_client", "hero_driver", "hero_node", "hero_sim", "hero_swarm")
 """All whose modules a simulated run may use."""
 

@@ -23,8 +23,6 @@ from hero_node.texts import one_line
 
 from .errors import ExperimentError
 
-__all__ = ["compute", "open_dask", "open_pool"]
-
 MAX_NEW_POOLS = 3
 """Worker pools that are started in place of broken ones; a batch that kills its worker would do so for ever."""
 

@@ -7,8 +7,6 @@ from typing import Iterator
 
 from hero_node.errors import HeroError
 
-__all__ = ["ExperimentError", "report_place"]
-
 
 class ExperimentError(HeroError):
     """One line for users: the thing, its value and the remedy."""

@@ -18,8 +18,6 @@ from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Optional, T
 from .errors import ExperimentError
 from .marked_yaml import Entry, read_entries
 
-__all__ = ["Bound", "Cell", "Comparing", "Experiment", "Metric", "Start", "parse_experiment"]
-
 MAX_ROBOTS = 1000
 MAX_TIME_S = 86_400.0
 MAX_SEED = 2**31 - 1

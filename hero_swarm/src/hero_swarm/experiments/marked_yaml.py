@@ -14,8 +14,6 @@ from hero_node.yaml_text import MAX_CHARACTERS
 
 from .errors import ExperimentError
 
-__all__ = ["Entry", "read_entries"]
-
 MAX_DEPTH = 20
 """Of lists and mappings within each other; an experiment has four."""
 

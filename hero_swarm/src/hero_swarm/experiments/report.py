@@ -21,8 +21,6 @@ from .reporting.summary import build_report, describe, format_summaries
 from .results_folder import REAL, SIMULATED, ResultsFolder
 from .runner import read_experiment
 
-__all__ = ["main", "write_report"]
-
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""

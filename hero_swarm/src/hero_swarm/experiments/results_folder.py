@@ -27,8 +27,6 @@ from hero_node.safe_file import write_file
 from .errors import ExperimentError
 from .experiment_file import Cell, Experiment
 
-__all__ = ["REAL", "SIMULATED", "ResultsFolder", "Run", "RunKey", "format_csv", "format_table"]
-
 SIMULATED = "simulated"
 """Kind of a run that was computed."""
 

@@ -18,8 +18,6 @@ from .batch import SAMPLE_S, list_sources, load_cell_arena, take_values
 from .errors import report_place
 from .experiment_file import Cell, Experiment
 
-__all__ = ["RobotTrial"]
-
 
 class RobotTrial:
     """A behavior with its metrics and the end of the trial.

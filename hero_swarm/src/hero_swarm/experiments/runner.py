@@ -22,8 +22,6 @@ from .errors import ExperimentError
 from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
 from .results_folder import REAL, SIMULATED, ResultsFolder, Run, RunKey
 
-__all__ = ["open_folder", "parse_options", "read_experiment", "run_experiment"]
-
 MAX_BATCH = 1000
 
 BATCH_ROBOT_S = 240_000.0

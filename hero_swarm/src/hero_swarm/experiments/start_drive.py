@@ -10,8 +10,6 @@ from hero_client.controllers.unicycle import go_to_pose
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.geometry import STOP, Pose
 
-__all__ = ["PERIOD_S", "StartDrive"]
-
 PERIOD_S = 0.05
 """Time between two steps."""
 

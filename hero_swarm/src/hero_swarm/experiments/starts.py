@@ -14,8 +14,6 @@ from ..trial import scatter, scatter_objects
 from .errors import ExperimentError
 from .experiment_file import Start
 
-__all__ = ["place_all", "place_objects"]
-
 _DIAMETER_M = 2.0 * BODY_RADIUS_M
 
 

@@ -5,8 +5,6 @@ from typing import Any, Tuple
 
 import numpy as np
 
-__all__ = ["Stream", "open_stream"]
-
 
 class Stream:
     """An array (T, ...) of single precision that is written entry by entry.

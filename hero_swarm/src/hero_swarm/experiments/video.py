@@ -21,8 +21,6 @@ from hero_client.values.robot_constants import BODY_RADIUS_M
 from ..trial import OPEN, Trial
 from .errors import ExperimentError
 
-__all__ = ["write_video"]
-
 FRAMES_PER_S = 10
 
 _SIZE_IN, _DPI = 6.0, 100

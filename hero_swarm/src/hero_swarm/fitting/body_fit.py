@@ -14,8 +14,6 @@ from hero_client.values.wheel_paths import follow_wheels
 
 from .recording import Recording, measure_wheels
 
-__all__ = ["MIN_TURN_RAD", "fit_body", "follow_body"]
-
 STRETCH_S = 8.0
 POSE_PERIOD_S = 0.1
 HEADING_M = 0.1

@@ -18,8 +18,6 @@ from hero_sim.world.range_sensors import (
 
 from .recording import Recording
 
-__all__ = ["InfraredFit", "fit_infrared"]
-
 _MIN_DISTANCE_M, _MAX_DISTANCE_M = 0.03, 0.20
 """Of what is seen: nearer, errors of poses and saturation tell more than the sensor; farther, there is no signal."""
 
@@ -63,7 +61,8 @@ def fit_infrared(recordings: List[Recording], arena: Arena, end_share: float) ->
     sensors, bright, counts, is_held_out = (array[enough] for array in (sensors, bright, counts, is_held_out))
     # The signal depends linearly on the alphas and on beta.
     fixed = find_offset(bright, np.zeros(1))
-    terms = np.column_stack((bright[:, None] * (sensors[:, None] == fitted_beams), find_offset(bright, np.ones(1)) - fixed))
+    by_beta = find_offset(bright, np.ones(1)) - fixed
+    terms = np.column_stack((bright[:, None] * (sensors[:, None] == fitted_beams), by_beta))
     drawn = np.append(np.full(len(fitted_beams), ALPHA_COUNTS_M2), BETA_COUNTS)
     slopes_m = 2.0 * ALPHA_COUNTS_M2 * bright**1.5  # counts for each m that the distance is wrong
     sds = np.hypot(NOISE_COUNTS, slopes_m * _POSE_SD_M)

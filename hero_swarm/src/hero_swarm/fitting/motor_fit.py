@@ -14,8 +14,6 @@ from .body_fit import follow_body
 from .recording import PULSES, SAMPLE_S, Recording, measure_wheels, sample_times
 from .replay import Motors, replay_commands
 
-__all__ = ["fit_motors", "predict_ends"]
-
 DELAY = "delay_s"
 
 _PARAMETERS = {  # start, step of the slope, least, most

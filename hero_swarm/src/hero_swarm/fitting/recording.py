@@ -6,8 +6,6 @@ import numpy as np
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 
-__all__ = ["NO_SCANS", "PULSES", "SAMPLE_S", "VELOCITY", "Recording", "measure_wheels", "sample_times"]
-
 VELOCITY, PULSES = 0, 1
 """Kinds of commands."""
 

@@ -13,8 +13,6 @@ from hero_sim.world.world import STEP_MS, World
 from ..trial import OPEN
 from .recording import PULSES, Recording, sample_times
 
-__all__ = ["Motors", "build_errors", "replay_commands"]
-
 _STEP_S = STEP_MS / 1000.0
 
 

@@ -14,8 +14,6 @@ from .motor_fit import fit_motors, predict_ends
 from .recording import Recording
 from .replay import Motors
 
-__all__ = ["describe_fit", "fit_robot"]
-
 HELD_OUT_SHARE = 1.0 / 3.0
 """The end of each recording, which the fit does not see."""
 

@@ -15,8 +15,6 @@ from ..behavior import derive_seed
 from ..experiments.experiment_file import FALLING
 from ..metrics import METRICS
 
-__all__ = ["Episode", "count_observations"]
-
 MAX_ANGULAR_RAD_S = 4.0
 
 _OWN = 14

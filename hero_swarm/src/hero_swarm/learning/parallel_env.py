@@ -20,8 +20,6 @@ from hero_sim.world.arena_file import load_arena
 
 from .episode import Episode, count_observations
 
-__all__ = ["SwarmEnv"]
-
 
 class SwarmEnv(ParallelEnv):  # type: ignore[misc]
     """Each robot is an agent; all are truncated after time_s.

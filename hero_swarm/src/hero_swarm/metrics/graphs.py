@@ -6,8 +6,6 @@ import numpy as np
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 
-__all__ = ["algebraic_connectivity", "cluster_fraction", "collisions", "measure_distances", "nearest_neighbor"]
-
 
 def measure_distances(places_m: np.ndarray) -> np.ndarray:
     """Return the distances (W, N, N) of all robots of each world; inf from a robot to itself."""

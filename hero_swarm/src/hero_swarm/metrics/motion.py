@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["consensus_error", "order", "rotation"]
-
 _STILL_M_S = 1e-3
 
 

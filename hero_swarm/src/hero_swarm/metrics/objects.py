@@ -4,8 +4,6 @@ import numpy as np
 
 from .graphs import cluster_fraction
 
-__all__ = ["object_cluster_fraction", "object_distance"]
-
 
 def object_cluster_fraction(places_m: np.ndarray, reach_m: float = 0.2) -> np.ndarray:
     """Return the share of objects in the largest cluster.

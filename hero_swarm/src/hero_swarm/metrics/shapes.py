@@ -8,8 +8,6 @@ import numpy as np
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 
-__all__ = ["coverage", "dispersion", "dispersion_ratio", "fatness", "hull_area", "ideal_dispersion"]
-
 Point = Tuple[float, ...]
 
 

@@ -13,8 +13,6 @@ from hero_client.values.robot_constants import BODY_RADIUS_M
 
 from ..behavior import Behavior, Binary, Sensed, Sight
 
-__all__ = ["BehaviorMarkers"]
-
 BEAM_M = 3.0
 """Length at which a beam of endless range is drawn."""
 

@@ -20,8 +20,6 @@ from hero_node.parameters import flag, number, robot_ids, whole_number, words
 from ..behavior import Random
 from .pose_source import PoseSource
 
-__all__ = ["NeighborsNode", "make_messages"]
-
 PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),

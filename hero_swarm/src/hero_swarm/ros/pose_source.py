@@ -14,8 +14,6 @@ from hero_client.values.object_sensing import NO_OBJECTS, Things
 from hero_msgs.msg import ObjectPoses
 from hero_node.geometry import Pose, pose_of
 
-__all__ = ["SIMULATOR_FRAME", "ObjectSource", "PoseSource"]
-
 SIMULATOR_FRAME = "world"
 """The frame of the simulator's ground truth, /hero_N/ground_truth; all other frames are those of localize."""
 

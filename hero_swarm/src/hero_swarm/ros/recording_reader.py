@@ -12,8 +12,6 @@ from hero_node.geometry import pose_of
 from ..experiments.errors import ExperimentError
 from ..fitting.recording import NO_SCANS, PULSES, VELOCITY, Recording
 
-__all__ = ["read_recordings"]
-
 POSES_TOPIC = "/localization/poses"
 
 _ROBOT = re.compile(r"/hero_(\d+)/(odom|ground_truth|laser|cmd_motor|cmd_vel|velocity_controller/cmd_vel)$")

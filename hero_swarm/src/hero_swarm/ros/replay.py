@@ -10,8 +10,6 @@ from hero_sim.scene_markers import make_markers
 
 from ..trial import Trial
 
-__all__ = ["replay"]
-
 PERIOD_S = 0.1
 
 

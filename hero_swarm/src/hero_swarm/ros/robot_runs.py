@@ -26,8 +26,6 @@ from ..safety import ROBOTS, SafetyFilter
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
 
-__all__ = ["run_on_robots"]
-
 OBJECT_RADIUS_M = 0.05
 RECORD_START_S = 20.0
 """The recorder has opened its first file by then."""

@@ -15,8 +15,6 @@ from hero_sim.stepped.swarm import StepSwarm
 from ..behavior import PULSES
 from ..wheel_pulses import find_pulses, list_dead_zones
 
-__all__ = ["WheelCommands"]
-
 
 def _convert_dead_zones(edges: Any, _content: Any) -> List[float]:
     edges_us = [float(edge_us) for edge_us in edges]

@@ -12,7 +12,7 @@ import rosgraph.roslogging
 import rospy
 from rosgraph_msgs.msg import Log
 
-from hero_client.ros.drivers import STATES
+from hero_client.values.robot_states import STATES
 from hero_msgs.msg import Robot, RobotArray
 from hero_node.errors import NodeError
 from hero_node.ros.master import ask_master

@@ -12,8 +12,6 @@ import numpy as np
 
 from hero_driver.commands.velocity_shaper import COMMAND_INTERVAL_S, STOP_REPEATS
 
-__all__ = ["CommandShaper", "Rows", "Sent", "Values"]
-
 Rows = Union[int, Sequence[int], np.ndarray]
 """The row of one robot, or the rows of several (K,), each named once."""
 

@@ -11,9 +11,6 @@ from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_
 from ...robot.ranges import convert_to_ranges
 from ...world.range_sensors import BEAMS
 
-__all__ = ["correct_ranges", "measure_ranges"]
-
-
 _FRONT_FIRST = np.roll(np.arange(BEAMS), BEAMS // 2)
 
 

@@ -15,8 +15,6 @@ from ...robot.clock import NEVER_MS
 from .command_shaper import Sent
 from .readings import DISTANCE, SCAN, WHEELS, Readings
 
-__all__ = ["Arrival", "RadioRows"]
-
 LENGTHS = {WHEELS: 1469, SCAN: 205, DISTANCE: 12}
 """Bytes of an odometry, five transforms and an encoder reading; of a scan; of a distance."""
 

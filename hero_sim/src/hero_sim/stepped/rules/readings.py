@@ -7,8 +7,6 @@ import numpy as np
 
 from ...robot.clock import LONG_AGO_MS
 
-__all__ = ["DISTANCE", "SCAN", "WHEELS", "Readings"]
-
 WHEELS, SCAN, DISTANCE = "wheels", "scan", "distance"
 """Parts that are read and sent at different times."""
 

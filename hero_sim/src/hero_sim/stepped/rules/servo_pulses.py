@@ -12,8 +12,6 @@ from ...robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
 from ...world.world import World
 from .which import Which, assign
 
-__all__ = ["ServoPulses"]
-
 _FORWARD = np.array([[-1.0], [1.0]])
 """The servos are mounted as mirror images: a pulse below the center drives the left wheel forward."""
 

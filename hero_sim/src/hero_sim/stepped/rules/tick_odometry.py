@@ -13,8 +13,6 @@ from hero_driver.corrections.tick_odometry import TWIST_WINDOW, WheelGeometry
 
 from ...world.kinematics import find_heading, follow_arcs, join_wheels
 
-__all__ = ["TickOdometryRows"]
-
 _TURN_RAD = 2.0 * math.pi
 
 _MAX_WAITING = 32

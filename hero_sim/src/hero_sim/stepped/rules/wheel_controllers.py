@@ -13,8 +13,6 @@ from ...robot.motor_pid import SAMPLE_MS, Gains
 from ...robot_constants import COMMAND_GAP_MS
 from .which import Which, assign, simplify
 
-__all__ = ["WheelControllers"]
-
 _SAMPLE_S = SAMPLE_MS / 1000.0
 
 

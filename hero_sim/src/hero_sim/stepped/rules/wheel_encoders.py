@@ -11,8 +11,6 @@ from ...robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
 from ...world.world import World
 from .which import Which, choose
 
-__all__ = ["WheelEncoders"]
-
 
 class WheelEncoders:
     """Counters and speed filters.

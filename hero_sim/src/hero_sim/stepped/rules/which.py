@@ -4,8 +4,6 @@ from typing import Any, Union
 
 import numpy as np
 
-__all__ = ["Which", "assign", "choose", "simplify"]
-
 Which = Union[bool, np.ndarray]
 """A mask (R,), or True for all robots, or False for none."""
 

@@ -12,8 +12,6 @@ from hero_node.geometry import Pose
 
 from .shapes import Body, Shape, place
 
-__all__ = ["PushedBody"]
-
 GRAVITY_M_S2 = 9.81
 
 Motion = Tuple[float, float, float]

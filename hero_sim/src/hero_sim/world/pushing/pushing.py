@@ -13,8 +13,6 @@ from ...robot_constants import BODY_RADIUS_M
 from .pushed_body import Motion, PushedBody
 from .shapes import Contact, Disc, find_contacts, touch_circle, touch_walls
 
-__all__ = ["MAX_PUSH_N", "Place", "Pushing"]
-
 MAX_PUSH_N = 0.77
 """Traction of a robot: 0.156 kg at an assumed friction of 0.5 with the floor."""
 

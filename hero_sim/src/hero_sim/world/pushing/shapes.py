@@ -6,8 +6,6 @@ Pure: floats, and only + - * / and roots, so that a world gives the same bytes o
 import math
 from typing import List, NamedTuple, Sequence, Tuple, Union
 
-__all__ = ["Contact", "Disc", "Polygon", "Shape", "find_contacts", "touch_circle", "touch_walls"]
-
 Point = Tuple[float, float]
 
 

@@ -9,8 +9,6 @@ from matplotlib.figure import Figure
 from ..experiment_file import Experiment
 from .statistics import Interval
 
-__all__ = ["draw_over_time", "draw_runs", "to_svg"]
-
 _WIDTH_IN = 8.0
 _POINT_SPREAD = 0.12
 """Points of a cell are spread over this share of its width, in the order of their seeds."""

@@ -8,8 +8,6 @@ import numpy as np
 from .figures import draw_over_time, draw_runs, list_labels, to_svg
 from .summary import Report, format_interval
 
-__all__ = ["OverTime", "draw_page"]
-
 OverTime = Tuple[np.ndarray, Mapping[int, np.ndarray]]
 """Times (T,) in s, and cell -> a metric of its runs (T, runs)."""
 

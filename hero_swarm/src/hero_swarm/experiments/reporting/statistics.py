@@ -12,16 +12,6 @@ import numpy as np
 
 from ..errors import ExperimentError
 
-__all__ = [
-    "FEW_SEEDS",
-    "Comparison",
-    "Interval",
-    "bootstrap_median",
-    "cliffs_delta",
-    "compare_pairs",
-    "correct_by_holm",
-]
-
 RESAMPLES = 9999
 """Odd, and one less than a round number, so that both bounds of the interval are resampled values."""
 

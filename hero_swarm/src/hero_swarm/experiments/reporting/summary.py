@@ -9,8 +9,6 @@ from ..experiment_file import Experiment, Metric
 from ..results_folder import Run, format_csv
 from .statistics import FEW_SEEDS, Comparison, Interval, bootstrap_median, compare_pairs, correct_by_holm
 
-__all__ = ["Compared", "Report", "Summary", "build_report", "describe", "format_interval", "format_summaries"]
-
 
 class Summary(NamedTuple):
     """One metric in one cell.
