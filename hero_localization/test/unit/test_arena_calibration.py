@@ -9,11 +9,13 @@ import pytest
 cv2 = pytest.importorskip("cv2")
 
 from hero_localization.calibration.arena_calibration import (  # noqa: E402
+    _fit,
+    _judge,
     average_tags,
     calibrate_arena,
     measure_residuals,
 )
-from hero_localization.calibration.print_fit import refine_corners  # noqa: E402
+from hero_localization.calibration.print_fit import _Print, refine_corners  # noqa: E402
 from hero_localization.camera.camera_model import Camera, Intrinsics  # noqa: E402
 from hero_localization.errors import CalibrationError  # noqa: E402
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
@@ -164,6 +166,8 @@ def test_a_wrong_place_of_five_is_named_alone_or_among_others(seed):
     found = calibrate_arena(LENS, see_all(ids=ids), taped)
     assert found.problems and re.search(r"\b%d\b" % bad, found.problems[0]), found.problems
     assert found.left_out in ([], [bad])
+    if not found.left_out:
+        assert 5.0 < float(re.search(r"is about (\d+) mm from its place", found.problems[0]).group(1)) < 14.0
 
 
 @pytest.mark.parametrize("scale", [0.98, 0.992, 1.009, 1.02])
@@ -281,3 +285,127 @@ def test_residuals_of_a_camera_are_those_of_the_places():
     residuals_m = measure_residuals(CAMERA, see_all({100: (0.01, 0.0)}), REFERENCES)
     assert residuals_m[100] == pytest.approx(0.01, abs=0.0005)
     assert max(residual for tag_id, residual in residuals_m.items() if tag_id != 100) < 0.0005
+
+
+def test_residuals_are_judged_at_their_limits():
+    ids = dict.fromkeys((1, 2, 3, 4), 0.0)
+    assert _judge({**ids, 2: 0.0059}, [], []) == [], "2.95 mm rms"
+    too_far, rms = "tag 2 is seen 6 mm from its place; measure that again", "residual 3.1 mm rms is above 3 mm: "
+    problems = _judge({**ids, 2: 0.0061}, [], [])
+    assert problems[0] == too_far and problems[1].startswith(rms) and len(problems) == 2
+    assert [problem[: len(rms)] for problem in _judge(dict.fromkeys(ids, 0.0031), [], [])] == [rms]
+    assert _judge(dict.fromkeys(ids, 0.0029), [], []) == []
+    left_out = "tag 2 was left out: it is seen 40 mm from its place; measure that again"
+    assert _judge({**ids, 2: 0.04}, [2], [7, 9]) == [left_out, "not seen: reference tags 7, 9"]
+
+
+def test_a_tag_in_half_of_the_frames_is_seen_at_its_median():
+    tag = see(1, Pose(0.2, 0.1, 0.0))
+    frames = [[tag._replace(corners=tag.corners + shift)] for shift in (0.0, 1.0, 50.0)]
+    (averaged,) = average_tags([*frames, [], [], []])
+    np.testing.assert_allclose(averaged.corners, tag.corners + 1.0)
+    assert average_tags([*frames, [], [], [], []]) == []
+
+
+def test_an_arena_has_room_for_its_tags_and_is_no_row():
+    for half_m, is_enough in ((0.16, True), (0.14, False)):
+        places = {index: ReferenceTag(Pose(x_m, y_m, 0.0)) for index, (x_m, y_m) in enumerate(
+            ((-0.5, -half_m), (0.5, -half_m), (-0.5, half_m), (0.5, half_m)))}  # fmt: skip
+        seen = [see(tag_id, tag.pose) for tag_id, tag in places.items()]
+        # Of four tags, twice the distance from the middle: 0.32 and 0.28 m.
+        if is_enough:
+            assert calibrate_arena(LENS, seen, places).problems == []
+        else:
+            with pytest.raises(CalibrationError, match="in a row"):
+                calibrate_arena(LENS, seen, places)
+
+
+@pytest.mark.parametrize(("share", "is_right"), [(0.9935, True), (0.9925, False), (1.0065, True), (1.0075, False)])
+def test_tags_may_measure_seven_thousandths_more_or_less(share, is_right):
+    exact = [see(tag_id, tag.pose) for tag_id, tag in REFERENCES.items()]
+    printed = {tag_id: tag._replace(size_m=0.1 / share) for tag_id, tag in REFERENCES.items()}
+    if is_right:
+        assert calibrate_arena(LENS, exact, printed).left_out == []
+    else:
+        with pytest.raises(CalibrationError, match="of their size"):
+            calibrate_arena(LENS, exact, printed)
+
+
+@pytest.mark.parametrize("height_m", [0.19, 0.21, 19.5, 20.5])
+def test_a_camera_hangs_between_20_cm_and_20_m(height_m):
+    camera = hang(tilt_rad=(0.05, -0.03, 0.1), position_m=(0.04, -0.02, height_m))
+    size = height_m / 2.2
+    known = {
+        tag_id: ReferenceTag(Pose(size * x_m, size * y_m, 0.0), 0.1 * size) for tag_id, (x_m, y_m) in PLACES.items()
+    }
+    seen = [see(tag_id, tag.pose, tag.size_m, camera) for tag_id, tag in known.items()]
+    if height_m < 1.0:  # closer than tags may lie
+        assert (_fit(LENS, seen, known) is not None) == (height_m > 0.2)
+    elif height_m < 20.0:
+        assert calibrate_arena(LENS, seen, known).camera.position_m[2] == pytest.approx(height_m, rel=1e-3)
+    else:
+        with pytest.raises(CalibrationError, match="no camera above the floor"):
+            calibrate_arena(LENS, seen, known)
+
+
+def test_references_a_field_of_30_m_apart_are_in_meters():
+    for side_m, is_far in ((29.9, False), (30.1, True)):
+        places = {index: ReferenceTag(Pose(x_m, y_m, 0.0)) for index, (x_m, y_m) in enumerate(
+            ((0.0, 0.0), (1.0, side_m), (0.0, side_m), (1.0, 0.0)))}  # fmt: skip
+        seen = [TagCorners(tag_id, np.zeros((4, 2))) for tag_id in places]
+        with pytest.raises(CalibrationError) as error:
+            calibrate_arena(LENS, seen, places)
+        assert ("30.1 m apart: write their places in m" in str(error.value)) == is_far
+
+
+def test_a_place_is_wrong_four_millimeters_off_if_the_others_agree():
+    exact = [see(tag_id, tag.pose) for tag_id, tag in REFERENCES.items()]
+    for off_m, is_wrong in ((0.0037, False), (0.0043, True)):
+        taped = {**REFERENCES, 103: ReferenceTag(Pose(PLACES[103][0], PLACES[103][1] + off_m, 0.0))}
+        assert calibrate_arena(LENS, exact, taped).left_out == ([103] if is_wrong else []), off_m
+
+
+def look_at_print(tag, size_px, cells):
+    """Return a print in a square of the image."""
+    return _Print(cells, tag, np.array((10, 20)), size_px)
+
+
+def test_a_print_is_compared_with_some_white_around_it():
+    cells = draw_tag("36h11", 5)
+    square = 64.0 * np.array(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)))
+    tag = TagCorners(5, square + (10.0 + 18.0, 20.0 + 18.0))
+    model = look_at_print(tag, 101, cells)
+    rows, columns = np.nonzero(model.seen)
+    # 64 px with 0.7 of 8 px on each side.
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (13, 87, 13, 87) and model.seen.sum() == 75**2
+    for scale in (1.0, 1.05):
+        shades = np.zeros((101, 101))
+        shades[model.seen] = model.render(np.array((scale, 0.3, 20.0, 220.0, 1.0)))
+        for row in range(8):
+            for column in range(8):
+                at = np.array((column + 0.5, row + 0.5)) * 8.0 + 18.0
+                u, v = np.rint(50.0 + scale * (at - 50.0)).astype(int)
+                assert shades[v, u] == pytest.approx(220.0 if cells[row, column] else 20.0, abs=1.0)
+        edge = 50.0 + scale * 32.0
+        assert shades[50, int(edge) + 3] == pytest.approx(220.0, abs=1.0), "white margin"
+    blurred = [model.render(np.array((1.0, blur_px, 20.0, 220.0, 1.0))) for blur_px in (1.0, 3.0)]
+    assert blurred[1].std() < 0.9 * blurred[0].std() < 0.9 * 100.0
+    bright = model.render(np.array((1.0, 1.0, 20.0, 220.0, 2.2)))
+    assert bright.mean() > blurred[0].mean() + 3.0 and bright.min() > 19.9 and bright.max() < 220.1
+
+
+def test_a_tag_at_the_rim_of_the_image_stays_as_it_is():
+    fine = np.kron(np.pad(draw_tag("36h11", 101), 4, constant_values=255), np.ones((4, 4), np.uint8))
+    gray = np.rint(255.0 * cv2.GaussianBlur(fine / 255.0 * 0.8 + 0.06, (0, 0), 0.8) ** (1.0 / 2.2)).astype(np.uint8)
+    square = 32.0 * np.array(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))) + 15.5
+    half_px = math.ceil(0.85 * 32.0)
+    tag = TagCorners(101, square)
+    room_px = 32 - half_px
+    for left, top, right, bottom, is_whole in (
+        (0, 0, 0, 0, True), (1, 0, 0, 0, True), (room_px + 1, 0, 0, 0, False), (0, room_px + 1, 0, 0, False),
+        (0, 0, room_px, 0, False), (0, 0, 0, room_px, False), (0, 0, room_px - 1, 0, True),
+    ):  # fmt: skip
+        window = gray[top : 64 - bottom, left : 64 - right]
+        moved = tag._replace(corners=square - (left, top))
+        (refined,) = refine_corners(window, [moved], "36h11")
+        assert (refined.corners != moved.corners).any() == is_whole, (left, top, right, bottom)

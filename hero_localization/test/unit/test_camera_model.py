@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hero_localization.camera.camera_model import Camera, Intrinsics
+from hero_localization.errors import CalibrationError
 
 MATRIX = np.array(((1390.0, 0.0, 955.0), (0.0, 1385.0, 545.0), (0.0, 0.0, 1.0)))
 DISTORTION = np.array((-0.12, 0.03, 0.0008, -0.0006, -0.002))
@@ -100,3 +101,21 @@ def test_lens_is_read_from_camera_information():
 def test_camera_information_that_does_not_fit_is_refused(matrix, model, distortion, words):
     with pytest.raises(ValueError, match=words):
         Intrinsics.from_camera_info(1920, 1080, matrix, model, distortion)
+
+
+def test_images_of_another_size_are_refused():
+    lens = Intrinsics(1920, 1080, MATRIX, DISTORTION)
+    lens.check_size(1080, 1920)
+    for height_px, width_px in ((1080, 1280), (720, 1920), (1920, 1080)):
+        with pytest.raises(CalibrationError, match="images have %d x %d pixels, but" % (width_px, height_px)):
+            lens.check_size(height_px, width_px)
+
+
+def test_rays_of_a_skewed_sensor_are_found_again():
+    matrix = MATRIX + ((0.0, 12.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    lens = Intrinsics(1920, 1080, matrix, DISTORTION)
+    rays = np.array(((0.3, -0.2), (-0.5, 0.3), (0.0, 0.1)))
+    np.testing.assert_allclose(lens.undistort(lens.distort(rays)), rays, atol=1e-9)
+    flat = lens._replace(distortion=np.zeros(5)).distort(rays)
+    expected = rays * (1390.0, 1385.0) + (955.0, 545.0)
+    np.testing.assert_allclose(flat, expected + np.column_stack((12.0 * rays[:, 1], np.zeros(3))))

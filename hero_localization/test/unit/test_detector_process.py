@@ -13,9 +13,8 @@ pytest.importorskip("cv2")
 
 from hero_localization.errors import DetectorError
 from hero_localization.prints.tag_images import draw_tag
-from hero_localization.tracking.detector_process import (
-    DetectorProcess,
-)
+from hero_localization.tracking import detector_process
+from hero_localization.tracking.detector_process import DetectorProcess
 from hero_localization.tracking.detectors import create_detector
 from hero_localization.tracking.tag_search import TagSearch
 
@@ -124,3 +123,104 @@ def test_process_ends_when_its_parent_is_killed():
         "up\n",
         -signal.SIGKILL,
     )
+
+
+class FakeConnection:
+    """One end of a pipe, with what comes over it."""
+
+    def __init__(self, *received):
+        self.received, self.sent, self.polled_s = list(received), [], []
+
+    def recv(self):
+        if not self.received:
+            raise EOFError
+        return self.received.pop(0)
+
+    def send(self, message):
+        self.sent.append(message)
+
+    def poll(self, timeout_s):
+        self.polled_s.append(timeout_s)
+        return False
+
+    def close(self):
+        self.sent.append("closed")
+
+
+def make_memory(gray):
+    memory = os.memfd_create("test")
+    os.ftruncate(memory, gray.size)
+    os.write(memory, gray.tobytes())
+    return memory
+
+
+def test_the_process_answers_with_what_it_finds():
+    memory = make_memory(picture(100, 200))
+    options = ("aruco", "36h11", 2.0, WIDTH_PX, HEIGHT_PX, 20.0)
+    connection = FakeConnection(options, (0.0, {}), (0.1, {5: (119.5, 219.5)}))
+    with pytest.raises(EOFError):
+        detector_process.serve(connection, memory)
+    os.close(memory)
+    ready, *answers = connection.sent
+    assert ready is None
+    for ((tag_id, corners),) in answers:
+        assert tag_id == 5 and corners.mean(axis=0) == pytest.approx((119.5, 219.5), abs=0.5)
+    assert len(answers) == 2
+
+
+@pytest.mark.parametrize(("backend", "fine"), [("apriltag", ["fine 16h5"]), ("aruco", [])])
+def test_only_apriltag_has_fine_detectors(backend, fine, monkeypatch):
+    made = []
+    monkeypatch.setattr(detector_process, "create_detector", lambda *given: given)
+    monkeypatch.setattr(detector_process, "create_fine_detectors", lambda family: ["fine " + family])
+    monkeypatch.setattr(detector_process, "TagSearch", lambda *given: made.append(given))
+    memory = make_memory(np.zeros((4, 6), np.uint8))
+    with pytest.raises(EOFError):
+        detector_process.serve(FakeConnection((backend, "16h5", 1.5, 6, 4, 9.0)), memory)
+    os.close(memory)
+    assert made == [((backend, "16h5", 1.5), 6, 4, fine, 9.0)]
+
+
+def test_a_detector_that_cannot_be_made_is_told_to_the_parent():
+    memory, connection = make_memory(np.zeros((4, 6), np.uint8)), FakeConnection(("zbar", "16h5", 1.5, 6, 4, 9.0))
+    detector_process.serve(connection, memory)
+    os.close(memory)
+    (problem,) = connection.sent
+    assert "zbar" in problem
+
+
+def test_the_process_ends_with_its_connection(monkeypatch):
+    served = []
+
+    def serve(connection, memory):
+        served.append((connection, memory))
+        raise EOFError
+
+    monkeypatch.setattr(detector_process, "serve", serve)
+    monkeypatch.setattr(detector_process, "Connection", lambda number: number)
+    monkeypatch.setattr(sys, "argv", ["detector_process", "7", "8"])
+    detector_process.main()
+    assert served == [(7, 8)]
+
+
+def test_a_process_that_hangs_is_named_and_killed():
+    calls, connection = [], FakeConnection()
+
+    class Hanging:
+        def wait(self, timeout_s=None):
+            calls.append(("wait", timeout_s))
+            if timeout_s is not None:
+                raise subprocess.TimeoutExpired("detector", timeout_s)
+
+        def kill(self):
+            calls.append("kill")
+
+    hanging = DetectorProcess.__new__(DetectorProcess)
+    hanging._connection, hanging._process = connection, Hanging()
+    hanging._shape, hanging._frame = (2, 3), np.zeros((2, 3), np.uint8)
+    with pytest.raises(DetectorError, match="did not answer for 60 s: start again"):
+        hanging.search(np.full((2, 3), 7, np.uint8), 1.5, {3: (1.0, 2.0)})
+    assert connection.sent == [(1.5, {3: (1.0, 2.0)}), "closed"] and connection.polled_s == [60.0]
+    assert calls == [("wait", 5.0), "kill", ("wait", None)] and (hanging._frame == 7).all()
+    with pytest.raises(DetectorError, match="has ended"):
+        hanging.search(np.zeros((2, 3), np.uint8), 1.6, {})

@@ -1,7 +1,9 @@
 """Cameras as recorded: stamps, damaged images, reads that hang, devices that vanish; and their controls."""
 
 import threading
+from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 import rospy
@@ -71,13 +73,13 @@ class Recording:
 def play(monkeypatch):
     """Return a function that plays openings to their end, and returns the recording and the source."""
 
-    def run(*openings, path="rtsp://camera", controls=DeviceControls()):  # noqa: B008
+    def run(*openings, path="rtsp://camera", controls=DeviceControls(), min_backoff_s=0.0):  # noqa: B008
         recording = Recording(*openings)
         monkeypatch.setattr(frame_source.cv2, "VideoCapture", recording)
         monkeypatch.setattr(frame_source.time, "monotonic", lambda: recording.now_s)
         monkeypatch.setattr(rospy, "get_time", lambda: BOOTED_S + recording.now_s)
         monkeypatch.setattr(LiveSource, "_keep", lambda source, picture: recording.keep(source, picture))
-        monkeypatch.setattr(frame_source, "MIN_BACKOFF_S", 0.0)
+        monkeypatch.setattr(frame_source, "MIN_BACKOFF_S", min_backoff_s)
         source = DeviceSource(path, SIZE_PX, 30.0, controls)
         try:
             assert recording.is_played.wait(TIMEOUT_S)
@@ -181,3 +183,58 @@ def test_a_device_that_is_no_camera_has_no_controls():
     port = device_controls.ControlPort(DEVICE)
     port.write(device_controls.GAIN, 3)
     assert port.read(device_controls.GAIN) is None
+
+
+def test_a_camera_is_asked_for_small_images_of_one_size_and_rate(play, monkeypatch):
+    asked, backends = {}, []
+    monkeypatch.setattr(Recording, "set", lambda self, name, value: asked.update({name: value}))
+    opened = Recording.__call__
+
+    def open_recording(self, path, backend):
+        backends.append((path, backend))
+        return opened(self, path, backend)
+
+    monkeypatch.setattr(Recording, "__call__", open_recording)
+    play([(1.0, image(10), 0)], path="rtsp://camera")
+    assert asked == {
+        cv2.CAP_PROP_FOURCC: cv2.VideoWriter_fourcc(*"MJPG"), cv2.CAP_PROP_FRAME_WIDTH: 64,
+        cv2.CAP_PROP_FRAME_HEIGHT: 48, cv2.CAP_PROP_FPS: 30.0, cv2.CAP_PROP_BUFFERSIZE: 2,
+    }  # fmt: skip
+    assert backends[0] == ("rtsp://camera", cv2.CAP_ANY)
+    backends.clear()
+    play([(1.0, image(10), 0)], path=DEVICE)
+    assert backends[0] == (DEVICE, cv2.CAP_V4L2)
+
+
+@pytest.mark.parametrize(("age_s", "stamp_s"), [(0.0, 101.0), (4.9, 96.1), (5.1, 101.0), (-0.1, 101.0)])
+def test_an_image_is_at_most_five_seconds_old(play, age_s, stamp_s):
+    recording, _ = play([(1.0, image(10), 101.0 - age_s)])
+    assert recording.kept == [(stamp_s, 10, 0)]
+
+
+@pytest.mark.parametrize(("slow_s", "failures", "opened"), [(0.1, 3, 1), (0.1, 4, 2), (0.9, 3, 1), (1.1, 1, 2)])
+def test_four_failures_or_one_second_end_a_camera(play, slow_s, failures, opened):
+    reads = [(0.1, image(10), 0), *[(slow_s, DAMAGED, 0)] * failures, (0.1, image(20), 0)]
+    recording, _ = play(reads, [(0.1, image(30), 0)])
+    assert [shade for _, shade, _ in recording.kept] == ([10, 20, 30] if opened == 1 else [10, 30])
+
+
+def test_a_camera_that_stays_away_is_opened_less_and_less_often(play, monkeypatch):
+    waits_s = []
+
+    class Ending(threading.Event):
+        def wait(self, timeout=None):
+            waits_s.append(timeout)
+            return False
+
+    threads = SimpleNamespace(Event=Ending, Thread=threading.Thread, Condition=threading.Condition)
+    monkeypatch.setattr(frame_source, "threading", threads)
+    play([(0.1, image(10), 0)], *[None] * 6, [(0.1, image(20), 0)], None, None, min_backoff_s=0.5)
+    assert waits_s[:9] == [0.5, 1.0, 2.0, 4.0, 8.0, 8.0, 8.0, 0.5, 1.0]
+
+
+def test_an_image_of_another_size_is_taken_after_a_camera_was_opened_again(play):
+    recording, source = play([(0.1, image(10), 0)], [(0.1, ODD, 0)])
+    assert [shade for _, shade, _ in recording.kept] == [10, 0]
+    gray = DeviceSource._decode(source, (7.0, image(30), 4))
+    assert (gray.stamp_s, gray.gray.shape, gray.number) == (7.0, (48, 64), 4)

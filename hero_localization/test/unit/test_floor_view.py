@@ -6,6 +6,7 @@ from test_camera_model import DISTORTION, MATRIX
 
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import SettingsError
+from hero_localization.tracking import floor_view
 from hero_localization.tracking.floor_view import MAX_SIDE_PX, FloorView
 from hero_localization.tracking.tag_corners import TagCorners
 
@@ -68,3 +69,55 @@ def test_tags_are_outlined_where_the_view_shows_them():
     for tag, color in zip(tags, ((0, 200, 0), (0, 0, 255))):
         for column, row in np.rint(view.find_pixels(tag.corners)).astype(int):
             assert tuple(seen[row, column]) == color
+
+
+def test_the_box_ends_at_the_middle_of_the_last_pixel():
+    camera = hang_camera(0.1, 0.7)
+    camera = camera._replace(lens=camera.lens._replace(distortion=np.zeros(5)))
+    left_m, low_m, right_m, high_m = FloorView(camera, HEIGHT_M).box_m
+    corners = np.array(((0.0, 0.0), (1919.0, 0.0), (0.0, 1079.0), (1919.0, 1079.0)))
+    x_m, y_m = camera.intersect(corners, HEIGHT_M).T
+    assert (left_m, low_m, right_m, high_m) == pytest.approx((x_m.min(), y_m.min(), x_m.max(), y_m.max()), abs=1e-9)
+
+
+def test_a_camera_sees_three_of_its_heights_to_each_side():
+    low_m, high_m = np.array(FloorView(hang_camera(1.3, 0.0), HEIGHT_M).box_m).reshape(2, 2)
+    reach_m = np.maximum(np.abs(low_m - (0.1, -0.2)), np.abs(high_m - (0.1, -0.2)))
+    assert reach_m == pytest.approx((6.6, 6.6))
+
+
+def test_a_camera_that_looks_far_away_is_refused():
+    with pytest.raises(SettingsError, match="does not look at the floor below it"):
+        FloorView(hang_camera(1.75, 0.0), HEIGHT_M)
+
+
+def test_a_view_is_black_where_the_camera_saw_nothing():
+    view = FloorView(hang_camera(0.5, 0.4), HEIGHT_M)
+    seen = view.rectify(np.full((1080, 1920), 255, np.uint8))
+    rows, columns = np.indices(seen.shape)[:, ::40, ::40].reshape(2, -1)
+    left_m, _, _, high_m = view.box_m
+    scale = MAX_SIDE_PX / max(view.box_m[2] - left_m, high_m - view.box_m[1])
+    places_m = (left_m + (columns + 0.5) / scale, high_m - (rows + 0.5) / scale, np.full(len(rows), HEIGHT_M))
+    pixels = view.camera.project(np.column_stack(places_m))
+    for row, column, (u, v) in zip(rows, columns, pixels):
+        if 10.0 < u < 1910.0 and 10.0 < v < 1070.0:
+            assert seen[row, column] == 255, (row, column)
+        elif not (-30.0 < u < 1950.0 and -30.0 < v < 1110.0):
+            assert seen[row, column] == 0, (row, column)
+
+
+def test_a_tag_is_drawn_with_its_front_and_number(monkeypatch):
+    drawn = []
+    for name in ("polylines", "line", "putText"):
+        monkeypatch.setattr(floor_view.cv2, name, lambda image, *given, name=name: drawn.append((name, given)))
+    view = FloorView(hang_camera(0.0, 0.0), HEIGHT_M)
+    square = np.array(((880.0, 380.0), (920.0, 380.0), (920.0, 420.0), (880.0, 420.0)))
+    nowhere = TagCorners(4, np.full((4, 2), np.nan))
+    view.draw(np.zeros((1080, 1920), np.uint8), [nowhere, TagCorners(17, square)], set())
+    (_, (outline, is_closed, *look)), (_, (start, end, *_)), (_, (text, place, _, size, *_)) = drawn
+    corners = view.find_pixels(square)
+    np.testing.assert_array_equal(outline[0], np.rint(corners))
+    assert is_closed and look == [(0, 200, 0), 2]
+    assert start == pytest.approx(corners.mean(axis=0), abs=0.51)
+    assert end == pytest.approx(corners[:2].mean(axis=0), abs=0.51)
+    assert (text, place, size) == ("17", (start[0] + 12, start[1] - 12), 0.7)

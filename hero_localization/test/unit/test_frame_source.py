@@ -1,6 +1,7 @@
 """Images from topics and videos become gray; what cannot be used or opened is named; the newest image counts."""
 
 import re
+import threading
 
 import cv2
 import numpy as np
@@ -188,3 +189,79 @@ def test_what_cannot_be_opened_is_told_with_the_reason(tmp_path, device, reason)
     device = device.format(folder=tmp_path)
     with pytest.raises(FrameSourceError, match=re.escape("%s %s" % (device, reason))):
         open_source("", device, "640x480", 30.0, DeviceControls())
+
+
+def test_topics_are_subscribed_by_their_kind(monkeypatch):
+    for topic, kind in (("/camera/image_raw", Image), ("/camera/image_raw/compressed", CompressedImage)):
+        kinds = {}
+        monkeypatch.setattr(rospy, "Subscriber", lambda name, kind, receive, **_: kinds.update({name: kind}))  # noqa: B023
+        TopicSource(topic)
+        assert kinds == {topic: kind, "/camera/camera_info": CameraInfo}
+
+
+def test_a_source_came_last_when_it_was_opened(source, monkeypatch, receivers):
+    monkeypatch.setattr(rospy, "get_time", lambda: 77.0)
+    assert TopicSource("/camera/image_raw").arrived_s == 77.0
+    assert source.lens is None and source.problem == source.warning == ""
+
+
+def test_an_item_is_waited_for_and_handed_over_once():
+    newest = frame_source.Newest()
+    newest.keep(1)
+    newest.keep(2)
+    assert newest.take(0.0) == 2 and newest.take(0.0) is None
+    thread = threading.Timer(0.0, newest.keep, (3,))
+    thread.start()
+    assert newest.take(TIMEOUT_S) == 3
+    thread.join()
+
+
+def test_colors_are_weighed_as_eyes_do(source):
+    for encoding, channels, red in (("rgb8", 3, 0), ("bgr8", 3, 2), ("8UC3", 3, 2), ("rgba8", 4, 0), ("bgra8", 4, 2)):
+        image = make_image(encoding, channels)
+        rows = np.zeros((3, image.step), np.uint8)
+        rows[:, red : 4 * channels : channels] = 200
+        image.data = rows.tobytes()
+        source.receive(image)
+        assert set(source.poll(0.0).gray.ravel()) == {60}, encoding
+    source.receive(make_image("8UC1", 1))
+    np.testing.assert_array_equal(source.poll(0.0).gray, GRAY)
+
+
+def test_an_image_may_fill_its_rows_and_its_bytes_exactly(source):
+    image = make_image("mono8", 1, padding=0)
+    source.receive(image)
+    np.testing.assert_array_equal(source.poll(0.0).gray, GRAY)
+    image.data += b"more"
+    source.receive(image)
+    np.testing.assert_array_equal(source.poll(0.0).gray, GRAY)
+
+
+@pytest.mark.parametrize("size_px", ["1920", "1920x", "x1080", "1920x1080x3", "1920 x -1", "largexsmall"])
+def test_a_size_that_is_none_is_named(size_px):
+    with pytest.raises(FrameSourceError, match="the size of images is '%s', but must be such as 1920x1080" % size_px):
+        open_source("", "/dev/null", size_px, 30.0, DeviceControls())
+
+
+def test_a_video_that_comes_too_late_goes_on_from_then(video, clock):
+    first = video.poll(TIMEOUT_S)
+    clock[0] += 5.0
+    second, third = video.poll(TIMEOUT_S), video.poll(TIMEOUT_S)
+    assert second.stamp_s == first.stamp_s + 5.0
+    assert third.stamp_s == pytest.approx(second.stamp_s + 1.0 / RATE_HZ, abs=1e-4)
+
+
+def test_a_device_or_an_address_is_opened_with_the_size_asked_for(monkeypatch):
+    opened = []
+    monkeypatch.setattr(frame_source, "DeviceSource", lambda *given: opened.append(given))
+    for device in ("/dev/video0", "rtsp://camera/1"):
+        open_source("", device, " 640 x 480", 15.0, DeviceControls())
+    assert opened == [(device, (640, 480), 15.0, DeviceControls()) for device in ("/dev/video0", "rtsp://camera/1")]
+
+
+def test_what_may_not_be_read_is_named_with_a_remedy_for_devices(monkeypatch, tmp_path):
+    monkeypatch.setattr(frame_source.os, "access", lambda path, mode: False)
+    with pytest.raises(FrameSourceError, match="/dev/null may not be read by this user: sudo usermod -aG video"):
+        open_source("", "/dev/null", "640x480", 30.0, DeviceControls())
+    with pytest.raises(FrameSourceError, match="may not be read by this user$"):
+        open_source("", __file__, "640x480", 30.0, DeviceControls())

@@ -1,10 +1,13 @@
 """The lens from rendered images of a ChArUco board, and what too few or poor images are told."""
 
+import math
+
 import numpy as np
 import pytest
 
 pytest.importorskip("cv2")
 
+from hero_localization.calibration import lens_calibration
 from hero_localization.calibration.lens_calibration import (
     REGIONS,
     BoardView,
@@ -13,6 +16,7 @@ from hero_localization.calibration.lens_calibration import (
     find_board,
     is_mirrored,
 )
+from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.errors import CalibrationError
 from hero_localization.prints.boards import Board, draw_board, list_board_corners
 from hero_localization.simulated_camera.board_renderer import BoardRenderer
@@ -213,3 +217,143 @@ def test_four_views_tilted_by_a_quarter_radian_are_enough(tilt_rad, is_told):
     holds = [((0.0, tilt, 0.1), place) for tilt, (_, place) in zip(tilts_rad, list_holds(10, 0.5))]
     problems = calibrate(project(holds, noise_px=0.05)).problems
     assert any("hardly tilted" in problem for problem in problems) == is_told
+
+
+@pytest.fixture
+def judge(monkeypatch):
+    """Return a function that calibrates from as many views as there are errors, of a fit that has these."""
+
+    def run(errors_px, rms_px=0.1, tilts_rad=(0.3,) * 9, focal_error=0.001):
+        used = []
+
+        def fit(views, width_px, height_px, board, guess=None):
+            used.append([int(view.ids[0]) for view in views])
+            chosen = np.array([errors_px[index] for index in used[-1]])
+            return lens_calibration._Fit(None, rms_px, chosen, np.array(tilts_rad))
+
+        monkeypatch.setattr(lens_calibration, "_fit", fit)
+        monkeypatch.setattr(lens_calibration, "_measure_focal_error", lambda *_: focal_error)
+        everywhere = {(u, v): 25 for u in (0.1, 0.5, 0.9) for v in (0.1, 0.5, 0.9)}
+        views = [put_corners(everywhere)._replace(ids=np.array([index])) for index in range(len(errors_px))]
+        return calibrate_lens(views, 960, 540, BOARD), used
+
+    return run
+
+
+def test_a_lens_is_good_up_to_the_limits_of_its_errors(judge):
+    good = [1.0] * 9
+    for changes, word in (
+        ({"rms_px": 0.5}, None), ({"rms_px": 0.51}, "error 0.51 px rms is above 0.5 px"),
+        ({"focal_error": 0.003}, None), ({"focal_error": 0.0031}, "known to 0.31 % only"),
+        ({"tilts_rad": (0.26,) * 4}, None), ({"tilts_rad": (0.26,) * 3 + (0.24,) * 9}, "hardly tilted"),
+    ):  # fmt: skip
+        problems = judge(good, **changes)[0].problems
+        assert len(problems) == (word is not None) and (word or "") in "".join(problems), changes
+    both = judge(good, tilts_rad=(0.0,) * 9, focal_error=0.1)[0].problems
+    assert len(both) == 1 and "tilted by 30 to 45 degrees" in both[0], "one remedy for both"
+    assert judge(good, focal_error=0.002)[0].focal_error == 0.002
+
+
+def test_an_image_three_times_as_wrong_as_the_median_is_left_out(judge):
+    for worst, left_out in ((2.9, []), (3.1, [2])):
+        found, used = judge([1.0, 1.0, worst, *[1.0] * 6])
+        assert found.left_out == left_out and len(used) == 1 + len(left_out)
+        assert used[-1] == [index for index in range(9) if index not in left_out]
+    found, used = judge([1.0, 1.0, 9.0, *[1.0] * 5])
+    assert found.left_out == [] and used == [list(range(8))], "eight are needed"
+
+
+def test_eight_views_are_enough(judge):
+    assert judge([1.0] * 8)[0].problems == []
+    with pytest.raises(CalibrationError, match="found in 7 images; it takes 8"):
+        judge([1.0] * 7)
+
+
+def test_the_focal_error_is_that_of_the_jackknife(monkeypatch):
+    """Of means of numbers, for which the jackknife gives the standard error itself."""
+    random = np.random.RandomState(3)
+    values = random.normal(700.0, 5.0, (6, 2))
+    views = [BoardView(np.array([index]), value) for index, value in enumerate(values)]
+
+    def fit(others, width_px, height_px, board, guess):
+        matrix = np.diag((*np.mean([view.pixels for view in others], axis=0), 1.0))
+        return lens_calibration._Fit(Intrinsics(960, 540, matrix, np.zeros(5)), 0.1, np.ones(1), np.ones(1))
+
+    monkeypatch.setattr(lens_calibration, "_fit", fit)
+    whole = fit(views, 960, 540, BOARD, None)
+    errors = values.std(axis=0, ddof=1) / np.sqrt(6.0) / values.mean(axis=0)
+    found = lens_calibration._measure_focal_error(views, whole, 960, 540, BOARD)
+    assert found == pytest.approx(errors.max(), rel=1e-6)
+
+
+def test_images_that_no_lens_explains_are_refused():
+    views = [BoardView(np.arange(12), np.zeros((12, 2), np.float32)) for _ in range(8)]
+    with pytest.raises(CalibrationError, match="no lens explains these images"):
+        calibrate(views)
+
+
+def test_twelve_corners_make_a_view():
+    small = Board(columns=4, rows=5)
+    printed = np.pad(draw_board(small, 60), 60, constant_values=255)
+    view = find_board(printed, small)
+    assert sorted(view.ids) == list(range(12))
+    # Pixels have their centers at whole numbers, corners lie between.
+    expected = (list_board_corners(small)[:, :2] / small.square_m + 1.0) * 60.0 - 0.5
+    np.testing.assert_allclose(view.pixels, expected[view.ids], atol=0.1)
+    printed[:180, :180] = 255
+    assert find_board(printed, small) is None, "eleven or fewer"
+
+
+def test_a_board_is_that_of_the_print():
+    assert Board() == (9, 7, 0.025, 0.0185, "DICT_4X4_50")
+    corners_m = list_board_corners(BOARD)
+    x_m, y_m = np.meshgrid(np.arange(1, 9) * 0.025, np.arange(1, 7) * 0.025)
+    np.testing.assert_allclose(corners_m, np.column_stack((x_m.ravel(), y_m.ravel(), np.zeros(48))), atol=1e-7)
+    drawn = draw_board(BOARD, 40)
+    assert drawn.shape == (280, 360) and drawn[2, 2] == 0 and drawn[2, 42] == 255 == drawn[42, 2]
+
+
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (0.4, -0.3, 0.2)])
+def test_a_board_is_seen_where_it_is_held(turn):
+    import cv2
+
+    options = CameraOptions(
+        width_px=480, height_px=360, focal_px=(500.0, 490.0), center_px=(250.0, 170.0), noise=0.0, blur_px=0.0
+    )
+    board, place_m = BOARD, np.array((-0.02, 0.01, 0.4))
+    image = BoardRenderer(options, board).render(turn, place_m, np.random.RandomState(0))
+    cell = 40
+    printed = np.pad(draw_board(board, cell), 2 * cell, constant_values=255)
+    around = np.pad(printed, 3 * cell, constant_values=110).astype(float)
+    low, high = (change(around.astype(np.uint8), np.ones((9, 9))) for change in (cv2.erode, cv2.dilate))
+    rotation = cv2.Rodrigues(np.array(turn))[0]
+    seen = {}
+    for row, column in np.random.RandomState(2).randint(8, np.array(around.shape) - 8, (900, 2)):
+        x_m, y_m = (np.array((column + 0.5, row + 0.5)) - np.array(around.shape[::-1]) / 2.0) * board.square_m / cell
+        point_m = (rotation @ (x_m, y_m, 0.0) + place_m)[None]
+        ((u, v),) = cv2.projectPoints(point_m, np.zeros(3), np.zeros(3), View(options).matrix, options.distortion)[0][0]
+        if low[row, column] == high[row, column] and 1 <= u < 479 and 1 <= v < 359:
+            shade = int(low[row, column])
+            assert image[round(v), round(u)] == pytest.approx(20.0 + 0.8 * shade, abs=2.0), (u, v)
+            seen[shade] = seen.get(shade, 0) + 1
+    assert set(seen) == {0, 110, 255} and min(seen.values()) > 15
+    noisy = [
+        BoardRenderer(options._replace(noise=4.0), board).render(turn, place_m, np.random.RandomState(seed)).astype(int)
+        for seed in (1, 2)
+    ]
+    plain = np.abs(image.astype(int) - 108) < 2
+    assert (noisy[0] - noisy[1])[plain].std() == pytest.approx(4.0 * math.sqrt(2.0), rel=0.05)
+
+
+def test_a_board_is_blurred_by_pixel_and_lens():
+    steepest = []
+    for blur_px in (0.1, 1.0, 2.0):
+        options = CameraOptions(
+            width_px=320, height_px=240, focal_px=(600.0, 600.0), center_px=(160.0, 120.0), noise=0.0, blur_px=blur_px
+        )
+        image = BoardRenderer(options, Board()).render((0.0, 0.0, 0.0), (0.0, 0.0, 0.4), np.random.RandomState(0))
+        steepest.append(np.abs(np.diff(image.astype(int), axis=1)).max() / (0.8 * 255.0))
+    # Of an edge that lies on a pixel's middle or border, as wide as a Gaussian of lens and pixel.
+    for blur_px, share in zip((1.0, 2.0), steepest[1:]):
+        assert share == pytest.approx(math.erf(0.5 / math.sqrt(2.0) / math.hypot(blur_px, 0.29)), rel=0.06)
+    assert steepest[0] > 0.85

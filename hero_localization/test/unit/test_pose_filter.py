@@ -408,3 +408,53 @@ def test_no_hand_moves_a_robot_by_less_than_a_centimeter_or_six_degrees():
             found = pose_filter.add_measurement(Measurement(1.1 + 0.035 * index, pose, COVARIANCE))
         assert found is outcome, pose
         assert pose_filter.pose() == pytest.approx(pose, abs=1e-3)
+
+
+def test_a_covariance_is_taken_if_it_is_one():
+    random, count = np.random.RandomState(0), [0, 0]
+    for _ in range(300):
+        half = random.normal(size=(3, 3))
+        covariance = half + half.T + np.diag(random.uniform(0.0, 4.0, 3))
+        smallest = np.linalg.eigvalsh(covariance)[0]
+        if abs(smallest) < 1e-6:
+            continue
+        try:
+            PoseFilter().add_measurement(Measurement(0.0, ZERO, covariance))
+        except ValueError as error:
+            assert smallest < 0.0 and "covariance" in str(error)
+        else:
+            assert smallest > 0.0
+        count[int(smallest > 0.0)] += 1
+    assert min(count) > 50
+    for stamp_s in (math.nan, math.inf):
+        with pytest.raises(ValueError, match="finite"):
+            PoseFilter().add_measurement(Measurement(stamp_s, ZERO, COVARIANCE))
+
+
+def test_a_pose_waits_a_quarter_of_a_second_for_odometry():
+    used, waiting = Outcome.USED, Outcome.WAITING
+    for ahead_s, outcome in ((0.0, used), (0.01, waiting), (0.24, waiting), (0.26, used)):
+        assert start_filter().add_measurement(Measurement(1.0 + ahead_s, ZERO, COVARIANCE)) is outcome, ahead_s
+    pose_filter = start_filter()
+    for stamp_s in (1.1, 1.2):
+        assert pose_filter.add_measurement(Measurement(stamp_s, ZERO, COVARIANCE)) is Outcome.WAITING
+    (first,) = pose_filter.add_odometry(1.1, ZERO)
+    assert (first.measurement.stamp_s, first.outcome, first.before) == (1.1, Outcome.USED, ZERO)
+    assert pose_filter.used_s == 1.1
+    assert [correction.measurement.stamp_s for correction in pose_filter.add_odometry(1.3, ZERO)] == [1.2]
+
+
+def test_poses_come_late_by_a_second_at_most():
+    for late_s, outcome in ((0.95, Outcome.USED), (1.05, Outcome.TOO_LATE)):
+        pose_filter = start_filter()
+        for index in range(1, 31):
+            pose_filter.add_odometry(1.0 + 0.1 * index, ZERO)
+            assert pose_filter.add_measurement(Measurement(1.0 + 0.1 * index, ZERO, COVARIANCE)) is Outcome.USED
+        assert pose_filter.add_measurement(Measurement(4.0 - late_s - 0.001, ZERO, COVARIANCE)) is outcome, late_s
+
+
+def test_the_map_frame_of_odometry_turns_by_less_than_half_a_circle():
+    pose_filter = start_filter(Pose(0.0, 0.0, 3.0))
+    pose_filter.add_odometry(1.1, Pose(0.0, 0.0, -1.0))
+    assert pose_filter.find_odom_origin(pose_filter.pose()).yaw_rad == pytest.approx(3.0)
+    assert pose_filter.find_odom_origin(Pose(0.0, 0.0, 3.0)).yaw_rad == pytest.approx(4.0 - math.tau)

@@ -13,6 +13,7 @@ from hero_localization.calibration.lens_calibration import find_board  # noqa: E
 from hero_localization.errors import LocalizationError  # noqa: E402
 from hero_localization.prints import print_tags  # noqa: E402 - there is nothing to print without these
 from hero_localization.prints.boards import Board  # noqa: E402
+from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
 
 DOTS_PER_MM = 8.0
@@ -217,3 +218,65 @@ def test_sizes_may_be_as_small_and_as_large_as_named(arguments, limits):
     for size_mm in (low_mm - 0.01, high_mm + 0.01):
         with pytest.raises(LocalizationError, match="must be from 5 to"):
             list_pages(*arguments, str(size_mm))
+
+
+@pytest.mark.parametrize(("family", "tag_id"), [("36h11", 9), ("16h5", 4)])
+def test_white_cells_lie_on_one_black_square(family, tag_id):
+    figure = print_tags.draw_page([(print_tags.Sheet(tag_id, 48.0, 73.0, True), 90.0, 150.0)], family, A4_MM)
+    (axes,) = figure.axes
+    black, white = axes.collections
+    (corners,) = (path.vertices[:4] for path in black.get_paths())
+    assert corners.min(axis=0).tolist() == [66.0, 126.0] and corners.max(axis=0).tolist() == [114.0, 174.0]
+    assert black.get_facecolor()[0].tolist() == [0.0, 0.0, 0.0, 1.0] and white.get_facecolor()[0].tolist() == [1.0] * 4
+    assert white.get_zorder() > black.get_zorder()
+    cells = draw_tag(family, tag_id)
+    cell_mm, found = 48.0 / len(cells), np.zeros(cells.shape, int)
+    for path in white.get_paths():
+        low, high = path.vertices[:4].min(axis=0), path.vertices[:4].max(axis=0)
+        left, right = np.rint((np.array((low[0], high[0])) - 66.0) / cell_mm).astype(int)
+        top = int(round((174.0 - high[1]) / cell_mm))
+        assert high - low == pytest.approx(((right - left) * cell_mm, cell_mm))
+        found[top, left:right] += 1
+    np.testing.assert_array_equal(found, cells > 0)
+
+
+def test_what_is_not_named_has_its_default():
+    options = vars(print_tags.parse_options([]))
+    assert options == {
+        "robots": (), "references": (), "family": "36h11", "size": 40.0, "reference_size": 100.0, "board": False,
+        "paper": "a4", "out": "tags.pdf",
+    }  # fmt: skip
+    (page,) = list_pages("--robots", "3", "--references", "7")
+    robot, reference = print_tags.Sheet(3, 40.0, 73.0, True), print_tags.Sheet(7, 100.0, 150.0, False)
+    assert {sheet for sheet, _, _ in page} == {robot, reference}
+    assert list_pages("--references", "7", cells=6)[0][0][0].outer_mm == pytest.approx(100.0 * 10.0 / 6.0)
+
+
+@pytest.mark.parametrize(("module", "package"), [("matplotlib", "python3-matplotlib"), ("cv2", "python3-opencv")])
+def test_a_missing_library_is_named_with_its_package(module, package, monkeypatch):
+    find_spec = print_tags.importlib.util.find_spec
+    monkeypatch.setattr(
+        print_tags.importlib.util, "find_spec", lambda name: None if name == module else find_spec(name)
+    )
+    with pytest.raises(LocalizationError, match="%s is missing; install it: apt install %s" % (module, package)):
+        print_tags.run(print_tags.parse_options(["--robots", "3"]))
+
+
+def test_the_program_writes_its_file(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(print_tags.sys, "argv", ["print_tags", "--robots", "1-3", "--out", str(tmp_path / "tags.pdf")])
+    with pytest.raises(SystemExit) as end:
+        print_tags.main()
+    assert end.value.code == 0
+    assert (tmp_path / "tags.pdf").is_file() and "3 tags on 1 page;" in capsys.readouterr().out
+
+
+def test_lines_and_texts_are_as_thin_and_small_as_scissors_and_eyes_need():
+    for sheet in (print_tags.Sheet(101, 100.0, 150.0, False), print_tags.Sheet(7, 40.0, 73.0, True)):
+        (rim, *_), marks, texts = draw(sheet)
+        assert rim.get_linewidth() == 0.4 and not rim.get_fill() and rim.get_linestyle() == (0, (4, 4)), "dashed"
+        assert all(mark.get_linewidth() == 0.8 and mark.get_color() == "black" for mark in marks)
+        assert texts[0].get_fontsize() == 6.0 or sheet.is_robot
+    _, axes = print_tags._open_page(A4_MM)
+    assert {line.get_linewidth() for line in axes.lines} == {0.4} and axes.texts[0].get_fontsize() == 8.0
+    assert not axes.axison and axes.get_position().bounds == (0.0, 0.0, 1.0, 1.0)
+    assert axes.figure.get_size_inches() * 25.4 == pytest.approx(A4_MM)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from hero_localization.calibration import robot_calibration
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
 from hero_localization.errors import CalibrationError
 from hero_node.geometry import Pose, transform_pose, wrap_angle
@@ -174,3 +175,63 @@ def test_a_short_drive_is_enough_from_its_limit_on():
             assert not is_enough and "it takes 80" in str(error)
         else:
             assert is_enough
+
+
+def test_forty_poses_within_the_odometry_are_enough():
+    seen, odometry = drive()
+    first_s, last_s = odometry[0][0], odometry[-1][0]
+    # Of a pose whose delay may be half a second, the robot's must be known before it, and 0.1 s after it.
+    inside = [item for item in seen if first_s + 0.5 <= item[0] <= last_s - 0.1]
+    chosen = [inside[index] for index in np.linspace(0, len(inside) - 1, 40).astype(int)]
+    beyond = [(first_s + 0.49, seen[0][1]), (last_s - 0.09, seen[-1][1])] * 20
+    assert calibrate_robot([*chosen, *beyond], odometry).delay_s == pytest.approx(0.08, abs=0.02)
+    with pytest.raises(CalibrationError, match=r"seen 39 times, which is too few \(40\)"):
+        calibrate_robot([*chosen[1:], *beyond], odometry)
+    again = calibrate_robot([*reversed(seen)], [*reversed(odometry)])
+    assert again == calibrate_robot(seen, odometry), "in any order"
+
+
+@pytest.mark.parametrize(("turn_rad", "is_enough"), [(4.1, True), (3.9, False)])
+def test_a_turn_of_four_radians_is_enough(turn_rad, is_enough):
+    parts = ((turn_rad / 1.2 / 1.02, 0.0, 1.2), (0.5, 0.0, 0.0), (turn_rad / 1.2 / 1.02, 0.0, -1.2), *FULL[3:])
+    # Wheels slip by up to 3 %: of the turn, what odometry counted.
+    seen, odometry = drive(parts)
+    yaws_rad = np.unwrap([pose.yaw_rad for _, pose in odometry])
+    scale = turn_rad / np.ptp(yaws_rad)
+    counted = [(stamp_s, pose._replace(yaw_rad=wrap_angle(yaw_rad * scale)))
+               for (stamp_s, pose), yaw_rad in zip(odometry, yaws_rad)]  # fmt: skip
+    if is_enough:
+        assert calibrate_robot(seen, counted).delay_s == pytest.approx(0.08, abs=0.004)
+    else:
+        with pytest.raises(CalibrationError, match="turned by 223 degrees only; it takes 229"):
+            calibrate_robot(seen, counted)
+
+
+@pytest.mark.parametrize(("error_s", "is_named"), [(0.0049, False), (0.0051, True)])
+def test_a_delay_is_known_well_enough_to_five_milliseconds(error_s, is_named, monkeypatch):
+    monkeypatch.setattr(robot_calibration, "_find_delay", lambda *_: (0.08, error_s))
+    found = calibrate_robot(*drive())
+    assert found.delay_error_s == error_s
+    assert found.problems == (["the delay is known to 5 ms only: let the robot turn to and fro"] if is_named else [])
+
+
+def test_the_delay_and_its_error_are_those_of_least_squares():
+    random = np.random.RandomState(2)
+    odometry_s = np.arange(0.0, 12.0, 0.03)
+    counted_rad = 3.0 * np.sin(odometry_s)
+    errors, stated = [], []
+    for _ in range(30):
+        stamps_s = np.sort(random.uniform(1.0, 11.0, 200))
+        yaw_rad = 0.97 * np.interp(stamps_s - 0.1234, odometry_s, counted_rad) + 0.5 + random.normal(0.0, 0.02, 200)
+        delay_s, error_s = robot_calibration._find_delay(stamps_s, yaw_rad, odometry_s, counted_rad)
+        errors.append(delay_s - 0.1234)
+        stated.append(error_s)
+    # Of yaw by time, a straight line through the noise: sd / (rms of the slope) / sqrt(n).
+    assert np.mean(stated) == pytest.approx(0.02 / (3.0 * 0.97 / math.sqrt(2.0)) / math.sqrt(200.0), rel=0.15)
+    assert np.std(errors) == pytest.approx(np.mean(stated), rel=0.35) and abs(np.mean(errors)) < 0.0004
+
+
+def test_the_pauses_of_the_drive_are_those_that_the_camera_needs():
+    pauses_s = [duration_s for duration_s, *speeds in CALIBRATION_DRIVE if not any(speeds)]
+    assert pauses_s == [0.5, 0.4, 0.4, 0.8]
+    assert [part[0] for part in CALIBRATION_DRIVE if any(part[1:])] == [2.6, 2.6, 2.0, 2.0]

@@ -13,6 +13,7 @@ from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import SettingsError
 from hero_localization.tracking import settings
 from hero_localization.tracking.detectors import DEFAULT_BACKEND
+from hero_localization.tracking.tag_pose import TagLayout
 from hero_node.geometry import Pose
 from hero_test.bad_yaml import make_bad_yaml
 
@@ -205,6 +206,7 @@ def test_what_a_file_leaves_out_has_its_default(path):
     write(path, "references: {100: [1, 2, 90]}\nmounts: {3: [0.01, 0.02, -90]}\n")
     found = settings.load(path)
     assert (found.decimate, found.delay_s, found.controls) == (2.0, 0.0, (None, None, None, None))
+    assert settings.Settings()[2:] == (2.0, TagLayout(), None, None, 0.0, {}, (None, None, None, None))
     assert found.layout.default_mount[:2] == (0.04, 0.076)
     assert found.layout.references[100] == (Pose(1.0, 2.0, math.pi / 2.0), 0.1, 0.0)
     assert found.layout.mounts[3] == pytest.approx((0.04, 0.076, 0.01, 0.02, -math.pi / 2.0))
@@ -229,3 +231,12 @@ def test_a_file_that_is_no_text_is_refused_by_its_name(path):
         file.write(b"family: \xff\xfe\x00")
     with pytest.raises(SettingsError, match="camera.yaml is no YAML file"):
         settings.load(path)
+
+
+def test_what_cannot_be_read_is_named(path, tmp_path):
+    with pytest.raises(SettingsError, match="cannot be read: Is a directory"):
+        settings.load(str(tmp_path))
+    write(path, "detector: [apriltag]")
+    with pytest.raises(SettingsError, match="detector is .*, but must be a word such as"):
+        settings.load(path)
+    assert settings.find_change_s(path) == os.stat(path).st_mtime and settings.find_change_s(path + ".none") == 0.0

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ cv2 = pytest.importorskip("cv2")
 
 from hero_localization.errors import SettingsError  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402 - without OpenCV there is no camera
-from hero_localization.simulated_camera import camera_node  # noqa: E402
 from hero_localization.simulated_camera.board_renderer import list_board_places  # noqa: E402
 from hero_localization.simulated_camera.frame_times import list_frames  # noqa: E402
 from hero_localization.simulated_camera.lab_setup import (  # noqa: E402
@@ -191,7 +189,8 @@ def test_same_seed_gives_the_same_bytes_and_another_seed_others():
 
 def test_robots_out_of_the_picture_leave_it_as_it_is():
     empty = render(np.empty((0, 3)), ())
-    assert (render([(5.0, 0.0, 0.0)]) == empty).all()
+    for pose in ((5.0, 0.0, 0.0), (-5.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, -5.0, 0.0)):
+        assert (render([pose]) == empty).all(), pose
 
 
 def test_frames_arrive_late_in_order_and_some_never():
@@ -204,14 +203,6 @@ def test_frames_arrive_late_in_order_and_some_never():
     delays_s = arrivals_s - stamps_s
     assert delays_s.min() >= 0.06 and delays_s.max() <= 0.14 + 1e-9
     assert frames == list(itertools.islice(list_frames(options, 5.0, seed=3), 900))
-
-
-def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--first-id", "200"])
-    with pytest.raises(SystemExit) as end:
-        camera_node.main()
-    assert end.value.code == 1
-    assert capsys.readouterr().err == "simulated_camera: tags from 100 on are reference tags: take lower ids\n"
 
 
 @pytest.mark.parametrize(
@@ -299,7 +290,6 @@ def test_a_robots_top_is_a_disc_round_its_center_wherever_its_tag_sits():
         assert center_px == pytest.approx(expected_px, abs=0.6)
         radius_px = 0.036835 * 694.5 / (2.2 - tag.height_m)
         assert area_px == pytest.approx(math.pi * radius_px**2, rel=0.12)
-
 
 
 def test_light_falls_off_mostly_to_the_right_and_on_robots_too():
@@ -396,27 +386,70 @@ def test_camera_hangs_over_the_middle_of_the_arena_as_high_as_it_must():
         assert ((pixels >= 0.0) & (pixels <= (1919.0, 1079.0))).all() == is_seen
 
 
-def test_a_camera_with_fewer_pixels_sees_the_same():
-    small = camera_node._scale(CameraOptions(), 960, 540)
-    points_m = np.array([(0.7, -0.3, 0.076), (-1.0, 0.5, 0.0)])
-    large_px, small_px = (View(options).project(points_m) for options in (CameraOptions(), small))
-    assert small_px + 0.5 == pytest.approx((large_px + 0.5) / 2.0)
-    assert (small.width_px, small.height_px, small.blur_px) == (960, 540, 0.35)
+def in_tag(tag, x_m, y_m):
+    """Return a place on the robot as seen from its tag: to the right and down in the upright print, m."""
+    off_m = complex(x_m - tag.x_m, y_m - tag.y_m) * np.exp(-1j * tag.yaw_rad)
+    return -off_m.imag, -off_m.real
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--count", "501"], "--count: 501 is not from 1 to 500"),
-        (["--first-id", "-1"], "--first-id: -1 is not"),
-        (["--width", "159"], "--width: 159 is not from 160 to 4096"),
-        (["--rate", "0.4"], "--rate: 0.4 is not from 0.5 to 120"),
-        (["--delay", "5.1"], "--delay: 5.1 is not from 0 to 5"),
-        (["--exposure", "0.11"], "--exposure: 0.11 is not from 0 to 0.1"),
-        (["--tag-size", "nan"], "--tag-size: nan is not from 0.01 to 0.2"),
-    ],
-)
-def test_options_beyond_their_limits_are_named(arguments, words, capsys):
-    with pytest.raises(SystemExit):
-        camera_node.parse_options(arguments)
-    assert words in capsys.readouterr().err
+def expect_shade(tag, cells, is_round, x_m, y_m):
+    """Return the shade of a place on a plate, None beyond it."""
+    right_m, down_m = in_tag(tag, x_m, y_m)
+    cell_m = tag.size_m / len(cells)
+    reach_m = max(abs(right_m), abs(down_m))
+    if math.hypot(x_m, y_m) > 0.036835 if is_round else reach_m > tag.size_m / 2.0 + 2.0 * cell_m:
+        return None
+    if reach_m > tag.size_m / 2.0 + cell_m:
+        return 205.0 if is_round else 225.0
+    if reach_m > tag.size_m / 2.0:
+        return 225.0
+    row, column = (math.floor(place_m / cell_m + len(cells) / 2.0) for place_m in (down_m, right_m))
+    return 225.0 if cells[row, column] else 25.0
+
+
+@pytest.mark.parametrize("is_round", [True, False])
+@pytest.mark.parametrize(("family", "size_m"), [("36h11", 0.03), ("16h5", 0.024)])
+def test_a_plate_shows_print_margin_and_rim_each_at_its_place(is_round, family, size_m):
+    tag = PrintedTag(3, size_m, 0.0, 0.005, -0.004, 0.7, family)
+    near = STRAIGHT._replace(focal_px=(9000.0, 9000.0))
+    plate = CameraRenderer(near, ARENA, ())._print_plate(tag, is_round)
+    cells, count = draw_tag(family, 3), {}
+    for x_m, y_m in np.random.RandomState(1).uniform(-0.048, 0.048, (1500, 2)):
+        around = {
+            expect_shade(tag, cells, is_round, x_m + dx_m, y_m + dy_m)
+            for dx_m in (-0.0009, 0.0, 0.0009)
+            for dy_m in (-0.0009, 0.0, 0.0009)
+        }
+        if len(around) > 1:
+            continue  # at an edge
+        (expected,) = around
+        column, row, _ = np.rint(plate.to_texel @ (x_m, y_m, 1.0)).astype(int)
+        inside = 0 <= row < len(plate.texture) and 0 <= column < len(plate.texture)
+        shade, cover = plate.texture[row, column] if inside else (0.0, 0.0)
+        assert (shade, cover) == pytest.approx((expected or 0.0, float(expected is not None)), abs=0.01), (x_m, y_m)
+        count[expected] = count.get(expected, 0) + 1
+    assert min(count.values()) > 15 and set(count) >= {None, 25.0, 225.0}
+    far_m = 0.036835 + math.hypot(0.005, 0.004) if is_round else size_m / 2.0 + 2.0 * size_m / len(cells)
+    assert plate.reach_m == pytest.approx(far_m + 0.004)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_camera_hangs_as_low_as_the_last_pixel_allows(axis):
+    arena = build_rectangle(*((4.0, 1.0), (1.0, 3.0))[axis], 1)
+    references = list_references(arena, "36h11")
+    camera = hang_above(CameraOptions(), arena, references, 0.04)
+    sheets = [tag._replace(size_m=0.13) for tag in references]
+    x_m, y_m = arena.bounds_m.reshape(2, 2).T
+    tops_m = [(x, y, 0.076) for x in x_m for y in y_m]
+    corners_m = np.vstack([tops_m, *(tag_corners(tag, np.zeros((1, 3)))[0] for tag in sheets)])
+    last_px = float(View(camera).project(corners_m)[:, axis].max())
+    name = ("width_px", "height_px")[axis]
+    for size_px, is_enough in ((math.ceil(last_px) + 1, True), (math.ceil(last_px), False)):
+        other = hang_above(CameraOptions()._replace(**{name: size_px}), arena, references, 0.04)
+        assert (other.position_m == camera.position_m) == is_enough
+
+
+def test_a_camera_file_that_cannot_be_written_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SettingsError, match="camera.yaml cannot be written: "):
+        write_camera_file(str(tmp_path / "file" / "camera.yaml"), View(SMALL), SMALL, [TAG], [])

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+import yaml
+from PIL import Image
 
 from hero_localization.mapping.map_files import save_map
 from hero_localization.mapping.occupancy_grid import OccupancyGrid
@@ -93,3 +95,51 @@ def test_a_saved_map_is_an_arena_of_the_simulator(tmp_path):
 def test_a_map_that_cannot_be_written_is_an_error(tmp_path):
     with pytest.raises(OSError):
         save_map(str(tmp_path / "none" / "arena.yaml"), OccupancyGrid((0.0, 0.0, 1.0, 1.0)))
+
+
+def test_twenty_scans_wait_and_poses_are_kept_for_two():
+    swarm_map = make_map()
+    for step in range(30):
+        swarm_map.add_ranges(0, 0.25 * step, AHEAD)
+    for step in range(59):
+        swarm_map.add_pose(0, 0.125 * step, Pose(0.0, 0.0, 0.0))
+    # Poses are known from 5.25 to 7.25 s.
+    assert swarm_map.update() == 9
+    swarm_map = make_map()
+    for step in range(30):
+        swarm_map.add_ranges(0, 1.0 + 0.01 * step, AHEAD)
+    swarm_map.add_pose(0, 1.0, Pose(0.0, 0.0, 0.0))
+    swarm_map.add_pose(0, 1.5, Pose(0.0, 0.0, 0.0))
+    assert swarm_map.update() == 20
+
+
+def test_a_robot_that_others_pass_is_where_it_was_at_the_time_of_the_scan():
+    for other_m, is_mapped in ((0.13, False), (0.4, True)):
+        swarm_map = make_map()
+        for step in range(11):
+            swarm_map.add_pose(0, 0.1 * step, Pose(0.0, 0.0, 0.0))
+            swarm_map.add_pose(1, 0.1 * step, Pose(other_m + 0.1 * step - 0.5, 0.0, 0.0))
+            swarm_map.add_ranges(0, 0.5, AHEAD)
+        swarm_map.update()
+        assert swarm_map.grid.occupied.any() == is_mapped
+
+
+def test_changes_are_told_to_their_last_row_and_column():
+    swarm_map = make_map()
+    swarm_map.take_change()
+    swarm_map.grid.log_odds[3:8, 20:31] = -1.0
+    percent, box = swarm_map.take_change()
+    assert box == (3, 20, 8, 31) and (percent[3:8, 20:31] == 27).all()
+    assert swarm_map.take_change()[1] == (0, 0, 0, 0)
+
+
+def test_a_saved_map_is_as_map_server_reads_it(tmp_path):
+    grid = OccupancyGrid((-0.5, 0.0, -0.46, 0.03))
+    grid.log_odds[:] = [[-3.0, 3.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, -3.0, 0.0]]
+    image = save_map(str(tmp_path / "arena.yaml"), grid)
+    assert image == str(tmp_path / "arena.png")
+    assert np.asarray(Image.open(image)).tolist() == [[205, 205, 254, 205], [205] * 4, [254, 0, 205, 205]], "top first"
+    assert yaml.safe_load((tmp_path / "arena.yaml").read_text()) == {
+        "image": "arena.png", "resolution": 0.01, "origin": [-0.5, 0.0, 0.0], "negate": 0,
+        "occupied_thresh": 0.65, "free_thresh": 0.196,
+    }  # fmt: skip

@@ -194,7 +194,7 @@ def test_small_tags_that_the_detector_misses_are_found_by_the_fine_one():
     assert watch.fine.searched_px < 14 * 80**2 + 2 * 1.7 * WIDTH_PX * HEIGHT_PX / 12.0
 
 
-@pytest.mark.parametrize(("side_px", "found"), [(18.0, [1]), (22.0, [])])
+@pytest.mark.parametrize(("side_px", "found"), [(18.0, [1]), (20.0, [])])
 def test_the_smallest_tags_are_found_by_the_finest_detector(side_px, found, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "SIDE_PX", side_px)
     watch, tags = Watch(with_fine=True), [(1, (800.0, 500.0))]
@@ -327,3 +327,19 @@ def test_the_tiles_take_turns_within_two_seconds(step_s, sweep_s, monkeypatch):
         search.search(FRAME, frame * step_s)
     searched = [window for window in windows if window in tiles]
     assert searched[:12] == tiles and len(searched) <= 14
+
+
+@pytest.mark.parametrize(("side_px", "found"), [(34.0, [1]), (36.0, [])])
+def test_small_tags_have_a_finer_detector(side_px, found, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "SIDE_PX", side_px)
+    watch, tags = Watch(with_fine=True, smallest_px=40.0), [(1, (800.0, 500.0))]
+    watch.see(tags, frames=30)
+    watch.detector.blind = {1}
+    assert watch.see(tags) == found
+
+
+def test_a_place_out_of_the_image_does_not_end_the_search():
+    watch = Watch()
+    watch.see([(1, (800.0, 500.0))], frames=10)
+    watch.index += 5
+    assert watch.see([(1, (834.0, 500.0))], expected={1: (-300.0, 500.0)}) == [1]

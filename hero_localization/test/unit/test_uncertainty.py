@@ -191,3 +191,9 @@ def test_correlated_poses_are_joined_as_the_kalman_filter_has_it():
     assert pose == pytest.approx(joined @ np.linalg.inv(second) @ seen, rel=1e-3)
     left = np.minimum((4.9e-7, 4.9e-7, 9e-6), np.diag(second))
     np.testing.assert_allclose(covariance, joined + np.diag(left), rtol=2e-3, atol=1e-9)
+
+
+def test_rounding_below_zero_is_no_uncertainty():
+    report = make_robot_pose(3, 1, None, Pose(0.1, 0.2, 0.3), np.diag((-1e-18, 0.0, -1e-18)))
+    assert (report.position_sd, report.yaw_sd) == (0.0, 0.0)
+    assert (report.id, report.state, report.x, report.y, report.yaw) == (3, 1, 0.1, 0.2, 0.3)

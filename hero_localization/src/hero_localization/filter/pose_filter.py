@@ -136,7 +136,7 @@ class PoseFilter:
         self._steps: List[_Step] = []
         self._rejected: List[Measurement] = []
         self._waiting: List[Measurement] = []
-        self._systematic = np.zeros(3)
+        self._systematic = SYSTEMATIC
 
     def add_odometry(self, stamp_s: float, pose: Pose) -> List[Correction]:
         """Follow a reading of /hero_N/odom; return what became of measured poses that waited for it."""

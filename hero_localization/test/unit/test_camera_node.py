@@ -1,0 +1,114 @@
+"""The node of the simulated camera: its options, the robots' true poses, and the board that it shows."""
+
+import math
+import sys
+
+import numpy as np
+import pytest
+
+pytest.importorskip("cv2")
+
+from hero_localization.errors import SettingsError
+from hero_localization.simulated_camera import camera_node
+from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, View
+
+
+def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--first-id", "200"])
+    with pytest.raises(SystemExit) as end:
+        camera_node.main()
+    assert end.value.code == 1
+    assert capsys.readouterr().err == "simulated_camera: tags from 100 on are reference tags: take lower ids\n"
+
+
+def test_a_camera_with_fewer_pixels_sees_the_same():
+    small = camera_node._scale(CameraOptions(), 960, 540)
+    points_m = np.array([(0.7, -0.3, 0.076), (-1.0, 0.5, 0.0)])
+    large_px, small_px = (View(options).project(points_m) for options in (CameraOptions(), small))
+    assert small_px + 0.5 == pytest.approx((large_px + 0.5) / 2.0)
+    assert (small.width_px, small.height_px, small.blur_px) == (960, 540, 0.35)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--count", "501"], "--count: 501 is not from 1 to 500"),
+        (["--first-id", "-1"], "--first-id: -1 is not"),
+        (["--width", "159"], "--width: 159 is not from 160 to 4096"),
+        (["--rate", "0.4"], "--rate: 0.4 is not from 0.5 to 120"),
+        (["--delay", "5.1"], "--delay: 5.1 is not from 0 to 5"),
+        (["--exposure", "0.11"], "--exposure: 0.11 is not from 0 to 0.1"),
+        (["--tag-size", "nan"], "--tag-size: nan is not from 0.01 to 0.2"),
+    ],
+)
+def test_options_beyond_their_limits_are_named(arguments, words, capsys):
+    with pytest.raises(SystemExit):
+        camera_node.parse_options(arguments)
+    assert words in capsys.readouterr().err
+
+
+def test_the_camera_is_a_webcam_above_a_lab():
+    assert CameraOptions() == (
+        1920, 1080, (1390.0, 1390.0), (948.0, 551.0), (-0.09, 0.02, 0.0006, -0.0004, 0.0),
+        (0.03, -0.02, 2.2), (0.02, -0.015, 0.01), 0.7, 3.0, 0.35, 0.008, 30.0, 0.07, 0.01, 0.02,
+    )  # fmt: skip
+    assert PrintedTag(5) == (5, 0.04, 0.076, 0.0, 0.0, 0.0, "36h11")
+    options = vars(camera_node.parse_options([]))
+    names = ("count", "first_id", "width", "rate", "delay", "exposure", "tag_size", "seed", "stamps", "family")
+    assert tuple(options[name] for name in names) == (1, 0, 1920, 30.0, 0.07, 0.008, 0.04, 0, "capture", "36h11")
+
+
+def test_options_are_taken_up_to_their_limits():
+    for name, low, high in (
+        ("count", 1, 500), ("first-id", 0, 500), ("width", 160, 4096), ("rate", 0.5, 120.0),
+        ("delay", 0.0, 5.0), ("exposure", 0.0, 0.1), ("tag-size", 0.01, 0.2),
+    ):  # fmt: skip
+        step = 1 if isinstance(low, int) else 0.001
+        for value in (low, high):
+            camera_node.parse_options(["--" + name, str(value)])
+        for value in (low - step, high + step):
+            with pytest.raises(SystemExit):
+                camera_node.parse_options(["--" + name, str(value)])
+
+
+def test_the_board_is_shown_four_times_at_each_place():
+    scene = camera_node.BoardScene(camera_node.parse_options(["--board"]), CameraOptions(width_px=64, height_px=36))
+    scene._renderer.render = lambda turn, place_m, random: (turn, place_m)
+    shown = [scene.render(0.0) for _ in range(12)]
+    assert [shown.index(place) for place in shown] == [0] * 4 + [4] * 4 + [8] * 4
+
+
+def test_references_are_printed_for_the_camera_file(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--arena", "empty"])
+    camera_node._run()
+    assert capsys.readouterr().out.startswith("references: {100: [-1.120, -0.800, 0], 101: ")
+    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--first-id", "90", "--count", "10"])
+    camera_node._run()
+    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--first-id", "91", "--count", "10"])
+    with pytest.raises(SettingsError, match="tags from 100 on"):
+        camera_node._run()
+
+
+def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):
+    monkeypatch.setattr(camera_node.rospy, "Subscriber", lambda *_, **__: None)
+    true = camera_node.TrueRobots([4, 7])
+
+    def receive(stamp_s, x_m):
+        message = camera_node.Odometry()
+        message.header.stamp = camera_node.rospy.Time.from_sec(stamp_s)
+        message.pose.pose.position.x, message.pose.pose.position.y = x_m, 2.0
+        message.pose.pose.orientation.z, message.pose.pose.orientation.w = math.sin(0.5), math.cos(0.5)
+        message.twist.twist.linear.x, message.twist.twist.angular.z = 0.2, 1.0
+        true._receive(message, 7)
+
+    assert true.find(1.0)[0] == []
+    for index in range(30):
+        receive(1.0 + 0.5 * index, float(index))
+    for stamp_s, x_m, moved_s in ((6.0, 10.0, 0.0), (5.0, 10.0, -0.1), (6.05, 10.0, 0.05), (15.2, 28.0, 0.1),
+                                  (15.7, 29.0, 0.1), (15.42, 29.0, -0.08)):  # fmt: skip
+        ids, poses, speeds = true.find(stamp_s)
+        heading_rad = 1.0 + moved_s / 2.0
+        moved_m = 0.2 * moved_s
+        expected = (x_m + moved_m * math.cos(heading_rad), 2.0 + moved_m * math.sin(heading_rad), 1.0 + moved_s)
+        assert ids == [7] and speeds.tolist() == [[0.2, 1.0]]
+        assert poses[0] == pytest.approx(expected), stamp_s
