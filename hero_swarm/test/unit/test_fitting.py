@@ -21,7 +21,7 @@ from hero_swarm.fitting import infrared_fit
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body
 from hero_swarm.fitting.infrared_fit import _list_readings, fit_infrared
 from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
-from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, measure_wheels, sample_times
+from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, interpolate_poses, measure_wheels, sample_times
 from hero_swarm.fitting.replay import Motors, build_errors
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
 from hero_swarm.metrics import METRICS
@@ -63,7 +63,7 @@ def record(kind, time_s=60.0, delay_ms=0, turns=True):
     tables = [np.array(table) for table in (commands, odometry, poses)]
     for table in tables:
         table[:, 0] /= 1000.0
-    return Recording("hero_4", *tables)
+    return Recording(*tables)
 
 
 def test_hidden_errors_come_back_and_predict_paths_not_seen():
@@ -106,7 +106,7 @@ def record_scans(time_s):
         for table, pose in zip(poses, rows.world.poses + random.normal(0.0, (0.001, 0.001, 0.01), (2, 3))):
             table.append((now_ms / 1000.0 + 0.1, *pose))
     own, other = map(np.array, poses)
-    return Recording("hero_0", np.empty((0, 4)), own, own, np.array(scans), (other,))
+    return Recording(np.empty((0, 4)), own, own, np.array(scans), (other,))
 
 
 def test_hidden_infrared_constants_come_back_from_a_known_arena():
@@ -116,7 +116,7 @@ def test_hidden_infrared_constants_come_back_from_a_known_arena():
         assert fit.values["alpha%d_counts_m2" % beam] == pytest.approx(0.36 if beam == 3 else 0.5, rel=0.03), beam
     assert fit.values["beta_counts"] == pytest.approx(-3.0, abs=0.3)
     assert fit.after_counts < fit.before_counts / 3.0
-    lines = describe_fit(Fit("hero_4", fit.values, 0.0, 0.03, 0.01, fit), 4)
+    lines = describe_fit(Fit(fit.values, 0.0, 0.03, 0.01, fit), 4)
     assert re.search(r"# hero_4: held-out infrared signals are \d\.\d counts off, before the fit \d\.\d$", lines[-2])
     assert ",beta_counts=-" in lines[-1]
 
@@ -127,7 +127,7 @@ def test_infrared_sensors_that_saw_too_little_are_named(monkeypatch):
     monkeypatch.setattr(infrared_fit, "_list_readings", lambda *_: [column[readings[0] != 3] for column in readings])
     fit = fit_infrared([recording], WALLS, 2.0 / 3.0)
     assert "alpha3_counts_m2" not in fit.values and len(fit.values) == 8
-    assert describe_fit(Fit("hero_4", fit.values, 0.0, 0.03, 0.01, fit), 4)[-2].endswith("as on the drawing: 3")
+    assert describe_fit(Fit(fit.values, 0.0, 0.03, 0.01, fit), 4)[-2].endswith("as on the drawing: 3")
 
 
 def test_infrared_sensors_cannot_be_fitted_where_they_saw_too_little():
@@ -209,7 +209,7 @@ def make_recording(duration_s, yaw_rad=0.0, turn_rad_s=0.0, speed_m_s=0.1, perio
     cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
     places_m = (2.0 + cosine * forward_m - sine * left_m, 1.0 + sine * forward_m + cosine * left_m)
     yaws_rad = np.remainder(turned_rad + yaw_rad + math.pi, math.tau) - math.pi
-    return Recording("hero_4", np.empty((0, 4)), odometry, np.column_stack((times_s, *places_m, yaws_rad)))
+    return Recording(np.empty((0, 4)), odometry, np.column_stack((times_s, *places_m, yaws_rad)))
 
 
 def test_wheels_roll_as_far_as_their_arcs():
@@ -227,12 +227,18 @@ def test_wheels_roll_as_far_as_their_arcs():
     assert straight[1, :2] == pytest.approx((math.cos(step_rad / 2.0), math.sin(step_rad / 2.0)))
 
 
-def test_poses_are_cut_at_both_ends_and_samples_lie_within_the_odometry():
+def test_a_recording_is_cut_and_samples_lie_within_the_odometry():
     recording = make_recording(2.0)
-    assert recording.cut(0.5, 1.0).poses[:, 0] == pytest.approx(np.arange(0.5, 1.01, 0.05))
-    assert len(recording.cut(0.5, 1.0).odometry) == len(recording.odometry)
+    first = recording.cut(0.501)
+    assert first.poses[:, 0] == pytest.approx(np.arange(0.0, 1.01, 0.05))
+    assert np.array_equal(first.odometry[:, 0], first.poses[:, 0])
     assert recording.time_s == pytest.approx(2.0)
     assert sample_times(recording) == pytest.approx(np.arange(1, 40) * 0.05)
+
+
+def test_poses_are_interpolated_the_short_way_round():
+    poses = np.array(((0.0, 0.0, 1.0, 3.0), (1.0, 2.0, 1.0, 3.2 - math.tau)))
+    assert interpolate_poses(poses, np.array([0.5]))[0] == pytest.approx((1.0, 1.0, 3.1))
 
 
 def test_a_body_is_fitted_to_stretches_that_have_poses_throughout():

@@ -16,7 +16,7 @@ from hero_sim.world.range_sensors import (
     measure_brightness,
 )
 
-from .recording import Recording
+from .recording import Recording, interpolate_poses
 
 _MIN_DISTANCE_M, _MAX_DISTANCE_M = 0.03, 0.20
 """Of what is seen: nearer, errors of poses and saturation tell more than the sensor; farther, there is no signal."""
@@ -95,9 +95,7 @@ def _list_readings(
 
 def _find_poses(poses: np.ndarray, times_s: np.ndarray) -> np.ndarray:
     """Return the poses (K, 3) at these times (K,); nan where they are not known."""
-    known_s = poses[:, 0]
-    columns = [np.interp(times_s, known_s, column) for column in (*poses[:, 1:3].T, np.unwrap(poses[:, 3]))]
-    ends = np.searchsorted(known_s, times_s)
-    bounds_s = np.concatenate(([-np.inf], known_s, [np.inf]))
+    ends = np.searchsorted(poses[:, 0], times_s)
+    bounds_s = np.concatenate(([-np.inf], poses[:, 0], [np.inf]))
     gaps_s = bounds_s[ends + 1] - bounds_s[ends]
-    return np.where(gaps_s[:, None] < _MAX_GAP_S, np.column_stack(columns), np.nan)
+    return np.where(gaps_s[:, None] < _MAX_GAP_S, interpolate_poses(poses, times_s), np.nan)

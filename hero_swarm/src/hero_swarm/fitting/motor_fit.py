@@ -11,7 +11,7 @@ import numpy as np
 from hero_sim.robot.firmware import SPIN_MS
 
 from .body_fit import follow_body
-from .recording import PULSES, SAMPLE_S, Recording, measure_wheels, sample_times
+from .recording import PULSES, SAMPLE_S, Recording, interpolate_poses, measure_wheels, sample_times
 from .replay import Motors, replay_commands
 
 DELAY = "delay_s"
@@ -37,20 +37,17 @@ _PHASES_S = np.arange(0.0, SPIN_MS, 8.0) / 1000.0
 """Of the cycle in which the firmware reads commands, that are tried: which one a robot has is not in its messages."""
 
 
-def fit_motors(recordings: List[Recording], end_share: float) -> List[Motors]:
-    """Return the motors of one robot in each of its recordings, from the first share of them.
-
-    Those on the drawing without servo pulses.
-    """
+def fit_motors(recordings: List[Recording]) -> List[Motors]:
+    """Return the motors of one robot in each of its recordings; those on the drawing without servo pulses."""
     if not any((recording.commands[:, 1] == PULSES).any() for recording in recordings):
         return [Motors({}) for _ in recordings]
-    parts = [_cut_odometry(recording, end_share * recording.time_s) for recording in recordings]
     values, steps, least, most = np.array(list(_PARAMETERS.values())).T
-    phases_s = np.zeros(len(parts))
+    phases_s = np.zeros(len(recordings))
     for _ in range(_ITERATIONS):
         sloped = np.vstack((values, values + np.diag(steps)))
         differences = np.hstack([
-            _compare(part, [_build_motors(own, phase_s) for own in sloped]) for part, phase_s in zip(parts, phases_s)
+            _compare(recording, [_build_motors(own, phase_s) for own in sloped])
+            for recording, phase_s in zip(recordings, phases_s)
         ])
         slopes = (differences[1:] - differences[0]).T  # by steps
         square, gradient = slopes.T @ slopes, slopes.T @ differences[0]
@@ -58,8 +55,8 @@ def fit_motors(recordings: List[Recording], end_share: float) -> List[Motors]:
         moves = [np.linalg.solve(square + damping * scale, gradient) for damping in _DAMPINGS]
         candidates = np.clip([values - steps * move for move in moves], least, most)
         motors = [_build_motors(own, phase_s) for own in candidates for phase_s in _PHASES_S]
-        squares = np.array([(_compare(part, motors) ** 2).sum(axis=1) for part in parts])
-        squares = squares.reshape(len(parts), len(candidates), len(_PHASES_S))
+        squares = np.array([(_compare(recording, motors) ** 2).sum(axis=1) for recording in recordings])
+        squares = squares.reshape(len(recordings), len(candidates), len(_PHASES_S))
         costs = squares.min(axis=2).sum(axis=0)
         best, last = int(costs.argmin()), float((differences[0] ** 2).sum())
         if costs[best] < last:
@@ -67,10 +64,6 @@ def fit_motors(recordings: List[Recording], end_share: float) -> List[Motors]:
         if costs[best] > (1.0 - _END) * last:
             break
     return [_build_motors(values, phase_s) for phase_s in phases_s]
-
-
-def _cut_odometry(recording: Recording, end_s: float) -> Recording:
-    return recording._replace(odometry=recording.odometry[recording.odometry[:, 0] <= end_s])
 
 
 def _build_motors(values: np.ndarray, phase_s: float) -> Motors:
@@ -95,10 +88,7 @@ def predict_ends(
     wheels_m = replay_commands(recording, [motors for motors, _ in robots])
     poses = np.stack([follow_body(wheels_m[:, row], body) for row, (_, body) in enumerate(robots)], axis=1)
     times_s = sample_times(recording)
-    measured = np.column_stack(
-        [np.interp(times_s, recording.poses[:, 0], column)
-         for column in (*recording.poses[:, 1:3].T, np.unwrap(recording.poses[:, 3]))]
-    )  # fmt: skip
+    measured = interpolate_poses(recording.poses, times_s)
     span = round(path_s / SAMPLE_S)
     first = np.searchsorted(times_s, max(start_share * recording.time_s, recording.poses[0, 0]))
     starts = np.arange(first, np.searchsorted(times_s, recording.poses[-1, 0]) - span, span)

@@ -25,7 +25,6 @@ class Recording(NamedTuple):
         others: poses of the other robots.
     """
 
-    name: str
     commands: np.ndarray
     odometry: np.ndarray
     poses: np.ndarray
@@ -37,10 +36,10 @@ class Recording(NamedTuple):
         """Time of the last odometry."""
         return float(self.odometry[-1, 0])
 
-    def cut(self, start_s: float, end_s: float) -> "Recording":
-        """Return the poses of a part, with all commands and odometry."""
-        inside = (self.poses[:, 0] >= start_s) & (self.poses[:, 0] <= end_s)
-        return self._replace(poses=self.poses[inside])
+    def cut(self, share: float) -> "Recording":
+        """Return its first share, with all commands and scans."""
+        odometry = self.odometry[self.odometry[:, 0] <= share * self.time_s]
+        return self._replace(odometry=odometry, poses=self.poses[self.poses[:, 0] <= odometry[-1, 0]])
 
 
 def sample_times(recording: Recording) -> np.ndarray:
@@ -57,3 +56,9 @@ def measure_wheels(recording: Recording, times_s: np.ndarray) -> np.ndarray:
     halves_m = turns_rad * (WHEEL_SEPARATION_M / 2.0)
     rolled_m = np.cumsum(np.vstack(([(0.0, 0.0)], np.column_stack((paths_m - halves_m, paths_m + halves_m)))), axis=0)
     return np.column_stack([np.interp(times_s, recording.odometry[:, 0], column) for column in rolled_m.T])
+
+
+def interpolate_poses(poses: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """Return x m, y m, yaw rad (K, 3) at these times (K,), from poses with their times (P, 4)."""
+    columns = (*poses[:, 1:3].T, np.unwrap(poses[:, 3]))
+    return np.column_stack([np.interp(times_s, poses[:, 0], column) for column in columns])

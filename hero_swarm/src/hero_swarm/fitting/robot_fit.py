@@ -37,7 +37,6 @@ class Fit(NamedTuple):
         infrared: None without an arena.
     """
 
-    name: str
     values: Dict[str, float]
     delay_s: float
     before_m: float
@@ -51,8 +50,8 @@ def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit
     Raises: ValueError if they tell too little.
     """
     share = 1.0 - HELD_OUT_SHARE
-    body = fit_body([recording.cut(0.0, share * recording.time_s) for recording in recordings])
-    motors = fit_motors(recordings, share)
+    seen = [recording.cut(share) for recording in recordings]
+    body, motors = fit_body(seen), fit_motors(seen)
     drawn = Motors({}), np.ones(3)
     ends_m = np.hstack([
         predict_ends(recording, [drawn, (own, body)], share, PATH_S) for recording, own in zip(recordings, motors)
@@ -65,7 +64,7 @@ def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit
     separation = {"wheel_separation_m": float(body[2]) * WHEEL_SEPARATION_M}
     infrared = None if arena is None else fit_infrared(recordings, arena, share)
     values = {**motors[0].values, **rolled, **separation, **(infrared.values if infrared else {})}
-    return Fit(recordings[0].name, values, motors[0].delay_s, before_m, after_m, infrared)
+    return Fit(values, motors[0].delay_s, before_m, after_m, infrared)
 
 
 def describe_fit(fit: Fit, robot_id: int) -> List[str]:
@@ -82,4 +81,4 @@ def describe_fit(fit: Fit, robot_id: int) -> List[str]:
         unseen = [str(beam) for beam in range(BEAMS) if "alpha%d_counts_m2" % beam not in fit.values]
         if unseen:
             remarks.append("infrared sensors that saw too little are as on the drawing: %s" % ", ".join(unseen))
-    return ["# %s: %s" % (fit.name, remark) for remark in remarks] + ["robot=%d,%s" % (robot_id, values)]
+    return ["# hero_%d: %s" % (robot_id, remark) for remark in remarks] + ["robot=%d,%s" % (robot_id, values)]

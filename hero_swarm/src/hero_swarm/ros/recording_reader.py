@@ -84,11 +84,11 @@ def _align(robot_id: int, tables: Sequence[Rows]) -> Recording:
     """Return a recording, of its tables in order, whose time begins with the odometry."""
     start_s = min(tables[1])[0]
     commands, odometry, poses, scans, *others = (_shift(rows, start_s) for rows in tables)
-    name = "hero_%d" % robot_id
     steps = np.diff(odometry, axis=0)
     if (np.hypot(steps[:, 1], steps[:, 2]) > MAX_SPEED_M_S * np.maximum(steps[:, 0], 0.02)).any():
-        raise ExperimentError("%s: its odometry jumps: it was set, or the robot started anew; record again" % name)
-    return Recording(name, commands, odometry, poses, scans, tuple(others))
+        text = "hero_%d: its odometry jumps: it was set, or the robot started anew; record again"
+        raise ExperimentError(text % robot_id)
+    return Recording(commands, odometry, poses, scans, tuple(others))
 
 
 def _shift(rows: Rows, start_s: float) -> np.ndarray:
