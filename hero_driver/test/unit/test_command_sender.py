@@ -2,6 +2,7 @@
 
 import itertools
 
+import pytest
 from commanded_robot import MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
 from hypothesis import given
 from hypothesis import strategies as st
@@ -110,3 +111,13 @@ def test_a_robot_that_left_gets_nothing_more():
         robot.closed = True
         clock.run(1.0)
     assert len(robot.writes) == 1
+
+
+@pytest.mark.parametrize(("silence_s", "is_sent"), [(0.45, True), (0.55, False)])
+def test_motion_goes_to_a_robot_that_was_heard_in_the_last_half_second(silence_s, is_sent):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock)
+        robot.peer.wheels.read_ticks(0.0, 0.0)
+        clock.run(silence_s)
+        robot.drive(0.1)
+        assert bool(robot.writes) == is_sent

@@ -147,6 +147,8 @@ def test_a_driver_that_neither_listens_nor_dials_is_refused():
 
 
 def test_robots_are_addresses_with_the_usual_port_unless_another_is_given():
+    config = read_config({"robots": [{"host": "a", "port": 1}, {"host": "a", "port": 65535}]})
+    assert [robot.port for robot in config.robots] == [1, 65535]
     config = read_config({"robots": [{"host": "10.0.0.7"}, {"host": "hero-3.local", "port": 4000}]})
     assert config.robots == (Address("10.0.0.7", 11411), Address("hero-3.local", 4000))
 

@@ -6,10 +6,11 @@ import types
 import pytest
 
 from hero_driver.transport import dialer
-from hero_driver.transport.dialer import BACKOFF_MAX_S, STABLE_S, start_dialer
+from hero_driver.transport.dialer import start_dialer
 
 ADDRESS = ("127.0.0.1", 11411)
 CALLS = 8
+BACKED_OFF_S = [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0, 10.0]
 
 
 class Ended:
@@ -30,15 +31,16 @@ class Ended:
 
 @pytest.mark.parametrize(
     "lasts_s, expected_s",
-    [(0.0, [0.5, 1.0, 2.0, 4.0, 8.0] + 3 * [BACKOFF_MAX_S]), (STABLE_S, CALLS * [0.5])],
-    ids=["hangs up at once", "stays a while"],
+    [(0.0, BACKED_OFF_S), (2.9, BACKED_OFF_S), (3.0, CALLS * [0.5])],
+    ids=["hangs up at once", "hangs up soon", "stays a while"],
 )
 def test_the_driver_backs_off_from_a_robot_that_hangs_up_at_once(monkeypatch, lasts_s, expected_s):
-    clock = types.SimpleNamespace(now_s=0.0)
+    clock = types.SimpleNamespace(now_s=1000.0)
     monkeypatch.setattr(dialer, "time", types.SimpleNamespace(monotonic=lambda: clock.now_s))
     monkeypatch.setattr(dialer, "_connect", lambda address: None)
 
     def hand_over(sock, address, note_closed):
+        assert threading.current_thread().daemon, "it would keep the driver from ending"
         clock.now_s += lasts_s
         note_closed()
 

@@ -11,12 +11,9 @@ from hero_driver.config import DriverConfig, read_config
 PACKAGE = Path(__file__).resolve().parents[2]
 
 
-def test_the_page_of_parameters_is_generated_from_the_code():
+def test_the_page_and_the_yaml_file_hold_every_limit_and_default():
     page = PACKAGE.parent / "docs" / "driver_parameters.md"
     assert page.read_text() == documented_parameters.make_page()
-
-
-def test_the_yaml_file_holds_every_parameter_at_its_default():
     text = (PACKAGE / "config" / "hero_driver.yaml").read_text()
     assert text == documented_parameters.make_yaml()
     assert read_config(yaml.safe_load(text)) == DriverConfig()

@@ -352,9 +352,31 @@ def test_the_loop_waits_for_its_next_timer_and_not_at_all_for_calls(still_loop, 
     loop._epoll = epoll
 
 
+def test_what_woke_the_loop_is_taken_and_wakes_it_once(still_loop):
+    loop, _ = still_loop
+    loop._wake_sender.send(b"123")
+    loop._run_once()
+    with pytest.raises(BlockingIOError):
+        loop._wake_receiver.recv(1)
+
+
 def test_a_loop_that_does_not_run_answers_nobody():
     loop = EventLoop(TransportSettings("", 0, (), 1.0))
     with pytest.raises(NoAnswerError, match="the driver did not answer within 0.0 s"):
         loop.ask(lambda answer: answer("late"), 0.0)
     assert loop._calls.waiting
     loop._close_all()
+
+
+def test_the_end_of_a_connection_is_told_once_to_who_dialled_it(still_loop):
+    loop, handler = still_loop
+    assert not loop._listener.getblocking()
+    far = socket.create_connection(loop.listening)
+    near, _ = loop._listener.accept()
+    told = []
+    loop._add_link(near, "10.0.0.7:11411", lambda: told.append(list(handler.endings)))
+    (link,) = loop._links.values()
+    for _ in range(2):
+        link.close("the end")
+    assert told == [["the end"]] and not loop._links
+    far.close()

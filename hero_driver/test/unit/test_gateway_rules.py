@@ -13,6 +13,8 @@ from hero_driver.config import read_config
 from hero_driver.fleet.admission import GARBAGE_BURST_LENGTH
 from hero_driver.gateway import Gateway
 from hero_driver.rosserial.packets import encode_packet
+from hero_driver.rosserial.payloads import TopicInfo
+from hero_driver.rosserial.session import Topic, TopicKind
 from hero_msgs.msg import Robot
 
 
@@ -363,3 +365,70 @@ def test_the_end_waits_two_seconds_for_wheels_that_turn(driver):
         assert answers == expected
     (line,) = [text for level, text in driver.lines if level == "error" and "the driver ends" in text]
     assert line.endswith("hero_0 (its wheels turn)")
+
+
+def test_a_robot_that_has_said_who_it_is_leaves_the_unidentified_ones(driver):
+    links = [driver.connect(port=port) for port in (1, 2)]
+    assert driver.gateway._admission.unidentified == 2
+    driver.receive(links[0])
+    assert driver.gateway._admission.unidentified == 1
+    links[1].close("closed by the robot")
+    assert driver.gateway._admission.unidentified == 0
+
+
+def test_a_topic_keeps_its_publisher_until_its_layout_changes(driver):
+    bridge, jobs, replaced = join_bridge(driver), [], []
+    bridge._registrar = SimpleNamespace(submit=lambda job, **options: jobs.append(job) or True)
+    bridge._endpoints.advertise = lambda name, layout, publishers, old: replaced.append(old)
+    name, publishers = "/hero_0/note", []
+    for md5sum in ("a" * 32, "a" * 32, "b" * 32, "b" * 32):
+        bridge.declare(make_topic(name, TopicKind.PUBLISHER, md5sum), name)
+        publishers.append(bridge._publishers[name])
+    first, second = publishers[0], publishers[2]
+    assert publishers == [first, first, second, second] and first is not second
+    for job in jobs:
+        job()
+    assert replaced == [[], [], [first], []]
+
+
+def test_what_a_robot_takes_has_an_id_once_its_layout_is_registered(driver):
+    bridge, jobs = join_bridge(driver), []
+    bridge._registrar = SimpleNamespace(submit=lambda job, **options: jobs.append(job) or True)
+    bridge._loop = SimpleNamespace(call_soon=lambda call: call())
+    usable = [True, True, False]
+    bridge._endpoints.subscribe = lambda *_: usable.pop(0)
+    name = "/hero_0/note"
+    for md5sum, before, after in (("a" * 32, 150, 150), ("b" * 32, None, 150), ("c" * 32, None, None)):
+        bridge.declare(make_topic(name, TopicKind.SUBSCRIBER, md5sum), name)
+        assert bridge.find_id(name) == before
+        jobs.pop()()
+        assert bridge.find_id(name) == after
+    bridge.declare(make_topic(name, TopicKind.SUBSCRIBER, "c" * 32), name)
+    bridge.detach("closed")
+    jobs.pop()()
+    assert bridge.find_id(name) is None, "of a connection that has ended"
+
+
+def join_bridge(driver):
+    driver.join()
+    return driver.gateway.bridges["/hero_0"]
+
+
+def make_topic(name, kind, md5sum):
+    return Topic(TopicInfo(150, name, "std_msgs/String", md5sum, 512), kind)
+
+
+def test_only_new_robots_of_an_address_are_limited(monkeypatch):
+    driver = Driver(monkeypatch, max_connections_per_address=2)
+    for number in (0, 1, 0, 1, 0):
+        link = driver.join(number=number)
+        assert not link.closed
+        link.close("closed by the robot")
+    assert "more than 2 new robots from one address" in driver.join(number=2).reason
+
+
+def test_of_an_address_with_robots_only_the_newest_goes(monkeypatch):
+    driver = Driver(monkeypatch, max_connections=3)
+    links = [driver.join(port=number, number=number) for number in (1, 2, 3)]
+    driver.connect(OTHER_HOST)
+    assert [link.closed for link in links] == [False, False, True]

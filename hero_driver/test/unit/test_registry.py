@@ -307,3 +307,19 @@ def test_robots_and_connections_belong_to_at_most_one_of_each_other(script):
         assert len(held) == len(set(held))
         for record in fleet.robots.values():
             assert (record.link is None) == (record.state is RobotState.AWAY)
+
+
+def test_a_robot_silent_for_three_seconds_gives_way_to_its_new_address():
+    for silent_s, verdict in ((2.9, Verdict.REFUSED), (3.0, Verdict.TOOK_OVER)):
+        fleet = make_fleet()
+        identify(fleet, 1, T0)
+        assert identify(fleet, 2, T0 + silent_s, host="10.0.0.2").verdict is verdict
+
+
+def test_take_overs_five_seconds_apart_are_of_one_robot():
+    for later_s, verdict in ((4.9, Verdict.REFUSED), (5.0, Verdict.TOOK_OVER)):
+        fleet = make_fleet()
+        identify(fleet, 1, T0)
+        record = identify(fleet, 2, T0 + 1.0).record
+        record.last_heard_s = T0 + 1.0 + later_s
+        assert identify(fleet, 3, T0 + 1.0 + later_s).verdict is verdict

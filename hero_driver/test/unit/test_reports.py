@@ -4,6 +4,7 @@ import io
 
 import pytest
 import rospy
+from diagnostic_updater import DiagnosticStatusWrapper
 
 from hero_driver import reports
 from hero_driver.commands.stop_progress import StopState
@@ -33,12 +34,22 @@ class Updater:
 
     def __init__(self):
         self.publisher = self
+        self.tasks, self.updates = {}, 0
 
     def setHardwareID(self, name):  # noqa: N802 - its name
         pass
 
     def add(self, name, task):
-        pass
+        self.tasks[name] = task
+
+    def removeByName(self, name):  # noqa: N802 - its name
+        del self.tasks[name]
+
+    def get_num_connections(self):
+        return 1
+
+    def force_update(self):
+        self.updates += 1
 
 
 @pytest.fixture(name="reporter")
@@ -84,7 +95,7 @@ def test_a_duplicate_has_a_row_with_its_own_address_and_nothing_else(reporter):
 
 def test_hundreds_of_duplicates_of_one_robot_do_not_fill_the_report(reporter):
     refused = {"10.0.0.2:%d" % port: "refused" for port in range(500)}
-    assert len(publish(reporter, make_record(refused=refused))) == 1 + DUPLICATES_SHOWN
+    assert len(publish(reporter, make_record(refused=refused))) == 1 + DUPLICATES_SHOWN == 9
 
 
 def test_what_a_robot_says_of_itself_keeps_no_other_out_of_the_report(reporter):
@@ -99,3 +110,49 @@ def test_what_a_robot_says_of_itself_keeps_no_other_out_of_the_report(reporter):
     )
     other = make_record(identity=Identity("/hero_8", 8))
     assert [row.id for row in publish(reporter, odd, other)] == [7, 8]
+
+
+def test_a_robot_of_which_nothing_came_has_zeros_in_its_report(reporter):
+    status = describe_robot(make_record(), None, None, StopState.NOT_STOPPED, {}, NOW_S)
+    row = status.message
+    assert (status.corrected_stamps, status.odometry_resets, status.packets, status.received_length) == (0,) * 4
+    assert (status.foreign_frames, status.duplicates, status.problem, status.tunes) == ([], [], "", False)
+    assert (row.clock_offset, row.uptime.to_sec(), row.dropped_messages, row.model) == (0.0, 0.0, 0, "")
+    (row,) = publish(reporter, make_record())
+    assert (row.packets_per_s, row.bytes_per_s) == (0.0, 0.0)
+
+
+def test_rates_are_what_came_since_the_last_report_by_the_time_between(reporter):
+    def measure(now_s, *records):
+        robots = [describe_robot(record, None, None, StopState.NOT_STOPPED, {}, now_s) for record in records]
+        status = FleetStatus(now_s, "", False, 0, 0, "", robots)
+        reporter.measure_rates(status)
+        reporter.publish(status)
+        return [(row.packets_per_s, row.bytes_per_s) for row in reporter._publisher.published[-1].robots]
+
+    assert measure(NOW_S, make_record(packets=100, received_length=1000)) == [(0.0, 0.0)]
+    assert measure(NOW_S + 2.0, make_record(packets=500, received_length=9000)) == [(200.0, 4000.0)]
+    assert measure(NOW_S + 2.0, make_record(packets=900, received_length=9000)) == [(200.0, 4000.0)], "no time"
+    assert measure(NOW_S + 3.0) == []
+    assert measure(NOW_S + 4.0, make_record(packets=950, received_length=9000)) == [(0.0, 0.0)], "it was gone"
+
+
+def test_a_report_says_since_when_each_robot_is_in_its_state(reporter):
+    assert publish(reporter, make_record(since_s=NOW_S - 12.0))[0].since.to_sec() == 1795240942 - 12
+    assert publish(reporter, make_record(since_s=NOW_S - 2e9))[0].since.to_sec() == 0
+
+
+def test_diagnostics_have_a_part_for_each_robot_that_is_known(reporter):
+    updater = reporter._updater
+    for updates, numbers in enumerate(((7,), (7, 8), (8,)), 1):
+        records = [make_record(identity=Identity("/hero_%d" % number, number)) for number in numbers]
+        publish(reporter, *records)
+        reporter.diagnose()
+        assert sorted(updater.tasks) == ["driver", *("hero_%d" % number for number in numbers)]
+        assert updater.updates == updates
+    stat = DiagnosticStatusWrapper()
+    updater.tasks["hero_8"](stat)
+    values = {pair.key: pair.value for pair in stat.values}
+    assert (values["address"], values["state"], values["stop"]) == ("10.0.0.1:4711", "READY", "NOT_STOPPED")
+    stat = updater.tasks["driver"](DiagnosticStatusWrapper())
+    assert (stat.level, stat.message) == (stat.OK, "1 of 1 robots ready")

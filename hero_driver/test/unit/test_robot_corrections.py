@@ -1,5 +1,7 @@
 """A robot's messages as ROS programs get them: true stamps, proximity, the rest untouched."""
 
+import struct
+
 import pytest
 from corrected_robot import TYPES, CorrectedRobot, list_payloads, list_transforms
 from robot_messages import (
@@ -10,12 +12,15 @@ from robot_messages import (
     build_imu,
     build_laser,
     build_odometry,
+    build_transform,
+    build_transform_message,
     read_scan,
     read_seq,
     read_stamp_ns,
 )
 
 from hero_driver.corrections.robot_corrections import OFFSET_MAX_S, OFFSET_SAMPLES
+from hero_node.geometry import Pose
 
 UPTIME_NS = 2 * NS_PER_S
 
@@ -159,3 +164,44 @@ def test_odometry_and_a_reading_up_to_10_ms_apart_are_of_one_burst(apart_ms, bel
         robot.receive("/hero_0/encoder", build_encoder(NOW_NS + encoder_ms * MS, 0.0, 0.0), NOW_NS)
         robot.receive("/hero_0/odom", build_odometry(NOW_NS + next_ms * MS), NOW_NS + 34 * MS)
         assert len(list_payloads(robot.outputs, "/hero_0/odom")) == 2 - waits
+
+
+@pytest.mark.parametrize("is_wanted", [True, False])
+def test_a_distance_passes_and_is_a_range_where_one_is_wanted(is_wanted):
+    name = "/hero_0/distance"
+    robot = CorrectedRobot({name: "std_msgs/Float32"}, is_wanted=lambda topic: is_wanted)
+    assert robot.corrections.derive_topics(name, "std_msgs/Float32") == {"/hero_0/range": "sensor_msgs/Range"}
+    for number in range(2):
+        outputs = robot.receive(name, struct.pack("<f", 0.5), NOW_NS + number)
+        assert outputs[0] == (name, struct.pack("<f", 0.5))
+        ranges = [(topic, read_seq(payload), read_stamp_ns(payload)) for topic, payload in outputs[1:]]
+        assert ranges == [("/hero_0/range", number, NOW_NS + number)] * is_wanted
+        assert all(b"hero_0/hat_link" in payload for _, payload in outputs[1:])
+    assert robot.receive(name, b"short", NOW_NS) == [(name, b"short")]
+    assert robot.corrections.refused == is_wanted
+
+
+def test_eight_messages_wait_for_a_reading_and_more_are_refused():
+    robot = CorrectedRobot()
+    robot.receive_burst(NOW_NS, (0.0, 0.0))
+    stamp_ns = NOW_NS + 34 * MS
+    robot.receive("/hero_0/odom", build_odometry(stamp_ns), stamp_ns)
+    for number in range(10):
+        transform = build_transform(stamp_ns + number, "hero_0/odom", "hero_0/base_link")
+        assert robot.receive("/tf", build_transform_message(transform), stamp_ns) == []
+        assert robot.corrections.refused == max(0, number - 6)
+    outputs = robot.receive("/hero_0/encoder", build_encoder(stamp_ns, 0.0, 0.0), stamp_ns)
+    assert len(list_transforms(outputs)) == 7
+
+
+def test_counters_that_begin_anew_are_no_turn_of_a_wheel():
+    robot = CorrectedRobot()
+    for begin_anew in (robot.corrections.note_reboot, lambda: robot.corrections.set_pose(Pose(0.0, 0.0, 0.0))):
+        robot.receive_burst(NOW_NS, (500.0, 500.0))
+        robot.receive_burst(NOW_NS + 34 * MS, (500.0, 500.0))
+        still = robot.corrections.wheels.still_readings
+        begin_anew()
+        for number in (2, 3):
+            robot.receive_burst(NOW_NS + number * 34 * MS, (0.0, 0.0))
+        assert robot.corrections.wheels.still_readings == still + 1 > 1
+        begin_anew()

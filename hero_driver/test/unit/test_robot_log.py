@@ -88,3 +88,12 @@ def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):
             robot_log.receive(peer, Log(LOG_INFO, "line %d" % number), NOW_S + second + 0.005 * number)
         assert len(lines) == LINES_PER_S * (second + 1)
         assert peer.record.dropped_messages == 7 * (second + 1)
+
+
+def test_ten_lines_of_a_robot_without_a_name_are_kept(lines):
+    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    peer.bridge, peer.early_logs = None, []
+    logs = [Log(LOG_INFO, "line %d" % number) for number in range(12)]
+    for log in logs:
+        robot_log.receive(peer, log, NOW_S)
+    assert peer.early_logs == logs[:10] and lines == []

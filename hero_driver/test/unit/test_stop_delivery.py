@@ -108,6 +108,7 @@ def test_a_tuning_that_is_known_ends_with_one_write_that_fits_the_window(control
         clock.run(CONFIRMED_S + 0.5 + 4 * network_s)
         assert robot.peer.stop.state is StopState.AT_REST
         assert not robot.bridge.commands.tunes(clock.now_s)
+    assert BURST_LIGHTS * 24 == 1488
     assert WINDOW_LENGTH >= max(len(data) for _, data in robot.writes) >= BURST_LIGHTS * 24 + 2 * 56
     assert robot.list_motor_packets() == []
 
@@ -301,6 +302,14 @@ def test_a_robot_that_was_released_is_stopped_again_as_the_first_time():
             robot.stopped = False
             clock.run(1.0)
             assert robot.peer.stop is None and not robot.stops._peers
+
+
+def test_a_deadline_that_has_come_is_not_waited_for():
+    with Clock().is_the_drivers() as clock:
+        robot, ended = make_moving(clock, "pulses"), []
+        stop(robot)
+        robot.stops.await_rest([robot.peer], clock.now_s, ended.append)
+    assert ended == [[robot.peer]]
 
 
 def test_why_a_robot_may_still_move_is_said_in_words():

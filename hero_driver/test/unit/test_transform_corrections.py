@@ -105,6 +105,13 @@ def test_transforms_of_foreign_frames_are_refused_counted_and_named(pair):
     assert len(name) < 150
 
 
+@pytest.mark.parametrize(("length", "passes"), [(128, True), (129, False)])
+def test_a_frames_name_has_at_most_128_characters(length, passes):
+    robot = CorrectedRobot()
+    pair = ("hero_0/base_link", "hero_0/".ljust(length, "x"))
+    assert list_pairs(receive_transforms(robot, pair)) == [pair] * passes
+
+
 def test_a_foreign_transform_does_not_take_its_neighbors_along():
     own = ("hero_0/base_link", "hero_0/hat_link")
     robot = CorrectedRobot()
@@ -119,9 +126,9 @@ def test_frames_that_a_robot_makes_up_do_not_fill_the_memory():
     robot = CorrectedRobot()
     for number in range(1000):
         receive_transforms(robot, ("map", "x%d" % number), ("hero_0/base_link", "hero_0/x%d" % number))
-    assert len(robot.corrections.transforms.foreign_frames) <= 32
-    assert len({child for _, child in list_pairs(robot.outputs)}) <= 32
-    assert robot.corrections.refused >= 1000
+    assert len(robot.corrections.transforms.foreign_frames) == 32
+    assert len({child for _, child in list_pairs(robot.outputs)}) == 32
+    assert robot.corrections.refused == 1000 + 1000 - 32
 
 
 def test_a_broken_message_of_transforms_is_refused_whole():

@@ -45,8 +45,7 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     linear_m_s, angular_rad_s = components[0], components[5]
     if linear_m_s == 0.0 and angular_rad_s == 0.0:
         return ZERO_TWIST
-    is_within = abs(linear_m_s) <= MAX_LINEAR_M_S and abs(angular_rad_s) <= MAX_ANGULAR_RAD_S
-    if is_within or not clamp:
+    if not clamp:
         return payload
     clamped_m_s = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
     clamped_rad_s = max(-MAX_ANGULAR_RAD_S, min(MAX_ANGULAR_RAD_S, angular_rad_s))

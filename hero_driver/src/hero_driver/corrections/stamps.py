@@ -44,16 +44,10 @@ class StampFilter:
     def correct(self, topic: Topic, stamp_ns: int, arrival_ns: int) -> int:
         """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
         last_ns = self.last_ns.get(topic)
-        ahead_ns = stamp_ns - arrival_ns
-        if self._lowest_ns <= ahead_ns <= self._max_future_ns and (last_ns is None or stamp_ns > last_ns):
-            self.last_ns[topic] = stamp_ns
-            return stamp_ns
         result_ns = stamp_ns
-        if self._use_arrival:
+        if not self._lowest_ns <= stamp_ns - arrival_ns <= self._max_future_ns:
             result_ns = arrival_ns
-        elif not self._lowest_ns <= ahead_ns <= self._max_future_ns:
-            result_ns = arrival_ns
-            self.corrected += 1
+            self.corrected += not self._use_arrival
         if last_ns is not None and result_ns <= last_ns:
             if last_ns - arrival_ns > self._max_future_ns + STEP_SLACK_NS:
                 # No stamp that was let through lies so far ahead of its arrival: ROS time itself went back

@@ -114,8 +114,7 @@ class TickOdometry:
         right_m = (right_ticks - last[1]) * self._right_tick_m
         is_moving = left_m != 0.0 or right_m != 0.0
         if is_moving:
-            gap_s = MIN_GAP_S if elapsed_s <= MIN_GAP_S else min(elapsed_s, MAX_GAP_S)
-            limit_m = MAX_WHEEL_SPEED_M_S * gap_s
+            limit_m = MAX_WHEEL_SPEED_M_S * min(max(elapsed_s, MIN_GAP_S), MAX_GAP_S)
             # A larger step is a reset counter or garbage, not motion.
             if -limit_m <= left_m <= limit_m and -limit_m <= right_m <= limit_m:
                 self._move(left_m, right_m)
@@ -144,7 +143,7 @@ class TickOdometry:
         angle_rad = (right_m - left_m) / self._separation_m
         half_rad = angle_rad / 2.0
         # The chord of the arc: its length is distance * sin(half) / half, its direction yaw + half.
-        chord_m = distance_m if -1e-9 < half_rad < 1e-9 else distance_m * math.sin(half_rad) / half_rad
+        chord_m = distance_m * (math.sin(half_rad) / half_rad) if half_rad else distance_m
         direction_rad = self.yaw_rad + half_rad
         self.x_m += chord_m * math.cos(direction_rad)
         self.y_m += chord_m * math.sin(direction_rad)

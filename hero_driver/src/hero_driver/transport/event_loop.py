@@ -371,7 +371,6 @@ class EventLoop(LinkOwner):
             self.close_link(link, THE_DRIVER_ENDS)
         for reader in self._readers:
             reader.close()
-        self._readers.clear()
         self._epoll.close()
         self._wake_receiver.close()
         self._wake_sender.close()

@@ -9,6 +9,11 @@ from vectors import STOCK_TOPICS, build_declaration
 
 from hero_driver.rosserial.errors import PayloadError, RosserialError
 from hero_driver.rosserial.payloads import (
+    LOG_DEBUG,
+    LOG_ERROR,
+    LOG_FATAL,
+    LOG_INFO,
+    LOG_WARN,
     Log,
     TopicInfo,
     WireTime,
@@ -146,3 +151,7 @@ def test_any_log_line_is_read_back(level, text):
 @given(secs=uint32s, nsecs=uint32s)
 def test_any_time_is_read_back(secs, nsecs):
     assert decode_time(encode_time(WireTime(secs, nsecs))) == (secs, nsecs)
+
+
+def test_levels_of_log_lines_have_the_numbers_of_rosserial_msgs():
+    assert (LOG_DEBUG, LOG_INFO, LOG_WARN, LOG_ERROR, LOG_FATAL) == (0, 1, 2, 3, 4)
