@@ -31,7 +31,7 @@ import re
 import subprocess
 import time
 from pathlib import Path
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, NamedTuple, Optional
 
 import pexpect
 
@@ -44,11 +44,6 @@ ENDING_S = 60.0
 QUIET_S = 0.05
 """Ctrl-C is pressed after this much silence. rospy hangs if the signal arrives while the main thread logs a line: the
 signal handler waits for a lock that this thread holds. A test is fast enough to hit that every time."""
-
-PREPARING_COMMAND = re.compile("(cd|mkdir|chmod|echo|source|catkin config|catkin_create_pkg) ")
-"""Commands on which later pages build: they change a terminal or the workspace."""
-
-BUILD_COMMAND = "catkin build"
 
 PROMPT_PATTERN = re.compile("\x02([0-9]+)\x03")
 SHOWN_LINES = 30
@@ -313,39 +308,6 @@ class Course:
         self._changes = changes
         self._terminals: Dict[int, Terminal] = {}
 
-    def prepare(self, pages: Sequence[Path]) -> None:
-        """Leave files, workspace and terminals as these pages do, so that a later page can run without them.
-
-        Of their commands, only those on which later pages build are typed; the workspace is built once; programs that
-        are still running at the end are started. Raises: PageError, TutorialError.
-        """
-        typed: List[Tuple[Terminal, str]] = []
-        builds: List[Tuple[Terminal, str]] = []
-        running: Dict[int, Tuple[Block, Path]] = {}
-        for page in pages:
-            for block in self._read_blocks(page):
-                if block.language != "console" or block.file is not None:
-                    self._write_file(block)
-                    continue
-                terminal = self._open_terminal(block.terminal)
-                for step in block.read_steps(page):
-                    if not step.command:
-                        running.pop(block.terminal, None)
-                    elif PREPARING_COMMAND.match(step.command):
-                        typed.append((terminal, step.command))
-                        self._type(terminal, step.command)
-                    elif step.command.startswith(BUILD_COMMAND):
-                        builds.append((terminal, step.command))
-                if block.keeps_running:
-                    running[block.terminal] = (block, page)
-        for terminal, command in builds[-1:]:
-            self._type(terminal, command)
-        for terminal, command in typed:
-            if command.startswith("source "):  # what was not built yet could not be sourced
-                self._type(terminal, command)
-        for block, page in running.values():
-            self._run_block(block, page)
-
     def run_page(self, page: Path) -> None:
         """Run a page. Raises: PageError, TutorialError."""
         for block in self._read_blocks(page):
@@ -375,11 +337,6 @@ class Course:
         if number not in self._terminals:
             self._terminals[number] = Terminal(self._environment)
         return self._terminals[number]
-
-    def _type(self, terminal: Terminal, command: str) -> None:
-        terminal.type_line(command)
-        if not terminal.wait_for_end(DEADLINE_S):
-            raise TutorialError("$ %s: no end\n%s" % (command, terminal.output))
 
     def _run_block(self, block: Block, page: Path) -> None:
         terminal = self._open_terminal(block.terminal)
@@ -419,7 +376,7 @@ class Course:
             )
             if result.returncode == 0:
                 return
-            time.sleep(0.1)
+            time.sleep(0.5)  # most of these commands are programs of ROS, which cost half of that to start
         output = result.stdout.decode(errors="replace")
         raise TutorialError("%s:%d: %s: did not succeed in time:\n%s" % (page, block.line, command, output))
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Runs pages of a course, or README and quick start, with the simulator: real commands in real terminals.
 
-Usage: test_tutorials.py COURSE FIRST LAST, the numbers of the first and last page; those before are only prepared.
+Usage: test_tutorials.py COURSE
 """
 
 import os
@@ -49,8 +49,6 @@ def make_changes():
 
 
 class TutorialsTest(unittest.TestCase):
-    pages_before = ()
-
     @classmethod
     def setUpClass(cls):
         home = tempfile.TemporaryDirectory(prefix="tutorials_")
@@ -60,7 +58,6 @@ class TutorialsTest(unittest.TestCase):
         cls.failed = None
         cls.master = rosgraph.Master("tutorials")
         cls.own_parameters = frozenset(cls.master.getParamNames())
-        cls.course.prepare(cls.pages_before)
 
     def run_page(self, page):
         if self.failed:
@@ -75,17 +72,16 @@ class TutorialsTest(unittest.TestCase):
             self.master.deleteParam(name)
 
 
-def add_pages(pages, first, last):
+def add_pages(pages):
     """Add one test per page. Of pages without numbers, the order of the names is that of the pages, too."""
-    TutorialsTest.pages_before = pages[: first - 1]
-    for page in pages[first - 1 : last]:
+    for page in pages:
         name = "test_%s_works_as_shown" % page.stem
         setattr(TutorialsTest, name, lambda self, page=page: self.run_page(page))
 
 
 if __name__ == "__main__":
-    course, first, last = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
-    add_pages(PAGES[course], first, last)
+    course = sys.argv[1]
+    add_pages(PAGES[course])
     missing = [name for name in PROGRAMS.get(course, ()) if shutil.which(name) is None]
     tests = unittest.skipIf(missing, "not installed: " + ", ".join(missing))(TutorialsTest)
-    rostest.rosrun("hero_tutorial", "tutorials_%s_%d_to_%d" % (course, first, last), tests, sys.argv)
+    rostest.rosrun("hero_tutorial", "tutorials_" + course, tests, sys.argv)

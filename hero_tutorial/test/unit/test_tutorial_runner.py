@@ -137,36 +137,6 @@ def test_blocks_can_be_skipped_and_commands_replaced(try_page):
     assert [path.name for path in home.iterdir()] == ["other"]
 
 
-def test_a_page_can_run_after_earlier_ones_were_only_prepared(tmp_path):
-    home = tmp_path / "home"
-    home.mkdir()
-    build = tmp_path / "catkin"
-    build.write_text("#!/bin/sh\necho built >> ~/builds\necho 'x=5' > ~/setup.bash\n", encoding="utf-8")
-    build.chmod(0o755)
-    earlier, later = tmp_path / "1.md", tmp_path / "2.md"
-    earlier.write_text(
-        "<!-- tutorial: file ~/file -->\n```text\nhello\n```\n"
-        + console(f"$ export PATH={tmp_path}:$PATH", "$ mkdir ~/new && cd ~/new", "$ touch ~/typed", "any output")
-        + console("$ catkin build", "$ catkin build", "$ source ~/setup.bash", "built")
-        + console("$ touch ~/ended; cat", instructions="terminal 2; keeps running")
-        + console("^C", instructions="terminal 2")
-        + console("$ printf 'still\\n'; cat", "still", instructions="terminal 3; keeps running"),
-        encoding="utf-8",
-    )
-    later.write_text(
-        console("$ echo $PWD $x; cat ~/file ~/builds", "/.../new 5", "hello", "built")
-        + console("^C", "...", instructions="terminal 3"),
-        encoding="utf-8",
-    )
-    course = Course(home, tmp_path, {"export PATH": "source /dev/null; export PATH"})
-    try:
-        course.prepare([earlier])
-        course.run_page(later)
-    finally:
-        course.close()
-    assert sorted(path.name for path in home.iterdir()) == ["builds", "file", "new", "setup.bash"]
-
-
 def test_replacements_apply_to_commands_and_expected_output(try_page):
     try_page(console("$ echo HERE", "HERE"), {"HERE": "there"})
 
