@@ -13,12 +13,13 @@ from hero_client.ros.ros_link import NEEDED
 @pytest.fixture(name="ros")
 def make_ros(monkeypatch):
     """The clock, the timers and the publisher that a CommandTopic uses."""
-    ros = SimpleNamespace(now_s=100.0, sent=[], warned=[], timers=[], subscribers=0)
+    ros = SimpleNamespace(now_s=100.0, sent=[], warned=[], timers=[], daemons=[], subscribers=0)
     publisher = SimpleNamespace(publish=ros.sent.append, get_num_connections=lambda: ros.subscribers)
 
     def make_timer(after_s, call):
         ros.timers.append(call)
-        return SimpleNamespace(start=lambda: None)
+        timer = SimpleNamespace(start=lambda: ros.daemons.append(timer.daemon))
+        return timer
 
     monkeypatch.setattr(robot_topics.rospy, "Publisher", lambda *arguments, **options: publisher)
     monkeypatch.setattr(robot_topics.rospy, "is_shutdown", lambda: False)
@@ -38,7 +39,7 @@ def subscribe(ros):
 def test_the_newest_early_command_is_sent_with_the_subscription(ros):
     ros.topic.publish("slow")
     ros.topic.publish("fast")
-    assert ros.sent == []
+    assert ros.sent == [] and ros.daemons == [True], "it keeps no program from ending"
     subscribe(ros)
     assert ros.sent == ["fast"]
     ros.topic.publish("next")

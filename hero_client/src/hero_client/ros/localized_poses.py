@@ -88,7 +88,6 @@ class LocalizedPoses:
             )
         return pose
 
-
     def age_s(self, robot_id: int, now_s: float) -> float:
         """Return how old the pose of a robot is; inf if it has none."""
         report = self._newest
@@ -128,7 +127,6 @@ class PoseListener:
                     if time.monotonic() >= deadline_s or rospy.is_shutdown():
                         raise
             time.sleep(POLL_PERIOD_S)
-
 
     def age_s(self, robot_id: int) -> float:
         """Return how old the pose of a robot is; inf if it has none."""
