@@ -219,7 +219,9 @@ def test_robots_see_objects_and_push_them_in_each_world_for_itself(swarm):
     for robot in swarm.worlds[0].robots[:2]:
         robot.drive(0.1, 0.0)
     swarm.sleep(2.0)
+    poses = swarm.rows.world.object_poses
     pushed, lifted = swarm.rows.world.list_objects()
+    assert poses[0, :, 0].tolist() == [pushed.x_m, lifted.x_m] and poses[1, 0, :2] == pytest.approx((0.3, 0.0))
     assert pushed.x_m > disc.x_m + 0.05 and abs(pushed.y_m) < 0.02
     assert swarm[0].fresh_proximity()[0] == pytest.approx(0.0368 + 0.01, abs=0.02)
     other = swarm.rows.world.observe().obstacles[1][1]

@@ -148,4 +148,7 @@ def test_robots_connect_from_addresses_of_their_own():
         while not events.seen:
             link.poll(1.0)
         assert events.seen == ["failed"], "nobody listens"
+        link._address = ("255.255.255.255", 1)  # not for TCP, so that the system refuses at once
+        link.connect(1)
+        assert events.seen == ["failed"] * 2 and not link.is_connecting(1)
         link.close_all()
