@@ -139,7 +139,8 @@ class Contacts:
         touches, pairs, beside, wanted_m = False, _NONE, _NONE, _NO_M
         if self._robots_gap_m < _SHIFT_M:
             firsts, seconds = self._pairs
-            apart_m = positions_m.take(firsts, axis=1) - positions_m.take(seconds, axis=1)
+            pair_m = positions_m.take(self._pairs, axis=1)
+            apart_m = pair_m[:, 0] - pair_m[:, 1]
             distance_m = np.sqrt(square_length(apart_m))
             touches, pairs, gap_m = _find_touching((distance_m - self._touching_m) / 2.0, self._pushes_m)
             self._robots_gap_m = min(gap_m, self._reach_m)
@@ -156,10 +157,12 @@ class Contacts:
             return
         before_m = positions_m.copy()
         if np.count_nonzero(self._pushes_m):
-            _push(positions_m, apart_m, distance_m, self._pushes_m, firsts, 1.0)
-            _push(positions_m, apart_m, distance_m, self._pushes_m, seconds, -1.0)
+            pressed, ways_m = _take_ways(apart_m, distance_m, self._pushes_m)
+            _push(positions_m, firsts[pressed], ways_m)
+            _push(positions_m, seconds[pressed], -ways_m)
         if np.count_nonzero(self._wall_pushes_m):
-            _push(positions_m, away_m, free_m, self._wall_pushes_m, rows, 1.0)
+            pressed, ways_m = _take_ways(away_m, free_m, self._wall_pushes_m)
+            _push(positions_m, rows[pressed], ways_m)
         self._solve(positions_m, pairs, wanted_m, beside)
         self.could_touch(float(np.abs(positions_m - before_m).max()) * math.sqrt(2.0))
         # Those that press on each other are looked at in each step.
@@ -216,19 +219,16 @@ class Contacts:
         return robots_m, np.maximum(self._radii_m - measure_clearance(positions_m.T, self._arena), 0.0)
 
 
-def _push(
-    positions_m: np.ndarray,
-    ways_m: np.ndarray,
-    lengths_m: np.ndarray,
-    pushes_m: np.ndarray,
-    rows: np.ndarray,
-    sign: float,
-) -> None:
-    """Push the robots at rows (K,) along ways_m (2, K), of lengths_m (K,), by pushes_m (K,), in place."""
-    pressed = pushes_m.nonzero()[0]
-    shares = sign * pushes_m[pressed] / np.maximum(lengths_m[pressed], _TOUCH_M)
-    for axis_m, axis_ways_m in zip(positions_m, ways_m.take(pressed, axis=1) * shares):
-        axis_m += np.bincount(rows[pressed], axis_ways_m, len(axis_m))
+def _take_ways(ways_m: np.ndarray, lengths_m: np.ndarray, pushes_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return which entries (K,) are pushed, and how far along ways_m (2, P), of lengths_m (P,), by pushes_m (P,)."""
+    pressed = (pushes_m != 0.0).nonzero()[0]  # of truth values: ten times as fast as of numbers
+    return pressed, ways_m.take(pressed, axis=1) * (pushes_m[pressed] / np.maximum(lengths_m[pressed], _TOUCH_M))
+
+
+def _push(positions_m: np.ndarray, rows: np.ndarray, ways_m: np.ndarray) -> None:
+    """Move the robots at rows (K,), any of them several times, by ways_m (2, K), in place."""
+    for axis_m, axis_ways_m in zip(positions_m, ways_m):
+        axis_m += np.bincount(rows, axis_ways_m, len(axis_m))
 
 
 def _carry_over(entries: np.ndarray, values: np.ndarray, wanted: np.ndarray, columns: int) -> np.ndarray:
