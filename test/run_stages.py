@@ -18,6 +18,8 @@ TIMEOUT_S = 3600.0  # of one that hangs
 OPTIONS_PYTHON = (3, 10)  # with an older one the stage options is left out
 COMPUTING_LOAD = 1.0
 WAITING_LOAD = 1 / 3
+LONGEST = ("hero_sim", "hero_swarm", "hero_localization", "hero_calibration")
+"""Packages whose unit tests take longest. Begun last, one would keep one core busy for a minute while the others idle."""
 
 sys.path.insert(0, str(ROOT / "test" / "faults"))
 import run as faults  # noqa: E402
@@ -31,15 +33,15 @@ def make_pytest_job(name, arguments, results_dir, load):
 
 
 def make_unit_jobs(results_dir, packages):
-    """Return the jobs of some packages, that with most files first; of a single package one for each core."""
+    """Return the jobs of some packages, those first that take longest; of a single package one for each core."""
     jobs = []
-    for package in sorted(packages, key=lambda package: -len(packages[package])):
-        files = sorted(packages[package], key=lambda path: -path.stat().st_size)
+    for package in sorted(packages, key=lambda package: (package not in LONGEST, package)):
+        files = sorted(map(str, packages[package]))
         parts = min(count_cores() // len(packages) or 1, len(files))
         for part in range(parts):
             name = package + (f"_{part + 1}_of_{parts}" if parts > 1 else "")
-            arguments = map(str, files[part::parts])
-            jobs.append(make_pytest_job("unit: " + name, arguments, results_dir / name, COMPUTING_LOAD))
+            job = make_pytest_job("unit: " + name, files, results_dir / name, COMPUTING_LOAD)
+            jobs.append(job._replace(environment={"HERO_PART": f"{part}/{parts}"}))
     return jobs
 
 
@@ -81,8 +83,7 @@ def make_core_job(results_dir, selection):
 def make_jobs(stages, results, pattern, paths):
     """Return all jobs of the stages, in the order in which they begin: noetic, what waits, and what computes.
 
-    What computes fills the cores to the end; noetic computes for longest. Of what computes, the simulator's unit tests
-    take longest.
+    What computes fills the cores to the end; noetic computes for longest, then the longest unit tests.
     """
     jobs = []
     # What these install the first time comes from the network.
@@ -124,7 +125,8 @@ def make_jobs(stages, results, pattern, paths):
     if len(paths) > len(rostests):
         unit_tests = find_unit_tests([path for path in paths if path.suffix != ".test"])
         jobs += make_unit_jobs(results / "unit", unit_tests)
-    return sorted(jobs, key=lambda job: (job.name != "noetic", job.load, job.name != "unit: hero_sim"))
+    first = ["noetic", *("unit: " + package for package in LONGEST)]
+    return sorted(jobs, key=lambda job: (job.name != "noetic", job.load, job.name not in first))
 
 
 def main():
