@@ -121,3 +121,15 @@ def test_motion_goes_to_a_robot_that_was_heard_in_the_last_half_second(silence_s
         clock.run(silence_s)
         robot.drive(0.1)
         assert bool(robot.writes) == is_sent
+
+
+def test_a_command_that_may_go_does_not_wait_for_the_timer_of_another():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock)
+        for speed_m_s in (0.1, 0.2):
+            robot.drive(speed_m_s)
+        clock.run(0.01)
+        written = len(robot.writes)
+        assert robot.peer.send_due
+        robot.drive(0.1, POSITION)
+        assert len(robot.writes) == written + 1

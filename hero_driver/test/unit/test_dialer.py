@@ -48,3 +48,20 @@ def test_the_driver_backs_off_from_a_robot_that_hangs_up_at_once(monkeypatch, la
     start_dialer(ADDRESS, hand_over, lambda text: None, ended)
     assert ended.is_over.wait(60.0)
     assert ended.waits_s == expected_s
+
+
+def test_why_a_robot_cannot_be_reached_is_said_once_until_it_changes(monkeypatch):
+    refused, no_route = OSError(111, "refused"), OSError(113, "no route")
+    errors = iter([refused] * 3 + [no_route] * 2 + [None] + [no_route] * 2)
+
+    def connect(address):
+        error = next(errors)
+        if error is not None:
+            raise error
+
+    monkeypatch.setattr(dialer, "_connect", connect)
+    ended, texts = Ended(), []
+    start_dialer(ADDRESS, lambda sock, address, note_closed: note_closed(), texts.append, ended)
+    assert ended.is_over.wait(60.0)
+    assert [text.partition("reached: ")[2].partition(";")[0] for text in texts] == ["refused", "no route", "no route"]
+    assert ended.waits_s == BACKED_OFF_S

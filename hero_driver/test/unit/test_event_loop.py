@@ -380,3 +380,14 @@ def test_the_end_of_a_connection_is_told_once_to_who_dialled_it(still_loop):
         link.close("the end")
     assert told == [["the end"]] and not loop._links
     far.close()
+
+
+def test_the_loop_listens_where_it_was_told_to():
+    loop = EventLoop(TransportSettings("127.0.0.2", 0, (), 1.0))
+    loop.open(Notes())
+    assert loop.listening.host == "127.0.0.2"
+    again = EventLoop(TransportSettings("127.0.0.2", loop.listening.port, (), 1.0))
+    with pytest.raises(OSError, match="in use"):
+        again.open(Notes())
+    for opened in (loop, again):
+        opened._close_all()

@@ -432,3 +432,36 @@ def test_of_an_address_with_robots_only_the_newest_goes(monkeypatch):
     links = [driver.join(port=number, number=number) for number in (1, 2, 3)]
     driver.connect(OTHER_HOST)
     assert [link.closed for link in links] == [False, False, True]
+
+
+def test_after_the_end_of_a_connection_nothing_of_the_same_read_counts(driver, monkeypatch):
+    first = driver.join()
+    second = driver.connect(OTHER_HOST)
+    received = []
+
+    def close_at_once(peer, event, now_s):
+        received.append(event)
+        peer.link.closed = True
+
+    monkeypatch.setattr(driver.gateway, "_receive_event", close_at_once)
+    driver.receive(second, FakeRobot(5, PUBLISHED).encode_declarations())
+    assert len(received) == 1 and not first.closed
+
+
+def test_commanders_are_watched_at_each_look(driver):
+    bridge, looks = join_bridge(driver), []
+    bridge.commands.watch_commanders = looks.append
+    driver.gateway.open()
+    driver.run(0.26)
+    assert looks == pytest.approx([100.05 + 0.05 * number for number in range(5)])
+
+
+def test_calls_of_services_fail_with_the_reason_when_the_robot_leaves(driver):
+    bridge, reasons = join_bridge(driver), []
+    bridge._services = {"/hero_0/a": SimpleNamespace(fail=reasons.append)}
+    bridge.detach("silent for 6.1 s")
+    assert reasons == ["silent for 6.1 s"]
+    bridge._registrar = SimpleNamespace(submit=lambda job, **options: True)
+    for _ in range(2):
+        bridge.close()
+    assert reasons == ["silent for 6.1 s", "the robot left"] and not bridge._publishers

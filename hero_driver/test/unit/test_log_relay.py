@@ -82,3 +82,17 @@ def test_different_messages_about_one_robot_are_limited(rosout):
     assert len(texts) == ROBOT_LINES_MAX + 2
     assert texts[ROBOT_LINES_MAX] == ("WARNING", "hero_1: too many different messages; further ones are suppressed")
     assert texts[-1] == ("ERROR", "about another robot")
+
+
+def test_lines_that_were_dropped_are_counted_once(rosout):
+    logger, texts = rosout
+    logger.setLevel(logging.INFO)
+    relay = LogRelay()
+    relay._worker._calls.refused = 3
+    for number in range(2):
+        relay.log("warn", "line %d" % number)
+    relay._worker._calls.refused = 5
+    relay.log("warn", "line 2")
+    relay.close()
+    said = ["line 0 (3 log lines before it were dropped)", "line 1", "line 2 (2 log lines before it were dropped)"]
+    assert [text for _, text in texts] == said

@@ -342,3 +342,12 @@ def test_the_speed_of_odometry_is_of_all_three_axes_each():
         assert message_layouts.read_odometry_velocity(bytes(payload)) == expected
     assert message_layouts.read_odometry_velocity(bytes(payload[-680:])) == (0.0, 0.5)
     assert message_layouts.read_odometry_velocity(bytes(payload[-679:])) is None
+
+
+def test_a_writer_of_odometry_keeps_the_frames_until_others_come():
+    writer = make_writer()
+    frames = []
+    for prefix in ("hero_0", "hero_1", "hero_1", "hero_0"):
+        payload = build_odometry(NOW_NS).replace(b"hero_0", prefix.encode())
+        frames.append(read_odometry(writer.rewrite(payload, 0, NOW_NS, None))[0])
+    assert frames == ["hero_0/odom", "hero_1/odom", "hero_1/odom", "hero_0/odom"]

@@ -323,3 +323,21 @@ def test_take_overs_five_seconds_apart_are_of_one_robot():
         record = identify(fleet, 2, T0 + 1.0).record
         record.last_heard_s = T0 + 1.0 + later_s
         assert identify(fleet, 3, T0 + 1.0 + later_s).verdict is verdict
+
+
+def test_sixteen_addresses_of_duplicates_are_remembered():
+    fleet = make_fleet()
+    record = identify(fleet, 0, T0).record
+    for number in range(1, 20):
+        identify(fleet, number, T0 + 1.0, host="10.0.1.%d" % number)
+    assert len(record.rivals) == 16
+
+
+def test_an_id_is_kept_for_a_robot_that_was_heard_after_its_duplicate_came():
+    for heard_s, is_reserved in ((T0 + 1.0, False), (T0 + 1.001, True)):
+        fleet = make_fleet()
+        record = identify(fleet, 1, T0).record
+        identify(fleet, 2, T0 + 1.0, host="10.0.0.2")
+        record.last_heard_s = heard_s
+        assert fleet.is_reserved(record, "10.0.0.2") == is_reserved
+        assert not fleet.is_reserved(record, "10.0.0.3")
