@@ -21,7 +21,14 @@ from hero_swarm.fitting import infrared_fit
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body
 from hero_swarm.fitting.infrared_fit import _list_readings, fit_infrared
 from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
-from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, interpolate_poses, measure_wheels, sample_times
+from hero_swarm.fitting.recording import (
+    PULSES,
+    VELOCITY,
+    Recording,
+    interpolate_poses,
+    measure_wheels,
+    sample_times,
+)
 from hero_swarm.fitting.replay import Motors, build_errors
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
 from hero_swarm.metrics import METRICS
