@@ -19,7 +19,7 @@ OPTIONS_PYTHON = (3, 10)  # with an older one the stage options is left out
 COMPUTING_LOAD = 1.0
 WAITING_LOAD = 1 / 3
 LONGEST = ("hero_sim", "hero_swarm", "hero_localization", "hero_calibration")
-"""Packages whose unit tests take longest. Begun last, one would keep one core busy for a minute while the others idle."""
+"""Packages whose unit tests take longest: begun last, one would keep a core busy for a minute while the others idle."""
 
 sys.path.insert(0, str(ROOT / "test" / "faults"))
 import run as faults  # noqa: E402

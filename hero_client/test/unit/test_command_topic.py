@@ -18,7 +18,8 @@ def make_ros(monkeypatch):
 
     def make_timer(after_s, call):
         ros.timers.append(call)
-        timer = SimpleNamespace(start=lambda: ros.daemons.append(timer.daemon))
+        timer = SimpleNamespace()
+        timer.start = lambda: ros.daemons.append(timer.daemon)
         return timer
 
     monkeypatch.setattr(robot_topics.rospy, "Publisher", lambda *arguments, **options: publisher)
