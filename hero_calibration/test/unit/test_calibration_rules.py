@@ -324,6 +324,8 @@ def test_gains_are_searched_first_for_the_integral_and_scaled_to_the_servo():
         assert tried[1:4] == [(650.0 * scale, integral * scale, 0.1) for integral in (4000.0, 6000.0, 8500.0)]
         assert tried[4:] == [(proportional * scale, 6000.0 * scale, 0.1) for proportional in (400.0, 900.0, 1400.0)]
         assert search.best()[0] == tried[5] and GainSearch.count_rounds() == 7
+        with pytest.raises(IndexError):
+            search.next_gains()
 
 
 def test_kept_calibrations_are_restored_robot_by_robot(tmp_path, capsys):

@@ -10,7 +10,7 @@ from test_calibration_rules import FakeSession
 from hero_calibration.errors import CalibrationError
 from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models.encoder_readings import TICK_M, Readings
-from hero_calibration.procedures import infrared, motors, velocity
+from hero_calibration.procedures import infrared, motors, velocity, wheels
 from hero_calibration.robots.session import SETTLE_S
 from hero_node.geometry import Pose
 
@@ -195,3 +195,40 @@ def test_ticks_of_other_models_count_as_those_of_the_stock_robot(model, ticks, m
     message.header.seq, message.header.stamp = 5, ros_probe.rospy.Time(6)
     probe._take_encoder(message)
     assert heard == [(7.0, 6.0, 5, ticks, -ticks)]
+
+
+def test_a_probe_hears_its_topics_and_commands_its_controllers(monkeypatch):
+    ros_probe = pytest.importorskip("hero_calibration.robots.ros_probe", reason="imports rospy")
+    heard, sent = [], []
+
+    def advertise(topic, kind, **options):
+        return SimpleNamespace(publish=lambda message: sent.append((topic.partition("/hero_3/")[2], message)))
+
+    monkeypatch.setattr(ros_probe.rospy, "Publisher", advertise)
+    monkeypatch.setattr(ros_probe.rospy, "Subscriber", lambda topic, *arguments, **options: heard.append(topic))
+    probe = ros_probe.RosProbe(3, "hero")
+    assert heard == ["/hero_3/encoder", "/hero_3/laser", "/hero_3/odom", "/localization/poses"]
+    probe.drive(1.5, 0.1)
+    probe.drive(2.0)
+    probe.turn(-0.7)
+    probe.stop()
+    velocity, position = "velocity_controller/cmd_vel", "position_controller/cmd_vel"
+    assert [(topic, twist.linear.x, twist.angular.z) for topic, twist in sent] == [
+        (velocity, 0.1, 1.5), (velocity, 0.0, 2.0), (position, 0.0, -0.7), (velocity, 0.0, 0.0), (position, 0.0, 0.0),
+    ]  # fmt: skip
+    probe.set_pulses(1400)
+    assert sent[-1][0] == "cmd_motor" and {getattr(sent[-1][1], name) for name in sent[-1][1].__slots__} == {1400}
+
+
+def test_a_side_of_a_square_ends_on_time_and_needs_two_readings():
+    session = FakeSession(1)
+    (probe,) = session.probes
+    wheels._drive(session, [probe], (0.1, 0.5, 1.05))
+    assert session.time_s == pytest.approx(101.05 + SETTLE_S, abs=0.021)
+    assert {command for command in probe.sent if command != "stop"} == {("drive", 0.5, 0.1)}
+    for seq, heard_s in enumerate((1.0, 2.0, 3.0, 4.0)):
+        probe.receive_encoder(heard_s, heard_s, seq + 1, 10.0 * seq, -10.0 * seq)
+    start_s = 2.01 + wheels.MEASURE_S / 2.0  # since the middle of a stop, without its first reading
+    assert wheels._take_ticks(probe, start_s, 4.0).tolist() == [[20.0, -20.0], [30.0, -30.0]]
+    with pytest.raises(CalibrationError, match="no encoder readings came"):
+        wheels._take_ticks(probe, start_s, 3.99)
