@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from hero_client import ProgramError
 from hero_localization.calibration.lens_calibration import BoardView, LensCalibration
 from hero_localization.calibration.robot_calibration import RobotCalibration
 from hero_localization.camera.camera_model import Intrinsics
@@ -116,3 +117,97 @@ def test_too_few_views_are_refused_before_any_is_taken(capsys):
     with pytest.raises(SystemExit):
         calibrate_camera.parse_options(["lens", "--views", "7"])
     assert "--views 7: it takes at least 8 images" in capsys.readouterr().err
+
+
+def test_views_are_still_and_away_from_others(tmp_path, monkeypatch):
+    board = Board(0, monkeypatch)
+    # Each image by how far the board is moved from the one before: still below 3 px, new from 40 px on.
+    places_px = np.cumsum([0.0, 2.9, 39.0, 2.9, 0.2, 40.0, 3.1, 2.9, 50.0, 2.9])
+    taken = []
+    monkeypatch.setattr(
+        board, "find", lambda gray, _: BoardView(np.arange(4), np.full((4, 2), (places_px[board.pictures - 1], 0.0)))
+    )
+    monkeypatch.setattr(calibrate_camera, "find_board", board.find)
+    monkeypatch.setattr(calibrate_camera, "say", taken.append)
+    parsed = calibrate_camera.parse_options(["lens", "--file", str(tmp_path / "camera.yaml")])
+    with pytest.raises(IndexError):  # no more images
+        calibrate_camera.calibrate_lens_by_board(parsed, board, SimpleNamespace(now_s=0.0))
+    assert taken[1:] == ["%d of at least 20 images" % count for count in (1, 2, 3, 4)]
+
+
+def test_a_shift_is_that_of_the_corners_that_both_views_show():
+    view = BoardView(np.array([1, 2, 5]), np.array([(0.0, 0.0), (10.0, 0.0), (0.0, 10.0)]))
+    other = BoardView(np.array([5, 2, 7]), np.array([(3.0, 14.0), (10.0, 1.0), (99.0, 99.0)]))
+    assert calibrate_camera._measure_shift(view, other) == pytest.approx((5.0 + 1.0) / 2.0)
+    assert calibrate_camera._measure_shift(view, other._replace(ids=np.array([6, 7, 8]))) == math.inf
+
+
+def test_without_a_board_for_ten_seconds_a_hint_is_given(tmp_path, monkeypatch, capsys):
+    board, program = Board(0, monkeypatch), SimpleNamespace(now_s=100.0)
+    times_s = iter((105.0, 109.9, 110.1, 119.0, 120.0, 120.2))
+
+    def take():
+        program.now_s = next(times_s)
+        return Frame(0.0, np.full((2, 2), 77, np.uint8), 0)
+
+    board.take = take
+    monkeypatch.setattr(calibrate_camera, "find_board", lambda gray, _: None)
+    mirrored = []
+    monkeypatch.setattr(calibrate_camera, "is_mirrored", lambda gray, _: mirrored.append(program.now_s))
+    parsed = calibrate_camera.parse_options(["lens", "--file", str(tmp_path / "camera.yaml")])
+    with pytest.raises(StopIteration):
+        calibrate_camera.calibrate_lens_by_board(parsed, board, program)
+    assert mirrored == [110.1, 120.2]
+    assert capsys.readouterr().out.count("no board in the images (mean shade 77 of 255)") == 2
+    times_s = iter((120.0,))
+    program.now_s = 100.0
+    monkeypatch.setattr(calibrate_camera, "is_mirrored", lambda gray, _: True)
+    with pytest.raises(CalibrationError, match="mirrored"):
+        calibrate_camera.calibrate_lens_by_board(parsed, board, program)
+
+
+@pytest.fixture
+def images(monkeypatch):
+    """Return the images of a camera that gives none."""
+    polls_s = []
+    source = SimpleNamespace(problem="", warning="too dark", lens="its own", poll=polls_s.append, close=lambda: None)
+    monkeypatch.setattr(calibrate_camera, "open_source", lambda *_: source)
+    found = calibrate_camera.Images(calibrate_camera.parse_options(["lens"]), SimpleNamespace(running=True), None)
+    found.polls_s = polls_s
+    return found
+
+
+def test_an_image_is_waited_for_for_ten_seconds(images, capsys):
+    with pytest.raises(CalibrationError, match="no image from camera/image_raw for 10 s: is the camera's driver"):
+        images.take()
+    assert images.polls_s == [0.1] * 100 and capsys.readouterr().out == "  too dark\n", "a warning once"
+    images.source.problem = "unplugged"
+    with pytest.raises(CalibrationError, match="for 10 s: unplugged"):
+        images.take()
+    images._program.running = False
+    with pytest.raises(ProgramError, match="the file is as it was"):
+        images.take()
+    assert images.find_lens(settings.Settings()) == "its own"
+    images.close()
+
+
+def test_what_a_part_needs_is_named(tmp_path, capsys):
+    path = str(tmp_path / "camera.yaml")
+    for count in (3, 4):
+        settings.update(path, {"references": {100 + index: [index, 0.0, 0.0] for index in range(count)}})
+        options = calibrate_camera.parse_options(["arena", "--file", path])
+        if count == 4:
+            assert len(calibrate_camera._check_file(options).layout.references) == 4
+        else:
+            with pytest.raises(CalibrationError, match="names 3 reference tags, but it takes 4"):
+                calibrate_camera._check_file(options)
+    with pytest.raises(CalibrationError, match="run calibrate_camera arena first"):
+        calibrate_camera._check_file(calibrate_camera.parse_options(["robots", "--robots", "1", "--file", path]))
+    assert calibrate_camera._check_file(calibrate_camera.parse_options(["lens", "--file", path])).camera is None
+    with pytest.raises(SystemExit):
+        calibrate_camera.parse_options(["robots"])
+    assert "each turns on the spot and drives 0.12 m to and fro" in capsys.readouterr().err
+    options = calibrate_camera.parse_options(["lens"])
+    assert (options.rate, options.size, options.image, options.device, options.views, options.yaml) == (
+        30.0, "1920x1080", "camera/image_raw", "", 0, None,
+    )  # fmt: skip

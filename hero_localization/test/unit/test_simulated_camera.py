@@ -453,3 +453,20 @@ def test_a_camera_file_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingsError, match="camera.yaml cannot be written: "):
         write_camera_file(str(tmp_path / "file" / "camera.yaml"), View(SMALL), SMALL, [TAG], [])
+
+
+def test_light_falls_on_walls_and_hands_too():
+    image = render(np.empty((0, 3)), (), STRAIGHT._replace(light_gradient=0.8), hand_m=(0.9, 0.0))
+    for x_m, height_m, shade in ((-1.2, 0.025, 70.0), (1.2, 0.025, 70.0), (0.9, 0.25, 185.0)):
+        u, v = View(STRAIGHT).project(np.array((x_m, 0.0, height_m)))  # of the middle
+        light = 1.0 - 0.8 * (0.7 * u / 639.0 + 0.3 * v / 359.0)
+        assert shade_at(image, View(STRAIGHT), (x_m, 0.02, height_m)) == pytest.approx(shade * light, abs=4.0), x_m
+
+
+def test_plates_are_blurred_by_the_lens_however_little():
+    textures = [
+        CameraRenderer(STRAIGHT._replace(blur_px=blur_px), ARENA, ())._print_plate(TAG).texture[..., 0]
+        for blur_px in (0.0, 0.5, 1.0)
+    ]
+    steps = [np.abs(np.diff(texture, axis=0)).max() for texture in textures]
+    assert steps[0] > 1.02 * steps[1] > 1.1 * steps[2]

@@ -102,3 +102,32 @@ def test_the_map_shows_the_walls_before_which_robots_turn():
         swarm.drive(0.0, 1.0, duration_s=3.0)
     walls_m = np.abs(np.abs(grid.centers_of(grid.occupied)).max(axis=1) - 1.0)
     assert len(walls_m) > 40 and np.mean(walls_m < 0.016) > 0.9
+
+
+def test_errors_of_the_camera_are_a_bias_of_each_robot_and_noise():
+    assert CameraModel() == (0.1, 0.001, 0.005, 0.0005, 0.005)
+    with StepSwarm(1, seed=3, arena="empty", worlds=60) as swarm:
+        localization = StepLocalization(swarm, CameraModel(0.0, 0.02, 0.1, 1e-5, 1e-5), seed=2)
+        swarm.sleep(0.5)
+        first, later = [], []
+        for errors in (first, later):
+            for robot in swarm.robots:
+                pose, true = localization.find_pose(robot.row), swarm.rows.world.poses[robot.row]
+                errors.append(np.subtract(pose, true))
+            swarm.sleep(0.3)
+        np.testing.assert_allclose(first, later, atol=1e-3)
+        assert np.std(first, axis=0) == pytest.approx((0.02, 0.02, 0.1), rel=0.35)
+
+
+def test_poses_come_after_the_delay_25_times_a_second():
+    with StepSwarm(1, seed=3, arena="empty") as swarm:
+        localization, published_s = StepLocalization(swarm, CameraModel(delay_s=0.2)), []
+        for _ in range(400):
+            swarm.sleep(0.005)
+            found = localization._published[0]
+            if found is not None and (not published_s or found.stamp_s != published_s[-1][1]):
+                published_s.append((swarm.now_s, found.stamp_s))
+        times_s = np.array(published_s)
+        assert 0.2 <= times_s[0, 0] < 0.2 + 0.034 * 3.0
+        # Of readings each 34 ms, the first that is 40 ms after the last: every other one.
+        assert np.diff(times_s[:, 0]).min() > 0.039 and len(times_s) == pytest.approx(1.75 / 0.068, abs=3)
