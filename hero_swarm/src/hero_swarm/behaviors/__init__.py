@@ -57,7 +57,7 @@ def find_behavior(name: str) -> Type[Behavior]:
     if not path.endswith(".py"):
         raise ValueError("behavior %r: must be FILE.py, FILE.py:Class, or one of %s" % (name, ", ".join(list_names())))
     if not os.path.isfile(path):
-        raise ValueError("behavior %s: there is no such file" % path)
+        raise ValueError("behavior %s: no such file from %s; give its whole path" % (path, os.getcwd()))
     spec = importlib.util.spec_from_file_location("user_behavior", path)
     if spec is None or spec.loader is None:
         raise ValueError("behavior %s: is not a Python file" % path)

@@ -47,21 +47,25 @@ def _parse_fence(text: str) -> Optional[np.ndarray]:
 
 
 class BehaviorNode:
-    """One behavior on one swarm."""
+    """One behavior on one swarm.
+
+    Attributes:
+        behavior: with the numbers that were given.
+    """
 
     def __init__(self, swarm: Swarm, parameters: Any) -> None:
         """Begin; robots are stopped until their poses are known. Raises: ProgramError for a wrong parameter."""
         self._swarm = swarm
-        self._behavior = _make_behavior(parameters)
+        self.behavior = _make_behavior(parameters)
         self._frame = parameters["frame"]
         ids = [robot.robot_id for robot in swarm]
         self._source = PoseSource(ids, self._frame)
-        are_needed = any(isinstance(sensor, Objects) for sensor in self._behavior.sensors().values())
+        are_needed = any(isinstance(sensor, Objects) for sensor in self.behavior.sensors().values())
         topic, radius_m = parameters["objects_topic"], parameters["object_radius_m"]
         self._objects = ObjectSource(self._frame, topic, radius_m, are_needed)
         self._filter = SafetyFilter(parameters["safety"], _parse_fence(parameters["fence"]))
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
-        self._commands = WheelCommands(swarm, self._behavior.drive, folder, simulated)
+        self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         self._random = Random([parameters["seed"]], len(ids))
         self._memory: Any = None
         self._start_s = rospy.get_time()
@@ -69,13 +73,13 @@ class BehaviorNode:
         self._next_show_s = 0.0
         self._colors: Optional[np.ndarray] = None
         self._metric = rospy.Publisher("~metric", Float32, queue_size=5)
-        self._drawing = BehaviorMarkers(self._behavior, self._frame, rospy.get_name())
+        self._drawing = BehaviorMarkers(self.behavior, self._frame, rospy.get_name())
         self._markers = rospy.Publisher("behavior/markers", MarkerArray, queue_size=2)
 
     @property
     def period_s(self) -> float:
         """Time between two steps."""
-        return 1.0 / self._behavior.rate_hz
+        return 1.0 / self.behavior.rate_hz
 
     def step(self) -> None:
         """Sense, decide, and command all robots."""
@@ -84,8 +88,8 @@ class BehaviorNode:
         if self._objects.are_needed and not len(things.radii_m):
             poses, things = np.full_like(poses, np.nan), Things(np.full((1, 1, 3), np.nan), np.ones(1))
         now_s = rospy.get_time()
-        sensed = sense(self._behavior, now_s - self._start_s, poses[None], self._random, things)
-        linear_m_s, angular_rad_s, self._memory = decide(self._behavior, sensed, self._memory, self._random)
+        sensed = sense(self.behavior, now_s - self._start_s, poses[None], self._random, things)
+        linear_m_s, angular_rad_s, self._memory = decide(self.behavior, sensed, self._memory, self._random)
         self._filter.radii_m = [robot.model.body_radius_m for robot in self._swarm]
         speeds = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         may_move = sensed.is_known & np.isfinite(linear_m_s) & np.isfinite(angular_rad_s)
@@ -108,14 +112,14 @@ class BehaviorNode:
         known = np.isfinite(velocities).all(axis=1)
         if not known.any():
             return
-        value = float(METRICS[self._behavior.metric](poses[None, known], velocities[None, known], things.poses)[0])
+        value = float(METRICS[self.behavior.metric](poses[None, known], velocities[None, known], things.poses)[0])
         self._metric.publish(Float32(value))
         markers = self._drawing.draw(poses, sensed, value)
         if self._markers.get_num_connections():
             self._markers.publish(MarkerArray(markers))
 
     def _show_colors(self) -> None:
-        colors = self._behavior.colors(self._memory)
+        colors = self.behavior.colors(self._memory)
         if colors is None:
             return
         for row, (robot, color) in enumerate(zip(self._swarm, colors)):
@@ -150,6 +154,9 @@ def behavior() -> None:
               else Swarm(ids, odom=False, proximity=False)) as swarm:  # fmt: skip
             node = BehaviorNode(swarm, parameters)
             end_s = parameters["time_s"] or np.inf
+            text = "%s drives %d robots; its metric, %s, is on %s"
+            made = node.behavior
+            rospy.loginfo(text, type(made).__name__, len(swarm), made.metric, rospy.resolve_name("~metric"))
             for time_s in program.rate(1.0 / node.period_s):
                 if time_s >= end_s:
                     break
