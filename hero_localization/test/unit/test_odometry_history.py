@@ -53,13 +53,30 @@ def test_a_restart_goes_on_where_the_robot_stood_with_its_lengths():
     assert (found.distance_m, found.turned_rad, found.heading_rad) == pytest.approx((0.08, 0.3, 0.1))
     middle = history.find(0.05)
     assert middle.pose == pytest.approx((1.025, 2.0, 0.1))
-    assert middle[1:] == pytest.approx((0.025, 0.1, 0.1)), "lengths of path and turns, and heading"
-    assert history.find(0.25)[1:] == pytest.approx((0.065, 0.25, 0.15))
+    assert middle[1:4] == pytest.approx((0.025, 0.1, 0.1)), "lengths of path and turns, and heading"
+    assert history.find(0.25)[1:4] == pytest.approx((0.065, 0.25, 0.15))
+    assert [history.find(stamp_s).untold_s for stamp_s in (0.1, 0.15, 0.2, 0.3)] == pytest.approx((0.0, 0.05, 0.1, 0.1))
     assert history.find(9.0) == found and history.find(-0.01) is None
 
 
+@pytest.mark.parametrize(
+    ("elapsed_s", "before", "after", "is_restart"),
+    [
+        (1.6, (0.3, 0.0, 0.0), (0.0, 0.0, 0.0), True),
+        (1.6, (0.0, 0.0, 1.0), (0.001, 0.001, -0.02), True),
+        (1.4, (0.3, 0.0, 0.0), (0.0, 0.0, 0.0), False),
+        (1.6, (0.3, 0.0, 0.0), (0.003, 0.0, 0.0), False),
+        (1.6, (0.3, 0.0, 0.0), (0.0, 0.0, 0.04), False),
+        (1.6, (0.01, 0.0, 0.0), (0.0, 0.0, 0.0), False),
+    ],
+)
+def test_odometry_back_at_zero_after_a_pause_shows_a_restart(elapsed_s, before, after, is_restart):
+    history = make_history((0.0, *before), (elapsed_s, *after))
+    assert history.jumps == is_restart and history.find(elapsed_s).untold_s == is_restart * elapsed_s
+
+
 def test_odometry_is_kept_for_a_time_and_old_readings_are_left_out():
-    assert KEPT_S > 2.0 * REPLAYED_S, "the start of the filter may be so old"
+    assert KEPT_S > REPLAYED_S, "what is replayed may be so old"
     history = make_history(*((0.1 * number, 0.01 * number, 0.0, 0.0) for number in range(51)))
     assert history.find(5.0 - KEPT_S + 0.05) is not None and history.find(5.0 - KEPT_S - 0.15) is None
     history.add(4.9, Pose(7.0, 0.0, 0.0))

@@ -148,9 +148,9 @@ def test_slip_explains_no_more_than_what_odometry_counted():
 
 
 def test_a_late_pose_gives_the_same_as_if_it_had_come_in_order():
-    drive = Drive(2).run(2.5)
-    measured = [drive.measure(0.1 * index) for index in range(25)]
-    late = (18, 21)
+    drive = Drive(2).run(1.9)
+    measured = [drive.measure(0.1 * index) for index in range(19)]
+    late = (12, 15)
     in_time = [pose for index, pose in enumerate(measured) if index not in late]
     filters = PoseFilter(), PoseFilter()
     for pose_filter, poses in zip(filters, (measured, in_time + [measured[index] for index in late])):
@@ -374,6 +374,19 @@ def test_a_robot_is_blocked_if_it_came_nowhere_though_its_wheels_turned():
     assert hold(0.02, 0.0082, 0.1) == free_m, "it came two fifths of the way"
     assert hold(0.0048, 0.0, 0.1) == free_m, "so little may be slip"
     assert hold(0.02, 0.0, 0.085) == free_m and hold(0.02, 0.0, 0.51) == free_m, "too short or too long ago to tell"
+
+
+def test_a_blocked_robot_that_is_not_seen_any_more_follows_its_odometry():
+    drive, pose_filter = Drive(4, 0.1, loss=0.0).run(5.0).push(2.0), PoseFilter()
+    follow(drive, pose_filter)
+    place, start_s, last = pose_filter.pose(), drive.samples[-1].stamp_s, drive.samples[-1].odometry
+    for index in range(1, 120):
+        step = Pose(0.002 * index, 0.0, 0.0)
+        pose_filter.add_odometry(start_s + ODOMETRY_S * index, transform_pose(last, step))
+        moved_m = math.hypot(pose_filter.pose().x_m - place.x_m, pose_filter.pose().y_m - place.y_m)
+        if index < 50:
+            assert moved_m == 0.0, index
+    assert moved_m == pytest.approx(step.x_m + 0.1 * DELAY_S, abs=0.005)
 
 
 def test_four_outliers_over_a_tenth_of_a_second_that_agree_move_the_robot():

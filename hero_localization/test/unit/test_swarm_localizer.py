@@ -128,6 +128,36 @@ def test_a_restart_is_said_and_does_not_move_the_robot():
     assert swarm.lines[1:] == ["hero_0: its odometry was set or it restarted; its place in the map stays"]
 
 
+@pytest.mark.parametrize("driven_m", [0.0, 0.3])
+def test_a_robot_back_from_a_pause_is_found_where_it_drove_to(driven_m):
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}, (0.5, 0.0, 0.0))
+    swarm.now_s += 5.0
+    swarm.run(0.2, None, (0.5 + driven_m, 0.0, 0.0))
+    assert swarm[0].estimate.pose == pytest.approx((1.0 + driven_m, 2.0, 0.0))
+    swarm.run(PERIOD_S, {0: (1.0 + 0.99 * driven_m, 2.0, 0.0)}, (0.5 + driven_m, 0.0, 0.0))
+    assert swarm[0].state is RobotState.TRACKED and swarm[0].problem == ""
+    assert swarm.lines[1:] == [
+        "hero_0 lost: its pose follows its odometry",
+        "hero_0 found again after 5.2 s, %.0f mm and 0 degrees off its odometry" % (10.0 * driven_m),
+    ]
+
+
+def test_a_robot_moved_by_hand_in_a_pause_of_odometry_is_reported():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}, (0.5, 0.0, 0.0))
+    swarm.now_s += 5.0
+    swarm.run(0.5, {0: (1.3, 2.4, 0.0)}, (0.5, 0.0, 0.0))
+    assert swarm.lines[-1].startswith("hero_0 was moved by hand: pose reset by 500 mm")
+
+
+def test_a_robot_that_restarts_in_a_pause_was_moved_by_no_hand():
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}, (0.5, 0.0, 0.0))
+    swarm.now_s += 5.0
+    swarm.run(0.2).run(PERIOD_S, {0: (1.1, 2.0, 0.5)})
+    assert swarm[0].state is RobotState.TRACKED and swarm[0].problem == ""
+    assert swarm[0].estimate.pose == pytest.approx((1.1, 2.0, 0.5), abs=1e-3)
+    assert len(swarm.lines) == 4 and not any("by hand" in line for line in swarm.lines), swarm.lines
+
+
 def test_a_robot_that_is_off_or_falls_silent_is_named():
     swarm = Swarm(0)
     assert swarm[0].problem == "no odometry: is the robot on?"

@@ -4,13 +4,14 @@ A robot that restarts begins again at 0, 0, 0, and a program may set its odometr
 is continuous.
 """
 
+import math
 from typing import NamedTuple, Optional
 
 from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
 from .stamped_history import StampedHistory, interpolate_pose
 
-KEPT_S = 3.0
+KEPT_S = 2.0
 """Older poses than this come too late to be used: a camera with its driver delays by 0.05 to 0.3 s."""
 
 MAX_SPEED_M_S = 0.6
@@ -20,9 +21,15 @@ MAX_TURN_RAD_S = 20.0
 JITTER_M = 0.002
 """A robot that turns on the spot seems to come and go by ticks of its encoders: that is no distance."""
 
+JITTER_RAD = 0.03
+"""The same of one wheel, as a turn: wheels are 0.067 m apart."""
+
 JUMP_MARGIN_M = 0.02
 JUMP_MARGIN_RAD = 0.3
 """Readings arrive in bunches with stamps that are a few hundredths of a second off."""
+
+RESTART_S = 1.5
+"""A robot that restarts sends nothing for longer; its odometry is then back at 0, 0, 0."""
 
 
 class Odometry(NamedTuple):
@@ -35,6 +42,8 @@ class Odometry(NamedTuple):
     """Length of the path, and of all turns, since the first reading."""
     heading_rad: float = 0.0
     """Turns to the left less turns to the right since then: not wrapped."""
+    untold_s: float = 0.0
+    """Total time of the jumps since then, in which the robot drove an unknown path."""
 
 
 class OdometryHistory:
@@ -62,12 +71,14 @@ class OdometryHistory:
         """Add a reading of /hero_N/odom; one that is not newer than the last is left out."""
         if stamp_s <= self.newest_s:
             return
-        pose, distance_m, turned_rad, heading_rad = transform_pose(self._offset, raw), 0.0, 0.0, 0.0
+        pose, distance_m, turned_rad, heading_rad, untold_s = transform_pose(self._offset, raw), 0.0, 0.0, 0.0, 0.0
         if self._readings.newest is not None:
-            last, distance_m, turned_rad, heading_rad = self._readings.newest
+            last, distance_m, turned_rad, heading_rad, untold_s = self._readings.newest
             step_m, step_rad = measure_distance(last, pose), _turn_between(last, pose)
-            if _is_jump(step_m, step_rad, stamp_s - self.newest_s):
+            elapsed_s = stamp_s - self.newest_s
+            if _is_jump(step_m, step_rad, 0.0 if elapsed_s > RESTART_S and _is_origin(raw) else elapsed_s):
                 self.jumps += 1
+                untold_s += elapsed_s
                 self._offset = transform_pose(last, invert_pose(raw))
                 pose, step_rad = last, 0.0
             counted_m = measure_distance(self._counted, pose)
@@ -78,7 +89,7 @@ class OdometryHistory:
         else:
             self._counted = pose
         self.raw_pose = raw
-        self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad))
+        self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad, untold_s))
 
     def find(self, stamp_s: float) -> Optional[Odometry]:
         """Return the odometry at stamp_s, interpolated between two readings; after the newest, that one.
@@ -94,11 +105,16 @@ def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:
         start.distance_m + share * (end.distance_m - start.distance_m),
         start.turned_rad + share * (end.turned_rad - start.turned_rad),
         start.heading_rad + share * (end.heading_rad - start.heading_rad),
+        start.untold_s + share * (end.untold_s - start.untold_s),
     )
 
 
 def _turn_between(start: Pose, end: Pose) -> float:
     return wrap_angle(end.yaw_rad - start.yaw_rad)
+
+
+def _is_origin(pose: Pose) -> bool:
+    return math.hypot(pose.x_m, pose.y_m) < JITTER_M and abs(pose.yaw_rad) < JITTER_RAD
 
 
 def _is_jump(step_m: float, step_rad: float, elapsed_s: float) -> bool:

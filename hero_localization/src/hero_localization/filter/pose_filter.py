@@ -20,7 +20,7 @@ import numpy as np
 
 from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
-from .odometry_history import Odometry, OdometryHistory
+from .odometry_history import KEPT_S, Odometry, OdometryHistory
 
 DISTANCE_SCALE_SD = 0.012
 YAW_SCALE_SD_RAD_M = 0.065
@@ -53,6 +53,9 @@ SLIP_M, SLIP_RAD = 0.06, 0.6
 BLOCKED_S = (0.09, 0.5)
 BLOCKED_SHARE, MIN_SLIP_M = 0.4, 0.005
 """A robot that came less far than this share of what odometry counted, over a time between these, is blocked."""
+
+MAX_BLOCKED_S = 2.0
+"""A blocked robot that was not measured for longer may have driven away."""
 
 GATE = 16.3
 """A measured pose whose squared Mahalanobis distance is larger than this is an outlier: chi-squared, three degrees of
@@ -113,8 +116,6 @@ class _Step(NamedTuple):
     """An estimate, and the measured pose that led to it from the one before; None for a start."""
 
     estimate: Estimate
-    measured: Estimate
-    """After the last measured pose: from there on errors of odometry add up."""
     odometry: Odometry
     """At that time."""
     measurement: Optional[Measurement]
@@ -140,11 +141,14 @@ class PoseFilter:
 
     def add_odometry(self, stamp_s: float, pose: Pose) -> List[Correction]:
         """Follow a reading of /hero_N/odom; return what became of measured poses that waited for it."""
+        newest_s = self.odometry.newest_s
         self.odometry.add(stamp_s, pose)
-        if self._steps and self._steps[-1].estimate.stamp_s < stamp_s - 2.0 * REPLAYED_S:
-            # Nothing was measured for a while: move the start on, for odometry is not kept for ever.
-            last = self._steps[-1]
-            self._steps = [last._replace(estimate=self._predict(last, stamp_s - REPLAYED_S), measurement=None)]
+        if self.used_s > newest_s:  # measured while odometry was missing
+            self._steps = [
+                self._find_motion(step) if step.estimate.stamp_s > newest_s else step for step in self._steps
+            ]
+        if stamp_s > newest_s + KEPT_S:  # a pause: no odometry comes for what waits
+            self._waiting.clear()
         due = [measurement for measurement in self._waiting if measurement.stamp_s <= stamp_s]
         self._waiting = [measurement for measurement in self._waiting if measurement.stamp_s > stamp_s]
         # The pose before each, then what became of it.
@@ -213,19 +217,28 @@ class PoseFilter:
         return self._make_step(estimate, measurement)._replace(is_blocked=self._is_blocked(steps, measurement))
 
     def _make_step(self, estimate: Estimate, measurement: Optional[Measurement] = None) -> _Step:
-        odometry = self.odometry.find(estimate.stamp_s)
+        return _Step(estimate, self._get_odometry(estimate.stamp_s), measurement)
+
+    def _get_odometry(self, stamp_s: float) -> Odometry:
+        odometry = self.odometry.find(stamp_s)
         assert odometry is not None, "poses without odometry of their time are not used"
-        return _Step(estimate, estimate, odometry, measurement)
+        return odometry
+
+    def _find_motion(self, step: _Step) -> _Step:
+        odometry, newest = self.odometry.find(step.estimate.stamp_s), self._get_odometry(self.odometry.newest_s)
+        if odometry is None:  # in a long pause: where the robot drove since then is unknown
+            untold_s = newest.untold_s - (self.odometry.newest_s - step.estimate.stamp_s)
+            odometry = newest._replace(untold_s=untold_s)
+        return step._replace(odometry=odometry)
 
     def _is_blocked(self, steps: Sequence[_Step], measurement: Measurement) -> bool:
         """Return whether the robot came nowhere since a pose measured a moment ago, though its wheels turned."""
         for step in reversed(steps):
             since_s = measurement.stamp_s - step.estimate.stamp_s
             if step.measurement is not None and since_s >= BLOCKED_S[0]:
-                start, end = self.odometry.find(step.estimate.stamp_s), self.odometry.find(measurement.stamp_s)
-                if start is None or end is None or since_s > BLOCKED_S[1]:
+                if since_s > BLOCKED_S[1]:
                     return False
-                counted_m = measure_distance(start.pose, end.pose)
+                counted_m = measure_distance(step.odometry.pose, self._get_odometry(measurement.stamp_s).pose)
                 came_m = measure_distance(step.measurement.pose, measurement.pose)
                 return counted_m > MIN_SLIP_M and came_m < BLOCKED_SHARE * counted_m
         return False
@@ -260,15 +273,13 @@ class PoseFilter:
 
     def _predict(self, step: _Step, stamp_s: float) -> Estimate:
         """Return the estimate of a step moved on to stamp_s by the odometry since."""
-        start, end = self.odometry.find(step.estimate.stamp_s), self.odometry.find(stamp_s)
-        if start is None or end is None:  # it drove nothing that is known
-            return step.estimate._replace(stamp_s=stamp_s)
-        pose = transform_pose(step.estimate.pose, transform_pose(invert_pose(start.pose), end.pose))
-        measured = step.measured
-        moved_x_m, moved_y_m = pose.x_m - measured.pose.x_m, pose.y_m - measured.pose.y_m
+        start, end = step.estimate, self._get_odometry(stamp_s)
+        pose = _follow(step, end)
+        moved_x_m, moved_y_m = pose.x_m - start.pose.x_m, pose.y_m - start.pose.y_m
         driven_m, turned_rad = end.distance_m - step.odometry.distance_m, end.turned_rad - step.odometry.turned_rad
-        elapsed_s = stamp_s - measured.stamp_s
-        untold_s = max(0.0, stamp_s - max(measured.stamp_s, self.odometry.newest_s))
+        elapsed_s = stamp_s - start.stamp_s
+        untold_s = end.untold_s - step.odometry.untold_s
+        untold_s += max(0.0, stamp_s - max(start.stamp_s, self.odometry.newest_s))
         # A wrong heading at the start leads to a wrong place at the end.
         jacobian = np.array(((1.0, 0.0, -moved_y_m), (0.0, 1.0, moved_x_m), (0.0, 0.0, 1.0)))
         place_m2 = (DISTANCE_SCALE_SD * driven_m) ** 2 + DISTANCE_VARIANCE_M2_M * driven_m
@@ -280,7 +291,7 @@ class PoseFilter:
         drift_rad2 += (TURN_SCALE_SD * (end.heading_rad - step.odometry.heading_rad)) ** 2
         astray = np.array((-moved_y_m / 2.0, moved_x_m / 2.0, 1.0))
         growth = np.diag((place_m2, place_m2, yaw_rad2)) + drift_rad2 * np.outer(astray, astray)
-        return Estimate(stamp_s, pose, jacobian @ measured.covariance @ jacobian.T + growth)
+        return Estimate(stamp_s, pose, jacobian @ start.covariance @ jacobian.T + growth)
 
     @staticmethod
     def _update(predicted: Estimate, measurement: Measurement) -> Optional[Estimate]:
@@ -299,19 +310,18 @@ class PoseFilter:
             expected.y_m + float(change[1]),
             wrap_angle(expected.yaw_rad + float(change[2])),
         )
-        covariance = predicted.covariance - gain @ predicted.covariance
+        # The same as (1 - gain) @ predicted.covariance, but exact however large that is.
+        covariance = gain @ measurement.covariance
         return Estimate(predicted.stamp_s, pose, (covariance + covariance.T) / 2.0)
 
     def pose(self) -> Optional[Pose]:
         """Return where the robot is at its newest odometry; None before the first measured pose."""
         if not self._steps:
             return None
-        newest = self._steps[-1].estimate
-        start, end = self.odometry.find(newest.stamp_s), self.odometry.find(self.odometry.newest_s)
-        if start is None or end is None or newest.stamp_s >= self.odometry.newest_s:
-            return newest.pose
-        pose = transform_pose(newest.pose, transform_pose(invert_pose(start.pose), end.pose))
-        return newest.pose._replace(yaw_rad=pose.yaw_rad) if self._steps[-1].is_blocked else pose
+        step = self._steps[-1]
+        pose = _follow(step, self._get_odometry(self.odometry.newest_s))
+        is_blocked = step.is_blocked and self.odometry.newest_s - step.estimate.stamp_s <= MAX_BLOCKED_S
+        return step.estimate.pose._replace(yaw_rad=pose.yaw_rad) if is_blocked else pose
 
     def estimate(self) -> Optional[Estimate]:
         """Return pose() with its covariance; None before the first measured pose."""
@@ -332,6 +342,10 @@ class PoseFilter:
 def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
     """Return the covariance of x, y and yaw, (3, 3), of independent errors; position_sd_m: in x and y each."""
     return np.diag((position_sd_m**2, position_sd_m**2, yaw_sd_rad**2))
+
+
+def _follow(step: _Step, odometry: Odometry) -> Pose:
+    return transform_pose(step.estimate.pose, transform_pose(invert_pose(step.odometry.pose), odometry.pose))
 
 
 def _is_near(one: Pose, other: Pose) -> bool:
