@@ -40,7 +40,9 @@ def make_jobs(results_dir, families, table, long_minutes=0.0):
         if long_minutes:
             command += ["-x", "--long", "--minutes", str(long_minutes)]
             timeout_s = LONG_TIMEOUT_S + 60.0 * long_minutes
-        jobs.append(Job("faults: " + family, tuple(command), own_results, LOAD, timeout_s))
+        # Drivers of two families may have the same name: a stop that one keeps is not for the other.
+        environment = {"ROS_HOME": str(own_results / "ros_home")}
+        jobs.append(Job("faults: " + family, tuple(command), own_results, LOAD, timeout_s, environment))
     return jobs
 
 
