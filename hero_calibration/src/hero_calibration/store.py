@@ -86,7 +86,7 @@ def save(path: str, calibration: KeptCalibration) -> None:
                     write_file(base + PREVIOUS + suffix, file.read())
                 with suppress(CalibrationError):
                     old = load(path)
-                    is_same_model = {**others, **old.others}.get("model") == others.get("model")
+                    is_same_model = old.others.get("model", others.get("model")) == others.get("model")
                     if old.robot_id == calibration.robot_id and is_same_model:
                         values, others, text = {**old.values, **values}, {**old.others, **others}, read_text(path)
             content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **others, **values}

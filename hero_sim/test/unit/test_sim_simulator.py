@@ -124,7 +124,7 @@ def test_a_robot_that_left_connects_again_only_after_its_time(bench):
     link.calls.clear()
     robot.wants_connection = True
     simulator.serve_robot(0)
-    assert link.calls == [] and not robot.wants_connection, "nobody answers meanwhile"
+    assert link.calls == [] and not robot.wants_connection, "no connection is wanted meanwhile"
     simulator.swarm.now_ms = start_ms + 500
     robot.wants_connection = True
     simulator.serve_robot(0)

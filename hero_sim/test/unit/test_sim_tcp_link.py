@@ -122,7 +122,7 @@ def test_a_paused_robot_leaves_what_comes_to_the_system(driver):
 def test_the_end_of_a_connection_is_told_once_and_nothing_is_sent_after_it(driver):
     driver.socket.close()
     driver.poll_until(lambda: driver.events.seen[-1] == "lost")
-    driver.link.send(0, b"nobody")
+    driver.link.send(0, b"no peer")
     driver.link.pause(0, True)
     driver.link.drop_unsent(0)
     driver.link.close(0)
@@ -147,7 +147,7 @@ def test_robots_connect_from_addresses_of_their_own():
         link.connect(0)
         while not events.seen:
             link.poll(1.0)
-        assert events.seen == ["failed"], "nobody listens"
+        assert events.seen == ["failed"], "no server listens"
         link._address = ("255.255.255.255", 1)  # not for TCP, so that the system refuses at once
         link.connect(1)
         assert events.seen == ["failed"] * 2 and not link.is_connecting(1)

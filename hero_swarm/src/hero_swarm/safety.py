@@ -93,12 +93,11 @@ class SafetyFilter:
             wanted.reshape(rows, 2), normals.reshape(rows, *normals.shape[2:]), bounds.reshape(rows, bounds.shape[2]),
             self.max_speed_m_s,
         ).reshape(wanted.shape)  # fmt: skip
-        # Between planes that face each other the procedure is not at its end: slower is allowed by all.
-        closing_m_s, most_m_s = -(normals * found[:, :, None]).sum(axis=-1), TOLERANCE_M_S - bounds
-        is_too_fast = (closing_m_s > most_m_s) & (bounds <= 0.0)
-        found = found * np.where(is_too_fast, most_m_s / np.maximum(closing_m_s, TOLERANCE_M_S), 1.0).min(
-            axis=2, initial=1.0, keepdims=True
-        )
+        # Between planes that face each other it has not converged: a slower velocity is within all bounds.
+        closing_m_s, max_closing_m_s = -(normals * found[:, :, None]).sum(axis=-1), TOLERANCE_M_S - bounds
+        is_too_fast = (closing_m_s > max_closing_m_s) & (bounds <= 0.0)
+        slower = np.where(is_too_fast, max_closing_m_s / np.maximum(closing_m_s, TOLERANCE_M_S), 1.0)
+        found = found * slower.min(axis=2, initial=1.0, keepdims=True)
         linear_m_s = (found[..., 0] * cosine + found[..., 1] * sine) * known
         angular_rad_s = (found[..., 1] * cosine - found[..., 0] * sine) / self.lookahead_m * known
         excess = np.maximum(np.abs(angular_rad_s) / self.max_angular_rad_s, 1.0)

@@ -41,6 +41,8 @@ def find_in_path(ranges: Sequence[float], backward: bool = False) -> Tuple[float
     """
     free_m, nearest = math.inf, None
     for index, range_m in enumerate(ranges):
+        if not math.isfinite(range_m):
+            continue
         bearing_rad = wrap_angle(index * math.tau / len(ranges))
         off_rad = wrap_angle(bearing_rad - math.pi) if backward else bearing_rad
         known_m = max(range_m, MIN_RANGE_M)
@@ -48,7 +50,7 @@ def find_in_path(ranges: Sequence[float], backward: bool = False) -> Tuple[float
         if abs(off_rad) >= math.pi / 2.0 or aside_m >= BODY_RADIUS_M:
             continue
         touch_m = known_m * math.cos(off_rad) - math.sqrt(BODY_RADIUS_M**2 - aside_m**2)
-        if touch_m < free_m:  # neither nan nor inf, which come from nan and inf, are
+        if touch_m < free_m:
             free_m, nearest = touch_m, Obstacle(range_m, bearing_rad)
     return free_m, nearest
 

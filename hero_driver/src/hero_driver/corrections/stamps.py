@@ -47,7 +47,8 @@ class StampFilter:
         result_ns = stamp_ns
         if not self._lowest_ns <= stamp_ns - arrival_ns <= self._max_future_ns:
             result_ns = arrival_ns
-            self.corrected += not self._use_arrival
+            if not self._use_arrival:
+                self.corrected += 1
         if last_ns is not None and result_ns <= last_ns:
             if last_ns - arrival_ns > self._max_future_ns + STEP_SLACK_NS:
                 # No stamp that was let through lies so far ahead of its arrival: ROS time itself went back
