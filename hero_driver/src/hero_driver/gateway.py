@@ -39,9 +39,6 @@ from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
 
 NS_PER_S = 10**9
 
-FLEET_POLL_S = 0.1
-COMMANDER_POLL_S = 0.05
-
 STOP_LIMIT_S = 2.0
 """At the end of the driver, and of a connection, robots get this long to come to rest; 0.4 s is usual."""
 
@@ -86,10 +83,8 @@ class Gateway(LinkHandler):
         self.last_refusal = ""
 
     def open(self) -> None:
-        """Begin to serve what the loop brings."""
+        """Begin to publish transforms."""
         self._transforms.open()
-        self._loop.call_later(FLEET_POLL_S, self._poll_fleet)
-        self._loop.call_later(COMMANDER_POLL_S, self._poll_commanders)
 
     # What the transport calls.
 
@@ -145,6 +140,12 @@ class Gateway(LinkHandler):
                 self._receive_event(peer, event, now_s)
                 if link.closed:
                     break
+
+    def poll(self, now_s: float) -> None:
+        """Stop robots whose programs have fallen silent, and take down what belongs to robots that left for good."""
+        for bridge in self.bridges.values():
+            bridge.commands.watch_commanders(now_s)
+        self._collect_expired(now_s)
 
     def poll_link(self, link: Link, now_s: float) -> None:
         """Perform what is due in the session."""
@@ -437,15 +438,7 @@ class Gateway(LinkHandler):
         except Exception as error:  # noqa: BLE001 - an error with one robot must not keep the others moving
             self.report_bug(error)
 
-    def _poll_commanders(self) -> None:
-        self._loop.call_later(COMMANDER_POLL_S, self._poll_commanders)
-        now_s = time.monotonic()
-        for bridge in self.bridges.values():
-            bridge.commands.watch_commanders(now_s)
-
-    def _poll_fleet(self) -> None:
-        self._loop.call_later(FLEET_POLL_S, self._poll_fleet)
-        now_s = time.monotonic()
+    def _collect_expired(self, now_s: float) -> None:
         for record in self.fleet.collect_expired(now_s):
             bridge = self.bridges.pop(record.identity.namespace, None)
             if bridge is not None:

@@ -18,7 +18,7 @@ from hero_driver import command_sender, stop_delivery
 from hero_driver.commands.command_settings import CommandSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.fleet.namespaces import identify
-from hero_driver.gateway import COMMANDER_POLL_S
+from hero_driver.transport.event_loop import POLL_INTERVAL_S
 from hero_driver.peer import Peer
 from hero_driver.ros import robot_bridge, robot_commands
 from hero_driver.rosserial import packets
@@ -200,7 +200,7 @@ class CommandedRobot:
 
     def _watch_commanders(self):
         self.bridge.commands.watch_commanders(self.clock.now_s)
-        self.clock.call_later(COMMANDER_POLL_S, self._watch_commanders)
+        self.clock.call_later(POLL_INTERVAL_S, self._watch_commanders)
 
     def publish(self, name, payload, node="/program", source=None, is_old=False):
         """Let a node publish on a motion topic, or on an alias of it (source)."""

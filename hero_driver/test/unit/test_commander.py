@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hero_driver.commands.commander import Commander, Commanders
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
-from hero_driver.gateway import COMMANDER_POLL_S
+from hero_driver.transport.event_loop import POLL_INTERVAL_S
 from hero_driver.robot_constants import MAX_WATCHDOG_S
 
 NAN_TWIST = bytes(6) + b"\xf8\x7f" + bytes(40)
@@ -90,7 +90,7 @@ def find_silence_s(period_s, end_s, pauses, is_read_first=True, until_s=6.0):
             next_s += period_s
         if is_silent or commanders.find_silent(STOP_S, now_s) is not None:
             return now_s
-        now_s += COMMANDER_POLL_S
+        now_s += POLL_INTERVAL_S
     return None
 
 
@@ -124,7 +124,7 @@ def test_pauses_of_the_driver_keep_no_robot_of_a_hung_program_moving(period_s, p
     longest_s = max(pause_s for _, pause_s in pauses)
     stopped_s = find_silence_s(period_s, end_s, times_s, until_s=20.0)
     # One pause that does not count, and one in which the time is over.
-    assert stopped_s <= end_s + max(STOP_S, 4.0 * period_s) + 2.0 * longest_s + 2.0 * COMMANDER_POLL_S + 0.2
+    assert stopped_s <= end_s + max(STOP_S, 4.0 * period_s) + 2.0 * longest_s + 2.0 * POLL_INTERVAL_S + 0.2
 
 
 def test_of_two_programs_the_one_that_goes_on_keeps_the_robot_moving():

@@ -31,6 +31,9 @@ class Handler(LinkHandler):
             self.reads.append((data, now_s))
             self.changed.notify_all()
 
+    def poll(self, now_s):
+        """Have nothing to do."""
+
     def poll_link(self, link, now_s):
         """Have nothing to do."""
 
@@ -391,3 +394,16 @@ def test_the_loop_listens_where_it_was_told_to():
         again.open(Notes())
     for opened in (loop, again):
         opened._close_all()
+
+
+def test_the_handler_is_polled_every_0_05_s_and_its_links_though_it_fails(still_loop, monkeypatch):
+    loop, handler = still_loop
+    link, polled = Stub(closed=False), []
+    loop._timers.clear()
+    monkeypatch.setattr(event_loop.time, "monotonic", lambda: 1000.0)
+    monkeypatch.setattr(loop, "_links", {5: link, 6: Stub(closed=True)})
+    handler.poll = lambda now_s: polled.append(now_s) or 1 / 0
+    handler.poll_link = lambda *arguments: polled.append(arguments)
+    loop._poll()
+    assert polled == [1000.0, (link, 1000.0)] and len(handler.bugs) == 1
+    assert [(due_s, call) for due_s, _, call in loop._timers] == [(1000.05, loop._poll)]

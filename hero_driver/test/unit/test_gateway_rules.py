@@ -212,8 +212,7 @@ def test_a_duplicate_is_named_kept_and_let_in_when_its_place_is_free(driver):
     driver.receive(first)
     first.close("closed by the robot")
     assert not third.closed, "the place is kept for the first one"
-    driver.gateway.open()
-    driver.run(61.0)
+    driver.gateway.poll(driver.now_s + 61.0)
     assert third.reason == "the robot with the same id left; this one may try again"
     assert ("info", "hero_0 has left; its topics and services are unregistered") in driver.lines
     assert driver.gateway.bridges == {} and driver.list_rows() == []
@@ -337,21 +336,6 @@ def warn_twice(driver, number):
         driver.gateway.warn_robot(peer, text + "." * 500)
 
 
-def test_the_fleet_is_looked_at_every_0_1_s_and_commanders_every_0_05_s(driver):
-    driver.gateway.open()
-    looks = {"_poll_fleet": [], "_poll_commanders": []}
-    for _ in range(30):
-        for due_s, call in driver.later:
-            looks[call.__name__] += [due_s] * (due_s not in looks[call.__name__])
-        driver.run(0.05)
-    for name, period_s in (("_poll_fleet", 0.1), ("_poll_commanders", 0.05)):
-        times_s = looks[name]
-        assert len(times_s) > 5
-        assert [after - before for before, after in zip(times_s, times_s[1:])] == pytest.approx(
-            [period_s] * (len(times_s) - 1)
-        )
-
-
 def test_the_end_waits_two_seconds_for_wheels_that_turn(driver):
     driver.join(declarations=STOCK_DECLARATIONS)
     answers = []
@@ -448,12 +432,12 @@ def test_after_the_end_of_a_connection_nothing_of_the_same_read_counts(driver, m
     assert len(received) == 1 and not first.closed
 
 
-def test_commanders_are_watched_at_each_look(driver):
+def test_commanders_are_watched_at_each_poll(driver):
     bridge, looks = join_bridge(driver), []
     bridge.commands.watch_commanders = looks.append
-    driver.gateway.open()
-    driver.run(0.26)
-    assert looks == pytest.approx([100.05 + 0.05 * number for number in range(5)])
+    for now_s in (100.0, 100.05):
+        driver.gateway.poll(now_s)
+    assert looks == [100.0, 100.05]
 
 
 def test_calls_of_services_fail_with_the_reason_when_the_robot_leaves(driver):

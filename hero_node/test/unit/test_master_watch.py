@@ -6,6 +6,7 @@ import pytest
 
 from hero_node.errors import NodeError
 from hero_node.ros import master_watch
+from hero_node.ros.master import MasterRefusalError
 from hero_node.ros.master_watch import MasterWatch
 
 OWN = [("registerPublisher", "/odom"), ("registerSubscriber", "/led"), ("registerService", "/node/get_loggers")]
@@ -29,7 +30,7 @@ class Master:
         if not self.answers:
             raise NodeError("no answer")
         if method == "lookupService" and ("registerService", arguments[0]) not in self.known:
-            raise NodeError("unknown service")
+            raise MasterRefusalError("unknown service")
         if method == "registerSubscriber" and self.failures:
             raise self.failures.pop()
         if method.startswith("register"):

@@ -114,7 +114,9 @@ class TickOdometry:
         right_m = (right_ticks - last[1]) * self._right_tick_m
         is_moving = left_m != 0.0 or right_m != 0.0
         if is_moving:
-            limit_m = MAX_WHEEL_SPEED_M_S * min(max(elapsed_s, MIN_GAP_S), MAX_GAP_S)
+            # min() and max() would cost as much as all else here.
+            gap_s = MIN_GAP_S if elapsed_s <= MIN_GAP_S else MAX_GAP_S if elapsed_s >= MAX_GAP_S else elapsed_s
+            limit_m = MAX_WHEEL_SPEED_M_S * gap_s
             # A larger step is a reset counter or garbage, not motion.
             if -limit_m <= left_m <= limit_m and -limit_m <= right_m <= limit_m:
                 self._move(left_m, right_m)

@@ -31,8 +31,9 @@ WRITE = select.EPOLLOUT
 LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver is restarted (ArduinoTcpHardware.h:99)."""
 
-POLL_INTERVAL_S = 0.1
-"""Sessions are polled this often for what is due (repeated requests, silence)."""
+POLL_INTERVAL_S = 0.05
+"""The handler is polled this often for what is due: repeated requests, silence of robots and of programs. One timer for
+all, because each costs a turn of the loop."""
 
 PAUSE_S = 1.0
 """Between two turns of the loop: after more, the driver or its PC was suspended, or too busy to run the loop."""
@@ -125,7 +126,7 @@ class EventLoop(LinkOwner):
         self._register(self._wake_receiver.fileno(), READ, self._take_wake)
         for address in self._settings.dial:
             start_dialer(address, self._hand_over, self._warn_network, self._ended)
-        self.call_later(POLL_INTERVAL_S, self._poll_links)
+        self.call_later(POLL_INTERVAL_S, self._poll)
 
     def run(self) -> None:
         """Serve until stop(); then close everything."""
@@ -352,9 +353,10 @@ class EventLoop(LinkOwner):
 
         self.call_later(ACCEPT_PAUSE_S, resume)
 
-    def _poll_links(self) -> None:
-        self.call_later(POLL_INTERVAL_S, self._poll_links)
+    def _poll(self) -> None:
+        self.call_later(POLL_INTERVAL_S, self._poll)
         now_s = time.monotonic()
+        self._call(lambda: self._handler.poll(now_s))
         for link in list(self._links.values()):
             if not link.closed:
                 self._handler.poll_link(link, now_s)

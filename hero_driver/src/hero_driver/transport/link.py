@@ -58,6 +58,10 @@ class LinkHandler:
         """The connection was closed, by either side."""
         raise NotImplementedError
 
+    def poll(self, now_s: float) -> None:
+        """Called every POLL_INTERVAL_S, before poll_link() for each connection."""
+        raise NotImplementedError
+
     def poll_link(self, link: "Link", now_s: float) -> None:
         """Called every POLL_INTERVAL_S for each connection."""
         raise NotImplementedError

@@ -21,6 +21,10 @@ SUCCESS = 1
 """First part of an answer of the master (ROS Master API)."""
 
 
+class MasterRefusalError(NodeError):
+    """The ROS master answered, and refused what was asked."""
+
+
 class LimitedTransport(xmlrpc.client.Transport):
     """XML-RPC over HTTP with a time limit."""
 
@@ -43,7 +47,7 @@ class LimitedTransport(xmlrpc.client.Transport):
 def ask_master(method: str, *arguments: Any) -> Any:
     """Call a method of the ROS master (Master API) and return its value.
 
-    Raises: NodeError if the master does not answer in time or refuses.
+    Raises: MasterRefusalError if the master refuses, another NodeError if it does not answer in time.
     """
     uri = ""
     try:
@@ -53,7 +57,7 @@ def ask_master(method: str, *arguments: Any) -> Any:
     except (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError) as error:
         raise NodeError("no ROS master at %r (%s)" % (uri, error)) from None
     if code != SUCCESS:
-        raise NodeError("the ROS master refuses %s: %s" % (method, text))
+        raise MasterRefusalError("the ROS master refuses %s: %s" % (method, text))
     return value
 
 

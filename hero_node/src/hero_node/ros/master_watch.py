@@ -11,7 +11,7 @@ import rospy
 from rospy.impl.registration import get_service_manager, get_topic_manager
 
 from ..errors import NodeError
-from .master import LimitedTransport, ask_master
+from .master import LimitedTransport, MasterRefusalError, ask_master
 
 SENTINEL = "~get_loggers"
 """A service that rospy registers when a node starts, and not again: what the node registers later does not tell."""
@@ -34,12 +34,14 @@ class MasterWatch:
 
         Raises: NodeError, OSError or xmlrpc.client.Error if the master or this node does not answer in time.
         """
+        was_restarted = False
         try:
-            ask_master("getPid")
+            ask_master("lookupService", rospy.resolve_name(SENTINEL))
+        except MasterRefusalError:
+            was_restarted = True
         except NodeError:
             self.is_lost = True
             raise
-        was_restarted = not _is_known()
         if not was_restarted and not self.is_lost:
             return ""
         self.is_lost = True
@@ -49,13 +51,6 @@ class MasterWatch:
             text = "the ROS master was started again: %d topics and %d services are registered again; restart"
             return text % counts + " the programs that were there before"
         return "the ROS master answers again; %d topics and %d services are registered again" % counts
-
-
-def _is_known() -> bool:
-    try:
-        return bool(ask_master("lookupService", rospy.resolve_name(SENTINEL)))
-    except NodeError:
-        return False
 
 
 def _register_again() -> Tuple[int, int]:
