@@ -13,7 +13,7 @@ from .experiments.errors import ExperimentError
 from .fitting.robot_fit import describe_fit, fit_robot
 
 
-def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="fit", description="Fit the simulator to the robots of recordings.")
     parser.add_argument("bags", nargs="+", metavar="BAG", help="recordings of odometry, commands and poses")
@@ -47,4 +47,4 @@ def fit(options: argparse.Namespace) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    command_line.run(lambda: fit(parse_options(sys.argv[1:] if arguments is None else arguments)), HeroError)
+    command_line.run(lambda: fit(parse_options(arguments)), HeroError)

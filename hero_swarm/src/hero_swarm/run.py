@@ -1,6 +1,5 @@
 """Program run: an experiment in the simulator, or with --robots on robots."""
 
-import sys
 from typing import Optional, Sequence
 
 from hero_node import command_line
@@ -13,7 +12,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
 
     def run() -> None:
-        options = parse_options(sys.argv[1:] if arguments is None else arguments)
+        options = parse_options(arguments)
         if options.robots is None:
             print(run_experiment(options))
             return

@@ -4,8 +4,6 @@ A run is computed again: seed and code give the same bytes, and nothing has to h
 """
 
 import argparse
-import json
-import os
 import sys
 from collections import deque
 from importlib import import_module
@@ -18,10 +16,10 @@ from .experiments.batch import build_trial
 from .experiments.code_version import hash_code
 from .experiments.errors import ExperimentError
 from .experiments.experiment_file import Cell, Experiment
-from .experiments.runner import read_experiment
+from .experiments.runner import read_results
 
 
-def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="show", description="Replay one run of an experiment.")
     parser.add_argument("folder", metavar="FOLDER", help="the results of run")
@@ -54,22 +52,18 @@ def _find(module: str) -> Any:
 
 def show_run(options: argparse.Namespace) -> None:
     """Replay the run that options name. Raises: ExperimentError."""
-    file = os.path.join(options.folder, "experiment.yaml")
-    if not os.path.isfile(file):
-        raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % options.folder)
     if not 0.01 <= options.speed <= 100.0:
         raise ExperimentError("--speed %g: must be from 0.01 to 100" % options.speed)
-    _, experiment = read_experiment(file)
+    _, experiment, about = read_results(options.folder)
     cell = _choose_cell(experiment, options.cell)
     seed = experiment.seeds[0] if options.seed is None else options.seed
     if seed not in experiment.seeds:
         raise ExperimentError(
             "--seed %d: the experiment has seeds %d to %d" % (seed, experiment.seeds[0], experiment.seeds[-1])
         )
-    with open(os.path.join(options.folder, "about.json"), encoding="utf-8") as about:
-        code = json.load(about)["code"]
-    if code != hash_code(experiment.behavior):
-        print("note: the results are of other code (%s), so this run may differ from theirs" % code, file=sys.stderr)
+    if about["code"] != hash_code(experiment.behavior):
+        text = "note: the results are of other code (%s), so this run may differ from theirs"
+        print(text % about["code"], file=sys.stderr)
     trial = build_trial(experiment, cell, [seed])
     robot_ids = range(trial.poses.shape[1])
     print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
@@ -94,4 +88,4 @@ def show_run(options: argparse.Namespace) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    command_line.run(lambda: show_run(parse_options(sys.argv[1:] if arguments is None else arguments)), HeroError)
+    command_line.run(lambda: show_run(parse_options(arguments)), HeroError)

@@ -76,8 +76,8 @@ class Trial:
 
     Attributes:
         rows: the robots, as arrays.
-        poses: true poses (W, N, 3), as of the last control step.
-        velocities: how they changed since the control step before, per second (W, N, 3).
+        poses: true poses (W, N, 3).
+        velocities: how they changed in the last control step, per second (W, N, 3).
         memory: what the behavior remembers.
     """
 
@@ -127,10 +127,7 @@ class Trial:
     def step(self) -> float:
         """Take one control step, let its time pass, and return the time (s)."""
         rows, now_s = self.rows, self.rows.now_ms / 1000.0
-        poses = rows.world.poses.reshape(self.poses.shape).copy()
-        self.velocities = (poses - self.poses) * self.behavior.rate_hz
-        self.poses = poses
-        self._seen.append((now_s, poses))
+        self._seen.append((now_s, self.poses))
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - self._delay_s + 1e-9:
             self._seen.popleft()
         sensed_poses = self._seen[0][1]
@@ -147,14 +144,16 @@ class Trial:
         if colors is not None:
             rows.send_light(self._all, np.column_stack((colors, np.ones(len(colors)))))
         rows.advance(rows.now_ms + round(1000.0 / self.behavior.rate_hz))
+        poses = rows.world.poses.reshape(self.poses.shape).copy()
+        self.velocities = (poses - self.poses) * self.behavior.rate_hz
+        self.poses = poses
         return rows.now_ms / 1000.0
 
     def run(self, time_s: float, every_s: float = 1.0) -> Iterator[Tuple[float, np.ndarray]]:
         """Yield the time (s) and the poses (W, N, 3) every so often, for so long."""
-        due_s = 0.0
-        while self.rows.now_ms < time_s * 1000.0 - 1e-6:
-            now_s = self.rows.now_ms / 1000.0
-            self.step()
+        now_s = due_s = 0.0
+        while now_s < time_s - 1e-9:
             if now_s >= due_s - 1e-9:
                 due_s += every_s
                 yield now_s, self.poses
+            now_s = self.step()

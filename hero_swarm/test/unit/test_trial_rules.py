@@ -104,11 +104,11 @@ def test_a_trial_senses_poses_of_a_while_ago_and_tells_speeds():
         for time_s, poses in trial.run(1.0, every_s=0.1):
             true.append(poses[0].copy())
             assert time_s == pytest.approx(0.1 * (len(true) - 1))
-            seen = trial.memory[-1]
-            assert seen[1] == pytest.approx(true[max(0, len(true) - 1 - steps)]) and seen[0] == pytest.approx(time_s)
             if len(true) > 1:
                 assert trial.velocities[0] == pytest.approx((true[-1] - true[-2]) * 10.0)
-        assert len(true) == 10
+        assert len(true) == len(trial.memory) == 10
+        for number, (time_s, seen) in enumerate(trial.memory):
+            assert time_s == pytest.approx(0.1 * number) and seen == pytest.approx(true[max(0, number - steps)])
     assert len(list(Trial(Note(), OPEN, 1, (1,), (1.0, 1.0)).run(2.0, every_s=0.5))) == 4
 
 

@@ -11,6 +11,7 @@ from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from hero_node.safe_file import replace_file
 from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena
@@ -24,7 +25,7 @@ from .errors import ExperimentError, report_place
 from .experiment_file import ERRORS, Cell, Experiment, Metric, parse_experiment
 from .results_folder import Run
 from .starts import place_all, place_objects
-from .streams import Stream, open_stream
+from .streams import Stream
 
 SAMPLE_S = 1.0
 """Between two samples of the metrics."""
@@ -163,36 +164,29 @@ def _run(experiment: Experiment, trial: Trial, stem: str, with_poses: bool) -> T
     series = np.full((samples, worlds, len(names)), np.nan)
     ends = np.full(worlds, samples - 1)
     running = np.ones(worlds, dtype=bool)
-    pose_period_s = 1.0 / experiment.record_hz if with_poses else math.inf
     poses_file: Optional[Stream] = None
     if with_poses:
-        count = math.floor(experiment.time_s / pose_period_s + 1e-9) + 1
-        poses_file = open_stream(stem + POSES_ENDING, (count, worlds, robots, 3))
-    poses, velocities = trial.poses, np.zeros_like(trial.poses)
+        count = math.floor(experiment.time_s * experiment.record_hz + 1e-9) + 1
+        poses_file = Stream(stem + POSES_ENDING, (count, worlds, robots, 3))
     now_s = 0.0
     while True:
-        if poses_file is not None and now_s >= poses_file.count * pose_period_s - 1e-6:
-            poses_file.append(np.where(running[:, None, None], poses, np.nan))
+        if poses_file is not None and now_s >= poses_file.count / experiment.record_hz - 1e-6:
+            poses_file.append(np.where(running[:, None, None], trial.poses, np.nan))
         sample = math.floor(now_s / SAMPLE_S + 1e-6)
         if sample < samples and np.isnan(series[sample]).all():
-            objects = trial.things.poses
-            series[sample] = np.column_stack([METRICS[name](poses, velocities, objects) for name in names])
+            state = trial.poses, trial.velocities, trial.things.poses
+            series[sample] = np.column_stack([METRICS[name](*state) for name in names])
             if until is not None:
                 held = running & until.holds(series[sample, :, names.index(until.metric)])
                 ends[held], running[held] = sample, False
         if now_s >= experiment.time_s - 1e-6 or not running.any():
             break
-        before = poses
         now_s = trial.step()
-        poses = trial.rows.world.poses.reshape(before.shape).copy()
-        velocities = (poses - before) * trial.behavior.rate_hz
     if poses_file is not None:
         poses_file.close()
     with_ends = np.where(np.arange(samples)[:, None, None] <= ends[:, None], series, np.nan)
-    file = open_stream(stem + METRICS_ENDING, with_ends.shape)
-    for values in with_ends:
-        file.append(values)
-    file.close()
+    with replace_file(stem + METRICS_ENDING) as file:
+        np.save(file, with_ends.astype(np.float32))
     return series, ends.tolist()
 
 

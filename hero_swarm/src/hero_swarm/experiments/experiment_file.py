@@ -23,7 +23,14 @@ MAX_TIME_S = 86_400.0
 MAX_SEED = 2**31 - 1
 MAX_RUNS = 1_000_000
 
-START_KINDS = ("uniform", "grid", "circle", "file", "arena")
+START_KEYS: Dict[str, Tuple[Tuple[str, ...], Tuple[str, ...]]] = {
+    # of each kind of start: what it needs, and what it may have
+    "uniform": (("cover",), ("gap_m",)),
+    "grid": ((), ("gap_m",)),
+    "circle": ((), ("gap_m",)),
+    "file": (("file",), ()),
+    "arena": ((), ()),
+}
 SETTINGS = ("robots", "errors", "delay_s", "arena", "objects")
 ERRORS = {"perfect": 0.0, "default": 1.0}
 """Differences between robots, as an option of the simulator."""
@@ -71,9 +78,8 @@ class Start(NamedTuple):
     """Placement of robots; lengths in m.
 
     Attributes:
-        kind: uniform in a square of which the bodies cover a share; grid or circle with gaps between bodies;
-        file: poses of
-            a file; arena: starts of the arena.
+        kind: uniform in a square of which the bodies cover a share; grid or circle with gaps between bodies; file: poses
+            of a file; arena: starts of the arena.
         cover: share of the square that bodies cover.
         gap_m: least distance between bodies.
         file: path of a CSV file with a line x m, y m, yaw rad for each robot.
@@ -188,20 +194,11 @@ def _parse_start(entry: Optional[Entry]) -> Start:
     if entry is None:
         return Start("arena", 0.0, 0.0, None)
     given = entry.mapping(("kind", "cover", "gap_m", "file"), ("kind",))
-    kind = given["kind"].choice(START_KINDS)
-    allowed = {"uniform": ("cover", "gap_m"), "file": ("file",), "arena": ()}.get(kind, ("gap_m",))
+    kind = given["kind"].choice(START_KEYS)
+    required, optional = START_KEYS[kind]
     for name, value in given.items():
-        if name != "kind" and name not in allowed:
-            raise ExperimentError(
-                "%s: start.%s does not go with kind: %s; %s"
-                % (
-                    value.place,
-                    name,
-                    kind,
-                    "allowed are: %s" % ", ".join(allowed) if allowed else "leave it out",
-                )
-            )
-    required = {"uniform": ("cover",), "file": ("file",)}.get(kind, ())
+        if name not in ("kind", *required, *optional):
+            raise ExperimentError("%s: start.%s does not go with kind: %s; leave it out" % (value.place, name, kind))
     entry.mapping(None, required)
     cover = given["cover"].number(1e-4, 0.5, "(share of the area)") if "cover" in given else 0.0
     gap_m = given["gap_m"].number(0.0, 10.0, "m") if "gap_m" in given else 0.0

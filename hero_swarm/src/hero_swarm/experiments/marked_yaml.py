@@ -4,7 +4,7 @@ Anchors and merge keys are refused: a line would not be unique, and a short file
 """
 
 import math
-from typing import Any, Callable, Collection, Dict, List, NamedTuple, NoReturn, Optional, Tuple
+from typing import Any, Collection, Dict, List, NamedTuple, NoReturn, Optional, Tuple
 
 import yaml
 
@@ -33,19 +33,8 @@ class Entry(NamedTuple):
 
     def refuse(self, text: str) -> NoReturn:
         """Raise ExperimentError: place, name and value, and what it must be."""
-        shown = (
-            self.value
-            if not isinstance(self.value, (list, dict))
-            else "a list"
-            if self.is_list
-            else "a mapping"
-        )
+        shown = {list: "a list", dict: "a mapping"}.get(type(self.value), self.value)
         raise ExperimentError("%s: %s is %s, but must be %s" % (self.place, self.name, shorten(shown), text))
-
-    @property
-    def is_list(self) -> bool:
-        """Whether it is a list."""
-        return isinstance(self.value, list)
 
     def number(self, low: float, high: float, unit: str) -> float:
         """Return a number in low..high."""
@@ -89,10 +78,8 @@ class Entry(NamedTuple):
         where = " in %s" % self.name if self.name else ""
         for name, entry in self.value.items():
             if allowed is not None and name not in allowed:
-                raise ExperimentError(
-                    "%s: unknown %s%s; allowed are: %s"
-                    % (entry.place, shorten(name), where, ", ".join(allowed))
-                )
+                text = "%s: unknown %s%s; allowed are: %s"
+                raise ExperimentError(text % (entry.place, shorten(name), where, ", ".join(allowed)))
         for name in required:
             if name not in self.value:
                 raise ExperimentError("%s: %s is missing%s" % (self.place, name, where))
@@ -113,58 +100,59 @@ def read_entries(text: str, file: str) -> Entry:
     """
     if len(text) > MAX_CHARACTERS:
         raise ExperimentError("%s: longer than %d characters, so not an experiment" % (file, MAX_CHARACTERS))
-    _check_depth(text, file)
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        loader = _Loader(text)
+        loader.name = file
+        node = loader.get_single_node()
     except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise ExperimentError("%s, line %d: not YAML: %s" % (file, line, error.problem)) from None
+        raise ExperimentError("%s: not YAML: %s" % (_find_place(error.problem_mark), error.problem)) from None
     except yaml.YAMLError as error:
         raise ExperimentError("%s: not YAML: %s" % (file, one_line(error))) from None
     if not isinstance(node, yaml.MappingNode):
-        raise ExperimentError(
-            "%s: must hold names and values, such as behavior: aggregation.Aggregation" % file
-        )
-    return _convert(node, "", file, yaml.SafeLoader(""))
+        raise ExperimentError("%s: must hold names and values, such as behavior: aggregation.Aggregation" % file)
+    return _convert(node, "", loader)
 
 
-def _check_depth(text: str, file: str) -> None:
-    """Refuse deep nesting and anchors before anything that works recursively meets them."""
-    opened = (yaml.MappingStartEvent, yaml.SequenceStartEvent)
-    closed = (yaml.MappingEndEvent, yaml.SequenceEndEvent)
-    depth = 0
-    try:
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            depth += isinstance(event, opened) - isinstance(event, closed)
-            is_shared = isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None
-            if depth > MAX_DEPTH or is_shared:
-                what = "anchors cannot be used" if is_shared else "more than %d levels" % MAX_DEPTH
-                raise ExperimentError("%s, line %d: %s" % (file, event.start_mark.line + 1, what))
-    except yaml.YAMLError:
-        return  # compose() says what is wrong
+class _Loader(yaml.SafeLoader):
+    """Refuses deep nesting and anchors before anything that works recursively meets them."""
+
+    _depth = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.peek_event()
+        self._depth += isinstance(event, yaml.CollectionStartEvent)
+        if event.anchor is not None or self._depth > MAX_DEPTH:
+            what = "more than %d levels" % MAX_DEPTH if event.anchor is None else "anchors cannot be used"
+            raise ExperimentError("%s: %s" % (_find_place(event.start_mark), what))
+        node = super().compose_node(parent, index)
+        self._depth -= isinstance(event, yaml.CollectionStartEvent)
+        return node
 
 
-def _convert(node: yaml.Node, name: str, file: str, loader: Any) -> Entry:
-    place = "%s, line %d" % (file, node.start_mark.line + 1)
+def _find_place(mark: yaml.Mark) -> str:
+    return "%s, line %d" % (mark.name, mark.line + 1)
+
+
+def _convert(node: yaml.Node, name: str, loader: Any) -> Entry:
+    place = _find_place(node.start_mark)
     if isinstance(node, yaml.MappingNode):
-        return Entry(_convert_mapping(node, name, file, loader), name, place)
+        return Entry(_convert_mapping(node, name, loader), name, place)
     if isinstance(node, yaml.SequenceNode):
-        return Entry([_convert(item, name, file, loader) for item in node.value], name, place)
-    construct: Callable[[yaml.Node], Any] = loader.construct_object
+        return Entry([_convert(item, name, loader) for item in node.value], name, place)
     try:
-        return Entry(construct(node), name, place)
+        return Entry(loader.construct_object(node), name, place)
     except (yaml.YAMLError, ValueError) as error:
         raise ExperimentError("%s: %s: %s" % (place, name, one_line(error))) from None
 
 
-def _convert_mapping(node: yaml.MappingNode, name: str, file: str, loader: Any) -> Dict[str, Entry]:
+def _convert_mapping(node: yaml.MappingNode, name: str, loader: Any) -> Dict[str, Entry]:
     mapping: Dict[str, Entry] = {}
     for key_node, value_node in node.value:
-        place = "%s, line %d" % (file, key_node.start_mark.line + 1)
+        place = _find_place(key_node.start_mark)
         if not isinstance(key_node, yaml.ScalarNode):
             raise ExperimentError("%s: a name must be a text" % place)
         key = str(key_node.value)
         if key in mapping:
             raise ExperimentError("%s: %s appears twice" % (place, shorten(key)))
-        mapping[key] = _convert(value_node, "%s.%s" % (name, key) if name else key, file, loader)
+        mapping[key] = _convert(value_node, "%s.%s" % (name, key) if name else key, loader)
     return mapping

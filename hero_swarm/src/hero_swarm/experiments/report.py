@@ -1,10 +1,8 @@
 """Program report: medians with intervals, comparisons and plots of an experiment's runs, as text, CSV, and a page."""
 
 import argparse
-import json
 import os
-import sys
-from typing import Dict, Mapping, Optional, Sequence
+from typing import Dict, Optional, Sequence
 
 import numpy as np
 
@@ -12,17 +10,15 @@ from hero_node import command_line
 from hero_node.errors import HeroError
 from hero_node.safe_file import write_file
 
-from ..metrics import UNITS
 from .batch import METRICS_ENDING, SAMPLE_S, list_sources
-from .errors import ExperimentError
 from .experiment_file import Experiment
 from .reporting.report_page import OverTime, draw_page
 from .reporting.summary import build_report, describe, format_summaries
 from .results_folder import REAL, SIMULATED, ResultsFolder
-from .runner import read_experiment
+from .runner import read_results
 
 
-def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(
         prog="report", description="Medians, intervals and plots of an experiment."
@@ -33,10 +29,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def write_report(path: str) -> None:
     """Write table, summary and page of the results in a folder, and print them. Raises: ExperimentError."""
-    file = os.path.join(path, "experiment.yaml")
-    if not os.path.isfile(file):
-        raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % path)
-    text, experiment = read_experiment(file)
+    text, experiment, about = read_results(path)
     folder = ResultsFolder(path, experiment, None)
     runs = folder.read_runs()
     folder.write_table(runs)
@@ -46,7 +39,7 @@ def write_report(path: str) -> None:
         report = build_report(experiment, [run for run in runs if run.kind == kind])
         suffix = "" if kind == SIMULATED else "_robots"
         over_time = _read_over_time(folder, experiment) if kind == SIMULATED else {}
-        page = draw_page(report, UNITS, over_time, text, _read_about(path))
+        page = draw_page(report, over_time, text, about)
         write_file(os.path.join(path, "summary%s.csv" % suffix), format_summaries(report).encode())
         write_file(os.path.join(path, "report%s.html" % suffix), page.encode())
         print(describe(report))
@@ -66,15 +59,6 @@ def _read_over_time(folder: ResultsFolder, experiment: Experiment) -> Dict[str, 
     }
 
 
-def _read_about(path: str) -> Mapping[str, str]:
-    with open(os.path.join(path, "about.json"), encoding="utf-8") as file:
-        about: Dict[str, str] = json.load(file)
-    return about
-
-
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    command_line.run(
-        lambda: write_report(parse_options(sys.argv[1:] if arguments is None else arguments).folder),
-        HeroError,
-    )
+    command_line.run(lambda: write_report(parse_options(arguments).folder), HeroError)

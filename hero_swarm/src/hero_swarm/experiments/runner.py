@@ -2,12 +2,13 @@
 
 import argparse
 import functools
+import json
 import math
 import os
 import sys
 import time
 from concurrent.futures import Executor
-from typing import Any, Callable, Iterable, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple
 
 from tqdm import tqdm
 
@@ -65,7 +66,7 @@ def _whole(low: int, high: int) -> Callable[[str], int]:
     return parse
 
 
-def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="run", description="Run an experiment: all seeds of all cells.")
     parser.add_argument("file", metavar="EXPERIMENT.yaml", help="experiment file")
@@ -110,6 +111,18 @@ def read_experiment(path: str) -> Tuple[str, Experiment]:
             "%s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)
         ) from error
     return text, parse_experiment(text, path, METRICS)
+
+
+def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
+    """Return the text of the experiment whose results a folder holds, what it describes, and on what it ran.
+
+    Raises: ExperimentError.
+    """
+    file = os.path.join(path, "experiment.yaml")
+    if not os.path.isfile(file):
+        raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % path)
+    with open(os.path.join(path, "about.json"), encoding="utf-8") as about:
+        return (*read_experiment(file), json.load(about))
 
 
 def choose_batch(experiment: Experiment, cell: int) -> int:

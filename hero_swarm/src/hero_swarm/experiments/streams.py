@@ -13,10 +13,12 @@ class Stream:
         count: entries that were written.
     """
 
-    def __init__(self, path: str, array: Any) -> None:
-        """Write into array, a memory map of path + ".part"."""
+    def __init__(self, path: str, shape: Tuple[int, ...]) -> None:
+        """Begin an array of shape (T, ...), which replaces the file path (.npy) when it is closed."""
         self.count = 0
-        self._path, self._array = path, array
+        self._path = path
+        self._array: Any = np.lib.format.open_memmap(  # type: ignore[no-untyped-call]
+            path + ".part", mode="w+", dtype=np.float32, shape=shape)
 
     def append(self, values: np.ndarray) -> None:
         """Write the next entry."""
@@ -29,10 +31,3 @@ class Stream:
         self._array.flush()
         del self._array
         os.replace(self._path + ".part", self._path)
-
-
-def open_stream(path: str, shape: Tuple[int, ...]) -> Stream:
-    """Return a stream of shape (T, ...), which replaces the file path (.npy) when it is closed."""
-    array: Any = np.lib.format.open_memmap(  # type: ignore[no-untyped-call]
-        path + ".part", mode="w+", dtype=np.float32, shape=shape)
-    return Stream(path, array)

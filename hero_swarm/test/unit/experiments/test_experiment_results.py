@@ -15,7 +15,7 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.summary import build_report
 from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
-from hero_swarm.experiments.streams import open_stream
+from hero_swarm.experiments.streams import Stream
 
 FILE = """\
 behavior: a.B
@@ -192,7 +192,7 @@ def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, 
         first = (path / name).read_text().splitlines()[1].split(",")
         assert first[:2] == ["2", "dispersion"] and float(first[3]) == pytest.approx(median)
     assert {"report.html", "report_robots.html", "runs.csv"} <= set(os.listdir(str(path)))
-    (_, _, over_time, text, about), (_, _, no_time, _, _) = pages
+    (_, over_time, text, about), (_, no_time, _, _) = pages
     times_s, values = over_time["dispersion"]
     assert times_s.tolist() == [0.0, 1.0, 2.0] and values[0][:, 1].tolist() == [1.0, 5.0, 9.0]
     assert text == FILE and about["code"] == "c0de" and no_time == {}
@@ -217,9 +217,9 @@ def test_a_report_compares_runs_of_one_seed_and_says_what_is_missing():
         Run(1, 7, (9.0, 1.0)),
     ]
     found = build_report(experiment, runs)
-    (compared,) = found.compared
-    assert (compared.first, compared.second, compared.comparison.pairs) == (0, 1, 1)
-    assert compared.comparison.difference.median == 2.0 and compared.comparison.delta == 1.0
+    ((*cells, comparison),) = found.compared
+    assert cells == [0, 1] and comparison.pairs == 1
+    assert comparison.difference.median == 2.0 and comparison.delta == 1.0
     assert [summary.values for summary in found.summaries][:2] == [(1.0, 1.0), (3.0, 6.0, 9.0)]
     remarks = "\n".join(found.remarks)
     for words in ("2 of 8 runs are still missing", "4 seeds: ", "1 runs are left out", "not reached in 1 runs"):
@@ -250,7 +250,7 @@ def test_times_of_batches_are_appended_below_one_heading(tmp_path):
 
 def test_a_stream_has_its_name_once_it_is_whole(tmp_path):
     path = tmp_path / "a.npy"
-    stream = open_stream(str(path), (3, 2))
+    stream = Stream(str(path), (3, 2))
     for values in ((1.0, 2.0), (3.0, 4.0)):
         stream.append(np.array(values))
     assert stream.count == 2 and not path.exists()

@@ -1,12 +1,11 @@
 """Draws the metrics of an experiment: every run as a point beside its cell's interval, and medians over time."""
 
 import io
-from typing import Any, List, Sequence, Tuple
+from typing import Any, Sequence, Tuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..experiment_file import Experiment
 from .statistics import Interval
 
 _WIDTH_IN = 8.0
@@ -82,8 +81,3 @@ def to_svg(figure: Figure) -> str:
     figure.savefig(output, format="svg", metadata={"Date": None})
     text = output.getvalue()
     return text[text.index("<svg") :]
-
-
-def list_labels(experiment: Experiment, cells: Sequence[int]) -> List[str]:
-    """Return what cells are called."""
-    return [experiment.cells[cell].label for cell in cells]

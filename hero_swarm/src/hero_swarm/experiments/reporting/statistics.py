@@ -1,9 +1,8 @@
 """Intervals and tests for the runs of an experiment. Pure: numpy, and scipy for the signed-rank test only.
 
 Medians have percentile bootstrap intervals (Efron 1979): bias-corrected intervals are undefined where most values are
-equal, which metrics that are bounded often are. Paired differences are tested by Wilcoxon's signed-rank test
-(1945), their size
-is Cliff's delta (1993), and several comparisons are corrected by Holm's step-down method (1979).
+equal, which metrics that are bounded often are. Paired differences are tested by Wilcoxon's signed-rank test (1945),
+their size is Cliff's delta (1993), and several comparisons are corrected by Holm's step-down method (1979).
 """
 
 from typing import List, NamedTuple, Sequence, Tuple

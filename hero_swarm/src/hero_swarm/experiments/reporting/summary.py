@@ -5,7 +5,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from ..errors import ExperimentError
-from ..experiment_file import Experiment, Metric
+from ..experiment_file import Comparing, Experiment
 from ..results_folder import Run, format_csv
 from .statistics import FEW_SEEDS, Comparison, Interval, bootstrap_median, compare_pairs, correct_by_holm
 
@@ -23,79 +23,54 @@ class Summary(NamedTuple):
     interval: Interval
 
 
-class Compared(NamedTuple):
-    """Two cells that differ in one value only.
-
-    Attributes:
-        corrected_p: p-value, corrected for the number of comparisons in the report.
-    """
-
-    first: int
-    second: int
-    comparison: Comparison
-    corrected_p: float
-
-
 class Report(NamedTuple):
     """Summary of an experiment's runs.
 
     Attributes:
+        compared: of each two cells that differ in one value only: the first, the second, and their comparison, of which
+            the p-value is corrected for the number of comparisons.
         remarks: what a reader should know before believing it.
     """
 
     experiment: Experiment
-    summaries: Tuple[Summary, ...]
-    compared: Tuple[Compared, ...]
-    remarks: Tuple[str, ...]
+    summaries: List[Summary]
+    compared: List[Tuple[int, int, Comparison]]
+    remarks: List[str]
 
 
 def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
     """Return what runs say. Raises: ExperimentError without a run that counts."""
     counted = [run for run in runs if not run.remark]
-    summaries = [
-        _summarize(metric, index, cell, counted)
-        for index, metric in enumerate(experiment.metrics)
-        for cell in range(len(experiment.cells))
-        if any(run.cell == cell for run in counted)
-    ]
+    summaries = []
+    for index, metric in enumerate(experiment.metrics):
+        for cell in sorted({run.cell for run in counted}):
+            values = tuple(run.values[index] for run in counted if run.cell == cell)
+            summaries.append(Summary(metric.name, cell, values, bootstrap_median(values)))
     if not summaries:
         raise ExperimentError("there is no run to report: compute them with run")
-    return Report(
-        experiment, tuple(summaries), _compare(experiment, counted), tuple(_remark(experiment, runs))
-    )
+    compared = [] if experiment.compare is None else _compare(experiment, experiment.compare, counted)
+    return Report(experiment, summaries, compared, _remark(experiment, runs))
 
 
-def _summarize(metric: Metric, index: int, cell: int, runs: Sequence[Run]) -> Summary:
-    values = tuple(run.values[index] for run in runs if run.cell == cell)
-    return Summary(metric.name, cell, values, bootstrap_median(values))
-
-
-def _compare(experiment: Experiment, runs: Sequence[Run]) -> Tuple[Compared, ...]:
-    """Compare cells that differ in experiment.compare.between only, each with the one of the first value."""
-    if experiment.compare is None:
-        return ()
-    index = [metric.name for metric in experiment.metrics].index(experiment.compare.metric)
-    values: Dict[int, Dict[Tuple[int, str], float]] = {}
+def _compare(experiment: Experiment, wanted: Comparing, runs: Sequence[Run]) -> List[Tuple[int, int, Comparison]]:
+    """Compare cells that differ in wanted.between only, each with the one of the first value."""
+    index = [metric.name for metric in experiment.metrics].index(wanted.metric)
+    values: List[Dict[Tuple[int, str], float]] = [{} for _ in experiment.cells]
     for run in runs:
-        values.setdefault(run.cell, {})[run.seed, run.kind] = run.values[index]
-    pairs: List[Tuple[int, int, Comparison]] = []
-    for first, second in _list_pairs(experiment):
-        shared = sorted(values.get(first, {}).keys() & values.get(second, {}).keys())
-        if shared:
+        values[run.cell][run.seed, run.kind] = run.values[index]
+    firsts: Dict[str, int] = {}
+    pairs = [
+        (firsts.setdefault(repr({**cell.varied, wanted.between: None}), index), index)
+        for index, cell in enumerate(experiment.cells)
+    ]
+    compared = []
+    for first, second in sorted(pairs):
+        shared = sorted(values[first].keys() & values[second].keys())
+        if first != second and shared:
             samples = [[values[cell][key] for key in shared] for cell in (first, second)]
-            pairs.append((first, second, compare_pairs(*samples)))
-    corrected = correct_by_holm([comparison.p_value for _, _, comparison in pairs])
-    return tuple(Compared(*pair, p_value) for pair, p_value in zip(pairs, corrected))
-
-
-def _list_pairs(experiment: Experiment) -> List[Tuple[int, int]]:
-    assert experiment.compare is not None
-    name = experiment.compare.between
-    groups: Dict[str, List[int]] = {}
-    for index, cell in enumerate(experiment.cells):
-        others = [item for item in cell.varied.items() if item[0] != name]
-        groups.setdefault(repr(others), []).append(index)
-    return [(cells[0], cell) for cells in groups.values() for cell in cells[1:]]
+            compared.append((first, second, compare_pairs(*samples)))
+    corrected = correct_by_holm([one.p_value for _, _, one in compared])
+    return [(first, second, one._replace(p_value=p)) for (first, second, one), p in zip(compared, corrected)]
 
 
 def _remark(experiment: Experiment, runs: Sequence[Run]) -> List[str]:
@@ -129,20 +104,12 @@ def describe(report: Report) -> str:
                 lines.append(
                     "  %-40s %s, %d runs" % (label, format_interval(summary.interval), len(summary.values))
                 )
-    for compared in report.compared:
+    for first, second, one in report.compared:
         assert report.experiment.compare is not None
-        cells = report.experiment.cells
-        lines.append(
-            "%s: %s against %s: difference %s, corrected p %.2g, Cliff's delta %+.2f"
-            % (
-                report.experiment.compare.metric,
-                cells[compared.second].label,
-                cells[compared.first].label,
-                format_interval(compared.comparison.difference),
-                compared.corrected_p,
-                compared.comparison.delta,
-            )
-        )
+        text = "%s: %s against %s: difference %s, corrected p %.2g, Cliff's delta %+.2f"
+        labels = (report.experiment.cells[cell].label for cell in (second, first))
+        values = format_interval(one.difference), one.p_value, one.delta
+        lines.append(text % (report.experiment.compare.metric, *labels, *values))
     return "\n".join(lines + ["note: " + remark for remark in report.remarks])
 
 
