@@ -204,13 +204,14 @@ def test_a_laser_has_the_fields_of_the_stock_scan():
 
 
 def test_an_imu_message_has_its_values_between_symmetric_covariances():
-    (packet,) = read_packets(messages.ImuMessages("hero_3").encode((7, 8), (0.1, 0.2, 0.3, 0.4), (1, 2, 3), (4, 5, 6)))
+    (packet,) = read_packets(messages.ImuMessages("hero_3").encode((7, 8), 2.0, 500.0))
     assert struct.unpack_from("<III", packet.payload) == (messages.SEQ_NEVER_COUNTED, 7, 8)
     frame, start = driver_side.read_text(packet.payload, 12)
     assert frame == "hero_3/hat_link" and packet.topic_id == declarations.ID_IMU
     values = struct.unpack_from("<37d", packet.payload, start)
-    assert values[:4] == pytest.approx((0.1, 0.2, 0.3, 0.4)) and not any(values[4:13])
-    assert values[13:16] == (1, 2, 3) and values[25:28] == (4, 5, 6)
+    turn = (0.0, 0.0, math.sin(1.0) * 16383 / 16384, math.cos(1.0) * 16383 / 16384)
+    assert values[:4] == pytest.approx(turn, abs=1e-7) and not any(values[4:13])
+    assert values[13:16] == (0.0, 0.0, 500.0) and values[25:28] == pytest.approx((0.0, 0.0, 8.192))
     for first, largest in ((16, 1.7157649993896484), (28, 0.002516058273613453)):
         covariance = np.reshape(values[first : first + 9], (3, 3))
         assert (covariance == covariance.T).all() and covariance.max() == largest

@@ -5,8 +5,10 @@ The only file of the simulated robot that touches the file system.
 
 import json
 import os
-from contextlib import suppress
 from typing import Any, Optional, Sequence
+
+from hero_node.number_checks import is_number
+from hero_node.safe_file import write_file
 
 from ..errors import CommandError, OptionError
 from ..robot_constants import MAX_PARAMETER
@@ -17,13 +19,6 @@ _ERASED_PID = [-1.0] * 6
 """The firmware then uses the gains of the program."""
 
 _REMEDY = "delete it to start over"
-
-
-def _is_storable(value: Any, may_be_erased: bool) -> bool:
-    """Return whether a value is a number that a robot computes with; only a sensor's constant may be erased (NaN)."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    return abs(value) < MAX_PARAMETER or (value != value and may_be_erased)
 
 
 class Flash:
@@ -68,11 +63,10 @@ class Flash:
             raise OptionError("flash file %s cannot be read: %s; %s" % (path, reason, _REMEDY)) from error
         for key, length in _LENGTHS.items():
             values = content.get(key) if isinstance(content, dict) else None
-            may_be_erased = key == "ir_calibration_counts_m2"
-            if (
-                not isinstance(values, list)
-                or len(values) != length
-                or not all(_is_storable(value, may_be_erased) for value in values)
+            may_be_erased = key == "ir_calibration_counts_m2"  # then it is NaN
+            if not isinstance(values, list) or len(values) != length or not all(
+                is_number(value, -MAX_PARAMETER, MAX_PARAMETER) or (may_be_erased and value != value)
+                for value in values
             ):
                 raise OptionError("flash file %s: %s must be a list of %d numbers; %s" % (path, key, length, _REMEDY))
             setattr(self, key, [float(value) for value in values])
@@ -85,13 +79,7 @@ class Flash:
         if self._path is None:
             return
         content = {key: getattr(self, key) for key in _LENGTHS}
-        # Two simulators with the same robot may write at the same time.
-        written = "%s.%d" % (self._path, os.getpid())
         try:
-            with open(written, "w", encoding="utf-8") as file:
-                json.dump(content, file, indent=1)
-            os.replace(written, self._path)
+            write_file(self._path, json.dumps(content, indent=1).encode())
         except OSError as error:
-            with suppress(OSError):
-                os.remove(written)
             raise CommandError("flash file %s cannot be written: %s" % (self._path, error.strerror)) from error

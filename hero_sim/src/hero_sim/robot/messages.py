@@ -43,6 +43,12 @@ LASER_RANGE_MAX_M = 0.236835
 """Fields of the stock LaserScan; the increment fits neither 15 nor 16 steps of a turn
 (RangeSensor.ino:67-72)."""
 
+_UNIT_QUATERNION = 16383.0 / 16384.0
+"""The largest part of a quaternion that the hat sends (0.99994, a 14-bit fixed point number)."""
+
+_GRAVITY = 8.192
+"""1 g in the hat's unit: raw counts / 1000 (IMUSensor.ino:182-188)."""
+
 _ANGULAR_COVARIANCE = (
     0.6175054311752319, -0.22783495485782623, -0.3221839368343353,
     -0.22783495485782623, 1.7157649993896484, 0.24605797231197357,
@@ -207,25 +213,21 @@ class ImuMessages:
     def __init__(self, name: str, model: RobotModel = HERO) -> None:
         """Build the template of the robot called name (hero_N)."""
         head = _header(SEQ_NEVER_COUNTED, name + "/hat_link")
-        values = [0.0] * (4 + 9 + 3) + list(_ANGULAR_COVARIANCE) + [0.0] * 3 + list(_LINEAR_COVARIANCE)
+        gravity = round_to_float32((0.0, 0.0, _GRAVITY))
+        values = [0.0] * (4 + 9 + 3) + [*_ANGULAR_COVARIANCE, *gravity, *_LINEAR_COVARIANCE]
         self._template = _Template([(model.own_ids[declarations.ID_IMU], head + struct.pack("<37d", *values))])
         start = self._template.payload_starts[0]
         self._stamp = start + 4
         self._quaternion = start + len(head)
 
-    def encode(
-        self,
-        stamp: Tuple[int, int],
-        quaternion: Sequence[float],
-        angular_counts: Sequence[float],
-        acceleration: Sequence[float],
-    ) -> bytes:
-        """Return the packet; quaternion is x y z w."""
+    def encode(self, stamp: Tuple[int, int], heading_rad: float, angular_counts: float) -> bytes:
+        """Return the packet of a robot that turns about z only."""
         data = self._template.data
+        turn = math.sin(heading_rad / 2.0) * _UNIT_QUATERNION, math.cos(heading_rad / 2.0) * _UNIT_QUATERNION
+        yaw_z, yaw_w, angular_z = round_to_float32((*turn, angular_counts))
         _STAMP.pack_into(data, self._stamp, *stamp)
-        _QUATERNION.pack_into(data, self._quaternion, *round_to_float32(quaternion))
-        struct.pack_into("<3d", data, self._quaternion + 8 * 13, *round_to_float32(angular_counts))
-        struct.pack_into("<3d", data, self._quaternion + 8 * 25, *round_to_float32(acceleration))
+        _QUATERNION.pack_into(data, self._quaternion, 0.0, 0.0, yaw_z, yaw_w)
+        struct.pack_into("<d", data, self._quaternion + 8 * 15, angular_z)
         return self._template.seal()
 
 

@@ -132,6 +132,6 @@ class Sensing:
         return self._laser_messages.encode(self._laser_seq, stamp, ranges_m.tolist(), counts.tolist())
 
     def _measure_imu(self, imu: ImuHat, millis: int, stamp: Tuple[int, int]) -> bytes:
-        reading = imu.read(millis, self._body.true_pose.yaw_rad, self._body.angular_rad_s)
-        self.odometry.set_heading(reading.heading_rad)
-        return self._imu_messages.encode(stamp, reading.quaternion, reading.angular_counts, reading.acceleration)
+        heading_rad, angular_counts = imu.read(millis, self._body.true_pose.yaw_rad, self._body.angular_rad_s)
+        self.odometry.set_heading(heading_rad)
+        return self._imu_messages.encode(stamp, heading_rad, angular_counts)

@@ -11,7 +11,8 @@ import numpy as np
 import yaml
 
 from hero_node.geometry import Pose
-from hero_node.texts import one_line, shorten
+from hero_node.texts import shorten
+from hero_node.yaml_text import parse_yaml, read_text
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
@@ -35,29 +36,17 @@ def load_arena(name: str) -> Arena:
     path = name
     if name in SHIPPED:
         path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "arenas", name + ".yaml")
-    content = _read_yaml(path)
     try:
+        # Numbers stay texts: what YAML takes for dates, booleans or objects has no meaning here.
+        content = parse_yaml(read_text(path), yaml.BaseLoader)
         if isinstance(content, dict) and "image" in content:
             return _build_from_map(content, path)
         return _build_arena(content, os.path.basename(path))
+    except OSError as error:
+        text = "arena %s cannot be read: %s; shipped are %s"
+        raise OptionError(text % (path, error.strerror, ", ".join(SHIPPED))) from error
     except ValueError as error:
         raise OptionError("arena %s: %s" % (path, error)) from error
-
-
-def _read_yaml(path: str) -> Any:
-    """Return what the file holds as mappings, lists and texts. Raises: OptionError."""
-    try:
-        with open(path, encoding="utf-8") as file:
-            # Numbers stay texts: what YAML takes for dates, booleans or objects has no meaning here.
-            return yaml.BaseLoader(file.read()).get_single_data()
-    except OSError as error:
-        raise OptionError(
-            "arena %s cannot be read: %s; shipped are %s" % (path, error.strerror, ", ".join(SHIPPED))
-        ) from error
-    except RecursionError as error:
-        raise OptionError("arena %s: lists within lists, deeper than can be read" % path) from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise OptionError("arena %s: %s" % (path, one_line(error))) from error
 
 
 def _build_from_map(content: Dict[str, Any], path: str) -> Arena:
