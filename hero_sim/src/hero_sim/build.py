@@ -9,7 +9,7 @@ import numpy as np
 from .errors import OptionError
 from .faults import FaultInjector, parse_fault
 from .link.tcp_link import TcpLink
-from .population import Rngs, build_radios, build_world, draw_servo_timing
+from .population import build_radios, build_world, draw_seeds, draw_servo_timing
 from .robot.firmware import Firmware
 from .robot.flash import Flash
 from .robot.models import parse_models
@@ -47,22 +47,17 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
 
     Raises: OptionError for an arena in which the robots find no place.
     """
-    rngs = Rngs(options)
-    world = build_world(options)
+    seeds, world = draw_seeds(options), build_world(options)
     models = parse_models(options.model, options.first_id, options.count)
     infrared = SharedReadings(world)
     robots: List[Firmware] = []
-    for index, address in enumerate(addresses):
+    for index, (address, model, seed) in enumerate(zip(addresses, models, seeds["robots"])):
         body, flash = Body(world, index, infrared), _build_flash(options, world.errors, index)
-        robot_id = options.first_id + index
+        robot_id, rng = options.first_id + index, np.random.RandomState(seed)
         timing = draw_servo_timing(options, robot_id)
-        robots.append(
-            Firmware(
-                robot_id, body, flash, rngs.robots[index], address, options.imu_hat, timing, report, models[index]
-            )
-        )
+        robots.append(Firmware(robot_id, body, flash, rng, address, options.imu_hat, timing, report, model))
     swarm = Swarm(world, robots)
-    swarm.switch_on(rngs.boot, BOOT_SPREAD_MS)
+    swarm.switch_on(np.random.RandomState(seeds["boot"]), BOOT_SPREAD_MS)
     return swarm
 
 

@@ -6,7 +6,7 @@ The same options give the same robots behind sockets and stepped in process.
 import argparse
 import copy
 import numbers
-from typing import Any, List, Optional, Sequence
+from typing import Any, Dict, List, Optional, Sequence
 
 import numpy as np
 
@@ -27,24 +27,10 @@ SERVO_TIMINGS = (CORE_2, CORE_3, _DRAWN)
 """Of all robots, or one of the two for each: which core real robots carry is not known."""
 
 
-class Rngs:
-    """One stream of random numbers for each purpose, so that one more draw here does not change all others.
-
-    Attributes:
-        places, world, boot: streams, made when they are asked for: to make one takes longer than to place a robot.
-        robots, radios: a stream for each robot.
-    """
-
-    def __init__(self, options: argparse.Namespace) -> None:
-        """Derive all from options.seed."""
-        seeds = _reseed(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
-        self._seeds = dict(zip(("places", "world", "boot"), seeds[:3]), robots=seeds[3::2], radios=seeds[4::2])
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in self.__dict__.get("_seeds", ()):
-            raise AttributeError(name)
-        seeds = self._seeds[name]
-        return list(map(np.random.RandomState, seeds)) if np.ndim(seeds) else np.random.RandomState(seeds)
+def draw_seeds(options: argparse.Namespace) -> Dict[str, Any]:
+    """Return a seed for each purpose, so that one more draw here does not change all others; of robots and radios (N,)."""
+    seeds = _reseed(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
+    return dict(zip(("places", "world", "boot"), seeds), robots=seeds[3::2], radios=seeds[4::2])
 
 
 _SCRATCH = np.random.RandomState(0)
@@ -105,10 +91,12 @@ def build_world(options: argparse.Namespace, worlds: int = 1) -> World:
     """
     arena = load_arena(options.arena) if options.arena else build_default(options.count)
     each = _list_worlds(options, worlds)
-    rngs = list(map(Rngs, each))
+    seeds = list(map(draw_seeds, each))
     errors = RobotErrors(*map(np.concatenate, zip(*map(build_errors, each))))
-    poses = [place_robots(arena, options.count, rng.places, float(errors.radius_m.max())) for rng in rngs]
-    return World(arena, np.concatenate(poses), [rng.world for rng in rngs], errors)
+    radius_m = float(errors.radius_m.max())
+    rngs = [np.random.RandomState(own["places"]) for own in seeds]
+    poses = [place_robots(arena, options.count, rng, radius_m) for rng in rngs]
+    return World(arena, np.concatenate(poses), [np.random.RandomState(own["world"]) for own in seeds], errors)
 
 
 def place_worlds(
@@ -136,8 +124,8 @@ def place_worlds(
 
 def build_radios(options: argparse.Namespace, worlds: int = 1) -> List[Radio]:
     """Return the Wi-Fi of each robot, world after world."""
-    rngs = [rng for one in _list_worlds(options, worlds) for rng in Rngs(one).radios]
-    return [Radio(PROFILES[options.wifi], rng) for rng in rngs]
+    seeds = [seed for one in _list_worlds(options, worlds) for seed in draw_seeds(one)["radios"]]
+    return [Radio(PROFILES[options.wifi], np.random.RandomState(seed)) for seed in seeds]
 
 
 def _list_worlds(options: argparse.Namespace, worlds: int) -> List[argparse.Namespace]:

@@ -7,7 +7,7 @@ from hero_node.geometry import Pose
 
 from .robot_constants import BODY_RADIUS_M
 from .world.arena import Arena
-from .world.pushing.shapes import Body, Disc
+from .world.pushing.shapes import Body, list_outlines
 
 FRAME = "world"
 
@@ -60,14 +60,9 @@ def draw_robot(
 
 def draw_objects(bodies: Sequence[Body]) -> List[Shape]:
     """Return discs, and the edges of polygons, where they are."""
-    shapes: List[Shape] = []
-    for body in bodies:
-        if isinstance(body.shape, Disc):
-            circle = (body.x_m, body.y_m, body.shape.reach_m)
-            shapes.append(_draw_circle("objects", len(shapes), circle, _OBJECT_COLOR))
-        for start_m, end_m in zip(body.corners_m, [*body.corners_m[1:], *body.corners_m[:1]]):
-            shapes.append(_draw_wall("objects", len(shapes), (*start_m, *end_m), _OBJECT_COLOR))
-    return shapes
+    edges_m, discs_m = list_outlines(bodies)
+    discs = [_draw_circle("objects", *item, _OBJECT_COLOR) for item in enumerate(discs_m)]
+    return discs + [_draw_wall("objects", *item, _OBJECT_COLOR) for item in enumerate(edges_m, len(discs))]
 
 
 def draw_arena(arena: Arena) -> List[Shape]:

@@ -13,7 +13,7 @@ from hero_sim.world.arena_file import load_arena
 from hero_sim.world.pushing import pushing as pushing_module
 from hero_sim.world.pushing.pushed_body import PushedBody
 from hero_sim.world.pushing.pushing import MAX_PUSH_N, Pushing
-from hero_sim.world.pushing.shapes import Disc, Polygon, find_contacts, touch_circle, touch_walls
+from hero_sim.world.pushing.shapes import Disc, Polygon, find_contacts, list_outlines, touch_circle, touch_walls
 
 STEP_M = 0.001
 """A robot at 0.1 m/s in 10 ms."""
@@ -440,7 +440,7 @@ def test_a_wide_robot_pushes_with_its_own_radius():
 
 def test_outlines_are_the_edges_and_discs_where_they_are():
     disc, box = place(Disc(0.05), 0.4, 0.1), place(BOX, 0.0, 0.0, math.pi / 2.0)
-    edges_m, discs_m = Pushing([disc, box], []).list_outlines()
+    edges_m, discs_m = list_outlines([disc.body, box.body])
     assert discs_m == [(0.4, 0.1, 0.05)]
     corners_m = [(0.1, -0.15), (0.1, 0.15), (-0.1, 0.15), (-0.1, -0.15)]
     assert edges_m == [pytest.approx((*a, *b)) for a, b in zip(corners_m, [*corners_m[1:], corners_m[0]])]

@@ -5,6 +5,7 @@ timers, which depend on the time alone, so that a world of a batch gives what it
 boot, self-tuning, the IMU hat, faults, and the time for which a command or a servo pulse (of core 3) blocks its loop.
 """
 
+import copy
 from typing import Callable, Collection, List, Optional, Sequence
 
 import numpy as np
@@ -255,7 +256,7 @@ class RobotRows:
         if self._is_ideal:
             self._call_hooks(rows, parts)
         else:
-            self._radios.send_readings(now_ms, self._measured.copy(), rows, parts)
+            self._radios.send_readings(now_ms, copy.deepcopy(self._measured), rows, parts)
 
     def _measure_distance(self, now_ms: int) -> None:
         self._distance_due_ms = now_ms + DISTANCE_MS
@@ -302,7 +303,8 @@ class RobotRows:
         return self._received
 
     def _receive_readings(self, now_ms: int) -> None:
-        for readings, rows, parts in self._radios.receive_readings(now_ms):
+        for readings, row, parts in self._radios.receive_readings(now_ms):
+            rows = np.array([row])
             self._received.receive(readings, rows, now_ms, parts)
             self._call_hooks(rows, parts)
 

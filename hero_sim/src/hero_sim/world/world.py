@@ -16,7 +16,7 @@ from .body_motion import BodyMotion
 from .kinematics import join_wheels
 from .noise import draw_normal
 from .pushing.pushing import Pushing
-from .pushing.shapes import Body
+from .pushing.shapes import Body, list_outlines
 from .range_sensors import (
     BEAMS,
     DISTANCE_NOISE_M,
@@ -204,7 +204,7 @@ class World:
 
     def _list_obstacles(self, pushing: Pushing) -> Obstacles:
         """Return the walls and the circles of a world, with its objects where they are now."""
-        edges_m, discs_m = pushing.list_outlines()
+        edges_m, discs_m = list_outlines([pushed.body for pushed in pushing.bodies])
         walls_m = np.vstack((self.arena.segments_m, np.reshape(edges_m, (-1, 4))))
         return Segments.from_ends(walls_m), np.vstack((self.arena.circles_m, np.reshape(discs_m, (-1, 3))))
 

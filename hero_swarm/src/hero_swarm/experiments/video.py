@@ -17,13 +17,14 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_sim.world.pushing.shapes import list_outlines
 
 from ..trial import OPEN, Trial
 from .errors import ExperimentError
 
 FRAMES_PER_S = 10
 
-_SIZE_IN, _DPI = 6.0, 100
+_SIZE_IN = 6.0
 _MARGIN_M = 0.2
 
 
@@ -39,7 +40,7 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
     if not os.access(folder, os.W_OK):
         raise ExperimentError("--video %s: the folder cannot be written to" % path)
     run = trial.run(time_s, speed / FRAMES_PER_S)
-    frames = [(poses[0].copy(), _list_circles(trial), _list_edges(trial)) for _, poses in run]
+    frames = [(poses[0].copy(), *list_outlines(trial.rows.world.list_objects())) for _, poses in run]
     figure = Figure(figsize=(_SIZE_IN, _SIZE_IN))
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -48,7 +49,9 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
     axes.set_xlim(low_m[0], high_m[0])
     axes.set_ylim(low_m[1], high_m[1])
     axes.set_aspect("equal")
-    axes.add_collection(LineCollection(trial.rows.world.arena.segments_m.reshape(-1, 2, 2), colors="0.4", linewidths=2))
+    arena = trial.rows.world.arena
+    axes.add_collection(LineCollection(arena.segments_m.reshape(-1, 2, 2), colors="0.4", linewidths=2))
+    axes.add_collection(_make_circles(axes, arena.circles_m, "#c07a2e"))
     moving = Film(axes)
 
     def draw_frames() -> Iterator[np.ndarray]:
@@ -78,17 +81,13 @@ def _write_with_ffmpeg(path: str, frames: Iterator[np.ndarray]) -> None:
         raise ExperimentError("--video %s: ffmpeg cannot write it" % path)
 
 
-def _list_circles(trial: Trial) -> np.ndarray:
-    """Return x y radius of round obstacles and of objects that are discs (C, 3)."""
-    bodies = trial.rows.world.list_objects()
-    discs = [(body.x_m, body.y_m, body.shape.reach_m) for body in bodies if not len(body.corners_m)]
-    return np.vstack((trial.rows.world.arena.circles_m, np.reshape(discs, (-1, 3))))
-
-
-def _list_edges(trial: Trial) -> List[Any]:
-    """Return the outlines of objects with corners."""
-    outlines = (list(body.corners_m) for body in trial.rows.world.list_objects() if len(body.corners_m))
-    return [[*corners_m, corners_m[0]] for corners_m in outlines]
+def _make_circles(axes: Any, circles_m: np.ndarray, color: str) -> EllipseCollection:
+    """Return circles (C, 3), x y radius."""
+    diameters_m = 2.0 * circles_m[:, 2]
+    return EllipseCollection(
+        diameters_m, diameters_m, np.zeros(len(diameters_m)), units="x", offsets=circles_m[:, :2],
+        transOffset=axes.transData, facecolors=color,
+    )  # fmt: skip
 
 
 def _find_limits(trial: Trial, frames: List[Any]) -> Tuple[np.ndarray, np.ndarray]:
@@ -108,26 +107,20 @@ class Film:
         self._axes = axes
         self._parts: List[Any] = []
 
-    def show(self, time_s: float, poses: np.ndarray, circles_m: np.ndarray, outlines_m: List[Any]) -> None:
-        """Draw robots, objects and the time in place of what was drawn before."""
+    def show(self, time_s: float, poses: np.ndarray, edges_m: List[Any], discs_m: List[Any]) -> None:
+        """Draw robots, objects (see list_outlines()) and the time in place of what was drawn before."""
         for part in self._parts:
             part.remove()
         places_m, headings = poses[:, :2], np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])))
         noses_m = np.stack((places_m, places_m + BODY_RADIUS_M * headings), axis=1)
-        round_m = np.full(len(poses), 2.0 * BODY_RADIUS_M)
+        bodies_m = np.column_stack((places_m, np.full(len(poses), BODY_RADIUS_M)))
         self._parts = [
             self._axes.add_collection(collection)
             for collection in (
-                LineCollection(outlines_m, colors="#c07a2e", linewidths=2),
-                self._make_circles(2.0 * circles_m[:, 2], circles_m[:, :2], "#c07a2e"),
-                self._make_circles(round_m, places_m, "#0072B2"),
+                LineCollection(np.reshape(edges_m, (-1, 2, 2)), colors="#c07a2e", linewidths=2),
+                _make_circles(self._axes, np.reshape(discs_m, (-1, 3)), "#c07a2e"),
+                _make_circles(self._axes, bodies_m, "#0072B2"),
                 LineCollection(noses_m, colors="white", linewidths=1),
             )
         ]
         self._parts.append(self._axes.text(0.02, 0.97, "%.1f s" % time_s, transform=self._axes.transAxes, va="top"))
-
-    def _make_circles(self, diameters_m: np.ndarray, places_m: np.ndarray, color: str) -> EllipseCollection:
-        return EllipseCollection(
-            diameters_m, diameters_m, np.zeros(len(diameters_m)), units="x", offsets=places_m,
-            transOffset=self._axes.transData, facecolors=color,
-        )  # fmt: skip

@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.world.arena_file import load_arena
+from hero_sim.world.pushing.shapes import list_outlines
 from hero_swarm.behavior import Behavior
 from hero_swarm.experiments import video
 from hero_swarm.experiments.errors import ExperimentError
@@ -30,7 +31,6 @@ def catch_frames(monkeypatch):
     written = []
     for name in ("_write_gif", "_write_with_ffmpeg"):
         monkeypatch.setattr(video, name, lambda path, frames, name=name: written.append((name, path, list(frames))))
-    monkeypatch.setattr(video, "_DPI", 10)
     return written
 
 
@@ -61,15 +61,19 @@ def test_a_video_shows_the_arena_or_where_robots_were():
     assert low_m.tolist() == (bounds_m[:2] - 0.2).tolist() and high_m.tolist() == (bounds_m[2:] + 0.2).tolist()
 
 
-def test_discs_are_circles_and_boxes_outlines_that_are_closed():
-    discs, box = make_trial(load_arena("discs")), make_trial(load_arena("box"))
-    circles_m = video._list_circles(discs)
-    assert len(circles_m) == len(discs.rows.world.arena.circles_m) + len(discs.rows.world.list_objects())
-    first = discs.rows.world.list_objects()[0]
-    assert circles_m[len(discs.rows.world.arena.circles_m)].tolist() == [first.x_m, first.y_m, first.shape.reach_m]
-    assert video._list_edges(discs) == [] and len(video._list_circles(box)) == len(box.rows.world.arena.circles_m)
-    (outline_m,) = video._list_edges(box)
-    assert len(outline_m) == 5 and tuple(outline_m[0]) == tuple(outline_m[-1])
+@pytest.mark.parametrize("name", ["obstacles", "discs", "box"])
+def test_obstacles_and_objects_are_shown_where_they_are(name, written):
+    trial = make_trial(load_arena(name))
+    edges_m, discs_m = list_outlines(trial.rows.world.list_objects())
+    circles_m = [*trial.rows.world.arena.circles_m.tolist(), *discs_m]
+    places_m = [circle_m[:2] for circle_m in circles_m]
+    places_m += [((x1_m + x2_m) / 2.0, (y1_m + y2_m) / 2.0) for x1_m, y1_m, x2_m, y2_m in edges_m]
+    video.write_video(trial, 0.05, 1.0, "run.gif")
+    ((_, _, (frame,)),) = written
+    scale, middle = len(frame) / (trial.rows.world.arena.bounds_m[2] + 0.2) / 2.0, len(frame) // 2
+    pixels = [(middle - round(scale * y_m), middle + round(scale * x_m)) for x_m, y_m in places_m]
+    around = [frame[row - 2 : row + 3, column - 2 : column + 3] for row, column in pixels]
+    assert around and all((patch == (0xC0, 0x7A, 0x2E)).all(axis=2).any() for patch in around)
 
 
 def test_each_frame_replaces_the_one_before():
@@ -77,7 +81,7 @@ def test_each_frame_replaces_the_one_before():
     film = video.Film(axes)
     poses = np.array([(1.0, 2.0, 0.0), (3.0, 4.0, np.pi / 2.0)])
     for time_s, shift_m in ((0.0, 5.0), (1.25, 0.0)):
-        film.show(time_s, poses + (shift_m, 0.0, 0.0), np.array([(0.0, 0.0, 0.3)]), [[(0.0, 0.0), (1.0, 0.0)]])
+        film.show(time_s, poses + (shift_m, 0.0, 0.0), [(0.0, 0.0, 1.0, 0.0)], [(0.0, 0.0, 0.3)])
         assert len(axes.collections) == 4 and len(axes.texts) == 1
     outlines, objects, robots, noses = axes.collections
     assert outlines.get_segments()[0].tolist() == [[0.0, 0.0], [1.0, 0.0]]

@@ -6,7 +6,7 @@ Pure. The only loops over robots in a step are here, since each robot has a conn
 import heapq
 import itertools
 import math
-from typing import Collection, Dict, List, NamedTuple, Sequence, Tuple
+from typing import Collection, Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
@@ -22,26 +22,8 @@ COMMAND_LENGTH = 56
 """Bytes of a Twist (servo pulses have fewer)."""
 
 
-class Arrival(NamedTuple):
-    """Readings that have arrived.
-
-    Attributes:
-        readings: of all robots, as they were sent.
-        rows: from which robots (K,).
-        parts: which of them.
-    """
-
-    readings: Readings
-    rows: np.ndarray
-    parts: Collection[str]
-
-
 class RadioRows:
-    """The connections.
-
-    Attributes:
-        due_ms: when the next readings arrive.
-    """
+    """The connections."""
 
     def __init__(self, radios: Sequence[Radio]) -> None:
         """Take the radio of each robot."""
@@ -49,7 +31,11 @@ class RadioRows:
         self._order = itertools.count()
         self._up: List[Tuple[int, int, int, Readings, Collection[str]]] = []
         self._down: Dict[int, List[Tuple[int, int, int, Tuple[float, float]]]] = {}
-        self.due_ms = NEVER_MS
+
+    @property
+    def due_ms(self) -> int:
+        """When the next readings arrive."""
+        return self._up[0][0] if self._up else NEVER_MS
 
     def send_readings(self, now_ms: int, readings: Readings, rows: np.ndarray, parts: Collection[str]) -> None:
         """Send parts of the readings of the robots at rows, which must not change any more."""
@@ -57,22 +43,17 @@ class RadioRows:
         for row in rows.tolist():
             arrival_ms = math.ceil(self._radios[row].up.send(now_ms, length))
             heapq.heappush(self._up, (arrival_ms, next(self._order), row, readings, parts))
-        self.due_ms = self._up[0][0]
 
-    def receive_readings(self, now_ms: int) -> List[Arrival]:
-        """Return what has arrived by now, in order."""
-        arrivals = []
-        while self._up and self._up[0][0] <= now_ms:
+    def receive_readings(self, now_ms: int) -> Iterator[Tuple[Readings, int, Collection[str]]]:
+        """Yield what has arrived by now, in order: readings as they were sent, the row of their robot, and which parts."""
+        while self.due_ms <= now_ms:
             _, _, row, readings, parts = heapq.heappop(self._up)
-            arrivals.append(Arrival(readings, np.array([row]), parts))
-        self.due_ms = self._up[0][0] if self._up else NEVER_MS
-        return arrivals
+            yield readings, row, parts
 
     def drop_readings(self, row: int) -> None:
         """Drop the readings of one robot that are on their way."""
         self._up = [sent for sent in self._up if sent[2] != row]
         heapq.heapify(self._up)
-        self.due_ms = self._up[0][0] if self._up else NEVER_MS
 
     def send_commands(self, topic: int, sent: Sent) -> np.ndarray:
         """Send commands to robots; return when they arrive, ms (K,)."""

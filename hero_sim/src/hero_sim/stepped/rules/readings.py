@@ -1,6 +1,5 @@
 """The newest readings of all robots, on the robots or as their programs have received them. Pure."""
 
-import copy
 from typing import Collection
 
 import numpy as np
@@ -28,10 +27,6 @@ class Readings:
         self.odometry_ms, self.scan_ms = np.zeros((2, rows), dtype=np.int64)
         self.distance_ms = np.full(rows, LONG_AGO_MS)
         self.distance_m = np.full(rows, np.nan)
-
-    def copy(self) -> "Readings":
-        """Return readings that do not change with these."""
-        return copy.deepcopy(self)
 
     def receive(self, sent: "Readings", rows: np.ndarray, now_ms: int, parts: Collection[str]) -> None:
         """Take what the robots at rows (K,) sent."""

@@ -11,7 +11,7 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from ...robot_constants import BODY_RADIUS_M
 from .pushed_body import Motion, PushedBody
-from .shapes import Contact, Disc, find_contacts, touch_circle, touch_walls
+from .shapes import Contact, find_contacts, touch_circle, touch_walls
 
 MAX_PUSH_N = 0.77
 """Traction of a robot: 0.156 kg at an assumed friction of 0.5 with the floor."""
@@ -89,15 +89,6 @@ class Pushing:
                 max(along for touch, (along, _) in zip(touches, pressures) if touch.robot is not None) / 2.0
             )
         return self.push_out(after_m)
-
-    def list_outlines(self) -> Tuple[List[Tuple[float, ...]], List[Tuple[float, ...]]]:
-        """Return the edges of all bodies, x1 y1 x2 y2, and the discs, x y radius."""
-        edges_m: List[Tuple[float, ...]] = []
-        for pushed in self.bodies:
-            corners_m = pushed.body.corners_m
-            edges_m += [(*start, *end) for start, end in zip(corners_m, [*corners_m[1:], *corners_m[:1]])]
-        discs = (pushed.body for pushed in self.bodies if isinstance(pushed.body.shape, Disc))
-        return edges_m, [(body.x_m, body.y_m, body.shape.reach_m) for body in discs]
 
     def push_out(self, places_m: Sequence[Place]) -> List[Place]:
         """Return places of robots out of the bodies that they reach into: their wheels slip."""

@@ -122,6 +122,13 @@ def place(shape: Shape, x_m: float, y_m: float, cosine: float, sine: float) -> B
     )
 
 
+def list_outlines(bodies: Sequence[Body]) -> Tuple[List[Tuple[float, ...]], List[Tuple[float, ...]]]:
+    """Return the edges of polygons, x1 y1 x2 y2, and the discs, x y radius."""
+    polygons_m = [body.corners_m for body in bodies if body.corners_m]
+    edges_m = [(*start_m, *end_m) for corners_m in polygons_m for start_m, end_m in _list_edges(corners_m)]
+    return edges_m, [(body.x_m, body.y_m, body.shape.reach_m) for body in bodies if not body.corners_m]
+
+
 def touch_circle(x_m: float, y_m: float, radius_m: float, body: Body) -> Contact:
     """Return where a circle, the first body, is nearest to body, the second."""
     if isinstance(body.shape, Disc):
