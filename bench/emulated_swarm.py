@@ -30,7 +30,8 @@ ZERO = bytes(48)
 def declare(number):
     """Return the packets with which robot number declares its topics (services are left out)."""
     time_request = packets.encode_packet(packets.ID_TIME, bytes(8))
-    return time_request + declarations.encode_declarations("hero_%d" % number, with_services=False)
+    topics = [entry for entry in declarations.DECLARATIONS if entry[0] in (declarations.PUB, declarations.SUB)]
+    return time_request + declarations.encode_entries("hero_%d" % number, topics)
 
 
 def text(value):

@@ -22,6 +22,7 @@ from hero_node.errors import HeroError, ProgramError
 from hero_node.parameters import check_parameters
 
 from .errors import OptionError
+from .population import add_options
 from .stepped.robot import StepRobot
 from .stepped.step_clock import StepMotion
 from .stepped.swarm import StepSwarm, StepWorld
@@ -30,15 +31,8 @@ from .stepped.swarm import StepSwarm, StepWorld
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run a script with its arguments; return its exit status."""
     parser = argparse.ArgumentParser(prog="python3 -m hero_sim.in_process", description=__doc__.partition("\n")[0])
-    parser.add_argument("--count", type=int, default=4, metavar="N", help="robots, hero_0 and on (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, metavar="S", help="seed of differences and noise (%(default)s)")
-    parser.add_argument("--arena", metavar="ARENA", help="arena, as for the simulator")
-    parser.add_argument("--wifi", default="ideal", help="network, as for the simulator (%(default)s)")
-    parser.add_argument(
-        "--model", action="append", default=[], metavar="MODEL[,robot=ID]", help="model, as for the simulator"
-    )
-    parser.add_argument("--seconds", type=float, metavar="S", help="end the script at this simulated time")
-    parser.add_argument("--perfect", action="store_true", help="robots without differences and noise")
+    add_options(parser)
+    parser.set_defaults(count=4)
     parser.add_argument("script", help="a script that uses hero_client")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the script")
     options = parser.parse_args(argv)

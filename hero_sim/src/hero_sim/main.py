@@ -10,7 +10,7 @@ from hero_node.command_line import WRONG_ARGUMENTS, call
 from .build import build_simulator
 from .errors import OptionError, SimulatorError
 from .faults import MAX_DURATION_S, FaultInjector, parse_fault
-from .population import SERVO_TIMINGS, build_errors, check_population
+from .population import SERVO_TIMINGS, add_options, build_errors, check_population
 from .robot.servo_pins import CORE_2
 from .simulator import Simulator
 from .world.robot_errors import describe_errors
@@ -24,12 +24,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="hero_sim", description="HeRo robots without hardware, behind the same TCP socket as real ones."
     )
+    add_options(parser)
     add = parser.add_argument
-    add("--count", type=int, default=1, metavar="N", help="number of robots (1)")
     add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
-    add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze, box, discs (a square that fits them)")
-    add("--seed", type=int, default=0, help="seed of all random numbers (0)")
-    add("--seconds", type=float, metavar="S", help="end after S simulated seconds")
     add("--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second (%(default)s)")
     add("--quiet", action="store_true", help="print nothing but errors")
     _add_link_options(parser.add_argument_group("network"))
@@ -41,8 +38,6 @@ def _add_link_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
     add("--host", default="127.0.0.1", help="host of the driver (%(default)s)")
     add("--port", type=int, default=DEFAULT_PORT, help="port of the driver (%(default)s)")
-    profiles = ("ideal", "router", "hotspot", "bad")
-    add("--wifi", choices=profiles, default="ideal", help="quality of the network (ideal)")
     add(
         "--fault",
         action="append",
@@ -54,15 +49,7 @@ def _add_link_options(group: "argparse._ArgumentGroup") -> None:
 
 def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
-    add(
-        "--model",
-        action="append",
-        default=[],
-        metavar="MODEL[,robot=ID]",
-        help="model of all robots or of one: hero, hero_plus, or v3.0 (older stock firmware); may be repeated (hero)",
-    )
     add("--imu-hat", action="store_true", help="robots have the IMU hat")
-    add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
     add(
         "--error",
         action="append",

@@ -42,6 +42,24 @@ def _reseed(seed: Any) -> np.random.RandomState:
     return _SCRATCH
 
 
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that programs with simulated robots share."""
+    add = parser.add_argument
+    add("--count", type=int, default=1, metavar="N", help="number of robots (%(default)s)")
+    add("--seed", type=int, default=0, help="seed of all random numbers (%(default)s)")
+    add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze, box, discs (a square that fits them)")
+    add("--wifi", choices=PROFILES, default="ideal", help="quality of the network (%(default)s)")
+    add("--seconds", type=float, metavar="S", help="end after S simulated seconds")
+    add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
+    add(
+        "--model",
+        action="append",
+        default=[],
+        metavar="MODEL[,robot=ID]",
+        help="model of all robots or of one: hero, hero_plus, or v3.0 (older stock firmware); may be repeated (hero)",
+    )
+
+
 def check_population(options: argparse.Namespace, worlds: int = 1) -> None:
     """Raise OptionError for a number of robots, an id or a seed that cannot be used; each world needs a seed."""
     given = {"--count": options.count, "--first-id": options.first_id, "--seed": options.seed, "worlds": worlds}

@@ -67,7 +67,7 @@ def test_a_laser_has_sixteen_ranges_of_which_the_odd_ones_are_averages():
 
 
 def test_declarations_have_the_stock_order_names_and_length():
-    data = declarations.encode_declarations("hero_0")
+    data = MODELS["hero"].encode_declarations("hero_0")
     assert len(data) == 2469
     declared = read_packets(data)
     infos = [payloads.decode_topic_info(packet.payload) for packet in declared]
@@ -128,9 +128,8 @@ def test_the_stock_cycles_are_rebuilt_byte_for_byte(capture):
 
 def test_the_stock_handshake_and_laser_are_rebuilt_byte_for_byte(capture):
     declared = [packet for packet in capture if packet.topic_id < 4]
-    assert b"".join(packets.encode_packet(*packet) for packet in declared) == declarations.encode_declarations(
-        "hero_0"
-    )
+    burst = b"".join(packets.encode_packet(*packet) for packet in declared)
+    assert burst == MODELS["hero"].encode_declarations("hero_0")
     lasers = [packet for packet in capture if packet.topic_id == 125]
     encoder = messages.LaserMessages("hero_0")
     for packet in lasers:

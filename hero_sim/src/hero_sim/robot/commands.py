@@ -31,7 +31,7 @@ _TWIST = "<d32xd"  # linear.x (m/s) and angular.z (rad/s); the firmware uses no 
 
 
 class CommandTable:
-    """The callbacks of one robot, by the stock robot's topic ids.
+    """The callbacks of one robot, by its topic ids.
 
     Attributes:
         blocked_us: how long the last callback blocked the robot's loop.
@@ -48,7 +48,7 @@ class CommandTable:
         model: RobotModel = HERO,
     ) -> None:
         """Serve the parts of the robot called name; log takes lines for the server, warn lines for users."""
-        self._own_ids = model.own_ids
+        self._own_ids = own_ids = model.own_ids
         self._name = name
         self._sensing = sensing
         self._motors = motors
@@ -59,7 +59,7 @@ class CommandTable:
         self._now_ms = 0
         self.blocked_us = 0
         velocity, position = motors.velocity, motors.position
-        self._callbacks: Dict[int, Tuple[str, Callable[..., Optional[bytes]]]] = {
+        callbacks: Dict[int, Tuple[str, Callable[..., Optional[bytes]]]] = {
             # layout of the message or request, in the order of its fields, and what it does
             ids.ID_LED: ("<4f", self._set_light),
             ids.ID_LASER_ENABLE: ("<?", self._enable_laser),
@@ -82,6 +82,7 @@ class CommandTable:
                 "", partial(self._tune, velocity, ids.ID_VELOCITY_PID_CALIBRATION_ANSWER)
             ),
         }  # fmt: skip
+        self._callbacks = {own_ids[stock]: (stock, *callbacks[stock]) for stock in callbacks if stock in own_ids}
 
     def receive(self, packet: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
         """Execute packet at millis of the robot, now_ms of the world; return a service's answer, as a packet.
@@ -92,15 +93,15 @@ class CommandTable:
         self.blocked_us = 0
         if packet.topic_id not in self._callbacks:
             return None  # The slots without a subscriber are empty: the firmware ignores them.
-        layout, callback = self._callbacks[packet.topic_id]
+        stock_id, layout, callback = self._callbacks[packet.topic_id]
         length, expected_length = len(packet.payload), struct.calcsize(layout)
         if length != expected_length:
-            name = ids.find_type(packet.topic_id)
-            raise CommandError("%s has %d bytes instead of %d" % (name, length, expected_length))
+            text = "%s has %d bytes instead of %d"
+            raise CommandError(text % (ids.find_type(stock_id), length, expected_length))
         values = struct.unpack(layout, packet.payload)
         if not all(abs(value) < MAX_PARAMETER for value in values):
-            name = ids.find_type(packet.topic_id)
-            raise CommandError("%s with %s, with which a real robot would do anything" % (name, list(values)))
+            text = "%s with %s, with which a real robot would do anything"
+            raise CommandError(text % (ids.find_type(stock_id), list(values)))
         return callback(*values)
 
     def _set_light(self, *color: float) -> None:

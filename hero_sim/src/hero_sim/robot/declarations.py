@@ -104,12 +104,6 @@ def find_type(topic_id: int) -> str:
     return next(message_type for _, declared_id, _, message_type in DECLARATIONS if declared_id == topic_id)
 
 
-def encode_declarations(name: str, with_services: bool = True) -> bytes:
-    """Return the packets with which the stock robot called name (hero_N) declares everything, in one burst."""
-    kept = [entry for entry in DECLARATIONS if with_services or entry[0] not in (ANS, REQ)]
-    return encode_entries(name, kept)
-
-
 def encode_entries(name: str, entries: Sequence[Declaration], encoder_md5: Optional[str] = None) -> bytes:
     """Return the packets that declare entries for the robot called name; encoder_md5: of another model's Encoder."""
     burst = b""

@@ -89,7 +89,6 @@ class Firmware:
     ) -> None:
         """Build a robot that is switched off; address is for its boot line, report takes lines for users."""
         self.model = model
-        self._stock_ids = {own: stock for stock, own in model.own_ids.items()}
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
         self.flash = flash
@@ -416,8 +415,7 @@ class Firmware:
 
     def _receive_command(self, packet: packets.Packet, millis: int, now_ms: int) -> None:
         try:
-            stock_id = self._stock_ids.get(packet.topic_id, declarations.ID_LAST_SUBSCRIBER_SLOT)
-            answer = self._commands.receive(packet._replace(topic_id=stock_id), millis, now_ms)
+            answer = self._commands.receive(packet, millis, now_ms)
             self._blocked_us += self._commands.blocked_us
         except CommandError as error:
             self.warn(str(error))

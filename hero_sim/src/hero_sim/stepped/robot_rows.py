@@ -6,6 +6,7 @@ boot, self-tuning, the IMU hat, faults, and the time for which a command or a se
 """
 
 import copy
+from functools import partial
 from typing import Callable, Collection, List, Optional, Sequence
 
 import numpy as np
@@ -114,8 +115,8 @@ class RobotRows:
         self._position_commands = CommandShaper(rows, 0.0)
         self._pulse_commands = CommandShaper(rows, SERVO_CENTER_US)
         self._topics = (
-            (self._velocity_commands, self._receive_velocities),
-            (self._position_commands, self._receive_positions),
+            (self._velocity_commands, partial(self._receive_twists, self._velocity)),
+            (self._position_commands, partial(self._receive_twists, self._position)),
             (self._pulse_commands, self._receive_pulses),
         )
         self._cycle_ms = now_ms
@@ -339,18 +340,13 @@ class RobotRows:
 
     # -- what the firmware does with a command ---------------------------------------------------------------
 
-    def _receive_velocities(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
-        accepted = self._velocity.find_accepted(now_ms, rows)
-        self._command(self._velocity, now_ms, rows[accepted], _limit_to_wheels(values[:, accepted]))
-
-    def _receive_positions(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
-        accepted = self._position.find_accepted(now_ms, rows)
-        rows = rows[accepted]
-        self._start_ticks[:, rows] = self._encoders.count(now_ms)[:, rows]
-        targets = _limit_to_wheels(values[:, accepted]) / self._encoders.tick_m[rows]
-        self._command(self._position, now_ms, rows, targets)
-
-    def _command(self, controller: WheelControllers, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> None:
+    def _receive_twists(self, controller: WheelControllers, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
+        accepted = controller.find_accepted(now_ms, rows)
+        rows, twists = rows[accepted], np.maximum(np.minimum(values[:, accepted], _LIMITS), -_LIMITS)
+        targets = np.array(split_to_wheels(*twists))
+        if controller is self._position:
+            self._start_ticks[:, rows] = self._encoders.count(now_ms)[:, rows]
+            targets /= self._encoders.tick_m[rows]
         stopped = controller.command(now_ms, rows, targets)
         if len(stopped):
             self._servos.stop(stopped)
@@ -359,8 +355,3 @@ class RobotRows:
         pulses_us, which = np.zeros((2, len(self._rows))), np.zeros(len(self._rows), dtype=bool)
         pulses_us[:, rows], which[rows] = values, True
         self._servos.write(now_ms, pulses_us, which)
-
-
-def _limit_to_wheels(twists: np.ndarray) -> np.ndarray:
-    """Return the wheels' speeds in m/s (2, K) for Twists (2, K) within the firmware's limits."""
-    return np.array(split_to_wheels(*np.maximum(np.minimum(twists, _LIMITS), -_LIMITS)))
