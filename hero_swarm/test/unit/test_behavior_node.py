@@ -57,12 +57,12 @@ class Stage:
 
     def run(self, seconds):
         """Let the behavior step, at the poses of robots that are not silent."""
-        for _ in range(round(seconds / self.node.period_s)):
+        for _ in range(round(seconds * self.node.behavior.rate_hz)):
             for robot in self.swarm:
                 if robot.robot_id not in self.silent:
                     self.node._source._receive_truth(robot.robot_id, self.tell(robot.true_pose))
             self.node.step()
-            self.swarm.sleep(self.node.period_s)
+            self.swarm.sleep(1.0 / self.node.behavior.rate_hz)
 
     def tell(self, pose):
         message = Odometry()

@@ -141,7 +141,7 @@ class ResultsFolder:
             return []
         cell, count = self._cells.index(digest), len(self._experiment.metrics)
         runs = [
-            Run(cell, seed, tuple(map(_decode, by_seed[seed]["values"])), kind, by_seed[seed]["remark"])
+            Run(cell, seed, tuple(map(float, by_seed[seed]["values"])), kind, by_seed[seed]["remark"])
             for seed in seeds
         ]
         return [run for run in runs if len(run.values) == count and run.seed in self._experiment.seeds]
@@ -234,7 +234,3 @@ def format_csv(rows: Iterable[Sequence[Any]]) -> str:
 def _encode(value: float) -> Any:
     """Return value for JSON, which has no infinity."""
     return value if math.isfinite(value) else repr(value)
-
-
-def _decode(value: Any) -> float:
-    return float(value)

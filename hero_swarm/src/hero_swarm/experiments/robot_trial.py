@@ -23,6 +23,7 @@ class RobotTrial:
     """A behavior with its metrics and the end of the trial.
 
     Attributes:
+        behavior: with the parameters of the cell.
         remark: why the trial does not count; empty while it does.
     """
 
@@ -33,7 +34,7 @@ class RobotTrial:
         self.remark = ""
         self._experiment = experiment
         self._label = "%s, seed %d" % (cell.label, seed)
-        self._behavior = find_behavior(experiment.behavior)(**cell.parameters)
+        self.behavior = find_behavior(experiment.behavior)(**cell.parameters)
         self._objects = len(load_cell_arena(cell).objects)
         self._names = names
         self._filter = safety
@@ -42,16 +43,6 @@ class RobotTrial:
         self._samples: List[List[float]] = []
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._reached = False
-
-    @property
-    def period_s(self) -> float:
-        """Time between two steps."""
-        return 1.0 / self._behavior.rate_hz
-
-    @property
-    def drive(self) -> str:
-        """The behavior's way to drive the wheels: see Behavior."""
-        return self._behavior.drive
 
     def step(
         self, time_s: float, poses: np.ndarray, ages_s: np.ndarray, things: Things = NO_OBJECTS
@@ -72,9 +63,9 @@ class RobotTrial:
             self._sample(time_s, poses, things)
         if self._reached or time_s >= self._experiment.time_s:
             return None
-        sensed = sense(self._behavior, time_s, poses[None], self._random, things)
+        sensed = sense(self.behavior, time_s, poses[None], self._random, things)
         with report_place(self._label):
-            linear_m_s, angular_rad_s, self._memory = decide(self._behavior, sensed, self._memory, self._random)
+            linear_m_s, angular_rad_s, self._memory = decide(self.behavior, sensed, self._memory, self._random)
         linear_m_s, angular_rad_s = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         return linear_m_s[0], angular_rad_s[0]
 

@@ -76,11 +76,6 @@ class BehaviorNode:
         self._drawing = BehaviorMarkers(self.behavior, self._frame, rospy.get_name())
         self._markers = rospy.Publisher("behavior/markers", MarkerArray, queue_size=2)
 
-    @property
-    def period_s(self) -> float:
-        """Time between two steps."""
-        return 1.0 / self.behavior.rate_hz
-
     def step(self) -> None:
         """Sense, decide, and command all robots."""
         poses, ages_s = self._source.read()
@@ -157,7 +152,7 @@ def behavior() -> None:
             text = "%s drives %d robots; its metric, %s, is on %s"
             made = node.behavior
             rospy.loginfo(text, type(made).__name__, len(swarm), made.metric, rospy.resolve_name("~metric"))
-            for time_s in program.rate(1.0 / node.period_s):
+            for time_s in program.rate(made.rate_hz):
                 if time_s >= end_s:
                     break
                 node.step()

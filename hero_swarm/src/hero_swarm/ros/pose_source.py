@@ -14,13 +14,12 @@ from hero_client.values.object_sensing import NO_OBJECTS, Things
 from hero_msgs.msg import ObjectPoses
 from hero_node.geometry import Pose, pose_of
 
+from ..safety import MAX_AGE_S
+
 SIMULATOR_FRAME = "world"
 """The frame of the simulator's ground truth, /hero_N/ground_truth; all other frames are those of localize."""
 
 FIRST_REPORT_S, REPORT_PERIOD_S = 3.0, 5.0
-
-MAX_AGE_S = 0.5
-"""A robot whose pose is older than this senses nothing, and is stopped."""
 
 
 class PoseSource:

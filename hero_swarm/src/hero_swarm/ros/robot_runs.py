@@ -69,7 +69,7 @@ def run_on_robots(
             safety = SafetyFilter(ROBOTS)
             safety.radii_m = [robot.model.body_radius_m for robot in swarm]
             trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], safety)
-            commands = WheelCommands(swarm, trial.drive, options.calibration)
+            commands = WheelCommands(swarm, trial.behavior.drive, options.calibration)
             name = "cell_%d_seed_%d" % (cell_index + 1, seed)
             with _record(program, folder.path, name, ids, experiment.time_s):
                 finished = _drive(program, swarm, trial, commands, source, objects)
@@ -185,7 +185,7 @@ def _drive(
     start_s = rospy.get_time()
     all_may_move = np.ones(len(swarm), dtype=bool)
     try:
-        for _ in program.rate(1.0 / trial.period_s):
+        for _ in program.rate(trial.behavior.rate_hz):
             for robot in swarm:
                 robot.check_not_stopped()
                 reason = robot.missing()

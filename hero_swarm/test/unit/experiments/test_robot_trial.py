@@ -38,7 +38,7 @@ def drive(text=FILE, lost_s=math.inf):
         if speeds is None:
             return trial, time_s, poses
         rows.send_velocity(np.arange(3), *speeds)
-        rows.advance(rows.now_ms + round(1000.0 * trial.period_s))
+        rows.advance(rows.now_ms + round(1000.0 / trial.behavior.rate_hz))
 
 
 def test_a_trial_ends_at_its_time_with_values_and_without_contact():
