@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_sim.link.wifi import PROFILES, Radio, WifiProfile
+from hero_sim.link.wifi import PROFILES, Radio
 
 
 def carry(profile, seconds=60, period_ms=34, length=1500, seed=0):
@@ -58,7 +58,7 @@ def test_a_bad_network_stalls_for_longer_than_any_recorded_one():
 
 def test_a_narrow_network_delays_what_exceeds_its_bandwidth():
     radio = Radio(
-        PROFILES["bad"]._replace(jitter_ms=0.0, spike_every_ms=0.0, stall_every_ms=0.0),
+        PROFILES["bad"]._replace(jitter_ms=0.0, outages_ms=()),
         np.random.RandomState(0),
     )
     for _ in range(100):
@@ -97,7 +97,7 @@ def test_nothing_is_lost_whatever_the_pace(profile, gaps, seed):
 
 
 def make_profile(**changes):
-    return WifiProfile(0.0, 0.0, 0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0)._replace(**changes)
+    return PROFILES["ideal"]._replace(**changes)
 
 
 def test_what_was_sent_later_never_arrives_earlier():
@@ -121,7 +121,7 @@ def test_a_connection_that_ends_drops_what_is_on_its_way_up_and_down():
 
 
 def test_outages_last_as_long_and_come_as_often_as_the_profile_says():
-    profile = make_profile(spike_every_ms=500.0, spike_ms=(100.0, 100.0))
+    profile = make_profile(outages_ms=[(500.0, 100.0, 100.0)])
     radio = Radio(profile, np.random.RandomState(1))
     delays_ms = np.array([radio.find_arrival(float(now_ms)) - now_ms for now_ms in range(200000)])
     assert delays_ms.max() == pytest.approx(100.0, abs=1.0)

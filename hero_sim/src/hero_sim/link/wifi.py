@@ -6,7 +6,7 @@ Source: published recordings of one HeRo on Wi-Fi: gaps between odoms p95 44-53 
 """
 
 from collections import deque
-from typing import Deque, Dict, NamedTuple, Tuple
+from typing import Deque, Dict, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -16,18 +16,15 @@ class WifiProfile(NamedTuple):
 
     base_ms: float  # least delay in one direction
     jitter_ms: float  # mean of the exponential delay on top
-    spike_every_ms: float  # mean time between spikes, 0 for none
-    spike_ms: Tuple[float, float]  # nothing passes for so long
-    stall_every_ms: float  # the same for rare, long ones
-    stall_ms: Tuple[float, float]
     bytes_per_s: float  # 0 for no limit
+    outages_ms: Sequence[Tuple[float, float, float]] = ()  # mean time between two; least, most in which nothing passes
 
 
 PROFILES: Dict[str, WifiProfile] = {
-    "ideal": WifiProfile(0.0, 0.0, 0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0),
-    "router": WifiProfile(2.0, 3.0, 10000.0, (30.0, 110.0), 0.0, (0.0, 0.0), 500e3),
-    "hotspot": WifiProfile(3.0, 5.0, 4500.0, (100.0, 280.0), 60000.0, (400.0, 1200.0), 250e3),
-    "bad": WifiProfile(5.0, 15.0, 2500.0, (100.0, 280.0), 20000.0, (500.0, 4000.0), 100e3),
+    "ideal": WifiProfile(0.0, 0.0, 0.0),
+    "router": WifiProfile(2.0, 3.0, 500e3, [(10000.0, 30.0, 110.0)]),
+    "hotspot": WifiProfile(3.0, 5.0, 250e3, [(4500.0, 100.0, 280.0), (60000.0, 400.0, 1200.0)]),
+    "bad": WifiProfile(5.0, 15.0, 100e3, [(2500.0, 100.0, 280.0), (20000.0, 500.0, 4000.0)]),
 }
 """ideal adds nothing. router and hotspot are the good and the common end of the recordings, bad is beyond
 their worst: links that are lost for seconds."""
@@ -36,15 +33,15 @@ their worst: links that are lost for seconds."""
 class _Outages:
     """Times at which nothing passes, drawn one after another."""
 
-    def __init__(self, every_ms: float, length_ms: Tuple[float, float], rng: np.random.RandomState) -> None:
-        self._every_ms = every_ms
-        self._length_ms = length_ms
+    def __init__(self, outages_ms: Tuple[float, float, float], rng: np.random.RandomState) -> None:
+        self._outages_ms = outages_ms
         self._rng = rng
         self._draw(0.0)
 
     def _draw(self, from_ms: float) -> None:
-        self._start_ms = from_ms + self._rng.exponential(self._every_ms)
-        self._end_ms = self._start_ms + self._rng.uniform(*self._length_ms)
+        every_ms, least_ms, most_ms = self._outages_ms
+        self._start_ms = from_ms + self._rng.exponential(every_ms)
+        self._end_ms = self._start_ms + self._rng.uniform(least_ms, most_ms)
 
     def find_end(self, at_ms: float) -> float:
         """Return when bytes sent at at_ms can pass."""
@@ -108,8 +105,7 @@ class Radio:
         self.stalled_until_ms = 0
         self._is_ideal = profile == PROFILES["ideal"]
         self._rng = rng
-        kinds = ((profile.spike_every_ms, profile.spike_ms), (profile.stall_every_ms, profile.stall_ms))
-        self._outages = [_Outages(every_ms, length_ms, rng) for every_ms, length_ms in kinds if every_ms > 0]
+        self._outages = [_Outages(outages_ms, rng) for outages_ms in profile.outages_ms]
         self.up = _Direction(self)
         self.down = _Direction(self)
 

@@ -29,6 +29,9 @@ LIGHT_US = 1000
 
 _TWIST = "<d32xd"  # linear.x (m/s) and angular.z (rad/s); the firmware uses no other
 
+Answer = Tuple[bool, str]
+"""Of a service: success and message."""
+
 
 class CommandTable:
     """The callbacks of one robot, by its topic ids.
@@ -59,7 +62,7 @@ class CommandTable:
         self._now_ms = 0
         self.blocked_us = 0
         velocity, position = motors.velocity, motors.position
-        callbacks: Dict[int, Tuple[str, Callable[..., Optional[bytes]]]] = {
+        callbacks: Dict[int, Tuple[str, Callable[..., Optional[Answer]]]] = {
             # layout of the message or request, in the order of its fields, and what it does
             ids.ID_LED: ("<4f", self._set_light),
             ids.ID_LASER_ENABLE: ("<?", self._enable_laser),
@@ -68,20 +71,12 @@ class CommandTable:
             ids.ID_CMD_MOTOR: ("<2h", self._drive_motors),
             ids.ID_MOTORS_PARAMETERS: ("<2h", self._set_motors),
             ids.ID_POSITION_CMD_VEL: (_TWIST, partial(self._drive, position)),
-            ids.ID_POSITION_PID_PARAMETERS: (
-                "<6f", partial(self._set_gains, position, ids.ID_POSITION_PID_PARAMETERS_ANSWER)
-            ),
-            ids.ID_POSITION_PID_CALIBRATION: (
-                "", partial(self._tune, position, ids.ID_POSITION_PID_CALIBRATION_ANSWER)
-            ),
+            ids.ID_POSITION_PID_PARAMETERS: ("<6f", partial(self._set_gains, position)),
+            ids.ID_POSITION_PID_CALIBRATION: ("", partial(self._tune, position)),
             ids.ID_VELOCITY_CMD_VEL: (_TWIST, partial(self._drive, velocity)),
-            ids.ID_VELOCITY_PID_PARAMETERS: (
-                "<6f", partial(self._set_gains, velocity, ids.ID_VELOCITY_PID_PARAMETERS_ANSWER)
-            ),
-            ids.ID_VELOCITY_PID_CALIBRATION: (
-                "", partial(self._tune, velocity, ids.ID_VELOCITY_PID_CALIBRATION_ANSWER)
-            ),
-        }  # fmt: skip
+            ids.ID_VELOCITY_PID_PARAMETERS: ("<6f", partial(self._set_gains, velocity)),
+            ids.ID_VELOCITY_PID_CALIBRATION: ("", partial(self._tune, velocity)),
+        }
         self._callbacks = {own_ids[stock]: (stock, *callbacks[stock]) for stock in callbacks if stock in own_ids}
 
     def receive(self, packet: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
@@ -102,7 +97,10 @@ class CommandTable:
         if not all(abs(value) < MAX_PARAMETER for value in values):
             text = "%s with %s, with which a real robot would do anything"
             raise CommandError(text % (ids.find_type(stock_id), list(values)))
-        return callback(*values)
+        answer = callback(*values)
+        if answer is None:
+            return None
+        return packets.encode_packet(self._own_ids[ids.ANSWER_IDS[stock_id]], messages.encode_answer(*answer))
 
     def _set_light(self, *color: float) -> None:
         self._sensing.set_light(self._millis, color)
@@ -121,27 +119,26 @@ class CommandTable:
         self._motors.receive_pulses(self._millis, left_us, right_us)
         self.blocked_us = PULSES_US
 
-    def _calibrate_ir(self, *calibration_counts_m2: float) -> bytes:
+    def _calibrate_ir(self, *calibration_counts_m2: float) -> Answer:
         self._flash.ir_calibration_counts_m2 = list(calibration_counts_m2)
-        text = "IR calibration parameters have been successfully recorded!"
-        return self._record(ids.ID_IR_CALIBRATION_ANSWER, text)
+        return self._record("IR calibration parameters have been successfully recorded!")
 
-    def _set_odom(self, x_m: float, y_m: float, yaw_rad: float) -> bytes:
+    def _set_odom(self, x_m: float, y_m: float, yaw_rad: float) -> Answer:
         self._sensing.set_odometry(Pose(x_m, y_m, yaw_rad))
         self._log("[HERO] Odometry was changed!")
-        return self._answer(ids.ID_SET_ODOM_ANSWER, True, "Odometry was changed!")
+        return True, "Odometry was changed!"
 
-    def _set_motors(self, *centers_us: int) -> bytes:
+    def _set_motors(self, *centers_us: int) -> Answer:
         self._flash.motor_centers_us = [float(center_us) for center_us in centers_us]
         self._motors.motors.centers_us = list(centers_us)
-        return self._record(ids.ID_MOTORS_PARAMETERS_ANSWER, "Motor Parameters has been succesfully recorded!")
+        return self._record("Motor Parameters has been succesfully recorded!")
 
-    def _record(self, answer_id: int, text: str) -> bytes:
+    def _record(self, text: str) -> Answer:
         self._save_flash()
         self._log(text)
-        return self._answer(answer_id, True, text)
+        return True, text
 
-    def _set_gains(self, controller: Controller, answer_id: int, *gains: float) -> bytes:
+    def _set_gains(self, controller: Controller, *gains: float) -> Answer:
         text = "PID Parameters has been succesfully recorded!"
         controller.set_gains(gains)
         self._log_green("Left  Motor PID = [%f, %f, %f]" % gains[:3])
@@ -149,7 +146,7 @@ class CommandTable:
         self._log_green("Recording values in the flash... ")
         self._save_flash()
         self._log_green(text + " ")
-        return self._answer(answer_id, True, text)
+        return True, text
 
     def _save_flash(self) -> None:
         """Write the flash; where that fails, the robot uses its new parameters, and an error is reported."""
@@ -161,11 +158,8 @@ class CommandTable:
     def _log_green(self, text: str) -> None:
         self._log("\x1b[92m[/%s] %s\x1b[0m" % (self._name, text))
 
-    def _tune(self, controller: Controller, answer_id: int) -> bytes:
+    def _tune(self, controller: Controller) -> Answer:
         self._motors.start_tuning(controller, self._millis, self._now_ms)
         self.blocked_us = PULSES_US
         # The firmware never sets success here (VelocityControl.ino:229-245).
-        return self._answer(answer_id, False, "PID Autotuning!")
-
-    def _answer(self, stock_id: int, success: bool, text: str) -> bytes:
-        return packets.encode_packet(self._own_ids[stock_id], messages.encode_answer(success, text))
+        return False, "PID Autotuning!"

@@ -99,6 +99,14 @@ DECLARATIONS: Tuple[Declaration, ...] = (
 )
 
 
+ANSWER_IDS = {
+    request: answer
+    for kind, answer, service, _ in DECLARATIONS if kind == ANS
+    for other, request, name, _ in DECLARATIONS if (other, name) == (REQ, service)
+}  # fmt: skip
+"""Ids of the responses of services, by those of their requests."""
+
+
 def find_type(topic_id: int) -> str:
     """Return the type of a declared topic or service."""
     return next(message_type for _, declared_id, _, message_type in DECLARATIONS if declared_id == topic_id)
