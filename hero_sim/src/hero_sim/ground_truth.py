@@ -4,10 +4,9 @@ Publishes only; called by the simulator's thread after a physics step, so nothin
 Frame of everything: `world`, the arena's own.
 """
 
-from typing import List, Optional
+from typing import List, Optional, Tuple
 
 import rospy
-from geometry_msgs.msg import Point, TransformStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
@@ -15,10 +14,10 @@ from visualization_msgs.msg import MarkerArray
 
 from hero_node.geometry import Pose
 
-from .robot.firmware import Firmware
 from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robot
-from .scene_markers import make_markers, rotate_about_z
+from .scene_markers import make_markers
 from .simulator import Simulator
+from .stepped.ros_messages import encode_odometry, encode_transforms
 
 POSE_PERIOD_MS = 50
 MARKER_PERIOD_MS = 100
@@ -41,7 +40,7 @@ class GroundTruth:
         self._poses = [
             rospy.Publisher("/%s/ground_truth" % robot.name, Odometry, queue_size=2) for robot in self._swarm.robots
         ]
-        self._odom_origins: List[Pose] = []
+        self._odom_origins: List[Tuple[str, str, Pose]] = []
         self._arena.publish(make_markers(draw_arena(self._swarm.world.arena)))
         self._swarm.after_step = self.publish
         self.publish(self._swarm.world.time_ms)
@@ -64,7 +63,7 @@ class GroundTruth:
                 light = robot.sensing.show_light(robot.to_millis(time_ms))
                 pose, radius_m = robot.body.true_pose, robot.model.radius_m
                 shapes += draw_robot(robot.body.index, robot.name, pose, light, radius_m)
-            self._markers.publish(make_markers(shapes, stamp))
+            self._markers.publish(make_markers(shapes, stamp.to_nsec()))
 
     def _publish_poses(self, stamp: rospy.Time) -> None:
         watched = [index for index, publisher in enumerate(self._poses) if publisher.get_num_connections()]
@@ -73,15 +72,9 @@ class GroundTruth:
         speeds = self._swarm.world.measure_body_speeds().tolist()
         for index in watched:
             robot = self._swarm.robots[index]
-            pose = robot.body.true_pose
-            message = Odometry()
-            message.header.stamp = stamp
-            message.header.frame_id = FRAME
-            message.child_frame_id = robot.name + "/base_link"
-            message.pose.pose.position = Point(pose.x_m, pose.y_m, 0.0)
-            message.pose.pose.orientation = rotate_about_z(pose.yaw_rad)
-            message.twist.twist.linear.x, message.twist.twist.angular.z = speeds[index]
-            self._poses[index].publish(message)
+            frames = FRAME, robot.name + "/base_link"
+            content = encode_odometry(stamp.to_nsec(), frames, robot.body.true_pose, *speeds[index])
+            self._poses[index].publish(Odometry().deserialize(content))
 
     def _publish_objects(self, stamp: rospy.Time) -> None:
         """Publish where objects are, and draw them anew when they have moved."""
@@ -101,20 +94,7 @@ class GroundTruth:
 
     def _publish_odom_frames(self, publisher: rospy.Publisher, stamp: rospy.Time) -> None:
         """Place each robot's odom frame in the world, anew whenever its odometry was set."""
-        robots = self._swarm.robots
-        origins = [robot.body.odom_origin for robot in robots]
+        origins = [(FRAME, robot.name + "/odom", robot.body.odom_origin) for robot in self._swarm.robots]
         if origins != self._odom_origins:
             self._odom_origins = origins
-            publisher.publish(TFMessage([_place_odom(robot, stamp) for robot in robots]))
-
-
-def _place_odom(robot: Firmware, stamp: rospy.Time) -> TransformStamped:
-    origin = robot.body.odom_origin
-    transform = TransformStamped()
-    transform.header.stamp = stamp
-    transform.header.frame_id = FRAME
-    transform.child_frame_id = robot.name + "/odom"
-    transform.transform.translation.x = origin.x_m
-    transform.transform.translation.y = origin.y_m
-    transform.transform.rotation = rotate_about_z(origin.yaw_rad)
-    return transform
+            publisher.publish(TFMessage().deserialize(encode_transforms(stamp.to_nsec(), origins)))
