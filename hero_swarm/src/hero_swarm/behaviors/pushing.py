@@ -1,6 +1,6 @@
 """Behaviors that push objects: gathering them, and moving one of them to a goal, alone or together."""
 
-from typing import Any, NamedTuple, Tuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,9 +10,6 @@ from hero_sim.world.kinematics import join_wheels
 
 from ..behavior import Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
 from ..steering import steer
-
-Velocity = Tuple[np.ndarray, np.ndarray]
-"""Forward and left (R,), m/s."""
 
 
 class ObjectClustering(Behavior):
@@ -37,19 +34,17 @@ class ObjectClustering(Behavior):
 
 
 class _Way(NamedTuple):
-    """The way of the first object to the goal, as each robot sees it (R,).
+    """The way of the first object to the goal, as each robot sees it.
 
     Attributes:
-        forward_m, left_m: where the object is.
-        along, across: direction of its way, forward and left.
-        length_m: of its way.
-        behind_m, aside_m: how far the robot is behind the object on this way, and how far to its right.
+        object_m: where the object is, forward and left (2, R).
+        along: direction of its way, forward and left (2, R).
+        length_m: of its way (R,).
+        behind_m, aside_m: how far the robot is behind the object on this way, and how far to its right (R,).
     """
 
-    forward_m: np.ndarray
-    left_m: np.ndarray
+    object_m: np.ndarray
     along: np.ndarray
-    across: np.ndarray
     length_m: np.ndarray
     behind_m: np.ndarray
     aside_m: np.ndarray
@@ -72,35 +67,35 @@ class PushToGoal(Behavior):
     gap_m = 0.05
 
     def _find_way(self, sensed: Sensed) -> _Way:
-        forward_m, left_m = sensed.objects.forward_m[:, 0], sensed.objects.left_m[:, 0]
+        object_m = np.array((sensed.objects.forward_m[:, 0], sensed.objects.left_m[:, 0]))
         to_x_m, to_y_m = self.goal_x_m - sensed.poses[:, 0], self.goal_y_m - sensed.poses[:, 1]
         cosine, sine = np.cos(sensed.poses[:, 2]), np.sin(sensed.poses[:, 2])
-        way_forward_m = cosine * to_x_m + sine * to_y_m - forward_m
-        way_left_m = cosine * to_y_m - sine * to_x_m - left_m
-        length_m = np.maximum(np.hypot(way_forward_m, way_left_m), 1e-6)
-        along, across = way_forward_m / length_m, way_left_m / length_m
-        behind_m, aside_m = forward_m * along + left_m * across, along * left_m - across * forward_m
-        return _Way(forward_m, left_m, along, across, length_m, behind_m, aside_m)
+        way_m = np.array((cosine * to_x_m + sine * to_y_m, cosine * to_y_m - sine * to_x_m)) - object_m
+        length_m = np.maximum(np.hypot(*way_m), 1e-6)
+        along = way_m / length_m
+        behind_m = object_m[0] * along[0] + object_m[1] * along[1]
+        return _Way(object_m, along, length_m, behind_m, along[0] * object_m[1] - along[1] * object_m[0])
 
-    def _go_around(self, sensed: Sensed, way: _Way) -> Velocity:
-        """Return the velocity around the object, on the shorter side, until the robot is behind it."""
-        range_m = np.maximum(np.hypot(way.forward_m, way.left_m), 1e-6)
+    def _go_around(self, sensed: Sensed, way: _Way) -> np.ndarray:
+        """Return the velocity (2, R) around the object, on the shorter side, until the robot is behind it."""
+        range_m = np.maximum(np.hypot(*way.object_m), 1e-6)
         side = np.where(way.aside_m > 0.0, 1.0, -1.0)
         inward = np.clip(4.0 * (range_m - sensed.objects.radii_m[0] - BODY_RADIUS_M - self.gap_m), -1.0, 1.0)
-        forward = (inward * way.forward_m - side * way.left_m) / range_m
-        left = (inward * way.left_m + side * way.forward_m) / range_m
-        return self.linear_m_s * forward, self.linear_m_s * left
+        return self.linear_m_s * ((inward * way.object_m + side * _turn_left(way.object_m)) / range_m)
 
-    def _command(self, sensed: Sensed, way: _Way, wanted: Velocity, gap_m: float) -> Tuple[np.ndarray, np.ndarray]:
-        """Return speeds for a velocity that is wanted, away from robots nearer than gap_m, at rest at the goal."""
+    def _command(self, sensed: Sensed, way: _Way, wanted: np.ndarray, gap_m: float) -> np.ndarray:
+        """Return speeds for a velocity (2, R) that is wanted, away from robots nearer than gap_m, at rest at the goal."""
         near = sensed.near
         range_m = np.maximum(near.range_m, 1e-6)
         push_m_s = 2.0 * np.maximum(2.0 * BODY_RADIUS_M + gap_m - range_m, 0.0) * near.seen / range_m
         forward_m_s = wanted[0] - (push_m_s * near.forward_m).sum(axis=1)
         left_m_s = wanted[1] - (push_m_s * near.left_m).sum(axis=1)
         moves = sensed.objects.seen[:, 0] & (way.length_m > self.goal_radius_m)
-        linear_m_s, angular_rad_s = steer(forward_m_s, left_m_s, self.linear_m_s)
-        return linear_m_s * moves, angular_rad_s * moves
+        return np.array(steer(forward_m_s, left_m_s, self.linear_m_s)) * moves
+
+
+def _turn_left(vectors: np.ndarray) -> np.ndarray:
+    return np.array((-vectors[1], vectors[0]))
 
 
 class CooperativeTransport(PushToGoal):
@@ -117,12 +112,8 @@ class CooperativeTransport(PushToGoal):
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         way = self._find_way(sensed)
         hidden = (way.behind_m > 0.0) & (np.abs(way.aside_m) < self.shade * sensed.objects.radii_m[0])
-        share_m_s = self.linear_m_s / np.maximum(np.hypot(way.forward_m, way.left_m), 1e-6)
-        around_forward_m_s, around_left_m_s = self._go_around(sensed, way)
-        wanted = (
-            np.where(hidden, share_m_s * way.forward_m, around_forward_m_s),
-            np.where(hidden, share_m_s * way.left_m, around_left_m_s),
-        )
+        share_m_s = self.linear_m_s / np.maximum(np.hypot(*way.object_m), 1e-6)
+        wanted = np.where(hidden, share_m_s * way.object_m, self._go_around(sensed, way))
         return (*self._command(sensed, way, wanted, self.gap_m), memory)
 
 
@@ -154,12 +145,8 @@ class BoxPushing(PushToGoal):
         # A robot that is not behind the object yet goes around it; from there it drives to its place, or on.
         arrived = way.behind_m > 0.5 * row_m
         ahead_m_s = np.where(pushes, self.linear_m_s, 1.5 * lag_m)
-        aside_m_s = 1.5 * off_m
-        around_forward_m_s, around_left_m_s = self._go_around(sensed, way)
-        wanted = (
-            np.where(arrived | pushes, ahead_m_s * way.along - aside_m_s * way.across, around_forward_m_s),
-            np.where(arrived | pushes, ahead_m_s * way.across + aside_m_s * way.along, around_left_m_s),
-        )
+        to_place = ahead_m_s * way.along + 1.5 * off_m * _turn_left(way.along)
+        wanted = np.where(arrived | pushes, to_place, self._go_around(sensed, way))
         return (*self._command(sensed, way, wanted, self.spacing_m - 2.0 * BODY_RADIUS_M), pushes)
 
     @staticmethod

@@ -6,7 +6,8 @@ import platform
 import subprocess
 import sys
 from importlib import import_module
-from typing import Any, Dict, List
+from pathlib import Path
+from typing import Any, Dict
 
 import numpy as np
 
@@ -21,27 +22,18 @@ def hash_code(behavior: str) -> str:
     """
     digest = hashlib.sha256()
     for package in PACKAGES:
-        folder = os.path.dirname(str(import_module(package).__file__))
-        for path in _list_sources(folder):
-            _add_file(digest, "%s/%s" % (package, os.path.relpath(path, folder)), path)
+        folder = Path(str(import_module(package).__file__)).parent
+        sources = (path for path in folder.rglob("*.py") if "__pycache__" not in path.parts)
+        for path in sorted(sources):
+            _add_file(digest, "%s/%s" % (package, path.relative_to(folder)), path)
     file = behavior.partition(":")[0]
     if file.endswith(".py"):
-        _add_file(digest, "behavior", file)
+        _add_file(digest, "behavior", Path(file))
     return digest.hexdigest()[:16]
 
 
-def _list_sources(folder: str) -> List[str]:
-    """Return the paths of the modules below folder, in an order that does not depend on the file system."""
-    paths: List[str] = []
-    for place, folders, files in os.walk(folder):
-        folders[:] = sorted(name for name in folders if name != "__pycache__")
-        paths.extend(os.path.join(place, name) for name in sorted(files) if name.endswith(".py"))
-    return paths
-
-
-def _add_file(digest: Any, name: str, path: str) -> None:
-    with open(path, "rb") as file:
-        content = file.read()
+def _add_file(digest: Any, name: str, path: Path) -> None:
+    content = path.read_bytes()
     digest.update(("%s %d\n" % (name, len(content))).encode())
     digest.update(content)
 
@@ -58,19 +50,8 @@ def describe_machine() -> Dict[str, str]:
 
 def _find_commit() -> str:
     """Return the commit of the sources, with "-dirty" if they differ from it; "unknown" outside a checkout."""
-    command = [
-        "git",
-        "-C",
-        os.path.dirname(os.path.realpath(__file__)),
-        "describe",
-        "--always",
-        "--dirty",
-        "--abbrev=12",
-    ]
+    command = ["git", "-C", str(Path(__file__).resolve().parent), "describe", "--always", "--dirty", "--abbrev=12"]
     try:
-        result = subprocess.run(
-            command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, timeout=10.0, check=True
-        )
+        return subprocess.check_output(command, stderr=subprocess.DEVNULL, timeout=10.0).decode().strip()
     except (OSError, subprocess.SubprocessError):
         return "unknown"
-    return result.stdout.decode().strip()

@@ -290,5 +290,5 @@ def test_outside_of_a_checkout_the_commit_is_unknown(monkeypatch, failure):
     def fail(*arguments, **options):
         raise failure
 
-    monkeypatch.setattr(code_version.subprocess, "run", fail)
+    monkeypatch.setattr(code_version.subprocess, "check_output", fail)
     assert code_version.describe_machine()["commit"] == "unknown"
