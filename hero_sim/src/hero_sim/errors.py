@@ -1,7 +1,9 @@
 """Errors of the simulator."""
 
+from hero_node.errors import HeroError
 
-class SimulatorError(Exception):
+
+class SimulatorError(HeroError):
     """Anything that the simulator reports itself."""
 
 

@@ -21,7 +21,6 @@ from hero_node.command_line import call, find_line, say
 from hero_node.errors import HeroError, ProgramError
 from hero_node.parameters import check_parameters
 
-from .errors import OptionError
 from .population import add_options
 from .stepped.robot import StepRobot
 from .stepped.step_clock import StepMotion
@@ -36,7 +35,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     parser.add_argument("script", help="a script that uses hero_client")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the script")
     options = parser.parse_args(argv)
-    return call(lambda: run_script(options), HeroError, OptionError)
+    return call(lambda: run_script(options), HeroError)
 
 
 def run_script(options: argparse.Namespace) -> None:

@@ -6,9 +6,10 @@ import signal
 from typing import Callable, Iterator, Optional, Sequence, Tuple
 
 from hero_node.command_line import WRONG_ARGUMENTS, call
+from hero_node.errors import HeroError
 
 from .build import build_simulator
-from .errors import OptionError, SimulatorError
+from .errors import OptionError
 from .faults import MAX_DURATION_S, FaultInjector, parse_fault
 from .population import SERVO_TIMINGS, add_options, build_errors, check_population
 from .robot.servo_pins import CORE_2
@@ -113,17 +114,6 @@ def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[
     return options
 
 
-def _stop_on_signals(simulator: Simulator) -> None:
-    """End simulator.run() at Ctrl-C and SIGTERM."""
-
-    def stop(signal_number: int, frame: object) -> None:
-        del signal_number, frame
-        simulator.stopping = True
-
-    signal.signal(signal.SIGINT, stop)
-    signal.signal(signal.SIGTERM, stop)
-
-
 @contextlib.contextmanager
 def simulate(
     options: argparse.Namespace, report: Callable[[str], None]
@@ -133,7 +123,8 @@ def simulate(
     Raises: OptionError for an option that cannot be used.
     """
     simulator, injector = build_simulator(options, (lambda text: None) if options.quiet else report)
-    _stop_on_signals(simulator)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: setattr(simulator, "stopping", True))
     try:
         yield simulator, injector
     finally:
@@ -146,7 +137,7 @@ def _report(text: str) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Run the simulator; return the exit status."""
-    return call(lambda: _run(parse_options(build_parser(), arguments)), SimulatorError)
+    return call(lambda: _run(parse_options(build_parser(), arguments)), HeroError)
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -17,13 +17,13 @@ import rosgraph.network
 import rospy
 
 from hero_node.command_line import call
-from hero_node.errors import NodeError
+from hero_node.errors import HeroError, NodeError
 from hero_node.ros.master import find_running_node
 from hero_node.ros.master_watch import MasterWatch
 from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
 from . import main as command_line
-from .errors import OptionError, SimulatorError
+from .errors import OptionError
 from .faults import FaultInjector, parse_fault
 from .ground_truth import GroundTruth
 from .simulator import Simulator
@@ -113,7 +113,7 @@ def watch_master(has_ended: threading.Event) -> None:
 
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
-    status = call(_run, SimulatorError, NodeError)
+    status = call(_run, HeroError)
     end_ros_node("hero_sim ends", MASTER_WAIT_S)
     os._exit(status)
 

@@ -216,13 +216,11 @@ class Simulator(LinkHandler):
             self._report("%s connected" % self.swarm.robots[index].name)
 
     def connection_failed(self, index: int, reason: str) -> None:
-        """A robot found no driver."""
         self._report_failure(reason)
         self.swarm.robots[index].connection_failed(self.swarm.now_ms)
         self.swarm.reschedule(index)
 
     def connection_lost(self, index: int, reason: str) -> None:
-        """The driver, or the network, ended a robot's connection."""
         self.radios[index].clear()
         self.swarm.robots[index].connection_lost()
         if self.swarm.now_ms >= self._quiet_until_ms[index]:
@@ -240,12 +238,10 @@ class Simulator(LinkHandler):
         self._limit_window(index)
 
     def writing_blocked(self, index: int) -> None:
-        """The driver does not read."""
         self.swarm.robots[index].block_writing(self.swarm.now_ms)
         self.swarm.reschedule(index)
 
     def writing_resumed(self, index: int) -> None:
-        """The driver reads again."""
         self.swarm.robots[index].unblock_writing(self.swarm.now_ms)
         self.swarm.reschedule(index)
 

@@ -7,12 +7,12 @@ Metrics are taken once per second of simulated time. A run has the same values a
 import math
 import time
 from contextlib import contextmanager
-from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
+from hero_node.errors import HeroError
 from hero_node.safe_file import replace_file
-from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena
 from hero_sim.world.robot_errors import draw_errors, read_known, set_known
@@ -33,13 +33,6 @@ SAMPLE_S = 1.0
 METRICS_ENDING, POSES_ENDING = ".metrics.npy", ".poses.npy"
 """Files of a batch: samples (T, W, metrics) of the metrics of list_sources(), and poses (T, W, N, 3); nan
 after a run's end."""
-
-
-class BatchResult(NamedTuple):
-    """Results of one batch, and its duration."""
-
-    runs: List[Run]
-    wall_s: float
 
 
 def load_checked(experiment: Experiment) -> None:
@@ -74,32 +67,25 @@ def _at(experiment: Experiment, name: str) -> Iterator[None]:
     """Name the line of what is wrong; what is not in the file is the behavior's need."""
     try:
         yield
-    except (ExperimentError, TypeError, ValueError) as error:
+    except (HeroError, TypeError, ValueError) as error:
         place = experiment.places.get(name, experiment.places["behavior"])
         raise ExperimentError("%s: %s" % (place, error)) from error
 
 
 def load_cell_arena(cell: Cell) -> Arena:
-    """Return the arena of a cell, an open plane without one. Raises: ExperimentError."""
+    """Return the arena of a cell, an open plane without one. Raises: OptionError."""
     name = cell.settings.get("arena")
-    try:
-        return load_arena(name) if name else OPEN
-    except OptionError as error:
-        raise ExperimentError(str(error)) from error
+    return load_arena(name) if name else OPEN
 
 
 def read_cell_errors(cell: Cell) -> List[str]:
-    """Return the errors of a cell's file, a text for each robot; none without a file. Raises: ExperimentError."""
+    """Return the errors of a cell's file, a text for each robot; none without a file. Raises: OptionError."""
     name, robots = cell.settings.get("errors", "default"), range(cell.settings["robots"])
     if name in ERRORS:
         return []
-    try:
-        known = read_known(name, robots)
-        own = draw_errors(map(np.random.RandomState, robots))
-        for text in known:
-            set_known(own, 0, text)
-    except OptionError as error:
-        raise ExperimentError(str(error)) from error
+    known, own = read_known(name, robots), draw_errors(map(np.random.RandomState, robots))
+    for text in known:
+        set_known(own, 0, text)
     return known
 
 
@@ -126,13 +112,10 @@ def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Tri
     )
 
 
-def compute_batch(
-    text: str, cell_index: int, seeds: Sequence[int], stem: str, with_poses: bool
-) -> BatchResult:
-    """Compute the runs of one cell with these seeds; their metrics over time, and poses, go to files that
-    begin with stem.
+def compute_batch(text: str, cell_index: int, seeds: Sequence[int], stem: str) -> Tuple[List[Run], float]:
+    """Return the runs of one cell with these seeds, and the seconds that took.
 
-    text: of the experiment's file.
+    Metrics over time, and poses, go to files that begin with stem. text: of the experiment's file.
     Raises: ExperimentError, also for whatever the behavior raises.
     """
     began_s = time.monotonic()
@@ -140,12 +123,12 @@ def compute_batch(
     cell = experiment.cells[cell_index]
     trial = build_trial(experiment, cell, seeds)
     with report_place("%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1])):
-        series, ends = _run(experiment, trial, stem, with_poses)
+        series, ends = _run(experiment, trial, stem)
     runs = [
         Run(cell_index, seed, take_values(experiment, series[: ends[world] + 1, world]))
         for world, seed in enumerate(seeds)
     ]
-    return BatchResult(runs, time.monotonic() - began_s)
+    return runs, time.monotonic() - began_s
 
 
 def list_sources(experiment: Experiment) -> List[str]:
@@ -156,7 +139,7 @@ def list_sources(experiment: Experiment) -> List[str]:
     return sorted(set(names))
 
 
-def _run(experiment: Experiment, trial: Trial, stem: str, with_poses: bool) -> Tuple[np.ndarray, List[int]]:
+def _run(experiment: Experiment, trial: Trial, stem: str) -> Tuple[np.ndarray, List[int]]:
     """Run a trial; return the samples (T, W, metrics) and the last sample of each world."""
     names, until = list_sources(experiment), experiment.until
     worlds, robots, _ = trial.poses.shape
@@ -165,7 +148,7 @@ def _run(experiment: Experiment, trial: Trial, stem: str, with_poses: bool) -> T
     ends = np.full(worlds, samples - 1)
     running = np.ones(worlds, dtype=bool)
     poses_file: Optional[Stream] = None
-    if with_poses:
+    if experiment.record_hz:
         count = math.floor(experiment.time_s * experiment.record_hz + 1e-9) + 1
         poses_file = Stream(stem + POSES_ENDING, (count, worlds, robots, 3))
     now_s = 0.0

@@ -33,7 +33,7 @@ _BATCHES_PER_WORKER = 2
 
 DASK = "dask:"
 
-Task = Tuple[str, int, Tuple[int, ...], str, bool]
+Task = Tuple[str, int, Tuple[int, ...], str]
 """Arguments of compute_batch()."""
 
 
@@ -150,7 +150,7 @@ def list_tasks(
         size = batch or min(share, choose_batch(experiment, cell))
         for start in range(0, len(seeds), size):
             chosen = tuple(seeds[start : start + size])
-            yield text, cell, chosen, folder.name_series(cell, chosen), experiment.record_hz > 0.0
+            yield text, cell, chosen, folder.name_series(cell, chosen)
 
 
 def _choose_engine(options: argparse.Namespace, behavior: str) -> Tuple[Callable[[], Executor], int]:
@@ -196,18 +196,14 @@ def run_experiment(options: argparse.Namespace) -> str:
         opener, workers = _choose_engine(options, experiment.behavior)
         tasks = list_tasks(text, experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()
-        for task, results in _watch(
-            engines.compute(opener, workers, compute_batch, tasks), len(missing), len(runs)
-        ):
-            folder.write_batch(results.runs)
-            folder.note_time(task[1], task[2], results.wall_s)
+        done = engines.compute(opener, workers, compute_batch, tasks)
+        for (_, cell, seeds, _), (computed, wall_s) in _watch(done, len(missing), len(runs)):
+            folder.write_batch(computed)
+            folder.note_time(cell, seeds, wall_s)
         print("%d runs in %.1f s" % (len(missing), time.monotonic() - began_s), file=sys.stderr)
     runs = folder.read_runs()
     left = folder.list_missing(runs)
+    cells, count = len(experiment.cells), len(experiment.seeds)
     if left:
-        return "%s: %d of %d runs are still to be computed, by other parts" % (
-            folder.path, len(left), len(experiment.cells) * len(experiment.seeds)
-        )  # fmt: skip
-    return "%s: all runs of %d cells with %d seeds each" % (
-        folder.write_table(runs), len(experiment.cells), len(experiment.seeds)
-    )  # fmt: skip
+        return "%s: %d of %d runs are still to be computed, by other parts" % (folder.path, len(left), cells * count)
+    return "%s: all runs of %d cells with %d seeds each" % (folder.write_table(runs), cells, count)

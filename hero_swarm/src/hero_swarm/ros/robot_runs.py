@@ -101,7 +101,7 @@ def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source:
                 if missing[robot.name] is None:
                     robot.drive(*speed)
     except StoppedError:
-        pass  # _confirm() tells
+        pass  # _ask() tells
     finally:
         swarm.stop()
 

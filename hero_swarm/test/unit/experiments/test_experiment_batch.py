@@ -38,7 +38,7 @@ def test_columns_are_a_last_sample_a_mean_or_the_first_time_below_a_bound():
 
 
 def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
-    whole = compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"), True).runs
+    whole = compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"))[0]
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
     assert series.shape == (5, 3, 3) and poses.shape == (9, 3, 3, 3) and np.isfinite(poses).all()
     assert [run.seed for run in whole] == [11, 12, 13] and {run.cell for run in whole} == {0}
@@ -47,8 +47,8 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
     assert [run.values[0] for run in whole] == pytest.approx(series[-1, :, 0].tolist())
 
     bound = float(np.sort(series[2, :, 0])[0]) * 1.0001  # one run is below it after 2 s
-    text = FILE.replace("time_s: 4", "time_s: 4\nuntil: {dispersion: %r}" % bound)
-    runs = compute_batch(text, 0, [11, 12, 13], str(tmp_path / "b"), False).runs
+    text = FILE.replace("time_s: 4", "time_s: 4\nuntil: {dispersion: %r}" % bound).replace("record: {hz: 2}\n", "")
+    runs = compute_batch(text, 0, [11, 12, 13], str(tmp_path / "b"))[0]
     ended = np.load(str(tmp_path / ("b" + METRICS_ENDING)))
     for world in range(3):
         below = np.flatnonzero(series[:, world, 0] <= bound)
@@ -57,13 +57,13 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
         assert runs[world].values[0] == pytest.approx(series[last, world, 0])
     assert np.isnan(ended[-1]).any()
     assert not (tmp_path / ("b" + POSES_ENDING)).exists()
-    alone = compute_batch(FILE, 0, [12], str(tmp_path / "c"), False).runs
+    alone = compute_batch(FILE, 0, [12], str(tmp_path / "c"))[0]
     assert alone == whole[1:2], "a run has the same values alone"
 
 
 def test_metrics_get_speeds_in_meters_per_second(tmp_path, monkeypatch):
     monkeypatch.setitem(metrics.METRICS, "dispersion", lambda poses, velocities, *_: velocities[:, 0, 0])
-    compute_batch(FILE.replace("hz: 2", "hz: 20"), 0, [11], str(tmp_path / "a"), True)
+    compute_batch(FILE.replace("hz: 2", "hz: 20"), 0, [11], str(tmp_path / "a"))
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
     moved_m = float(poses[40, 0, 0, 0] - poses[39, 0, 0, 0])  # in the last cycle before 2 s
     assert series[2, 0, 0] == pytest.approx(moved_m * 20.0, rel=1e-3) and abs(moved_m) > 1e-4
@@ -72,13 +72,12 @@ def test_metrics_get_speeds_in_meters_per_second(tmp_path, monkeypatch):
 def test_what_a_behavior_raises_names_the_cell_and_the_seeds(tmp_path, monkeypatch):
     monkeypatch.setitem(metrics.METRICS, "dispersion", lambda *arguments: 1 // 0)
     with pytest.raises(ExperimentError, match="with seeds 11 to 13: ZeroDivisionError: .*test_experiment_batch"):
-        compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"), False)
+        compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"))
 
 
-def make_experiment(robots=20, time_s=300, count=100, record="record: {hz: 2}"):
+def make_experiment(robots=20, time_s=300, count=100):
     text = FILE.replace("[3]", "[%d, 1000]" % robots).replace("time_s: 4", "time_s: %g" % time_s)
-    text = text.replace("count: 3", "count: %d" % count).replace("record: {hz: 2}", record)
-    return parse_experiment(text, "e.yaml", metrics.METRICS)
+    return parse_experiment(text.replace("count: 3", "count: %d" % count), "e.yaml", metrics.METRICS)
 
 
 class Folder:
@@ -96,9 +95,7 @@ def test_a_batch_is_some_seconds_of_work_and_something_for_each_worker():
         tasks = list(runner.list_tasks("text", experiment, missing, batch, workers, Folder()))
         assert [len(task[2]) for task in tasks] == sizes
         assert [(task[1], seed) for task in tasks for seed in task[2]] == missing
-        assert tasks[-1][0] == "text" and tasks[0][3] == "0:11-%d" % (10 + sizes[0]) and tasks[0][4]
-    (task, *_) = runner.list_tasks("text", make_experiment(record=""), missing, None, 1, Folder())
-    assert not task[4], "no poses are recorded"
+        assert tasks[-1][0] == "text" and tasks[0][3] == "0:11-%d" % (10 + sizes[0])
 
 
 def test_options_of_run_have_their_limits(capsys):
