@@ -28,7 +28,7 @@ SERVO_TIMINGS = (CORE_2, CORE_3, _DRAWN)
 
 
 def draw_seeds(options: argparse.Namespace) -> Dict[str, Any]:
-    """Return a seed for each purpose, so that one more draw here does not change all others; of robots and radios (N,)."""
+    """Return a seed for each purpose, so that one more draw does not change all others; of robots and radios (N,)."""
     seeds = _reseed(options.seed).randint(0, 2**31 - 1, size=3 + 2 * options.count)
     return dict(zip(("places", "world", "boot"), seeds), robots=seeds[3::2], radios=seeds[4::2])
 

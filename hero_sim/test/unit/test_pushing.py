@@ -13,7 +13,14 @@ from hero_sim.world.arena_file import load_arena
 from hero_sim.world.pushing import pushing as pushing_module
 from hero_sim.world.pushing.pushed_body import PushedBody
 from hero_sim.world.pushing.pushing import MAX_PUSH_N, Pushing
-from hero_sim.world.pushing.shapes import Disc, Polygon, find_contacts, list_outlines, touch_circle, touch_walls
+from hero_sim.world.pushing.shapes import (
+    Disc,
+    Polygon,
+    find_contacts,
+    list_outlines,
+    touch_circle,
+    touch_walls,
+)
 
 STEP_M = 0.001
 """A robot at 0.1 m/s in 10 ms."""

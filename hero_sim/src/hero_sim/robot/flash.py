@@ -5,7 +5,7 @@ The only file of the simulated robot that touches the file system.
 
 import json
 import os
-from typing import Any, Optional, Sequence
+from typing import Optional, Sequence
 
 from hero_node.number_checks import is_number
 from hero_node.safe_file import write_file

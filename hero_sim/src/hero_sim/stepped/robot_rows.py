@@ -7,7 +7,7 @@ boot, self-tuning, the IMU hat, faults, and the time for which a command or a se
 
 import copy
 from functools import partial
-from typing import Callable, Collection, List, Optional, Sequence
+from typing import Callable, Collection, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -114,7 +114,7 @@ class RobotRows:
         self._velocity_commands = CommandShaper(rows, 0.0)
         self._position_commands = CommandShaper(rows, 0.0)
         self._pulse_commands = CommandShaper(rows, SERVO_CENTER_US)
-        self._topics = (
+        self._topics: Tuple[Tuple[CommandShaper, Callable[..., None]], ...] = (
             (self._velocity_commands, partial(self._receive_twists, self._velocity)),
             (self._position_commands, partial(self._receive_twists, self._position)),
             (self._pulse_commands, self._receive_pulses),

@@ -84,7 +84,7 @@ class PushToGoal(Behavior):
         return self.linear_m_s * ((inward * way.object_m + side * _turn_left(way.object_m)) / range_m)
 
     def _command(self, sensed: Sensed, way: _Way, wanted: np.ndarray, gap_m: float) -> np.ndarray:
-        """Return speeds for a velocity (2, R) that is wanted, away from robots nearer than gap_m, at rest at the goal."""
+        """Return speeds (2, R) for a velocity that is wanted, away from robots nearer than gap_m; zero at the goal."""
         near = sensed.near
         range_m = np.maximum(near.range_m, 1e-6)
         push_m_s = 2.0 * np.maximum(2.0 * BODY_RADIUS_M + gap_m - range_m, 0.0) * near.seen / range_m

@@ -78,8 +78,8 @@ class Start(NamedTuple):
     """Placement of robots; lengths in m.
 
     Attributes:
-        kind: uniform in a square of which the bodies cover a share; grid or circle with gaps between bodies; file: poses
-            of a file; arena: starts of the arena.
+        kind: uniform in a square of which the bodies cover a share; grid or circle with gaps between bodies; file: the
+            poses of a file; arena: starts of the arena.
         cover: share of the square that bodies cover.
         gap_m: least distance between bodies.
         file: path of a CSV file with a line x m, y m, yaw rad for each robot.

@@ -33,7 +33,8 @@ class Entry(NamedTuple):
 
     def refuse(self, text: str) -> NoReturn:
         """Raise ExperimentError: place, name and value, and what it must be."""
-        shown = {list: "a list", dict: "a mapping"}.get(type(self.value), self.value)
+        kinds: Dict[type, str] = {list: "a list", dict: "a mapping"}
+        shown = kinds.get(type(self.value), self.value)
         raise ExperimentError("%s: %s is %s, but must be %s" % (self.place, self.name, shorten(shown), text))
 
     def number(self, low: float, high: float, unit: str) -> float:
@@ -113,7 +114,7 @@ def read_entries(text: str, file: str) -> Entry:
     return _convert(node, "", loader)
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]
     """Refuses deep nesting and anchors before anything that works recursively meets them."""
 
     _depth = 0

@@ -8,7 +8,7 @@ import itertools
 import os
 import shutil
 import subprocess
-from typing import Any, Iterator, List, Tuple
+from typing import Any, Iterator, List, Sequence, Tuple
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -107,7 +107,7 @@ class Film:
         self._axes = axes
         self._parts: List[Any] = []
 
-    def show(self, time_s: float, poses: np.ndarray, edges_m: List[Any], discs_m: List[Any]) -> None:
+    def show(self, time_s: float, poses: np.ndarray, edges_m: Sequence[Any], discs_m: Sequence[Any]) -> None:
         """Draw robots, objects (see list_outlines()) and the time in place of what was drawn before."""
         for part in self._parts:
             part.remove()

@@ -45,7 +45,7 @@ class RadioRows:
             heapq.heappush(self._up, (arrival_ms, next(self._order), row, readings, parts))
 
     def receive_readings(self, now_ms: int) -> Iterator[Tuple[Readings, int, Collection[str]]]:
-        """Yield what has arrived by now, in order: readings as they were sent, the row of their robot, and which parts."""
+        """Yield what has arrived by now, in order: readings as they were sent, the row of their robot, which parts."""
         while self.due_ms <= now_ms:
             _, _, row, readings, parts = heapq.heappop(self._up)
             yield readings, row, parts

@@ -69,7 +69,7 @@ Shape = Union[Disc, Polygon]
 
 
 def _list_edges(corners_m: Sequence[Point]) -> List[Tuple[Point, Point]]:
-    return list(zip(corners_m, [*corners_m[1:], corners_m[0]]))
+    return list(zip(corners_m, [*corners_m[1:], *corners_m[:1]]))
 
 
 def _find_center(corners_m: Sequence[Point]) -> Point:
@@ -122,10 +122,9 @@ def place(shape: Shape, x_m: float, y_m: float, cosine: float, sine: float) -> B
     )
 
 
-def list_outlines(bodies: Sequence[Body]) -> Tuple[List[Tuple[float, ...]], List[Tuple[float, ...]]]:
+def list_outlines(bodies: Sequence[Body]) -> Tuple[Sequence[Tuple[float, ...]], Sequence[Tuple[float, ...]]]:
     """Return the edges of polygons, x1 y1 x2 y2, and the discs, x y radius."""
-    polygons_m = [body.corners_m for body in bodies if body.corners_m]
-    edges_m = [(*start_m, *end_m) for corners_m in polygons_m for start_m, end_m in _list_edges(corners_m)]
+    edges_m = [start_m + end_m for body in bodies for start_m, end_m in _list_edges(body.corners_m)]
     return edges_m, [(body.x_m, body.y_m, body.shape.reach_m) for body in bodies if not body.corners_m]
 
 
