@@ -1,4 +1,4 @@
-"""Shared by all tests of pytest: markers, and hypothesis without time limits, chance or memory.
+"""Shared by all tests of pytest: markers, numpy on one core, and hypothesis without time limits, chance or memory.
 
 A busy machine is not a failure. Every run tries the same examples, whatever earlier runs found or left behind.
 """
@@ -10,6 +10,9 @@ from pathlib import Path
 import hypothesis
 import hypothesis.configuration
 import pytest
+
+# Before numpy is imported: threads of OpenBLAS take turns with the tests beside, and more CPU than they save.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 hypothesis.settings.register_profile(
     "repeatable",

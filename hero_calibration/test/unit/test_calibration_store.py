@@ -199,7 +199,7 @@ def directory(tmp_path_factory):
         yield tmp_path_factory.mktemp("any_file")
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(script=st.lists(st.tuples(st.integers(0, 330), st.integers(0, 6), PIECES), min_size=1, max_size=4))
 def test_any_file_is_read_or_refused_in_one_line_and_can_be_replaced(directory, script):
     path, content = save_whole(directory)

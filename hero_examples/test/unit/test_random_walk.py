@@ -1,4 +1,4 @@
-"""random_walk in virtual time: the robots of twenty worlds, each with errors of its own."""
+"""random_walk in virtual time: the robots of eight worlds, each with errors of its own."""
 
 import math
 from types import SimpleNamespace
@@ -16,7 +16,7 @@ from hero_sim.world.arena_file import load_arena
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples.random_walk import Walker
 
-WORLDS = 20
+WORLDS = 8
 ROBOTS = 10
 WALK_S = 60.0
 

@@ -44,14 +44,11 @@ def test_process_finds_what_a_search_in_this_process_does(process):
         assert [tag.tag_id for tag in found] == [tag.tag_id for tag in expected]
         assert all((tag.corners == same.corners).all() for tag, same in zip(found, expected))
     assert [tag.tag_id for tag in found] == [5]
-
-
-@pytest.mark.slow
-def test_expected_places_go_over(process):
-    for index in range(20):
-        process.search(picture(60, 60), index / 30.0, {})
-    (found,) = process.search(picture(400, 300), 20 / 30.0, {5: (419.5, 319.5)})
+    # Far from there, it is found where it is expected.
+    (found,) = process.search(picture(400, 300), 10 / 30.0, {5: (419.5, 319.5)})
     assert found.center == pytest.approx((419.5, 319.5), abs=0.5)
+    with pytest.raises(ValueError, match="480"):
+        process.search(picture(60, 60)[:100], 11 / 30.0, {})
 
 
 @pytest.mark.slow
@@ -67,10 +64,9 @@ def test_process_answers_also_where_sockets_have_a_default_timeout():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("backend", "family", "words"), [("zbar", "36h11", "zbar"), ("aruco", "9h9", "9h9")])
-def test_detector_that_cannot_be_made_is_named(backend, family, words):
-    with pytest.raises(DetectorError, match=words):
-        DetectorProcess(backend, family, 2.0, WIDTH_PX, HEIGHT_PX)
+def test_detector_that_cannot_be_made_is_named():
+    with pytest.raises(DetectorError, match="9h9"):
+        DetectorProcess("aruco", "9h9", 2.0, WIDTH_PX, HEIGHT_PX)
 
 
 def test_process_that_died_is_named(process):
@@ -79,12 +75,6 @@ def test_process_that_died_is_named(process):
         process.search(picture(60, 60), 0.0, {})
     with pytest.raises(DetectorError, match="has ended"):
         process.search(picture(60, 60), 0.1, {})
-
-
-@pytest.mark.slow
-def test_frame_of_another_size_is_refused(process):
-    with pytest.raises(ValueError, match="480"):
-        process.search(picture(60, 60)[:100], 0.0, {})
 
 
 @pytest.mark.slow

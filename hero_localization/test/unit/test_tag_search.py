@@ -22,24 +22,22 @@ class SeenTags(TagDetector):
     """Finds those of the tags given that lie in the window with their margin."""
 
     def __init__(self):
-        self.tags, self.searched_px, self.blind = [], 0, set()
+        self.searched_px, self.blind = 0, set()
+        self.place([])
 
     def place(self, tags):
-        half = SIDE_PX / 2.0
-        square = half * np.array(((-1, -1), (1, -1), (1, 1), (-1, 1)))
+        square = SIDE_PX / 2.0 * np.array(((-1, -1), (1, -1), (1, 1), (-1, 1)))
         self.tags = [TagCorners(tag_id, np.array(center) + square) for tag_id, center in tags]
+        corners = np.array([tag.corners for tag in self.tags]).reshape(-1, 4, 2)
+        self.low, self.high = corners.min(axis=1), corners.max(axis=1)
 
     def detect(self, gray, origin=(0, 0)):
         height, width = gray.shape
         self.searched_px += height * width
-        low, high = np.array(origin), np.array(origin) + (width, height)
-        margin = SIDE_PX / 6.0
-        return [
-            tag
-            for tag in self.tags
-            if tag.tag_id not in self.blind
-            and (tag.corners >= low + margin).all() and (tag.corners <= high - margin).all()
-        ]
+        low, high = np.array(origin) + SIDE_PX / 6.0, np.array(origin) + (width, height) - SIDE_PX / 6.0
+        inside = (self.low >= low) & (self.high <= high)
+        seen = [self.tags[index] for index in np.flatnonzero(inside.all(axis=1))]
+        return [tag for tag in seen if tag.tag_id not in self.blind]
 
 
 class Watch:
@@ -51,10 +49,12 @@ class Watch:
         self.search = TagSearch(self.detector, WIDTH_PX, HEIGHT_PX, fine, smallest_px)
 
     def see(self, tags, expected=None, frames=1):
+        detectors = (self.detector, self.fine, self.finest)
+        for detector in detectors:
+            detector.place(tags)
         for _ in range(frames):
             self.index += 1
-            for detector in (self.detector, self.fine, self.finest):
-                detector.place(tags)
+            for detector in detectors:
                 detector.searched_px = 0
             found = self.search.search(FRAME, self.index * FRAME_S, expected)
         return sorted(tag.tag_id for tag in found)

@@ -1,5 +1,6 @@
 """Fitting the simulator to simulated robots with hidden errors, and the file of what was found."""
 
+import functools
 import math
 import re
 
@@ -98,6 +99,7 @@ INFRARED = "alpha_counts_m2=0.5,alpha3_counts_m2=0.36,beta_counts=-3"
 WALLS = build_rectangle(0.5, 0.4, 1)
 
 
+@functools.lru_cache(maxsize=None)
 def record_scans(time_s):
     """Return signals of a robot that drives in a small arena with another one, and both robots' poses."""
     errors = draw_errors([np.random.RandomState(1), np.random.RandomState(5)])
