@@ -1,6 +1,6 @@
 // What is unknown at present, with cause and remedy, in one banner; and what of a robot may be shown as known.
 
-const element = (id) => document.getElementById(id);
+import { element, make } from "./dom.js";
 
 /** The state of a robot as shown: unknown while the page or the robot's driver is not up to date. */
 export function stateOf(robot, state) {
@@ -19,20 +19,12 @@ function listLosses(state, connection) {
   if (!connection.isFresh) {
     const cause = connection.isOpen ? "No answer from the monitor" : "No connection to the monitor";
     const since = connection.heardMs ? ` since ${time(connection.heardMs)}: this view is outdated` : "";
-    return [
-      {
-        cause: cause + since,
-        remedy: "Start it again: roslaunch hero_bringup monitor.launch; STOP ALL is sent once it answers. Until then: rosservice call /hero_driver/stop true",
-      },
-    ];
+    const remedy = "Start it again: roslaunch hero_bringup monitor.launch; STOP ALL is sent once it answers. Until then: rosservice call /hero_driver/stop true";
+    return [{ cause: cause + since, remedy }];
   }
   if (!connection.served) {
-    return [
-      {
-        cause: "Too many pages are open: this one shows no robots",
-        remedy: "STOP ALL works here, too; close or hide another page to see the robots here",
-      },
-    ];
+    const remedy = "STOP ALL works here, too; close or hide another page to see the robots here";
+    return [{ cause: "Too many pages are open: this one shows no robots", remedy }];
   }
   return state.losses;
 }
@@ -41,13 +33,7 @@ export function showLosses(state, connection) {
   const losses = listLosses(state, connection);
   const banner = element("losses");
   banner.hidden = losses.length === 0;
-  const lines = losses.map(({ cause, remedy }) => {
-    const line = document.createElement("span");
-    const bold = document.createElement("b");
-    bold.textContent = `${cause}. `;
-    line.append(bold, `${remedy}\n`);
-    return line;
-  });
+  const lines = losses.map(({ cause, remedy }) => make("span", {}, make("b", {}, `${cause}. `), `${remedy}\n`));
   const text = lines.map((line) => line.textContent).join("");
   if (banner.textContent !== text) banner.replaceChildren(...lines);
 }

@@ -2,6 +2,7 @@
 //
 // Names and texts come from robots, programs and the network: they are inserted as text, never as markup.
 
+import { element, make, setPressed } from "./dom.js";
 import { Connection } from "./connection.js";
 import { isDark, onTheme, showTheme } from "./theme.js";
 import { FleetTable } from "./panels/fleet.js";
@@ -18,8 +19,6 @@ import { Projector } from "./projector.js";
 import { StopPanel } from "./stop.js";
 
 const NOTICE_MS = 6000;
-
-const element = (id) => document.getElementById(id);
 
 /** As received, whether it is up to date, and the names of the chosen robots. */
 const state = {
@@ -62,7 +61,6 @@ const connection = new Connection({
     notice("info", "This page was suspended.");
   },
 });
-const send = (request) => connection.send(request);
 
 /** Choose these robots alone, or in addition; one that is chosen already is then left out again. */
 function choose(names, isAdded) {
@@ -82,16 +80,14 @@ function notice(level, text) {
   const box = element("notices");
   const last = box.lastElementChild;
   if (last !== null && last.textContent === text) return;
-  const line = document.createElement("p");
-  line.className = level;
-  line.textContent = text;
+  const line = make("p", { className: level }, text);
   box.append(line);
   while (box.childElementCount > 4) box.firstElementChild.remove();
   setTimeout(() => line.remove(), NOTICE_MS);
 }
 
 const history = new History();
-const map = new FleetMap(state, { choose, send });
+const map = new FleetMap(state, { choose, connection });
 const table = new FleetTable({ choose, history, isAdding: () => map.selecting });
 const log = new LogView();
 const chart = new Chart(history);
@@ -138,7 +134,6 @@ function showHead() {
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
   document.body.classList.toggle("stale", !state.isFresh);
   element("empty").hidden = robots.length > 0 || !isLive || Object.keys(state.replay).length > 0;
-  element("empty").textContent = "No robots. Robots appear here when they connect to the driver.";
   showLosses(state, connection);
 }
 
@@ -183,9 +178,7 @@ element("layers").addEventListener("click", () => {
 for (const button of document.querySelectorAll("#tabs button")) {
   button.addEventListener("click", () => {
     document.body.dataset.panel = button.dataset.panel;
-    for (const other of document.querySelectorAll("#tabs button")) {
-      other.setAttribute("aria-pressed", String(other === button));
-    }
+    for (const other of document.querySelectorAll("#tabs button")) setPressed(other, other === button);
   });
 }
 document.body.dataset.panel = "fleet";

@@ -1,6 +1,6 @@
 // A view for an audience: the map alone, over the whole screen, with big robots and numbers. STOP ALL keeps its place.
 
-const element = (id) => document.getElementById(id);
+import { element, setPressed } from "./dom.js";
 
 export class Projector {
   constructor(redraw) {
@@ -13,7 +13,7 @@ export class Projector {
 
   async show(isShown) {
     document.body.classList.toggle("projector", isShown);
-    element("projector").setAttribute("aria-pressed", String(isShown));
+    setPressed(element("projector"), isShown);
     this.redraw();
     try {
       if (isShown) await document.documentElement.requestFullscreen();

@@ -3,6 +3,7 @@
 // STOP ALL acts when it is pressed, at a place that never changes. Release is at the other end of the page, needs
 // a hold, and does nothing for a while after a stop.
 
+import { element, setText } from "./dom.js";
 import { HoldButton } from "./hold.js";
 
 const ANSWER_MS = 1400; // with one step of the timer, a missing answer shows within 1.5 s
@@ -10,13 +11,9 @@ const STEP_MS = 100;
 const HOLD_MS = 1000;
 const INERT_MS = 2000;
 
-const element = (id) => document.getElementById(id);
-
 export class StopPanel {
   constructor({ connection, endDrive, notice }) {
-    this.connection = connection;
-    this.endDrive = endDrive;
-    this.notice = notice;
+    Object.assign(this, { connection, endDrive, notice });
     this.pressedMs = null; // when it was pressed; null once the monitor has acknowledged that
     this.status = null; // the monitor's status of the last request
     this.stopped = false; // whether all drivers report that they have stopped
@@ -98,7 +95,7 @@ export class StopPanel {
     const banner = element("stopping");
     banner.hidden = text === "";
     if (banner.dataset.level !== level) banner.dataset.level = level;
-    if (banner.textContent !== text) banner.textContent = text;
+    setText(banner, text);
     const atRest = this.stopped && this.connection.isFresh && level !== "error" && level !== "warn";
     element("stop").classList.toggle("done", atRest);
     element("stop").textContent = atRest ? "STOPPED" : "STOP ALL";

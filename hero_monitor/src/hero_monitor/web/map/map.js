@@ -1,7 +1,7 @@
 // The map, seen from above: x to the right, y up, as in ROS. Lengths in mm, angles in mrad.
 
+import { element, make, setPressed } from "../dom.js";
 import { isLate } from "../connection.js";
-import { Occupancy } from "./occupancy.js";
 import { CameraPicture } from "./picture.js";
 import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
@@ -12,17 +12,20 @@ const LABEL_PX = 28; // of the frame's distance from the edge, and of the name b
 const MARGIN = 0.05; // of the map's size, around what Fit shows
 const EDGE_PX = 36; // covered by tools above and hints below
 
-const element = (id) => document.getElementById(id);
+/** Return the corners of a box on the map: left, low, right, high as seen from a pose. */
+function listCorners([x, y, yaw], [left, low, right, high]) {
+  const [cosine, sine] = [Math.cos(yaw / 1000), Math.sin(yaw / 1000)];
+  const corners = [[left, low], [right, low], [right, high], [left, high]];
+  return corners.map(([ahead, aside]) => [x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine]);
+}
 
 export class FleetMap {
-  constructor(state, { choose, send }) {
-    this.state = state;
-    this.choose = choose;
-    this.send = send;
+  constructor(state, { choose, connection }) {
+    Object.assign(this, { state, choose, connection });
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
-    this.shows = { trails: true, beams: true, names: true, ground_truth: false, picture: false };
-    this.shows.ground_truth = localStorage.getItem("ground_truth") === "true";
+    const ground_truth = localStorage.getItem("ground_truth") === "true";
+    this.shows = { trails: true, beams: true, names: true, ground_truth, picture: false };
     this.picture = new CameraPicture(() => this.update({}));
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
@@ -34,7 +37,7 @@ export class FleetMap {
     this.lasso = null;
     this.waiting = false;
     for (const name of Object.keys(this.shows)) {
-      element(name).setAttribute("aria-pressed", String(this.shows[name]));
+      setPressed(element(name), this.shows[name]);
       element(name).addEventListener("click", () => this.toggle(name));
     }
     element("fit").addEventListener("click", () => {
@@ -43,7 +46,7 @@ export class FleetMap {
     });
     element("select").addEventListener("click", () => {
       this.selecting = !this.selecting;
-      element("select").setAttribute("aria-pressed", String(this.selecting));
+      setPressed(element("select"), this.selecting);
     });
     element("zoomin").addEventListener("click", () => this.zoom(1.4));
     element("zoomout").addEventListener("click", () => this.zoom(1 / 1.4));
@@ -53,7 +56,7 @@ export class FleetMap {
 
   toggle(name) {
     this.shows[name] = !this.shows[name];
-    element(name).setAttribute("aria-pressed", String(this.shows[name]));
+    setPressed(element(name), this.shows[name]);
     if (name === "ground_truth") localStorage.setItem("ground_truth", String(this.shows.ground_truth));
     this.requestShown();
     this.picture.show(this.shows.picture, this.state.picture);
@@ -63,7 +66,7 @@ export class FleetMap {
   /** Tell what is to be seen here; to be repeated on each connection. */
   requestShown() {
     const { ground_truth, picture } = this.shows;
-    this.send({ do: "show", ground_truth, picture, visible: !document.hidden });
+    this.connection.send({ do: "show", ground_truth, picture, visible: !document.hidden });
   }
 
   /** Ask for places, with a hint, until a hint of null: onPlace({x, y, yaw}) in m and rad, yaw after a drag alone. */
@@ -111,17 +114,14 @@ export class FleetMap {
     });
     for (const change of ["focus", "blur"]) canvas.addEventListener(change, () => this.draw());
     canvas.addEventListener("pointerleave", () => (element("place").textContent = ""));
-    canvas.addEventListener(
-      "wheel",
-      (event) => {
-        event.preventDefault();
-        this.zoom(Math.exp(-event.deltaY * 0.0015), event.offsetX, event.offsetY);
-      },
-      { passive: false },
-    );
+    const turnWheel = (event) => {
+      event.preventDefault();
+      this.zoom(Math.exp(-event.deltaY * 0.0015), event.offsetX, event.offsetY);
+    };
+    canvas.addEventListener("wheel", turnWheel, { passive: false });
     canvas.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: [-60, 0], ArrowRight: [60, 0], ArrowUp: [0, -60], ArrowDown: [0, 60] }[event.key];
-      if (step) this.pan(-step[0], -step[1]);
+      const step = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] }[event.key];
+      if (step) this.pan(...step);
       else if (event.key === "+") this.zoom(1.4);
       else if (event.key === "-") this.zoom(1 / 1.4);
       else if (event.key === "Enter" && this.onPlace && !event.repeat && !isLate(event)) {
@@ -172,14 +172,13 @@ export class FleetMap {
     if (nearest !== null || !isAdded) this.choose(nearest === null ? [] : [nearest], isAdded);
   }
 
-  /** Robots inside the loop: a ray from them to the right crosses it an odd number of times. */
+  /** Robots inside the loop. */
   findInLasso() {
-    const isInside = ([x, y]) =>
-      this.lasso.filter(([ax, ay], index) => {
-        const [bx, by] = this.lasso[(index + 1) % this.lasso.length];
-        return ay > y !== by > y && x < ax + ((y - ay) / (by - ay)) * (bx - ax);
-      }).length % 2 === 1;
-    return Object.keys(this.state.poses).filter((name) => this.state.poses[name] && isInside(this.state.poses[name]));
+    const loop = new Path2D();
+    for (const place of this.lasso) loop.lineTo(...place);
+    const context = make("canvas").getContext("2d"); // without the map's transformation
+    const isInside = (pose) => pose && context.isPointInPath(loop, pose[0], pose[1], "evenodd");
+    return Object.keys(this.state.poses).filter((name) => isInside(this.state.poses[name]));
   }
 
   takePlace() {
@@ -221,27 +220,18 @@ export class FleetMap {
   }
 
   fit() {
-    const xs = [];
-    const ys = [];
-    const add = (x, y, reach) => {
-      xs.push(x - reach, x + reach);
-      ys.push(y - reach, y + reach);
-    };
-    for (const pose of Object.values({ ...this.state.replay, ...this.state.poses })) if (pose) add(pose[0], pose[1], 150);
-    for (const [x, y, yaw, length, width] of this.state.arena.boxes) {
-      const [cosine, sine] = [Math.abs(Math.cos(yaw / 1000)), Math.abs(Math.sin(yaw / 1000))];
-      xs.push(x - (length * cosine + width * sine) / 2, x + (length * cosine + width * sine) / 2);
-      ys.push(y - (length * sine + width * cosine) / 2, y + (length * sine + width * cosine) / 2);
-    }
-    for (const [x, y, radius] of this.state.arena.circles) add(x, y, radius);
-    for (const { lines = [], isBeam } of this.state.drawings) if (!isBeam) for (const [x, y] of lines.flat()) add(x, y, 60);
-    for (const [x, y] of this.state.grid ? Occupancy.corners(this.state.grid) : []) add(x, y, 0);
-    if (this.picture.box) {
-      const [left, low, right, high] = this.picture.box;
-      xs.push(left, right);
-      ys.push(low, high);
-    }
-    if (!xs.length) return false;
+    const { poses, replay, arena, grid, drawings } = this.state;
+    const places = []; // that are to be seen
+    const add = (pose, box) => places.push(...listCorners(pose, box));
+    const surround = ([x, y], reach) => places.push([x - reach, y - reach], [x + reach, y + reach]);
+    for (const pose of Object.values({ ...replay, ...poses })) if (pose) surround(pose, 150);
+    for (const [x, y, yaw, length, width] of arena.boxes) add([x, y, yaw], [-length / 2, -width / 2, length / 2, width / 2]);
+    for (const [x, y, radius] of arena.circles) surround([x, y], radius);
+    for (const { lines = [], isBeam } of drawings) if (!isBeam) for (const place of lines.flat()) surround(place, 60);
+    if (grid) add(grid.pose, [0, 0, grid.columns * grid.cell, grid.rows * grid.cell]);
+    if (this.picture.box) add([0, 0, 0], this.picture.box);
+    if (!places.length) return false;
+    const [xs, ys] = [0, 1].map((axis) => places.map((place) => place[axis]));
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const room = 1 - MARGIN;
     const edge = Math.min(this.height / 4, Math.max(EDGE_PX, element("frame").offsetHeight + LABEL_PX));
@@ -280,14 +270,13 @@ export class FleetMap {
   update(updates) {
     if ("poses" in updates) this.keepTrails();
     if ("picture" in updates) this.picture.show(this.shows.picture, this.state.picture);
-    const count = Object.keys(this.state.poses).length + Object.keys(this.state.replay).length;
-    if (!this.pinned && this.fittedFor !== this.sceneKey(count) && this.fit()) this.fittedFor = this.sceneKey(count);
+    const { poses, replay, fleet, grid, arena, drawings } = this.state;
+    const count = Object.keys(poses).length + Object.keys(replay).length;
+    const placed = fleet.robots.filter((robot) => robot.source).length;
+    // When there is something else to see, the view fits it again.
+    const scene = String([count, fleet.frame, this.picture.box, grid?.columns, arena.boxes.length, drawings.length > 0, placed]);
+    if (!this.pinned && this.fittedFor !== scene && this.fit()) this.fittedFor = scene;
     this.draw();
-  }
-
-  /** What there is to see: when it changes, the view fits it again. */
-  sceneKey(count) {
-    return `${count} ${this.state.fleet.frame} ${this.picture.box} ${this.state.grid?.columns} ${this.state.arena.boxes.length} ${this.state.drawings.length > 0} ${this.state.fleet.robots.filter((robot) => robot.source).length}`;
   }
 
   keepTrails() {

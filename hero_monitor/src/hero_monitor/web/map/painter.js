@@ -39,10 +39,11 @@ export class MapPainter {
     context.translate(this.width / 2, this.height / 2);
     context.scale(view.scale, -view.scale);
     context.translate(-view.x, -view.y);
-    this.paintOccupancy();
+    if (state.grid) this.paintOccupancy(state.grid);
     if (map.picture.box) this.paintPicture(map.picture);
     this.paintGrid();
-    this.paintArena();
+    this.paintShapes(state.arena, "--wall");
+    this.paintShapes(state.objects, "--object");
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
     if (shows.trails) for (const robot of robots) this.paintTrail(robot);
     if (shows.ground_truth) for (const robot of robots) this.paintGroundTruth(robot);
@@ -60,28 +61,53 @@ export class MapPainter {
     this.paintScale();
   }
 
-  at(pose, paint) {
+  /** Paint with a pose as the origin; texts and images with y down. */
+  at([x, y, yaw = 0], paint, isFlipped = false) {
     const { context } = this;
     context.save();
-    context.translate(pose[0], pose[1]);
-    context.rotate(pose[2] / 1000);
-    paint(context);
+    context.translate(x, y);
+    context.rotate(yaw / 1000);
+    if (isFlipped) context.scale(1, -1);
+    paint();
     context.restore();
   }
 
-  paintOccupancy() {
+  /** Take a pen; its width is that in px, but not less than that in mm. */
+  pen(ink, px, mm = 0) {
+    this.context.strokeStyle = this.context.fillStyle = ink;
+    this.context.lineWidth = Math.max(mm, px / this.view.scale);
+  }
+
+  circle(x, y, radius) {
+    this.context.beginPath();
+    this.context.arc(x, y, radius, 0, 2 * Math.PI);
+    return this.context;
+  }
+
+  path(...points) {
+    this.context.beginPath();
+    for (const [x, y] of points) this.context.lineTo(x, y);
+    return this.context;
+  }
+
+  dashed(lengths, paint) {
+    this.context.setLineDash(lengths);
+    paint();
+    this.context.setLineDash([]);
+  }
+
+  paintOccupancy(grid) {
+    const { context } = this;
     const read = (name, alpha) => [...this.ink(name).match(/[0-9a-f]{2}/gi).map((part) => parseInt(part, 16)), alpha];
     const colors = { unknown: read("--wall", UNKNOWN_ALPHA), free: [0, 0, 0, 0], occupied: read("--wall", 255) };
-    this.occupancy.paint(this.context, this.state.grid, colors);
+    this.at(grid.pose, () => {
+      context.imageSmoothingEnabled = false;
+      context.drawImage(this.occupancy.find(grid, colors), 0, 0, grid.columns * grid.cell, grid.rows * grid.cell);
+    });
   }
 
   paintPicture({ image, box: [left, low, right, high] }) {
-    const { context } = this;
-    context.save();
-    context.translate(left, high);
-    context.scale(1, -1);
-    context.drawImage(image, 0, 0, right - left, high - low);
-    context.restore();
+    this.at([left, high], () => this.context.drawImage(image, 0, 0, right - left, high - low), true);
   }
 
   paintGrid() {
@@ -91,8 +117,7 @@ export class MapPainter {
     const [left, low] = this.map.toMap(0, this.height);
     const [right, high] = this.map.toMap(this.width, 0);
     for (const [step, ink] of [[fine, "--grid"], [fine * 10, "--grid-bold"]]) {
-      context.strokeStyle = this.ink(ink);
-      context.lineWidth = 1 / view.scale;
+      this.pen(this.ink(ink), 1);
       context.beginPath();
       for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
         context.moveTo(x, low);
@@ -106,11 +131,6 @@ export class MapPainter {
     }
   }
 
-  paintArena() {
-    this.paintShapes(this.state.arena, "--wall");
-    this.paintShapes(this.state.objects, "--object");
-  }
-
   paintShapes({ boxes, circles }, ink) {
     const { context, view } = this;
     context.fillStyle = this.ink(ink);
@@ -118,19 +138,14 @@ export class MapPainter {
       const thick = Math.max(width, 3 / view.scale);
       this.at([x, y, yaw], () => context.fillRect(-length / 2, -thick / 2, length, thick));
     }
-    for (const [x, y, radius] of circles) {
-      context.beginPath();
-      context.arc(x, y, radius, 0, 2 * Math.PI);
-      context.fill();
-    }
+    for (const [x, y, radius] of circles) this.circle(x, y, radius).fill();
   }
 
   paintTrail(robot) {
     const trail = this.map.trails.get(robot.name);
     if (!trail || trail.length < 2) return;
-    const { context, view } = this;
+    const { context } = this;
     const now = Date.now();
-    context.lineWidth = Math.max(5, 1.5 / view.scale);
     context.lineJoin = context.lineCap = "round";
     // In a few pieces, older ones fainter.
     const pieces = TRAIL_INKS.map(() => new Path2D());
@@ -143,7 +158,7 @@ export class MapPainter {
       piece.lineTo(x, y);
     });
     pieces.forEach((piece, index) => {
-      context.strokeStyle = colorOf(robot.id, TRAIL_INKS[index]);
+      this.pen(colorOf(robot.id, TRAIL_INKS[index]), 1.5, 5);
       context.stroke(piece);
     });
   }
@@ -151,58 +166,37 @@ export class MapPainter {
   paintGroundTruth(robot) {
     const pose = this.state.ground_truth[robot.name];
     if (!pose) return;
-    const { context, view } = this;
-    context.strokeStyle = this.ink("--ink");
-    context.lineWidth = 1.2 / view.scale;
-    context.setLineDash([4 / view.scale, 3 / view.scale]);
-    this.at(pose, () => {
-      context.beginPath();
-      context.arc(0, 0, BODY_MM, 0, 2 * Math.PI);
-      context.moveTo(0, 0);
-      context.lineTo(BODY_MM * 1.35, 0);
-      context.stroke();
-    });
-    context.setLineDash([]);
+    const { scale } = this.view;
+    this.pen(this.ink("--ink"), 1.2);
+    this.at(pose, () =>
+      this.dashed([4 / scale, 3 / scale], () => {
+        this.circle(0, 0, BODY_MM).stroke();
+        this.path([0, 0], [BODY_MM * 1.35, 0]).stroke();
+      }),
+    );
   }
 
   paintGoal(robot) {
     const goal = this.state.goals[robot.name];
     if (!goal) return;
-    const { context, view, state } = this;
-    const pose = state.poses[robot.name];
-    context.strokeStyle = context.fillStyle = colorOf(robot.id);
-    context.lineWidth = Math.max(3, 1.5 / view.scale);
-    context.setLineDash([14, 12]);
-    context.beginPath();
-    context.moveTo(pose[0], pose[1]);
-    context.lineTo(goal[0], goal[1]);
-    context.stroke();
-    context.setLineDash([]);
-    for (const radius of [26, 11]) {
-      context.beginPath();
-      context.arc(goal[0], goal[1], Math.max(radius, (radius / 4) / view.scale), 0, 2 * Math.PI);
-      if (radius === 11) context.fill();
-      else context.stroke();
-    }
+    const { scale } = this.view;
+    this.pen(colorOf(robot.id), 1.5, 3);
+    this.dashed([14, 12], () => this.path(this.state.poses[robot.name], goal).stroke());
+    this.circle(goal[0], goal[1], Math.max(26, 6.5 / scale)).stroke();
+    this.circle(goal[0], goal[1], Math.max(11, 2.75 / scale)).fill();
   }
 
   /** Where robots of a formation go. */
   paintPlaces() {
-    const { context, view } = this;
-    context.strokeStyle = this.ink("--accent");
-    context.lineWidth = Math.max(3, 1.5 / view.scale);
-    for (const [x, y] of this.state.programs.flatMap(({ places }) => places)) {
-      context.beginPath();
-      context.arc(x, y, BODY_MM * this.enlarged, 0, 2 * Math.PI);
-      context.stroke();
-    }
+    this.pen(this.ink("--accent"), 1.5, 3);
+    const places = this.state.programs.flatMap((program) => program.places);
+    for (const [x, y] of places) this.circle(x, y, BODY_MM * this.enlarged).stroke();
   }
 
   /** Beams of a behavior's sensors, or its metric: lines over time and a text. */
   paintDrawing({ lines = [], text, at, color, isBeam }) {
     const { context, view } = this;
-    context.strokeStyle = context.fillStyle = color;
-    context.lineWidth = 1.5 / view.scale;
+    this.pen(color, 1.5);
     context.globalAlpha = isBeam ? 0.5 : 1;
     context.beginPath();
     for (const line of lines) line.forEach(([x, y], index) => (index ? context.lineTo(x, y) : context.moveTo(x, y)));
@@ -210,26 +204,16 @@ export class MapPainter {
     context.globalAlpha = 1;
     if (text === undefined) return;
     const [x, y, height] = at;
-    context.save();
-    context.translate(x, y);
-    context.scale(1, -1);
     context.font = `600 ${Math.max(height, 12 / view.scale)}px system-ui, sans-serif`;
     context.textAlign = "center";
     context.textBaseline = "middle";
-    context.fillText(text, 0, 0);
-    context.restore();
+    this.at([x, y], () => context.fillText(text, 0, 0), true);
   }
 
   paintLasso(points) {
-    const { context, view } = this;
-    context.strokeStyle = this.ink("--accent");
-    context.lineWidth = 2 / view.scale;
-    context.setLineDash([6 / view.scale, 4 / view.scale]);
-    context.beginPath();
-    for (const [x, y] of points) context.lineTo(x, y);
-    context.closePath();
-    context.stroke();
-    context.setLineDash([]);
+    const { scale } = this.view;
+    this.pen(this.ink("--accent"), 2);
+    this.dashed([6 / scale, 4 / scale], () => this.path(...points, points[0]).stroke());
   }
 
   paintBeams(robot) {
@@ -239,31 +223,20 @@ export class MapPainter {
     this.at(this.state.poses[robot.name], () => {
       ranges.forEach((range, index) => {
         const turn = -Math.PI + (index * 2 * Math.PI) / ranges.length;
-        const [cosine, sine] = [Math.cos(turn), Math.sin(turn)];
+        const along = (distance) => [distance * Math.cos(turn), distance * Math.sin(turn)];
         if (range === null || range < 0) {
           // Nothing in range: a tick shows the sensor's direction.
-          context.strokeStyle = this.ink("--beam-free");
-          context.lineWidth = 1 / view.scale;
-          context.beginPath();
-          context.moveTo(BODY_MM * cosine, BODY_MM * sine);
-          context.lineTo((BODY_MM + 14) * cosine, (BODY_MM + 14) * sine);
-          context.stroke();
+          this.pen(this.ink("--beam-free"), 1);
+          this.path(along(BODY_MM), along(BODY_MM + 14)).stroke();
           return;
         }
         const near = Math.min(1, Math.max(0, (range - BODY_MM) / (SENSOR_REACH_MM - BODY_MM)));
-        const reach = Math.max(range, BODY_MM);
-        const ink = `hsl(${(near * 48).toFixed(0)} 90% ${isDark() ? 58 : 44}%)`;
-        context.strokeStyle = context.fillStyle = ink;
-        context.lineWidth = Math.max(2.5, 1 / view.scale);
+        const end = along(Math.max(range, BODY_MM));
+        this.pen(`hsl(${(near * 48).toFixed(0)} 90% ${isDark() ? 58 : 44}%)`, 1, 2.5);
         context.globalAlpha = 0.45;
-        context.beginPath();
-        context.moveTo(BODY_MM * cosine, BODY_MM * sine);
-        context.lineTo(reach * cosine, reach * sine);
-        context.stroke();
+        this.path(along(BODY_MM), end).stroke();
         context.globalAlpha = 1;
-        context.beginPath();
-        context.arc(reach * cosine, reach * sine, Math.max(5, 2 / view.scale), 0, 2 * Math.PI);
-        context.fill();
+        this.circle(...end, Math.max(5, 2 / view.scale)).fill();
       });
     });
   }
@@ -283,62 +256,37 @@ export class MapPainter {
     this.at(pose, () => {
       context.scale(this.enlarged, this.enlarged);
       context.globalAlpha = isPlaced ? 1 : 0.4;
-      context.fillStyle = this.ink("--tyre");
+      context.fillStyle = context.strokeStyle = this.ink("--tyre");
       for (const side of [-1, 1]) {
         context.fillRect(-WHEEL_MM[0], side * WHEEL_MM[2] - WHEEL_MM[1] / 2, 2 * WHEEL_MM[0], WHEEL_MM[1]);
       }
-      if (hasShield) {
-        context.strokeStyle = this.ink("--tyre");
-        context.lineWidth = 3;
-        context.beginPath();
-        context.arc(0, 0, SHIELD_MM, 0, 2 * Math.PI);
-        context.stroke();
-      }
+      context.lineWidth = 3;
+      if (hasShield) this.circle(0, 0, SHIELD_MM).stroke();
       // From the rim to the middle: identity, a dark gap, and the light, which glows only within the gap.
       context.fillStyle = this.ink("--shell");
       context.strokeStyle = ink;
       context.lineWidth = 7;
       if (!isPlaced) context.setLineDash([12, 9]);
-      context.beginPath();
-      context.arc(0, 0, BODY_MM - 3.5, 0, 2 * Math.PI);
-      context.fill();
+      this.circle(0, 0, BODY_MM - 3.5).fill();
       context.stroke();
       context.setLineDash([]);
       // An arrowhead marks the front.
       context.fillStyle = ink;
-      context.beginPath();
-      context.moveTo(BODY_MM * 1.38, 0);
-      context.lineTo(BODY_MM * 0.92, BODY_MM * 0.4);
-      context.lineTo(BODY_MM * 0.92, -BODY_MM * 0.4);
-      context.closePath();
-      context.fill();
+      this.path([BODY_MM * 1.38, 0], [BODY_MM * 0.92, BODY_MM * 0.4], [BODY_MM * 0.92, -BODY_MM * 0.4]).fill();
       context.fillStyle = light || this.ink("--dark-light");
-      context.beginPath();
-      context.arc(0, 0, BODY_MM * (light ? 0.58 : 0.3), 0, 2 * Math.PI);
-      context.fill();
+      this.circle(0, 0, BODY_MM * (light ? 0.58 : 0.3)).fill();
       context.globalAlpha = 1;
       if (isChosen) {
-        context.strokeStyle = this.ink("--accent");
-        context.lineWidth = 2.5 / view.scale / this.enlarged;
-        context.beginPath();
-        context.arc(0, 0, BODY_MM * 1.5 + 4 / view.scale / this.enlarged, 0, 2 * Math.PI);
-        context.stroke();
+        this.pen(this.ink("--accent"), 2.5 / this.enlarged);
+        this.circle(0, 0, BODY_MM * 1.5 + 4 / view.scale / this.enlarged).stroke();
       }
     });
   }
 
   paintAim({ from, to }) {
-    const { context, view } = this;
-    context.strokeStyle = context.fillStyle = this.ink("--accent");
-    context.lineWidth = 2 / view.scale;
-    context.beginPath();
-    context.arc(from[0], from[1], 6 / view.scale, 0, 2 * Math.PI);
-    context.fill();
-    if (!to) return;
-    context.beginPath();
-    context.moveTo(from[0], from[1]);
-    context.lineTo(to[0], to[1]);
-    context.stroke();
+    this.pen(this.ink("--accent"), 2);
+    this.circle(...from, 6 / this.view.scale).fill();
+    if (to) this.path(from, to).stroke();
   }
 
   paintNames(robots) {
@@ -372,16 +320,11 @@ export class MapPainter {
   paintScale() {
     const { context, view } = this;
     const length = [10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000].find((mm) => mm * view.scale > 60) || 10000;
-    const wide = length * view.scale;
     const [x, y] = [14, this.height - 14];
+    const end = x + length * view.scale;
     context.strokeStyle = context.fillStyle = this.ink("--quiet");
     context.lineWidth = 1.5;
-    context.beginPath();
-    context.moveTo(x, y - 5);
-    context.lineTo(x, y);
-    context.lineTo(x + wide, y);
-    context.lineTo(x + wide, y - 5);
-    context.stroke();
+    this.path([x, y - 5], [x, y], [end, y], [end, y - 5]).stroke();
     context.font = "12px system-ui, sans-serif";
     context.textAlign = "left";
     context.textBaseline = "bottom";

@@ -1,8 +1,8 @@
 // The camera's picture: each that the monitor announces is fetched while it is shown, one at a time.
 
-const HINT = "no picture: roslaunch hero_localization camera.launch";
+import { element, make } from "../dom.js";
 
-const element = (id) => document.getElementById(id);
+const HINT = "no picture: roslaunch hero_localization camera.launch";
 
 export class CameraPicture {
   /** redraw: is called when the map has another picture, or none. */
@@ -26,25 +26,19 @@ export class CameraPicture {
     } else this.fetch();
   }
 
-  fetch() {
-    if (this.fetching || this.wanted === null || this.wanted.number === this.number) return;
+  async fetch() {
+    if (this.fetching) return;
     this.fetching = true;
-    const { number, box, poses } = this.wanted;
-    const image = new Image();
-    const end = () => {
-      this.fetching = false;
+    while (this.wanted !== null && this.wanted.number !== this.number) {
+      const { number, box, poses } = this.wanted;
+      const image = make("img", { src: `picture/${number}` });
+      const isThere = await image.decode().then(() => true, () => false);
       this.number = number;
-      this.fetch();
-    };
-    image.addEventListener("error", end);
-    image.addEventListener("load", () => {
-      if (this.wanted !== null) {
-        [this.image, this.box, this.poses] = [image, box, poses];
-        this.place();
-      }
-      end();
-    });
-    image.src = `picture/${number}`;
+      if (!isThere || this.wanted === null) continue;
+      [this.image, this.box, this.poses] = [image, box, poses];
+      this.place();
+    }
+    this.fetching = false;
   }
 
   /** Put a picture without a place on the map into the panel. */

@@ -1,13 +1,12 @@
 // A chart of one quantity over the last minute (uPlot, in vendor/): a line for each robot, or mean and extremes of many.
 
+import { element } from "../dom.js";
 import { KEPT_MS, QUANTITIES } from "../history.js";
 import { colorOf } from "../map/colors.js";
 
 const LINES_MAX = 12; // more cannot be told apart
 const PERIOD_MS = 500;
 const HEIGHT_PX = 170;
-
-const element = (id) => document.getElementById(id);
 
 /** Mean, least and greatest of the values that are known at each time. */
 function summarize(values) {

@@ -1,5 +1,6 @@
 // The table of robots. Cells change in place, which keeps selection, scrolling and screen readers undisturbed.
 
+import { Lines, element, isPressed, make, setPressed } from "../dom.js";
 import { colorOf } from "../map/colors.js";
 import { nearestOf } from "../history.js";
 import { sourceOf, stateOf } from "../losses.js";
@@ -28,22 +29,25 @@ function stateText(robot, state) {
 const speedOf = (robot, state, history) => history.speedOf(robot.name);
 const nearestRange = (robot, state) => nearestOf(state.ranges[robot.name]);
 
-/** value: what the table sorts by; text: of a value; lasting: it stays true of a robot that is unknown now. */
+/**
+ * value: what the table sorts by; text: of a value; lasting: it stays true of a robot that is unknown now;
+ * byName: it comes from topics of the robot's name, which of a refused robot are another one's.
+ */
 const COLUMNS = [
   { title: "Robot", value: (robot) => robot.id, text: (id, robot) => robot.name || robot.address, lasting: true },
   { title: "State", value: stateText, tag: "state", lasting: true },
-  { title: "Stop", value: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", lasting: true },
-  { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => LIGHTS[light] || light || "off" },
-  { title: "Nearest", value: nearestRange, text: (mm) => number(mm === null ? null : mm / 1000, 2, " m"), isNumber: true },
-  { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), isNumber: true },
-  { title: "Pose", value: sourceOf, text: (source) => source || "own odometry", tag: "source", lasting: true },
-  { title: "Address", value: (robot) => robot.address, details: true, lasting: true },
-  { title: "Odom", value: (robot) => robot.odom, text: (rate) => number(rate, 1, " Hz"), details: true, isNumber: true },
-  { title: "From robot", value: (robot) => robot.bytes, text: (bytes) => number(bytes / 1000, 1, " kB/s"), details: true, isNumber: true },
-  { title: "Clock", value: (robot) => robot.clock, text: (clock) => number(clock === null ? null : clock * 1000, 1, " ms"), details: true, isNumber: true },
-  { title: "Firmware", value: (robot) => robot.firmware, details: true, lasting: true },
-  { title: "Reconnects", value: (robot) => robot.reconnects, details: true, isNumber: true, lasting: true },
-  { title: "Last error", value: healthOf, text: String, details: true, isError: true, lasting: true },
+  { title: "Stop", value: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", className: "stop", lasting: true },
+  { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => LIGHTS[light] || light || "off", byName: true },
+  { title: "Nearest", value: nearestRange, text: (mm) => number(mm === null ? null : mm / 1000, 2, " m"), className: "number", byName: true },
+  { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), className: "number", byName: true },
+  { title: "Pose", value: sourceOf, text: (source) => source || "own odometry", tag: "source", lasting: true, byName: true },
+  { title: "Address", value: (robot) => robot.address, className: "details", lasting: true },
+  { title: "Odom", value: (robot) => robot.odom, text: (rate) => number(rate, 1, " Hz"), className: "details number" },
+  { title: "From robot", value: (robot) => robot.bytes, text: (bytes) => number(bytes / 1000, 1, " kB/s"), className: "details number" },
+  { title: "Clock", value: (robot) => robot.clock, text: (clock) => number(clock === null ? null : clock * 1000, 1, " ms"), className: "details number" },
+  { title: "Firmware", value: (robot) => robot.firmware, className: "details", lasting: true },
+  { title: "Reconnects", value: (robot) => robot.reconnects, className: "details number", lasting: true },
+  { title: "Last error", value: healthOf, text: String, className: "details error", lasting: true },
 ];
 
 function compare(a, b) {
@@ -55,36 +59,27 @@ function compare(a, b) {
 export class FleetTable {
   /** isAdding(): whether clicks choose robots in addition, without Shift, too. */
   constructor({ choose, history, isAdding }) {
-    this.choose = choose;
-    this.isAdding = isAdding;
-    this.history = history;
+    Object.assign(this, { choose, history, isAdding });
     this.column = COLUMNS[0];
     this.down = false;
-    this.rows = new Map();
     this.table = document.querySelector("#fleet table");
-    this.body = this.table.tBodies[0];
+    this.rows = new Lines(this.table.tBodies[0], () => this.makeRow());
     this.heads = COLUMNS.map((column) => this.makeHead(column));
-    const details = document.getElementById("details");
+    this.table.tHead.rows[0].append(...this.heads);
+    const details = element("details");
     const show = (isShown) => {
       this.table.classList.toggle("detailed", isShown);
-      details.setAttribute("aria-pressed", String(isShown));
+      setPressed(details, isShown);
       localStorage.setItem("details", String(isShown));
     };
-    details.addEventListener("click", () => show(details.getAttribute("aria-pressed") !== "true"));
+    details.addEventListener("click", () => show(!isPressed(details)));
     show(localStorage.getItem("details") === "true");
   }
 
   makeHead(column) {
-    const cell = document.createElement("th");
-    cell.scope = "col";
-    cell.className = classOf(column);
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = column.title;
+    const button = make("button", { type: "button" }, column.title);
     button.addEventListener("click", () => this.sortBy(column));
-    cell.append(button);
-    this.table.tHead.rows[0].append(cell);
-    return cell;
+    return make("th", { scope: "col", className: column.className || "" }, button);
   }
 
   sortBy(column) {
@@ -105,44 +100,17 @@ export class FleetTable {
       if (cell.getAttribute("aria-sort") !== order) cell.setAttribute("aria-sort", order);
     });
     this.table.classList.toggle("stopping", robots.some((robot) => robot.stop));
-    const left = new Set(this.rows.keys());
-    robots.forEach((robot, index) => {
-      const id = `${robot.name} ${robot.address} ${robot.state === "REFUSED"}`;
-      left.delete(id);
-      const row = this.rows.get(id) || this.addRow(id);
-      if (this.body.children[index] !== row.line) this.body.insertBefore(row.line, this.body.children[index] || null);
-      this.fill(row, robot, state);
-    });
-    for (const id of left) {
-      this.rows.get(id).line.remove();
-      this.rows.delete(id);
-    }
+    const keyOf = (robot) => `${robot.name} ${robot.address} ${robot.state === "REFUSED"}`;
+    this.rows.show(robots, keyOf, (row, robot) => this.fill(row, robot, state));
   }
 
-  addRow(id) {
-    const line = document.createElement("tr");
-    const row = { line, targets: [], texts: [], robot: null };
-    COLUMNS.forEach((column, index) => {
-      const cell = document.createElement(index === 0 ? "th" : "td");
-      cell.className = classOf(column);
-      let target = cell;
-      if (index === 0) {
-        cell.scope = "row";
-        const button = (row.button = document.createElement("button"));
-        button.type = "button";
-        row.chip = document.createElement("span");
-        row.chip.className = "chip";
-        target = document.createElement("span");
-        button.append(row.chip, target);
-        cell.append(button);
-      } else if (column.tag || column.title === "Light") {
-        target = document.createElement("span");
-        target.className = column.tag ? "tag" : "light";
-        cell.append(target);
-      }
-      line.append(cell);
-      row.targets.push(target);
-    });
+  makeRow() {
+    const targets = COLUMNS.map(({ tag, title }) => make("span", { className: tag ? "tag" : title === "Light" ? "light" : "" }));
+    const chip = make("span", { className: "chip" });
+    const button = make("button", { type: "button" }, chip, targets[0]);
+    const cells = COLUMNS.slice(1).map(({ className = "" }, index) => make("td", { className }, targets[index + 1]));
+    const line = make("tr", {}, make("th", { scope: "row" }, button), ...cells);
+    const row = { line, button, chip, targets, texts: [], robot: null };
     const choose = (isAdded) => row.robot.state !== "REFUSED" && this.choose([row.robot.name], isAdded);
     line.addEventListener("click", (event) => choose(this.isAdding() || event.shiftKey || event.ctrlKey || event.metaKey));
     // The loop of the keyboard: arrows go from row to row, with Shift they add robots on their way.
@@ -150,11 +118,10 @@ export class FleetTable {
       const next = { ArrowDown: line.nextElementSibling, ArrowUp: line.previousElementSibling }[event.key];
       if (!next) return;
       event.preventDefault();
-      if (event.shiftKey && row.button.getAttribute("aria-pressed") === "false") choose(true);
+      if (event.shiftKey && !isPressed(button)) choose(true);
       next.querySelector("button").focus();
       if (event.shiftKey && next.querySelector("[aria-pressed=false]")) next.dispatchEvent(new MouseEvent("click", { shiftKey: true }));
     });
-    this.rows.set(id, row);
     return row;
   }
 
@@ -162,10 +129,10 @@ export class FleetTable {
     row.robot = robot;
     const shownState = stateOf(robot, state);
     const isOutdated = shownState !== "READY" && shownState !== "JOINING";
-    const isRefused = robot.state === "REFUSED"; // then topics of its name are those of another robot
-    COLUMNS.forEach(({ title, value, text, tag, lasting }, index) => {
+    const isRefused = robot.state === "REFUSED";
+    COLUMNS.forEach(({ title, value, text, tag, lasting, byName }, index) => {
       const now = value(robot, state, this.history);
-      const isHidden = (isOutdated && !lasting) || (isRefused && ["Light", "Nearest", "Speed", "Pose"].includes(title));
+      const isHidden = (isOutdated && !lasting) || (isRefused && byName);
       const shown = isHidden ? "-" : text ? text(now, robot) : now === "" && !tag ? "-" : String(now);
       if (row.texts[index] === shown) return;
       row.texts[index] = shown;
@@ -177,12 +144,8 @@ export class FleetTable {
     });
     row.chip.style.background = colorOf(robot.id);
     row.line.classList.toggle("unknown", shownState === "UNKNOWN");
-    const isChosen = state.chosen.has(robot.name) && robot.state !== "REFUSED";
+    const isChosen = state.chosen.has(robot.name) && !isRefused;
     row.line.classList.toggle("chosen", isChosen);
-    row.button.setAttribute("aria-pressed", String(isChosen));
+    setPressed(row.button, isChosen);
   }
-}
-
-function classOf({ details, isNumber, isError, title }) {
-  return [details && "details", isNumber && "number", isError && "error", title === "Stop" && "stop"].filter(Boolean).join(" ");
 }

@@ -1,5 +1,6 @@
 // Log lines of nodes and robots by their time, newest at the bottom; a message that comes again, for any robot, stays one line.
 
+import { element, make } from "../dom.js";
 import { colorOf } from "../map/colors.js";
 
 const LINES_MAX = 500;
@@ -8,21 +9,13 @@ const AT_END_PX = 30;
 const DELAY_MAX_S = 10; // of lines on their way from other nodes; later, a clock was set back
 const NUMBER = /\d+(\.\d+)?/g;
 
-function cell(className, text) {
-  const part = document.createElement("span");
-  part.className = className;
-  part.textContent = text;
-  return part;
-}
+const cell = (className, text) => make("span", { className }, text);
 
 const isLate = (seconds, entry) => entry && seconds < entry.seconds && seconds > entry.seconds - DELAY_MAX_S;
 
 export class LogView {
   constructor() {
-    this.list = document.getElementById("lines");
-    this.level = document.getElementById("level");
-    this.mine = document.getElementById("mine");
-    this.words = document.getElementById("words");
+    [this.list, this.level, this.mine, this.words] = ["lines", "level", "mine", "words"].map(element);
     this.chosen = new Set();
     this.groups = new Map(); // by message without its numbers: the line that shows it, how often it came, and of whom
     for (const input of [this.level, this.mine, this.words]) {
@@ -42,13 +35,7 @@ export class LogView {
 
   append({ missed, lines }) {
     const atEnd = this.list.scrollHeight - this.list.scrollTop - this.list.clientHeight < AT_END_PX;
-    if (missed > 0) {
-      const gap = document.createElement("li");
-      gap.className = "gap";
-      gap.textContent = `${missed} lines left out`;
-      gap.entry = null;
-      this.list.append(gap);
-    }
+    if (missed > 0) this.list.append(make("li", { className: "gap", entry: null }, `${missed} lines left out`));
     for (const [, seconds, level, node, robot, text] of lines) this.add({ seconds, level, node, robot, text });
     while (this.list.childElementCount > LINES_MAX) {
       this.groups.delete(this.list.firstElementChild.entry?.key);
@@ -65,16 +52,14 @@ export class LogView {
     if (former && isLate(seconds, former.line.entry)) seconds = former.line.entry.seconds;
     const robots = new Set(former?.robots).add(robot);
     const count = (former?.count ?? 0) + 1;
-    const line = document.createElement("li");
-    line.className = LEVELS[level] || "info";
-    line.entry = { key, seconds, level, robots, words: `${node} ${text}`.toLowerCase() };
-    const time = new Date(seconds * 1000);
-    line.append(cell("time", time.toTimeString().slice(0, 8)), cell("level", LEVELS[level] || "?"));
+    const time = new Date(seconds * 1000).toTimeString().slice(0, 8);
     const source = cell("node", robots.size > 1 ? `${robots.size} robots` : robot || node);
     source.title = node;
     if (robot && robots.size === 1) source.style.color = colorOf(Number(robot.slice(robot.indexOf("_") + 1)));
-    line.append(source, cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text));
-    if (count > 1) line.lastElementChild.append(cell("count", `${count} times`));
+    const said = cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text);
+    if (count > 1) said.append(cell("count", `${count} times`));
+    const entry = { key, seconds, level, robots, words: `${node} ${text}`.toLowerCase() };
+    const line = make("li", { className: LEVELS[level] || "info", entry }, cell("time", time), source, said);
     line.hidden = !this.admits(line.entry);
     this.groups.set(key, { line, count, robots });
     this.list.insertBefore(line, this.findNext(seconds));

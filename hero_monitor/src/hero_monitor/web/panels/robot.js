@@ -4,9 +4,11 @@
 // button is let go, the page is hidden or loses focus, was suspended, or the network stalls. The monitor stops robots
 // on "end_drive", after 0.4 s of silence, or when the socket closes.
 
+import { Lines, element, isPressed, make, setPressed, setText } from "../dom.js";
 import { colorOf } from "../map/colors.js";
 import { isLate } from "../connection.js";
 import { healthOf, spanOf } from "./fleet.js";
+import { nearestOf } from "../history.js";
 import { stateOf } from "../losses.js";
 
 const HOLD_MS = 100;
@@ -16,18 +18,14 @@ const KEYS = {
   KeyW: [1, 0], KeyS: [-1, 0], KeyA: [0, 1], KeyD: [0, -1],
 };
 
-const element = (id) => document.getElementById(id);
-
 export class RobotPanel {
   constructor({ connection, map, notice }) {
-    this.connection = connection;
-    this.notice = notice;
-    this.map = map;
+    Object.assign(this, { connection, map, notice });
     this.names = [];
     this.driving = null;
     this.timer = null;
     this.keys = new Set();
-    this.facts = new Map();
+    this.facts = new Lines(element("facts"), (title) => this.makeFact(title));
     const pad = element("pad");
     for (const button of pad.querySelectorAll("button")) {
       const direction = button.dataset.direction.split(" ").map(Number);
@@ -64,7 +62,7 @@ export class RobotPanel {
       element(id).addEventListener("input", show);
       show();
     }
-    element("goto").addEventListener("click", () => this.setGoing(element("goto").getAttribute("aria-pressed") !== "true"));
+    element("goto").addEventListener("click", () => this.setGoing(!isPressed(element("goto"))));
     addEventListener("keydown", (event) => event.key === "Escape" && this.setGoing(false));
   }
 
@@ -72,7 +70,7 @@ export class RobotPanel {
     const count = this.names.length;
     const whose = count === 1 ? `the goal of ${this.names[0]}` : `where the middle of these ${count} goes, as they stand`;
     this.map.askPlace(going ? `Click ${whose}; drag to set the final heading.` : null, (place) => this.sendGoals(place));
-    element("goto").setAttribute("aria-pressed", String(going));
+    setPressed(element("goto"), going);
     element("goto").textContent = going ? "Choosing a goal" : "Go to goal";
   }
 
@@ -167,17 +165,17 @@ export class RobotPanel {
     const isKnown = robots.some((one) => stateOf(one, state) !== "UNKNOWN");
     element("control").hidden = !isKnown || !state.hello.control;
     element("advice").hidden = robots.length === 0 || state.hello.control;
-    element("advice").textContent = "View only. control:=true lets the monitor drive robots.";
     const problem = robot ? healthOf(robot) : "";
     element("problem").hidden = !problem;
     element("problem").textContent = problem;
-    this.showFacts(robot === null ? [] : this.listFacts(robot, state));
+    const facts = robot === null ? [] : this.listFacts(robot, state);
+    this.facts.show(facts, ([title]) => title, ({ value }, [, text]) => setText(value, text));
   }
 
   listFacts(robot, state) {
     if (stateOf(robot, state) === "UNKNOWN") return [["all data", "unknown"]];
     const pose = state.poses[robot.name];
-    const ranges = (state.ranges[robot.name] || []).filter((range) => range !== null && range >= 0);
+    const nearest = nearestOf(state.ranges[robot.name]);
     const meters = (value) => (value / 1000).toFixed(3);
     const facts = [
       ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
@@ -185,7 +183,7 @@ export class RobotPanel {
       ["pose source", robot.source || "own odometry: position on the map unknown"],
       ["frame", robot.source ? state.fleet.frame : "-"],
       ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
-      ["nearest", ranges.length ? `${meters(Math.min(...ranges))} m` : "nothing in range"],
+      ["nearest", nearest === null ? "nothing in range" : `${meters(nearest)} m`],
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
       ["from robot", `${robot.packets.toFixed(0)} packets/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
       ["address", robot.address],
@@ -205,23 +203,8 @@ export class RobotPanel {
     return facts;
   }
 
-  showFacts(facts) {
-    const titles = new Set(facts.map(([title]) => title));
-    for (const [title, fact] of this.facts) {
-      if (titles.has(title)) continue;
-      fact.term.remove();
-      fact.value.remove();
-      this.facts.delete(title);
-    }
-    facts.forEach(([title, text]) => {
-      let fact = this.facts.get(title);
-      if (!fact) {
-        fact = { term: document.createElement("dt"), value: document.createElement("dd") };
-        fact.term.textContent = title;
-        element("facts").append(fact.term, fact.value);
-        this.facts.set(title, fact);
-      }
-      if (fact.value.textContent !== text) fact.value.textContent = text;
-    });
+  makeFact(title) {
+    const value = make("dd");
+    return { line: make("div", {}, make("dt", {}, title), value), value };
   }
 }

@@ -1,10 +1,9 @@
 // The swarm in numbers, shown while no robot is chosen.
 
+import { element } from "../dom.js";
 import { stateOf } from "../losses.js";
 
 const DRIVING_M_S = 0.01;
-
-const element = (id) => document.getElementById(id);
 
 /** Each robot counts once: lost before stopped, stopped before driving; one that still joins does not count yet. */
 function classify(robot, state, history) {
