@@ -71,7 +71,7 @@ class Monitor:
         self.commander.drive(1, DriveCommand(self.namespace, SPEED_M_S, 0.0))
 
     def stop(self):
-        self.commander.stop_robot(self.namespace)
+        self.commander.dead_man.stop(self.namespace)
         self.commander.step()
 
 

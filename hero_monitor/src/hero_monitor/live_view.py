@@ -10,12 +10,10 @@ import asyncio
 import threading
 import time
 from collections import deque
-from typing import Any, Deque, Dict, List, Optional, Sequence, Set
+from concurrent.futures import Future
+from typing import Any, Deque, Dict, List, Sequence, Set
 
-import tornado.httpserver
 import tornado.ioloop
-import tornado.netutil
-import tornado.web
 
 from hero_node.errors import ProgramError
 from hero_sim.stepped.robot_rows import RobotRows
@@ -25,8 +23,8 @@ from hero_sim.stepped.topics import LATCHED, StepTopics
 from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
 from .foxglove.hub import TopicMessage, TopicType
 from .serving.access import Access
-from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits, TokenAttempts
-from .serving.server import ignore_request
+from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits
+from .serving.server import Server
 
 WAITING_MAX = 20_000
 """Messages between two turns of the server; the oldest are dropped."""
@@ -63,16 +61,15 @@ class LiveView:
         self._topics = StepTopics(rows, robot_ids, self._receive)
         self._types = {name: TopicType(kind.name, kind.definition) for name, kind in self._topics.types.items()}
         self._loop: Any = None
-        self._error: Optional[OSError] = None
-        self.port = port
         self._start_s = _monotonic() - rows.now_ms / 1000.0 / speed
-        is_ready = threading.Event()
-        self._thread = threading.Thread(target=self._serve, args=(port, is_ready), name="live view", daemon=True)
+        listening: Future[int] = Future()
+        self._thread = threading.Thread(target=self._serve, args=(port, listening), name="live view", daemon=True)
         self._thread.start()
-        is_ready.wait()
-        if self._error is not None:
+        try:
+            self.port = listening.result()
+        except OSError as error:
             self._topics.close()
-            raise ProgramError("cannot listen on port %d: %s; choose another" % (port, self._error.strerror))
+            raise ProgramError("cannot listen on port %d: %s; choose another" % (port, error.strerror)) from None
         rows.on_cycle.append(self._pace)
 
     def __enter__(self) -> "LiveView":
@@ -108,28 +105,19 @@ class LiveView:
         elif topic in self._wanted:
             self._waiting.append(message)
 
-    def _serve(self, port: int, is_ready: threading.Event) -> None:
+    def _serve(self, port: int, listening: "Future[int]") -> None:
         asyncio.set_event_loop(asyncio.new_event_loop())
         self._loop = tornado.ioloop.IOLoop.current()
         endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), self._origins)
-        shared = {"access": Access(None, ()), "limits": ConnectionLimits(CONNECTIONS_MAX), "attempts": TokenAttempts()}
-        route = endpoint.route
-        application = tornado.web.Application(
-            [(route.pattern, route.handler, {**shared, **route.values})], log_function=ignore_request
-        )
-        server = tornado.httpserver.HTTPServer(application)
+        server = Server(Access(None, ()), ConnectionLimits(CONNECTIONS_MAX), None, endpoint.route)
         try:
-            sockets = tornado.netutil.bind_sockets(port, "127.0.0.1")
-            self.port = sockets[0].getsockname()[1]
-            server.add_sockets(sockets)
+            listening.set_result(server.listen("127.0.0.1", port))
         except OSError as error:
-            self._error = error
+            listening.set_exception(error)
             return
-        finally:
-            is_ready.set()
         self._loop.start()
         endpoint.close()
-        server.stop()
+        server.close()
         self._loop.close()
 
     def _want(self, topics: Set[str]) -> bool:

@@ -3,7 +3,7 @@
 import time
 from concurrent.futures import Future
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Sequence, Union
 
 import rospy
 
@@ -14,10 +14,9 @@ from .background import Background
 from .control.client_commands import read_command
 from .control.commander import Commander, Notice
 from .control.dead_man import DriveCommand
-from .control.freshness import explain_refused_release, is_fresh, read_clock_ms
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
 from .control.programs import PROGRAMS_MAX, Child, Programs
-from .control.requests import RequestError, read_request
+from .control.requests import RequestError, is_fresh, read_clock_ms, read_request
 from .fleet_feed.feed import FleetFeed
 from .parameters import Parameters
 
@@ -29,7 +28,14 @@ Request = Dict[str, Any]
 GOALS_AT_ONCE = 100
 
 MOVING = ("drive", "goal", "start")
-"""Requests that make robots move: fresh, with control:=true, of robots that are connected and not stopped."""
+"""Requests that make robots move: with control:=true, of robots that are connected and not stopped."""
+
+INERT_S = 2.0
+"""After a stop no release counts: the finger that stopped all robots may tap again."""
+
+
+class RefusedError(Exception):
+    """A valid request is not carried out; the message says why."""
 
 
 class PageRequests:
@@ -49,10 +55,10 @@ class PageRequests:
         self._background, self._hand_over, self._broadcast = background, hand_over, broadcast
         self.programs = Programs(rospy.get_name(), hand_over, self._stop_robots_of)
         self._pending_goals = 0
-        self._carry_out: Dict[str, Callable[[PageSocket, Request], str]] = {
+        self._carry_out: Dict[str, Callable[[PageSocket, Request], None]] = {
             "show": self._show,
             "stop": self._stop,
-            "release": self._release,
+            "release": self._stop,
             "end_drive": self._end_drive,
             "stop_some": self._stop_some,
             "end": self._end,
@@ -67,76 +73,71 @@ class PageRequests:
         try:
             request = read_request(text)
             if request["do"] == "start":
-                check_values(request["program"], request["values"])
+                request["values"] = check_values(request["program"], request["values"])
         except RequestError as error:
             page.tell("error", "invalid request (%s): reload the page" % error)
             return
-        is_delayed = not is_fresh(request, read_clock_ms()) and request["do"] != "release"
-        if is_delayed and request["do"] == "drive":
-            return  # a button that is still held sends the next one at once
-        refusal = "the request was delayed: nothing was done" if is_delayed else self._explain_refusal(request)
-        refusal = refusal or self._carry_out[request["do"]](page, request)
-        if refusal:
-            page.tell("error", refusal)
+        try:
+            if is_fresh(request, read_clock_ms()):
+                self._check(request["do"], request.get("robots", ()))
+                self._carry_out[request["do"]](page, request)
+            elif request["do"] != "drive":  # a button that is still held sends the next one at once
+                raise RefusedError("the request was delayed: nothing was done")
+        except (RefusedError, FormationError) as error:
+            page.tell("error", str(error))
 
     def publish(self, client: int, topic: str, message_type: str, content: bytes) -> str:
         """Carry out a message of a Foxglove client by the rules of the page; return why it is refused, empty if not."""
         command = read_command(topic, message_type, content)
         if command is None:
             return "%s: only /hero_N/cmd_vel (geometry_msgs/Twist) and stop_request (std_msgs/Bool) are taken" % topic
-        if isinstance(command, bool):
-            if not command:
-                return "robots are released on the page only"
+        if command is False:
+            return "robots are released on the page only"
+        if command is True:
             self._commander.request_stop(True)
             self.end_programs_of_stopped_robots()
             self._background.warn("a Foxglove client requests to stop all robots")
-            return ""
-        robot = command.namespace.strip("/")
-        if not (command.linear_m_s or command.angular_rad_s):
-            self._commander.end_drive(client, command.namespace)
-            return ""
-        refusal = self._explain_refusal({"do": "drive", "robots": [robot]})
-        if not refusal and not self._commander.drive(client, command):
-            refusal = "%s is driven from another page" % robot
-        return refusal
+        elif not (command.linear_m_s or command.angular_rad_s):
+            self._commander.dead_man.release(client, command.namespace)
+        else:
+            try:
+                self._check("drive", [command.namespace.strip("/")])
+                self._drive_robots(client, [command])
+            except RefusedError as error:
+                return str(error)
+        return ""
 
-    def _explain_refusal(self, request: Request) -> str:
-        """Return why a request is refused; empty if it is not."""
-        if request["do"] not in (*MOVING, "record"):
-            return ""
+    def _check(self, do: str, robots: Sequence[str]) -> None:
+        """Check whether a page may request this. Raises: RefusedError."""
+        if do not in (*MOVING, "record"):
+            return
         if not self._parameters.control:
-            return "this monitor is view only: start it with control:=true to drive robots"
-        if request["do"] == "record":
-            return ""
-        missing = [robot for robot in request["robots"] if robot not in self._feed.robots]
+            raise RefusedError("this monitor is view only: start it with control:=true to drive robots")
+        if do == "record":
+            return
+        missing = [robot for robot in robots if robot not in self._feed.robots]
         if missing:
-            return "%s %s not connected" % (", ".join(missing), "is" if len(missing) == 1 else "are")
+            raise RefusedError("%s %s not connected" % (", ".join(missing), "is" if len(missing) == 1 else "are"))
         if self._feed.stopped or not self._commander.may_drive():
-            return "all robots are stopped: release them first"
-        return "" if request["do"] == "goal" else self.programs.find_driver(request["robots"])
+            raise RefusedError("all robots are stopped: release them first")
+        driver = self.programs.find_driver(robots)
+        if driver and do != "goal":
+            raise RefusedError(driver)
 
     # ---------------------------------------------------------------- view and stops
 
-    def _show(self, page: "PageSocket", request: Request) -> str:
+    def _show(self, page: "PageSocket", request: Request) -> None:
         page.ground_truth, page.picture = request["ground_truth"], request["picture"]
         page.visible = request["visible"]
-        return ""
 
-    def _stop(self, page: "PageSocket", request: Request) -> str:
-        self._request_stop(page, stop=True)
-        return ""
-
-    def _release(self, page: "PageSocket", request: Request) -> str:
-        refusal = explain_refused_release(request, read_clock_ms(), self._commander.stopped_ms)
-        if not refusal:
-            self._request_stop(page, stop=False)
-        return refusal
-
-    def _request_stop(self, page: "PageSocket", stop: bool) -> None:
-        self._commander.request_stop(stop)
+    def _stop(self, page: "PageSocket", request: Request) -> None:
+        """Stop all robots, or release them."""
+        verb, stopped_ms = request["do"], self._commander.stopped_ms
+        if verb == "release" and stopped_ms is not None and read_clock_ms() - stopped_ms < 1e3 * INERT_S:
+            raise RefusedError("NOT RELEASED: robots were stopped less than %g s ago; hold Release again" % INERT_S)
+        self._commander.request_stop(verb == "stop")
         self.end_programs_of_stopped_robots()
         self._feed.read_stop()
-        verb = "stop" if stop else "release"
         page.acknowledge(verb)
         # After the acknowledgement has left.
         self._hand_over(self._broadcast)
@@ -147,38 +148,37 @@ class PageRequests:
         if self._feed.stopped or not self._commander.may_drive():
             self.programs.end_all()
 
-    def _end_drive(self, page: "PageSocket", request: Request) -> str:
+    def _end_drive(self, page: "PageSocket", request: Request) -> None:
         for robot in request["robots"]:
-            self._commander.end_drive(page.number, "/" + robot)
-        return ""
+            self._commander.dead_man.release(page.number, "/" + robot)
 
-    def _stop_some(self, page: "PageSocket", request: Request) -> str:
+    def _stop_some(self, page: "PageSocket", request: Request) -> None:
         self.programs.end_those_of(request["robots"])
         for robot in request["robots"]:
             if robot in self._feed.robots:
-                self._commander.stop_robot("/" + robot)
-        return ""
+                self._commander.dead_man.stop("/" + robot)
 
     # ---------------------------------------------------------------- motion
 
-    def _drive(self, page: "PageSocket", request: Request) -> str:
-        taken = []
-        for robot in request["robots"]:
-            velocity = DriveCommand("/" + robot, float(request["linear"]), float(request["angular"]))
-            if not self._commander.drive(page.number, velocity):
-                taken.append(robot)
-        verb = "is" if len(taken) == 1 else "are"
-        return "%s %s driven from another page" % (", ".join(taken), verb) if taken else ""
+    def _drive(self, page: "PageSocket", request: Request) -> None:
+        linear_m_s, angular_rad_s = float(request["linear"]), float(request["angular"])
+        commands = [DriveCommand("/" + robot, linear_m_s, angular_rad_s) for robot in request["robots"]]
+        self._drive_robots(page.number, commands)
 
-    def _goal(self, page: "PageSocket", request: Request) -> str:
+    def _drive_robots(self, page: int, commands: Sequence[DriveCommand]) -> None:
+        taken = [command.namespace.strip("/") for command in commands if not self._commander.drive(page, command)]
+        if taken:
+            verb = "is" if len(taken) == 1 else "are"
+            raise RefusedError("%s %s driven from another page" % (", ".join(taken), verb))
+
+    def _goal(self, page: "PageSocket", request: Request) -> None:
         if self._pending_goals >= GOALS_AT_ONCE:
-            return "too many goals at once"
+            raise RefusedError("too many goals at once")
         (robot,), yaw_rad = request["robots"], request.get("yaw")
         frame, goal = self._feed.placement.to_goal(robot, Pose(request["x"], request["y"], yaw_rad or 0.0))
         self._pending_goals += 1
         sending = self._background.submit(self._commander.send_goal, "/" + robot, frame, goal, yaw_rad is not None)
         sending.add_done_callback(lambda sent: self._hand_over(self._tell_outcome, page, sent))
-        return ""
 
     def _tell_outcome(self, page: "PageSocket", sent: "Future[Notice]") -> None:
         self._pending_goals -= 1
@@ -186,45 +186,36 @@ class PageRequests:
 
     # ---------------------------------------------------------------- programs
 
-    def _start(self, page: "PageSocket", request: Request) -> str:
+    def _start(self, page: "PageSocket", request: Request) -> None:
         program, robots, values = request["program"], request["robots"], request["values"]
         if program not in self.programs.paths:
-            return "%s is not installed" % program
+            raise RefusedError("%s is not installed" % program)
         if self.programs.count >= PROGRAMS_MAX:
-            return "%d programs run: end one first" % PROGRAMS_MAX
+            raise RefusedError("%d programs run: end one first" % PROGRAMS_MAX)
         unknown = [robot for robot in robots if not self._feed.placement.knows(robot)]
         if OFFERS[program].has_frame and unknown:
-            return "%s needs the robots' places, but that of %s is unknown: start localize" % (program, unknown[0])
-        try:
-            places = place_robots(values, len(robots))
-        except FormationError as error:
-            return str(error)
-        ids = [self._feed.robots[robot].id for robot in robots]
+            text = "%s needs the robots' places, but that of %s is unknown: start localize"
+            raise RefusedError(text % (program, unknown[0]))
+        child = Child(program, robots, place_robots(values, len(robots)))
         for robot in robots:
             # A stop at the end of the program then finds it open.
             self._commander.prepare("/" + robot)
-        arguments = make_arguments(program, ids, self._feed.placement.frame, values)
-        self.programs.start(Child(program, robots, places), arguments)
-        return ""
+        ids = [self._feed.robots[robot].id for robot in robots]
+        self.programs.start(child, make_arguments(program, ids, self._feed.placement.frame, values))
 
-    def _end(self, page: "PageSocket", request: Request) -> str:
+    def _end(self, page: "PageSocket", request: Request) -> None:
         self.programs.end(request["number"])
-        return ""
 
     def _stop_robots_of(self, child: Child) -> None:
         for robot in child.driven:
-            self._commander.stop_robot("/" + robot)
+            self._commander.dead_man.stop("/" + robot)
 
-    def _record(self, page: "PageSocket", request: Request) -> str:
+    def _record(self, page: "PageSocket", request: Request) -> None:
         recording = self.programs.find_recording()
-        if recording is not None:
-            if not request["on"]:
-                recording.end()
-            return ""
-        if not request["on"]:
-            return ""
-        if "record" not in self.programs.paths:
-            return "hero_recording is not installed"
-        folder = Path(self._parameters.record_folder).expanduser() / time.strftime("%Y-%m-%d_%H-%M-%S")
-        self.programs.start(Child("record", folder=folder), ["--folder=%s" % folder])
-        return ""
+        if recording is not None and not request["on"]:
+            recording.end()
+        elif recording is None and request["on"]:
+            if "record" not in self.programs.paths:
+                raise RefusedError("hero_recording is not installed")
+            folder = Path(self._parameters.record_folder).expanduser() / time.strftime("%Y-%m-%d_%H-%M-%S")
+            self.programs.start(Child("record", folder=folder), ["--folder=%s" % folder])

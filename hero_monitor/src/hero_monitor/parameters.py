@@ -73,20 +73,18 @@ def load_parameters() -> Parameters:
             "foxglove_publish": flag(False),
         }
     )
-    host = str(given["host"])
+    host, token_file = str(given["host"]), str(given.pop("token_file"))
     if not host:
         raise ProgramError("~host is empty, but must be an address of this PC, such as 127.0.0.1")
-    names = re.split(r"[\s,]+", str(given["host_names"]).strip())
+    names, origins = (re.findall(r"[^\s,]+", str(given[name])) for name in ("host_names", "foxglove_origins"))
     own_name = platform.node()
-    return Parameters(
-        host,
-        given["port"],
-        read_token(host, str(given["token_file"])),
-        [name for name in [*names, own_name, own_name.partition(".")[0] + ".local", host] if name],
-        given["control"],
-        given["rate_hz"],
-        str(given["map_frame"]).lstrip("/"),
-        str(given["record_folder"]),
-        re.findall(r"[^\s,]+", str(given["foxglove_origins"])),
-        given["foxglove_publish"],
+    own_names = [name for name in (own_name, own_name.partition(".")[0] + ".local", host) if name]
+    given.update(
+        host=host,
+        token=read_token(host, token_file),
+        host_names=names + own_names,
+        map_frame=str(given["map_frame"]).lstrip("/"),
+        record_folder=str(given["record_folder"]),
+        foxglove_origins=origins,
     )
+    return Parameters(**given)

@@ -6,7 +6,7 @@ Everything runs on tornado's thread, except what may block (background).
 """
 
 import platform
-from typing import TYPE_CHECKING, Any, Dict
+from typing import TYPE_CHECKING, Any, Dict, Set
 
 import rospy
 
@@ -16,9 +16,9 @@ from hero_node.ros.program import Program, run
 
 from .background import Background
 from .control.commander import STOP_PERIOD_S, Commander
-from .control.freshness import CLOCK_PERIOD_S, read_clock_ms
 from .control.offers import describe_offers
 from .control.programs import find_programs
+from .control.requests import CLOCK_PERIOD_S, read_clock_ms
 from .fleet_feed.feed import FleetFeed
 from .fleet_feed.page_state import encode
 from .page_requests import PageRequests
@@ -64,23 +64,28 @@ class Monitor:
             self._broadcast_updates,
         )
         self._programs = self._requests.programs
-        actions = Actions(self._open_page, self._requests.receive, self._close_page, self._feed.picture.find_jpeg)
+        actions = Actions(self._open_page, self._requests.receive, self._leave, self._feed.picture.find_jpeg)
         # The other half of the files is for ROS: some per robot.
         limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         topics = RosTopics(self._background)
         source = TopicSource(topics.find_types, topics.want, topics.take)
-        publisher = Publisher(self._open_client, self._requests.publish, self._close_client)
+        publisher = Publisher(self._enter, self._requests.publish, self._leave)
         self._foxglove = FoxgloveEndpoint(
             source, parameters.foxglove_origins, publisher if parameters.foxglove_publish else None
         )
         access = Access(parameters.token, parameters.host_names)
         self._server = Server(access, limits, actions, self._foxglove.route)
-        self._tick = tornado.ioloop.PeriodicCallback(self._update_pages, 1000.0 / parameters.rate_hz)
-        self._stops = tornado.ioloop.PeriodicCallback(self._step, 1000.0 * STOP_PERIOD_S)
-        self._clock = tornado.ioloop.PeriodicCallback(self._send_clock, 1000.0 * CLOCK_PERIOD_S)
+        self._repeated = [
+            tornado.ioloop.PeriodicCallback(call, 1000.0 * period_s)
+            for call, period_s in (
+                (self._update_pages, 1.0 / parameters.rate_hz),
+                (self._step, STOP_PERIOD_S),
+                (self._send_clock, CLOCK_PERIOD_S),
+            )
+        ]
         self._end_check = tornado.ioloop.PeriodicCallback(self._check_end, 1000.0 * END_CHECK_PERIOD_S)
-        self._leaving: Any = None
-        self._clients = 0  # that may publish
+        self._present: Set[int] = set()  # pages, and clients that may publish
+        self._resting: Any = None
 
     def run(self) -> None:
         """Serve pages until the program ends. Raises: ProgramError."""
@@ -99,7 +104,8 @@ class Monitor:
         rospy.loginfo("fleet monitor: http://%s:%d%s", host, port, hint)
         self._end_check.start()
         if wanted.control:
-            self._background.submit(self._find_programs)
+            finding = self._background.submit(find_programs)
+            finding.add_done_callback(lambda found: self._loop.add_callback(self._offer, found.result()))
         try:
             self._loop.start()
         finally:
@@ -108,10 +114,6 @@ class Monitor:
             self._foxglove.close()
             self._server.close()
             self._background.close()
-
-    def _find_programs(self) -> None:
-        paths = find_programs()
-        self._loop.add_callback(self._offer, paths)
 
     def _offer(self, paths: Dict[str, str]) -> None:
         self._programs.paths = paths
@@ -127,41 +129,31 @@ class Monitor:
 
     def _open_page(self, page: "PageSocket") -> None:
         page.send(encode({"hello": {"control": self._parameters.control}}))
-        self._enter()
+        self._enter(page.number)
 
-    def _close_page(self, page: "PageSocket") -> None:
-        self._commander.drop_page(page.number)
-        self._leave_later()
-
-    def _open_client(self) -> None:
-        """A client that may publish is there: as for a page, robots are watched and stopped when it falls silent."""
-        self._clients += 1
-        self._enter()
-
-    def _close_client(self, number: int) -> None:
-        self._clients -= 1
-        self._commander.drop_page(number)
-        self._leave_later()
-
-    def _enter(self) -> None:
-        if self._leaving is not None:
-            self._loop.remove_timeout(self._leaving)
-            self._leaving = None
-        if not self._tick.is_running():
-            for repeated in (self._tick, self._stops, self._clock):
+    def _enter(self, number: int) -> None:
+        """A page is there, or a client that may publish: robots are watched, and stopped when it falls silent."""
+        self._present.add(number)
+        if self._resting is not None:
+            self._loop.remove_timeout(self._resting)
+            self._resting = None
+        for repeated in self._repeated:
+            if not repeated.is_running():
                 repeated.start()
 
-    def _leave_later(self) -> None:
-        if not self._server.pages and not self._clients and self._leaving is None:
-            self._leaving = self._loop.call_later(LINGER_S, self._leave)
+    def _leave(self, number: int) -> None:
+        self._present.discard(number)
+        self._commander.dead_man.drop_page(number)
+        if not self._present and self._resting is None:
+            self._resting = self._loop.call_later(LINGER_S, self._rest)
 
-    def _leave(self) -> None:
+    def _rest(self) -> None:
         """The last page has been gone for LINGER_S: no one there can stop what pages have started."""
-        self._leaving = None
+        self._resting = None
         if self._programs.end_all():
-            self._leaving = self._loop.call_later(END_CHECK_PERIOD_S, self._leave)
+            self._resting = self._loop.call_later(END_CHECK_PERIOD_S, self._rest)
             return
-        for repeated in (self._tick, self._stops, self._clock):
+        for repeated in self._repeated:
             repeated.stop()
         self._feed.update_subscriptions(has_pages=False, ground_truth=False, picture=False)
 
@@ -193,7 +185,7 @@ class Monitor:
         for page in self._server.pages:
             page.send_waiting()
             if page.ready:
-                updates = (state.take_updates if page in served else state.take_stop)(page.seen)
+                updates = state.take_updates(page.seen, None if page in served else ["stop"])
                 if updates is not None:
                     page.send(updates)
 

@@ -6,8 +6,8 @@ import threading
 
 import tornado.ioloop
 
-from hero_monitor.control.freshness import CLOCK_PERIOD_S, read_clock_ms
 from hero_monitor.control.offers import OFFERS, describe_offers
+from hero_monitor.control.requests import CLOCK_PERIOD_S, read_clock_ms
 from hero_monitor.fleet_feed.page_state import encode
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.connection_limits import ConnectionLimits
@@ -87,7 +87,7 @@ class ScriptedMonitor:
     def _run(self):
         asyncio.set_event_loop(asyncio.new_event_loop())
         self._loop = tornado.ioloop.IOLoop.current()
-        actions = Actions(self._open, self._receive, lambda page: None, lambda: b"")
+        actions = Actions(self._open, self._receive, lambda number: None, lambda: b"")
         self._server = Server(Access(None, []), ConnectionLimits(400), actions)
         self.port = self._server.listen("127.0.0.1", 0)
         clock = tornado.ioloop.PeriodicCallback(self._send_clock, 1e3 * CLOCK_PERIOD_S)

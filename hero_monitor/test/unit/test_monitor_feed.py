@@ -34,8 +34,7 @@ from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S, LocalizationWa
 from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_KEPT,
     MAX_LINE_LENGTH,
-    Received,
-    encode_ranges,
+    encode_range,
     shorten,
 )
 from hero_monitor.fleet_feed.placement import Placement
@@ -81,7 +80,7 @@ class Fleet:
         monkeypatch.setattr(feed_module.rospy, "Subscriber", lambda *arguments, **options: None)
         monkeypatch.setattr(feed_module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
         self.feed = FleetFeed("world", SimpleNamespace(submit=self.submit, warn=lambda *said: None))
-        self.page = Received()
+        self.page = {}
 
     def make_robot_feed(self, namespace):
         listener = SimpleNamespace(track=RobotTrack(), ranges_m=[0.1, math.inf])
@@ -115,7 +114,7 @@ class Fleet:
     def read(self):
         """Return all parts of the state, after a turn."""
         self.feed.read()
-        return json.loads(self.feed.page_state.take_updates(Received()))
+        return json.loads(self.feed.page_state.take_updates({}))
 
 
 def make_row(number, state=Robot.READY, **fields):
@@ -318,9 +317,13 @@ def test_lines_of_the_log_are_counted_and_known_by_their_robot(fleet):
     say("/other", "hero_0: hello")
     lines = fleet.read()["log"]["lines"]
     assert [line[4] for line in lines] == ["hero_0", "hero_0", "", ""] and lines[0][3] == "hero_driver"
+    fleet.feed._log_bytes.append(b"no line")
+    say("/other", "hello")
+    log = json.loads(fleet.feed.read() or fleet.feed.page_state.take_updates({"log": 4}))["log"]
+    assert log["missed"] == 1 and [line[5] for line in log["lines"]] == ["hello"]
     say("/other", "much", LOG_LINES_PER_READ + 10)
     fleet.feed.read()
-    assert fleet.feed.page_state.log.count == 4 + LOG_LINES_PER_READ + 10 and fleet.feed._log_bytes == deque()
+    assert fleet.feed.page_state.log.count == 6 + LOG_LINES_PER_READ + 10 and fleet.feed._log_bytes == deque()
     say("/other", "more", LOG_LINES_KEPT + 10)
     assert len(fleet.feed._log_bytes) == LOG_LINES_KEPT
 
@@ -406,4 +409,4 @@ def test_losses_begin_and_end_at_their_times():
 def test_texts_and_ranges_are_cut_at_their_limits():
     assert shorten("x" * MAX_LINE_LENGTH) == "x" * MAX_LINE_LENGTH
     assert shorten("x" * (MAX_LINE_LENGTH + 1)) == "x" * (MAX_LINE_LENGTH - 3) + "..."
-    assert encode_ranges([100.0, 100.1, -0.5, 0.0]) == [100000, -1, 0, 0]
+    assert [encode_range(range_m) for range_m in [100.0, 100.1, -0.5, 0.0]] == [100000, -1, 0, 0]

@@ -61,7 +61,7 @@ def connect(endpoint, attempts, token=TOKEN, uri="/foxglove", protocol="foxglove
         method="GET", uri=uri, host="localhost", headers=all_headers, connection=connection
     )
     request.remote_ip = "192.168.1.7"
-    values = {**endpoint.route.values, "attempts": attempts}
+    values = {**endpoint.route[2], "attempts": attempts}
     handler = FoxgloveSocket(
         tornado.web.Application(cookie_secret="secret"),
         request,
@@ -121,10 +121,10 @@ def make_socket(number=1):
 
 def test_topics_are_subscribed_to_while_there_is_a_client(topics):
     opened, closed = [], []
-    publisher = Publisher(lambda: opened.append(True), lambda *message: "", closed.append)
+    publisher = Publisher(opened.append, lambda *message: "", closed.append)
     endpoint, socket = FoxgloveEndpoint(topics.source, [], publisher), make_socket(7)
     endpoint.add(socket)
-    assert endpoint._tick.is_on and opened == [True]
+    assert endpoint._tick.is_on and opened == [7]
     endpoint._update()
     endpoint.hub.receive(socket.client, '{"op": "subscribe", "subscriptions": [{"id": 3, "channelId": 1}]}')
     topics.messages = [TopicMessage("/a", b"\1", 5, "")]
@@ -142,7 +142,7 @@ def test_topics_are_subscribed_to_while_there_is_a_client(topics):
     reading = FoxgloveEndpoint(topics.source, [])
     reading.add(make_socket())
     reading.remove(reading._sockets[0])
-    assert opened == [True] and closed == [7], "one that takes no messages tells nobody"
+    assert opened == [7] and closed == [7], "one that takes no messages tells nobody"
 
 
 def test_a_client_that_still_receives_gets_the_rest_in_one_write_later():

@@ -73,12 +73,12 @@ def test_what_pages_offer_is_what_launch_files_say():
                 continue
             assert given.default == float(default), (name, field)
             low, high = re.search(r"\(?(-?[\d.]+)\.\.([\d.]+)\)?", doc).groups()
-            assert float(low) <= given.low < given.high == float(high), (name, field)
+            assert float(low) <= given.limits[0] < given.limits[1] == float(high), (name, field)
     assert OFFERS["go_to_goal"].fields["avoid"].default is False
     assert OFFERS["behavior_milling"].fields["safety"].default == "fence and robots", "which the user has to switch off"
     formation = OFFERS["swarm_go_to"].fields
-    assert [(formation[name].low, formation[name].high) for name in ("x_m", "turn_deg")] == [(-1e3, 1e3), (-360, 360)]
-    assert formation["spacing_m"].high == 2.0 and OFFERS["led_show"].fields["period_s"].low == 0.5
+    assert [formation[name].limits for name in ("x_m", "turn_deg")] == [(-1e3, 1e3), (-360, 360)]
+    assert formation["spacing_m"].limits[1] == 2.0 and OFFERS["led_show"].fields["period_s"].limits[0] == 0.5
 
 
 def test_requests_end_at_the_limits_of_robots_and_texts():

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_monitor.control.freshness import AGE_MAX_S, INERT_S, explain_refused_release, is_fresh
+from hero_monitor.control.requests import AGE_MAX_S, is_fresh
 from hero_monitor.fleet_feed.losses import FORGOTTEN_S, LocalizationWatch, list_losses
 from hero_monitor.serving.server import PAGES_MAX, choose_served
 
@@ -65,15 +65,6 @@ def test_a_request_that_a_socket_held_moves_no_robot(kind):
 def test_a_stop_counts_at_any_age():
     assert is_fresh({"do": "stop", "heard_ms": 0}, 1000000)
     assert is_fresh({"do": "end_drive", "robots": ["hero_0"]}, 1000000)
-
-
-def test_no_release_counts_shortly_after_a_stop_of_any_page():
-    inert_ms = round(1000 * INERT_S)
-    fresh = {"do": "release", "heard_ms": 1000000}
-    assert explain_refused_release(fresh, 1000000, None) == ""
-    assert "less than 2 s ago" in explain_refused_release(fresh, 1000000, 1000000 - inert_ms + 1)
-    assert explain_refused_release(fresh, 1000000, 1000000 - inert_ms) == ""
-    assert "delayed" in explain_refused_release({**fresh, "heard_ms": 990000}, 1000000, None)
 
 
 def test_pages_that_no_one_can_see_give_way_to_others():

@@ -19,17 +19,16 @@ from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_AT_ONCE,
     LOG_LINES_KEPT,
     PageState,
-    Received,
     encode_color,
     encode_pose,
-    encode_ranges,
+    encode_range,
 )
 from hero_monitor.fleet_feed.placement import APART_M, Placement
 from hero_node.geometry import Pose
 
 
 def test_a_page_gets_each_part_of_the_state_once_until_it_changes():
-    state, page = PageState(), Received()
+    state, page = PageState(), {}
     state.put("poses", {"hero_0": [1, 2, 3]})
     state.put("fleet", {})
     assert json.loads(state.take_updates(page)) == {"poses": {"hero_0": [1, 2, 3]}, "fleet": {}}
@@ -41,7 +40,7 @@ def test_a_page_gets_each_part_of_the_state_once_until_it_changes():
 
 
 def test_a_page_that_missed_updates_gets_the_newest():
-    state, quick, slow = PageState(), Received(), Received()
+    state, quick, slow = PageState(), {}, {}
     for step in range(10):
         state.put("poses", {"hero_0": [step]})
         assert json.loads(state.take_updates(quick)) == {"poses": {"hero_0": [step]}}
@@ -49,17 +48,17 @@ def test_a_page_that_missed_updates_gets_the_newest():
 
 
 def test_a_page_that_is_not_served_gets_the_status_of_a_stop_alone():
-    state, page = PageState(), Received()
-    assert state.take_stop(page) is None
+    state, page = PageState(), {}
+    assert state.take_updates(page, ["stop"]) is None
     state.put("fleet", {})
     state.put("stop", {"text": "stopping"})
-    assert json.loads(state.take_stop(page)) == {"stop": {"text": "stopping"}}
-    assert state.take_stop(page) is None
+    assert json.loads(state.take_updates(page, ["stop"])) == {"stop": {"text": "stopping"}}
+    assert state.take_updates(page, ["stop"]) is None
     assert json.loads(state.take_updates(page)) == {"fleet": {}}
 
 
 def test_a_new_page_gets_the_newest_lines_and_a_slow_one_a_count():
-    state, early = PageState(), Received()
+    state, early = PageState(), {}
     state.log.append(1.0, 2, "node", "", "first")
     state.take_updates(early)
     for number in range(LOG_LINES_KEPT + 50):
@@ -68,12 +67,12 @@ def test_a_new_page_gets_the_newest_lines_and_a_slow_one_a_count():
     assert len(updates["lines"]) == LOG_LINES_AT_ONCE
     assert updates["lines"][-1][-1] == "line %d" % (LOG_LINES_KEPT + 49)
     assert updates["missed"] == LOG_LINES_KEPT + 50 - LOG_LINES_AT_ONCE
-    assert json.loads(state.take_updates(Received()))["log"]["missed"] == 0
+    assert json.loads(state.take_updates({}))["log"]["missed"] == 0
     assert state.take_updates(early) is None
 
 
 def test_lines_that_were_dropped_unread_count_as_missed():
-    state, page = PageState(), Received()
+    state, page = PageState(), {}
     state.log.append(1.0, 2, "node", "", "first")
     state.take_updates(page)
     state.log.skip(1000)
@@ -85,7 +84,7 @@ def test_lines_that_were_dropped_unread_count_as_missed():
 def test_log_lines_are_short_and_hold_nothing_that_cannot_be_printed():
     state = PageState()
     state.log.append(1.0, 2, "no\x1bde", "", "a\u202eb\n" + 1000 * "x")
-    line = json.loads(state.take_updates(Received()))["log"]["lines"][0]
+    line = json.loads(state.take_updates({}))["log"]["lines"][0]
     assert line[3] == "no?de"
     assert line[5].startswith("a?b?x") and len(line[5]) <= 400
 
@@ -93,7 +92,7 @@ def test_log_lines_are_short_and_hold_nothing_that_cannot_be_printed():
 def test_numbers_are_integers_and_those_not_finite_have_a_code():
     assert encode_pose(Pose(0.1234, -1.0, math.pi)) == [123, -1000, 3142]
     assert encode_pose(Pose(math.nan, 0.0, 0.0)) is None
-    assert encode_ranges([0.1, math.inf, -math.inf, math.nan]) == [100, None, 0, -1]
+    assert [encode_range(range_m) for range_m in [0.1, math.inf, -math.inf, math.nan]] == [100, None, 0, -1]
     assert encode_color(1.0, 0.5, 7.0) == "#ff80ff"
     assert encode_color(0.0, 0.0, 0.0) is None
     assert encode_color(math.nan, 1.0, 0.0) is None
@@ -106,7 +105,7 @@ def test_a_pose_that_cannot_be_drawn_is_none(pose):
 
 
 def test_an_impossible_range_is_an_invalid_reading():
-    assert encode_ranges([3e38, -3e38, 1e306]) == [-1, -1, -1]
+    assert [encode_range(range_m) for range_m in [3e38, -3e38, 1e306]] == [-1, -1, -1]
 
 
 @pytest.fixture()

@@ -12,10 +12,10 @@ from hero_monitor import page_requests
 from hero_monitor.control import commander as commander_module
 from hero_monitor.control.commander import LISTENER_TIMEOUT_S, Commander
 from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, DriveCommand
-from hero_monitor.control.freshness import AGE_MAX_S, INERT_S
 from hero_monitor.control.programs import PROGRAMS_MAX
+from hero_monitor.control.requests import AGE_MAX_S
 from hero_monitor.fleet_feed.placement import Placement
-from hero_monitor.page_requests import GOALS_AT_ONCE, PageRequests
+from hero_monitor.page_requests import GOALS_AT_ONCE, INERT_S, PageRequests
 from hero_node.errors import NodeError
 from hero_node.geometry import Pose
 
@@ -60,8 +60,10 @@ class Desk:
             stopped_ms=None,
             may_drive=lambda: self.may_drive,
             request_stop=lambda stop: self.note("request_stop", stop),
-            end_drive=lambda page, namespace: self.note("end_drive", page, namespace),
-            stop_robot=lambda namespace: self.note("stop_robot", namespace),
+            dead_man=SimpleNamespace(
+                release=lambda page, namespace: self.note("end_drive", page, namespace),
+                stop=lambda namespace: self.note("stop_robot", namespace),
+            ),
             prepare=lambda namespace: self.note("prepare", namespace),
             drive=lambda page, velocity: self.note("drive", page, *velocity) or velocity.namespace not in self.taken,
             send_goal=None,
@@ -335,7 +337,7 @@ def test_a_topic_is_opened_once_and_a_stop_waits_for_it(monkeypatch):
     ros = Ros(monkeypatch, connect_s=0.3)
     assert ros.commander.drive(1, MOVE) and ros.commander.drive(1, MOVE)
     assert len(ros.queued) == 1 and ros.take() == []
-    ros.commander.end_drive(1, "/hero_0")
+    ros.commander.dead_man.release(1, "/hero_0")
     for _ in range(3):
         ros.commander.step()
     assert ros.take() == [], "not lost: the topic is yet to be opened"
@@ -360,8 +362,8 @@ def test_a_driver_that_never_connects_is_waited_for_two_seconds(monkeypatch):
 def test_silence_the_end_of_a_page_and_a_stop_of_all_stop_robots(monkeypatch):
     for end in (
         lambda ros: ros.sleep(HOLD_TIMEOUT_S + 0.01),
-        lambda ros: ros.commander.drop_page(1),
-        lambda ros: ros.commander.stop_robot("/hero_0"),
+        lambda ros: ros.commander.dead_man.drop_page(1),
+        lambda ros: ros.commander.dead_man.stop("/hero_0"),
         lambda ros: ros.commander.request_stop(True),
         lambda ros: ros.commander.close(),
     ):
@@ -370,7 +372,7 @@ def test_silence_the_end_of_a_page_and_a_stop_of_all_stop_robots(monkeypatch):
         ros.work()
         ros.commander.drive(1, MOVE)
         assert not ros.commander.drive(2, MOVE)
-        ros.commander.drop_page(2)
+        ros.commander.dead_man.drop_page(2)
         ros.commander.step()
         assert ros.take() == [(TOPIC, 0.1, 0.5)]
         end(ros)

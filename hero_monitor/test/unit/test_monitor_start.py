@@ -155,10 +155,16 @@ def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):
 def test_limits_of_what_pages_may_set_are_the_ends_of_their_fields():
     for offer in OFFERS.values():
         for name, field in offer.fields.items():
-            assert field.admits(field.default), name
+            assert field.check(name, field.default) == field.default, name
             if not isinstance(field.default, float):
                 continue
-            outside = 1e-6 * max(1.0, abs(field.high))
-            assert field.admits(field.low) and field.admits(field.high)
-            assert not field.admits(field.low - outside) and not field.admits(field.high + outside)
-    assert [offer["program"] for offer in describe_offers(["follow", "led_show"])] == ["follow", "led_show"]
+            low, high = field.limits
+            assert (field.check(name, low), field.check(name, high)) == (low, high)
+            for outside in (low - 1e-6 * max(1.0, high), high + 1e-6 * max(1.0, high)):
+                with pytest.raises(ProgramError, match=name):
+                    field.check(name, outside)
+    follow, led_show = describe_offers(["follow", "led_show"])
+    assert [offer["program"] for offer in (follow, led_show)] == ["follow", "led_show"]
+    assert led_show["fields"][0]["choices"] == ("rainbow", "chase", "blink") and not led_show["fields"][0]["limits"]
+    assert (follow["fields"][0]["limits"], follow["fields"][0]["step"]) == ((0.1, 2.0), "any")
+    assert describe_offers(["behavior_segregation"])[0]["fields"][0]["step"] == 1

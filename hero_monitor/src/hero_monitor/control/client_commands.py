@@ -6,6 +6,7 @@ import struct
 from typing import Optional, Union
 
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_node.geometry import clamp
 
 from .dead_man import DriveCommand
 
@@ -22,8 +23,7 @@ def read_command(topic: str, message_type: str, content: bytes) -> Optional[Unio
         linear_m_s, _, _, _, _, angular_rad_s = _TWIST.unpack(content)
         if not math.isfinite(linear_m_s + angular_rad_s):
             return None
-        linear_m_s = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
-        angular_rad_s = max(-MAX_ANGULAR_RAD_S, min(MAX_ANGULAR_RAD_S, angular_rad_s))
+        linear_m_s, angular_rad_s = clamp(linear_m_s, MAX_LINEAR_M_S), clamp(angular_rad_s, MAX_ANGULAR_RAD_S)
         return DriveCommand("/" + velocity_topic[1], linear_m_s, angular_rad_s)
     if _STOP_TOPIC.fullmatch(topic) and message_type == "std_msgs/Bool" and len(content) == 1:
         return content != b"\0"

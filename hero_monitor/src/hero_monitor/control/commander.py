@@ -19,7 +19,7 @@ from hero_node.ros.master import ask_master
 
 from ..background import Background
 from .dead_man import DeadMan, DriveCommand
-from .freshness import read_clock_ms
+from .requests import read_clock_ms
 
 LISTENER_TIMEOUT_S = 2.0
 """To connect to a driver or a program that takes goals; about 0.1 s is usual."""
@@ -35,30 +35,27 @@ class Notice(NamedTuple):
 
 
 class Commander:
-    """Commands of pages to robots. All methods return at once, except send_goal()."""
+    """Commands of pages to robots. All methods return at once, except send_goal().
+
+    Attributes:
+        dead_man: stops robots; step() sends what it takes.
+        stopped_ms: when a page last stopped all robots, on the pages' clock; None before.
+    """
 
     def __init__(self, drivers: Drivers, background: Background) -> None:
         self._drivers = drivers
         self._background = background
-        self._dead_man = DeadMan()
+        self.dead_man = DeadMan()
         self._velocities: Dict[str, Optional[rospy.Publisher]] = {}
         self._goals: Dict[str, rospy.Publisher] = {}
-        self.stopped_ms: Optional[int] = None  # when a page last stopped all robots
+        self.stopped_ms: Optional[int] = None
 
     def drive(self, page: int, velocity: DriveCommand) -> bool:
         """Drive a robot for HOLD_TIMEOUT_S; return False if another page drives it."""
-        if not self._dead_man.hold(page, velocity, time.monotonic()):
+        if not self.dead_man.hold(page, velocity, time.monotonic()):
             return False
         self._publish(velocity)
         return True
-
-    def end_drive(self, page: int, namespace: str) -> None:
-        """Stop a robot that this page drives."""
-        self._dead_man.release(page, namespace)
-
-    def drop_page(self, page: int) -> None:
-        """Stop all robots that this page drives."""
-        self._dead_man.drop_page(page)
 
     def prepare(self, namespace: str) -> None:
         """Open a robot's topic, which takes a moment."""
@@ -66,15 +63,11 @@ class Commander:
             self._velocities[namespace] = None
             self._background.submit(self._open_velocity, namespace)
 
-    def stop_robot(self, namespace: str) -> None:
-        """Stop a robot, whichever program drives it."""
-        self._dead_man.stop(namespace)
-
     def step(self) -> None:
         """Send the stops that are due; to be called every STOP_PERIOD_S."""
-        for velocity in self._dead_man.take_stops(time.monotonic()):
+        for velocity in self.dead_man.take_stops(time.monotonic()):
             if not self._publish(velocity):
-                self._dead_man.stop(velocity.namespace)
+                self.dead_man.stop(velocity.namespace)
 
     def _publish(self, velocity: DriveCommand) -> bool:
         """Send a velocity; return False while the topic is being opened."""
@@ -91,9 +84,7 @@ class Commander:
         topic = namespace + "/velocity_controller/cmd_vel"
         publisher = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
         # A stop is sent once: it must not be lost before the driver is connected.
-        deadline_s = time.monotonic() + LISTENER_TIMEOUT_S
-        while publisher.get_num_connections() == 0 and time.monotonic() < deadline_s:
-            time.sleep(0.02)
+        _wait_for_connections(publisher, 1)
         self._velocities[namespace] = publisher
 
     def send_goal(self, namespace: str, frame: str, goal: Pose, with_heading: bool) -> Notice:
@@ -124,10 +115,8 @@ class Commander:
         if topic not in self._goals:
             # Not latched: a program that starts later must not find an old goal.
             self._goals[topic] = rospy.Publisher(topic, PoseStamped, queue_size=2, tcp_nodelay=True)
-        deadline_s = time.monotonic() + LISTENER_TIMEOUT_S
         # This node subscribes too, to show goals, and counts.
-        while self._goals[topic].get_num_connections() < len(others) + 1 and time.monotonic() < deadline_s:
-            time.sleep(0.02)
+        _wait_for_connections(self._goals[topic], len(others) + 1)
         return True
 
     def request_stop(self, stop: bool) -> None:
@@ -135,7 +124,7 @@ class Commander:
         self._drivers.request_stop(stop)
         if stop:
             self.stopped_ms = read_clock_ms()
-            self._dead_man.drop_all()
+            self.dead_man.drop_all()
             self.step()
 
     def may_drive(self) -> bool:
@@ -145,6 +134,12 @@ class Commander:
 
     def close(self) -> None:
         """Stop all robots that pages drive."""
-        self._dead_man.drop_all()
+        self.dead_man.drop_all()
         self.step()
         time.sleep(SEND_TIME_S)
+
+
+def _wait_for_connections(publisher: rospy.Publisher, count: int) -> None:
+    deadline_s = time.monotonic() + LISTENER_TIMEOUT_S
+    while publisher.get_num_connections() < count and time.monotonic() < deadline_s:
+        time.sleep(0.02)

@@ -45,29 +45,26 @@ class DeadMan:
         """Stop a robot, if this page drives it."""
         held = self._holds.get(namespace)
         if held is not None and held.page == page:
-            self._begin_stop(namespace)
+            self.stop(namespace)
 
     def drop_page(self, page: int) -> None:
         """Stop all robots that this page drives."""
         for namespace in [name for name, held in self._holds.items() if held.page == page]:
-            self._begin_stop(namespace)
+            self.stop(namespace)
 
     def drop_all(self) -> None:
         """Stop all robots that are driven."""
         for namespace in list(self._holds):
-            self._begin_stop(namespace)
+            self.stop(namespace)
 
     def stop(self, namespace: str) -> None:
         """Stop a robot, whichever program drives it."""
-        self._begin_stop(namespace)
-
-    def _begin_stop(self, namespace: str) -> None:
         self._holds.pop(namespace, None)
         self._stops.add(namespace)
 
     def take_stops(self, now_s: float) -> List[DriveCommand]:
         """Return the stops that are due at this step, each once: the driver repeats them."""
         for namespace in [name for name, held in self._holds.items() if now_s - held.last_s > HOLD_TIMEOUT_S]:
-            self._begin_stop(namespace)
+            self.stop(namespace)
         due, self._stops = self._stops, set()
         return [DriveCommand(namespace, 0.0, 0.0) for namespace in sorted(due)]

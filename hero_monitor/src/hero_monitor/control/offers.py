@@ -1,36 +1,15 @@
 """Programs that pages may start, and the parameters that they may set: nothing else is ever run. Pure."""
 
 import json
-from typing import Any, Dict, List, NamedTuple, Sequence, Union
+from typing import Any, Dict, List, NamedTuple, Sequence
 
 from hero_client.apps.formations import Point, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
-from hero_node.number_checks import is_number, is_whole_number
+from hero_node.errors import ProgramError
+from hero_node.parameters import Parameter, choice, flag, number, whole_number
 
 from .requests import MAX_GOAL_M, RequestError
-
-FORMATION_KEYS = ("shape", "spacing_m", "turn_deg", "x_m", "y_m")
-"""Of the formation; all others are parameters of the program."""
-
-class Field(NamedTuple):
-    """A parameter: a number within limits, one of some options, or a flag."""
-
-    default: Union[float, str, bool]
-    low: float = 0.0
-    high: float = 0.0
-    unit: str = ""
-    options: Sequence[str] = ()
-    on_map: bool = False  # a click on the map sets it
-    whole: bool = False
-
-    def admits(self, value: Any) -> bool:
-        """Return whether a page may set this value."""
-        if isinstance(self.default, bool):
-            return isinstance(value, bool)
-        if self.options:
-            return isinstance(value, str) and value in self.options
-        return (is_whole_number if self.whole else is_number)(value, self.low, self.high)
 
 
 class Offer(NamedTuple):
@@ -39,22 +18,22 @@ class Offer(NamedTuple):
     package: str
     program: str
     title: str
-    fields: Dict[str, Field] = {}
+    fields: Dict[str, Parameter] = {}
     has_frame: bool = False  # it needs the robots' places on the map
     drives: slice = slice(None)  # which of its robots, in their order; pages may drive the others meanwhile
     behavior: str = ""  # the built-in one that program behavior runs; fields but safety are numbers of its class
 
 
-_SPEED = Field(0.08, 0.01, MAX_LINEAR_M_S, "m/s")
+_SPEED = number(0.08, 0.01, MAX_LINEAR_M_S, "m/s")
 _SPEED_LIMIT = {"max_linear_m_s": _SPEED._replace(default=0.1)}
 _WHEELS = {"wheel_m_s": _SPEED._replace(default=0.12)}
-_GAIN = Field(0.5, 0.0, 5.0, "1/s")
-_RANGE = Field(0.5, 0.05, 5.0, "m")
-_COORDINATE = Field(0.0, -MAX_GOAL_M, MAX_GOAL_M, "m")
+_GAIN = number(0.5, 0.0, 5.0, "1/s")
+_RANGE = number(0.5, 0.05, 5.0, "m")
+_COORDINATE = number(0.0, -MAX_GOAL_M, MAX_GOAL_M, "m")
 _PUSH = {"goal_x_m": _COORDINATE, "goal_y_m": _COORDINATE, "linear_m_s": _SPEED}
-_VOTE = {"changes_hz": Field(0.5, 0.01, 10.0, "1/s"), "cruise_m_s": _SPEED._replace(default=0.1)}
+_VOTE = {"changes_hz": number(0.5, 0.01, 10.0, "1/s"), "cruise_m_s": _SPEED._replace(default=0.1)}
 
-BEHAVIORS: Dict[str, Dict[str, Field]] = {
+BEHAVIORS: Dict[str, Dict[str, Parameter]] = {
     "aggregation": {},
     "evolved_aggregation": _WHEELS,
     "cyclic_pursuit": _WHEELS,
@@ -63,14 +42,14 @@ BEHAVIORS: Dict[str, Dict[str, Field]] = {
     "wall_following": _WHEELS,
     "flocking": {
         "spacing_m": _RANGE._replace(default=0.25),
-        "alignment": Field(0.1, 0.0, 1.0, "m/s"),
-        "cohesion": Field(0.15, 0.0, 2.0, "1/s"),
+        "alignment": number(0.1, 0.0, 1.0, "m/s"),
+        "cohesion": number(0.15, 0.0, 2.0, "1/s"),
         "cruise_m_s": _SPEED._replace(default=0.05),
         **_SPEED_LIMIT,
     },
     "dispersion": {"spacing_m": _RANGE, "gain_1_s": _GAIN._replace(default=0.4), **_SPEED_LIMIT},
     "segregation": {
-        "groups": Field(2, 2, 6, whole=True),
+        "groups": whole_number(2, 2, 6),
         "own_m": _RANGE._replace(default=0.15),
         "others_m": _RANGE._replace(default=1.0),
         **_SPEED_LIMIT,
@@ -78,7 +57,7 @@ BEHAVIORS: Dict[str, Dict[str, Field]] = {
     "rendezvous": {"gain_1_s": _GAIN, **_SPEED_LIMIT},
     "leader_followers": {"gap_m": _RANGE._replace(default=0.15), "leader_m_s": _SPEED._replace(default=0.05)},
     "formation": {"side_m": _RANGE._replace(default=0.25), "max_linear_m_s": _SPEED},
-    "coverage": {"width_m": Field(2.0, 0.2, 20.0, "m"), "height_m": Field(2.0, 0.2, 20.0, "m"), **_SPEED_LIMIT},
+    "coverage": {"width_m": number(2.0, 0.2, 20.0, "m"), "height_m": number(2.0, 0.2, 20.0, "m"), **_SPEED_LIMIT},
     "object_clustering": _WHEELS,
     "box_pushing": _PUSH,
     "cooperative_transport": _PUSH,
@@ -87,7 +66,10 @@ BEHAVIORS: Dict[str, Dict[str, Field]] = {
 }
 """Built-in behaviors, with those of their numbers that pages may set."""
 
-_SAFETY = Field("fence and robots", options=("off", "fence and robots"))
+_SAFETY = choice("fence and robots", ("off", "fence and robots"))
+
+_PLACE = {"turn_deg": number(0.0, -360.0, 360.0, "deg"), "x_m": _COORDINATE, "y_m": _COORDINATE}
+"""Of a formation: a click on the map sets it."""
 
 _BEHAVIOR_TITLES = {"formation": "formation by distances"}
 """Titles other than the name without underscores."""
@@ -98,27 +80,25 @@ OFFERS = {
         "swarm_go_to",
         "formation",
         {
-            "shape": Field("circle", options=("circle", "line", "grid")),
-            "spacing_m": Field(0.3, AvoidanceLaw().min_spacing_m, 2.0, "m"),
-            "turn_deg": Field(0.0, -360.0, 360.0, "deg", on_map=True),
-            "x_m": Field(0.0, -MAX_GOAL_M, MAX_GOAL_M, "m", on_map=True),
-            "y_m": Field(0.0, -MAX_GOAL_M, MAX_GOAL_M, "m", on_map=True),
+            "shape": choice("circle", ("circle", "line", "grid")),
+            "spacing_m": number(0.3, AvoidanceLaw().min_spacing_m, 2.0, "m"),
+            **_PLACE,
             "linear_m_s": _SPEED,
         },
         has_frame=True,
     ),
-    "go_to_goal": Offer("hero_examples", "go_to_goal", "take goals from the map", {"avoid": Field(False)}),
+    "go_to_goal": Offer("hero_examples", "go_to_goal", "take goals from the map", {"avoid": flag(False)}),
     "random_walk": Offer(
         "hero_examples",
         "random_walk",
         "random walk",
-        {"linear_m_s": _SPEED._replace(default=0.1), "angular_rad_s": Field(1.5, 0.1, 4.0, "rad/s")},
+        {"linear_m_s": _SPEED._replace(default=0.1), "angular_rad_s": number(1.5, 0.1, 4.0, "rad/s")},
     ),
     "follow": Offer(
         "hero_examples",
         "follow",
         "follow the first one",
-        {"gap_m": Field(0.15, 0.1, 2.0, "m"), "linear_m_s": _SPEED._replace(default=0.15)},
+        {"gap_m": number(0.15, 0.1, 2.0, "m"), "linear_m_s": _SPEED._replace(default=0.15)},
         has_frame=True,
         drives=slice(1, None),
     ),
@@ -127,9 +107,9 @@ OFFERS = {
         "led_show",
         "light show",
         {
-            "pattern": Field("rainbow", options=("rainbow", "chase", "blink")),
-            "period_s": Field(4.0, 0.5, 60.0, "s"),
-            "brightness": Field(1.0, 0.0, 1.0),
+            "pattern": choice("rainbow", ("rainbow", "chase", "blink")),
+            "period_s": number(4.0, 0.5, 60.0, "s"),
+            "brightness": number(1.0, 0.0, 1.0),
         },
         drives=slice(0, 0),
     ),
@@ -148,16 +128,17 @@ OFFERS = {
 """The programs, in the order in which pages list them. Pages send "values" for the fields of one."""
 
 
-def check_values(program: str, values: Dict[str, Any]) -> None:
-    """Check the values that a page sets. Raises: RequestError."""
+def check_values(program: str, values: Dict[str, Any]) -> Dict[str, Any]:
+    """Return the values that a page sets, checked. Raises: RequestError."""
     if program not in OFFERS:
         raise RequestError("unknown program")
     fields = OFFERS[program].fields
     if set(values) != set(fields):
         raise RequestError("%s needs values for: %s" % (program, ", ".join(fields) or "nothing"))
-    for name, value in values.items():
-        if not fields[name].admits(value):
-            raise RequestError("%s of %s is invalid" % (name, program))
+    try:
+        return {name: fields[name].check(name, value) for name, value in values.items()}
+    except ProgramError as error:
+        raise RequestError(str(error)) from None
 
 
 def place_robots(values: Dict[str, Any], count: int) -> List[Point]:
@@ -177,13 +158,12 @@ def make_arguments(program: str, robot_ids: Sequence[int], frame: str, values: D
     offer = OFFERS[program]
     parameters: Dict[str, Any] = {"robots": " ".join(map(str, robot_ids))}
     if offer.behavior:
-        numbers = {name: value for name, value in values.items() if name in BEHAVIORS[offer.behavior]}
-        parameters.update(behavior=offer.behavior, safety=values["safety"], parameters=numbers)
+        numbers = dict(values)
+        parameters.update(behavior=offer.behavior, safety=numbers.pop("safety"), parameters=numbers)
+    elif "shape" in values:
+        parameters.update(formation=_make_formation(values), linear_m_s=values["linear_m_s"])
     else:
         parameters.update(values)
-    if "shape" in values:
-        parameters = {name: value for name, value in parameters.items() if name not in FORMATION_KEYS}
-        parameters["formation"] = _make_formation(values)
     if offer.has_frame:
         parameters["frame"] = frame
     # JSON is YAML, as rospy reads arguments: no value becomes another one, or another type.
@@ -197,9 +177,21 @@ def describe_offers(names: Sequence[str]) -> List[Dict[str, Any]]:
             "program": name,
             "title": OFFERS[name].title,
             "is_behavior": OFFERS[name].behavior != "",
-            "fields": [{"name": field, **OFFERS[name].fields[field]._asdict()} for field in OFFERS[name].fields],
+            "fields": [_describe_field(*field) for field in OFFERS[name].fields.items()],
         }
         for name in OFFERS
         if name in names
     ]
+
+
+def _describe_field(name: str, field: Parameter) -> Dict[str, Any]:
+    return {
+        "name": name,
+        "default": field.default,
+        "limits": field.limits,
+        "step": 1 if isinstance(field.default, int) else "any",
+        "unit": field.unit,
+        "choices": field.choices,
+        "on_map": name in _PLACE,
+    }
 

@@ -59,6 +59,7 @@ class Child:
     ) -> None:
         """robots: by their names. places: where they drive to, for the map. folder: of a recording."""
         self.program, self.robots, self.places, self.folder = program, list(robots), places, folder
+        self.title = OFFERS[program].title if program in OFFERS else "recording"
         self.driven = self.robots[OFFERS[program].drives] if program in OFFERS else []
         self.start_s = time.monotonic()
         self.end_s = math.inf
@@ -141,7 +142,7 @@ class Programs:
         """Return which program drives one of these robots, as a sentence; empty if none does."""
         for child in self._running.values():
             for robot in set(robots).intersection(child.driven):
-                return "%s drives %s: end it first" % (OFFERS[child.program].title, robot)
+                return "%s drives %s: end it first" % (child.title, robot)
         return ""
 
     def find_recording(self) -> Optional[Child]:
@@ -214,7 +215,7 @@ class Programs:
             {
                 "number": number,
                 "program": child.program,
-                "title": OFFERS[child.program].title if child.program in OFFERS else "recording",
+                "title": child.title,
                 "robots": child.robots,
                 "places": [[round(1000 * x_m), round(1000 * y_m)] for x_m, y_m in child.places],
                 "seconds": int(max(0.0, min(now_s, child.end_s) - child.start_s)) if number in self._running else 0,

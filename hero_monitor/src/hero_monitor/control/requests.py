@@ -1,19 +1,31 @@
 """Parses and checks the requests of pages. Pure.
 
-Nothing is trusted: the page may be of another version, or not a page at all.
+Nothing is trusted: the page may be of another version, or not a page at all. Requests that are made now are told from
+those that a socket held while monitor, page or network paused: the monitor tells each page its clock several times a
+second, and a page returns the newest value that it has heard. A stop counts at any age; what makes robots move counts
+only while it is fresh.
 """
 
 import json
 import math
+import time
 from typing import Any, Callable, Dict, Union
 
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_node.number_checks import is_number
 
+from .dead_man import HOLD_TIMEOUT_S
+
 MAX_TEXT_LENGTH = 16000
 """A group of a thousand robots."""
 
 MAX_GOAL_M = 1000.0
+
+CLOCK_PERIOD_S = 0.12
+"""Between two values of the clock."""
+
+AGE_MAX_S = {"drive": HOLD_TIMEOUT_S, "goal": 1.0, "start": 1.0, "record": 1.0, "release": 1.0}
+"""Of the requests that make robots move. They need heard_ms: the clock, as the page last heard it."""
 
 
 class RequestError(Exception):
@@ -41,23 +53,20 @@ def _is_single(value: Any) -> bool:
     return _is_names(value) and len(value) == 1
 
 
-_FRESH = {"heard_ms": _is_number(1e15)}
-
 REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
     "stop": {},
-    "release": _FRESH,
+    "release": {},
     "drive": {
         "robots": _is_names,
         "linear": _is_number(MAX_LINEAR_M_S),
         "angular": _is_number(MAX_ANGULAR_RAD_S),
-        **_FRESH,
     },
     "end_drive": {"robots": _is_names},
     "stop_some": {"robots": _is_names},
-    "goal": {"robots": _is_single, "x": _is_number(MAX_GOAL_M), "y": _is_number(MAX_GOAL_M), **_FRESH},
-    "start": {"program": _is_name, "robots": _is_names, "values": lambda value: isinstance(value, dict), **_FRESH},
+    "goal": {"robots": _is_single, "x": _is_number(MAX_GOAL_M), "y": _is_number(MAX_GOAL_M)},
+    "start": {"program": _is_name, "robots": _is_names, "values": lambda value: isinstance(value, dict)},
     "end": {"number": _is_number(1e9)},
-    "record": {"on": _is_flag, **_FRESH},
+    "record": {"on": _is_flag},
     "show": {"ground_truth": _is_flag, "picture": _is_flag, "visible": _is_flag},
 }
 """Requests of a page by its field "do", with the fields that it needs and their checks.
@@ -65,11 +74,10 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
 stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s. end_drive: it is let
 go. stop_some: end what drives these robots, and stop them. goal: a pose on the map in m; yaw (rad) may be added.
 start: a program of offers.OFFERS, with values for its fields. end: a program, by its number. record: begin or end the
-recording. show: whether the page is visible, and what it shows in addition to the fleet. heard_ms: the monitor's
-clock, as the page last heard it (freshness).
+recording. show: whether the page is visible, and what it shows in addition to the fleet.
 """
 
-_is_yaw = _is_number(2.0 * math.pi)
+_is_clock, _is_yaw = _is_number(1e15), _is_number(2.0 * math.pi)
 
 
 def read_request(text: Union[str, bytes]) -> Dict[str, Any]:
@@ -83,8 +91,23 @@ def read_request(text: Union[str, bytes]) -> Dict[str, Any]:
     kind = fields.get("do") if isinstance(fields, dict) else None
     if not isinstance(kind, str) or kind not in REQUESTS:
         raise RequestError("unknown request")
-    checks = {**REQUESTS[kind], "yaw": _is_yaw} if fields.get("yaw") is not None else REQUESTS[kind]
+    checks = dict(REQUESTS[kind])
+    if kind in AGE_MAX_S:
+        checks["heard_ms"] = _is_clock
+    if fields.get("yaw") is not None:
+        checks["yaw"] = _is_yaw
     for name, is_valid in checks.items():
         if not is_valid(fields.get(name)):
             raise RequestError("%s of %s is missing or invalid" % (name, kind))
     return dict(fields)
+
+
+def read_clock_ms() -> int:
+    """Return the time in ms; unlike CLOCK_MONOTONIC it runs while the PC sleeps."""
+    return round(1e3 * time.clock_gettime(time.CLOCK_BOOTTIME))
+
+
+def is_fresh(request: Dict[str, Any], now_ms: int) -> bool:
+    """Return whether a request was made recently enough to be carried out."""
+    limit_s = AGE_MAX_S.get(request["do"])
+    return limit_s is None or 0 <= now_ms - request["heard_ms"] <= 1e3 * limit_s

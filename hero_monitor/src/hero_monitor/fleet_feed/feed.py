@@ -8,7 +8,7 @@ import re
 import time
 from collections import deque
 from concurrent.futures import Future
-from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Set
+from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Set, Tuple
 
 import genpy
 import rospy
@@ -35,7 +35,7 @@ from .drawings import Drawings
 from .losses import SILENT_S, LocalizationWatch, list_losses
 from .master_link import MasterLink
 from .occupancy import encode_grid
-from .page_state import LOG_LINES_KEPT, PageState, encode_pose, encode_ranges, shorten
+from .page_state import LOG_LINES_KEPT, PageState, encode_pose, encode_range, shorten
 from .placement import Placement
 from .robot_feed import RobotFeed
 
@@ -45,26 +45,8 @@ ROW_PERIOD_S = 0.5
 LOG_LINES_PER_READ = 40
 """Decoding a line takes about 0.05 ms; a swarm that tunes its motors logs thousands a second."""
 
-UNREADABLE_PERIOD_S = 10.0
-"""Between two log lines about messages that cannot be read."""
-
 ROBOTS_MAX = 1000
 """Rows of the table."""
-
-SCENE_TYPES = {
-    "/tf_static": TFMessage,
-    "/behavior/markers": MarkerArray,
-    "/diagnostics": DiagnosticArray,
-    "/hero_sim/arena": MarkerArray,
-    "/hero_sim/markers": MarkerArray,
-    "/hero_sim/object_markers": MarkerArray,
-    "/hero_sim/replay": MarkerArray,
-    "/localization/poses": RobotPoses,
-    "/map": OccupancyGrid,
-    "/track/picture/compressed": CompressedImage,
-    "/track/picture/outline": PolygonStamped,
-}
-"""Topics of no single robot."""
 
 GROUND_TRUTH_TOPICS = {"/hero_sim/markers"}
 PICTURE_TOPICS = {"/track/picture/compressed", "/track/picture/outline"}
@@ -92,12 +74,27 @@ class FleetFeed:
         self.stopped = False
         self._feeds: Dict[str, RobotFeed] = {}
         self._scene: Dict[str, NewestMessage] = {}
+        put = self.page_state.put
+        # Topics of no single robot, in the order in which they are read: what places robots comes first.
+        self._receivers: Dict[str, Tuple[Any, Callable[[Any, float], Any]]] = {
+            "/tf_static": (TFMessage, self._receive_transforms),
+            "/localization/poses": (RobotPoses, self._localize),
+            "/diagnostics": (DiagnosticArray, self._receive_diagnostics),
+            "/map": (OccupancyGrid, self._receive_grid),
+            "/hero_sim/arena": (MarkerArray, lambda message, now_s: put("arena", describe_arena(message))),
+            "/hero_sim/object_markers": (MarkerArray, lambda message, now_s: put("objects", describe_arena(message))),
+            "/hero_sim/markers": (MarkerArray, lambda message, now_s: put("ground_truth", find_true_poses(message))),
+            "/hero_sim/replay": (MarkerArray, self._receive_replay),
+            "/track/picture/outline": (PolygonStamped, lambda message, now_s: self.picture.receive_outline(message)),
+            "/track/picture/compressed": (CompressedImage, self.picture.receive),
+            "/behavior/markers": (MarkerArray, self._drawings.receive),
+        }
         self._fleet_s = 0.0
         self._fleet_stamp_s: Optional[float] = None
         self._answering: Dict[str, bool] = {}
         self._localization = LocalizationWatch()
         self._grid: Optional[OccupancyGrid] = None
-        self._grid_frame = ""
+        self._shown_grid: Tuple[Optional[OccupancyGrid], str] = (None, "")
         self._replay_s = 0.0
         self._tracked: Set[str] = set()
         self.master = MasterLink(background)
@@ -128,42 +125,29 @@ class FleetFeed:
             self._change.result()
         robots = {row.namespace for row in self._rows if row.namespace and row.state != Robot.REFUSED}
         namespaces = robots if has_pages else set()
-        scene = set(SCENE_TYPES) if has_pages else set()
+        scene = set(self._receivers) if has_pages else set()
         scene -= set() if ground_truth else GROUND_TRUTH_TOPICS
         scene -= set() if picture else PICTURE_TOPICS
         if namespaces != set(self._feeds) or scene != set(self._scene):
             self._change = self._background.submit(self._change_subscriptions, namespaces, scene)
 
     def _change_subscriptions(self, namespaces: Set[str], scene: Set[str]) -> None:
-        for topic in scene - set(self._scene):
-            self._scene = {**self._scene, topic: NewestMessage(topic, SCENE_TYPES[topic])}
-        for topic in set(self._scene) - scene:
-            self._scene[topic].close()
-            self._scene = {known: kept for known, kept in self._scene.items() if known != topic}
-        for namespace in sorted(namespaces - set(self._feeds)):
-            self._feeds = {**self._feeds, namespace: RobotFeed(namespace)}
-        for namespace in set(self._feeds) - namespaces:
-            self._feeds[namespace].close()
-            self._feeds = {known: kept for known, kept in self._feeds.items() if known != namespace}
+        follow(self._scene, scene, lambda topic: NewestMessage(topic, self._receivers[topic][0]))
+        follow(self._feeds, namespaces, RobotFeed)
 
     # ---------------------------------------------------------------- reading
 
     def read(self) -> None:
-        """Update the state; a message that cannot be decoded affects no other."""
+        """Update the state."""
         self.read_stop()
-        self._read(self._read_fleet)
+        self._read_fleet()
         for feed in list(self._feeds.values()):
-            self._read(feed.read_newest)
-        self._read(self._read_scene)
+            feed.read_newest()
+        self._read_scene()
+        self.placement.set_robots(self.robots)
         self._put_robots()
         self._list_losses()
-        self._read(self._read_log)
-
-    def _read(self, part: Callable[[], None]) -> None:
-        try:
-            part()
-        except genpy.DeserializationError as error:
-            self._background.warn("a message on a robot's topic cannot be read: %s" % error, UNREADABLE_PERIOD_S)
+        self._read_log()
 
     def _read_fleet(self) -> None:
         now_s = time.monotonic()
@@ -176,7 +160,6 @@ class FleetFeed:
             self._fleet_stamp_s = message.header.stamp.to_sec()
             self._rows = sorted(message.robots, key=lambda row: row.id)[:ROBOTS_MAX]
             self.robots = {row.namespace.strip("/"): row for row in self._rows if row.state != Robot.REFUSED}
-            self.placement.set_robots(self.robots)
         elif answering == self._answering and now_s < self._fleet_s + ROW_PERIOD_S:
             return
         self._fleet_s, self._answering = now_s, answering
@@ -261,51 +244,46 @@ class FleetFeed:
         return self.page_state.put("stop", value)
 
     def _read_scene(self) -> None:
-        taken = {topic: newest.take() for topic, newest in self._scene.items()}
-        if taken.get("/tf_static") is not None:
-            for transform in taken["/tf_static"].transforms:
-                pose = pose_of(transform.transform.translation, transform.transform.rotation)
-                if is_plausible(pose):
-                    self.placement.receive_transform(transform.header.frame_id, transform.child_frame_id, pose)
-            self.placement.set_robots(self.robots)
-        if taken.get("/hero_sim/arena") is not None:
-            self.page_state.put("arena", describe_arena(taken["/hero_sim/arena"]))
-        if taken.get("/hero_sim/object_markers") is not None:
-            self.page_state.put("objects", describe_arena(taken["/hero_sim/object_markers"]))
-        grid = taken.get("/map") or self._grid
-        if (grid, self.placement.frame) != (self._grid, self._grid_frame):
-            # A map_server publishes once, perhaps before the robots are localized.
-            self._grid, self._grid_frame = grid, self.placement.frame
-            self.page_state.put("grid", grid and encode_grid(grid, self._grid_frame))
-        if taken.get("/diagnostics") is not None:
-            for status in taken["/diagnostics"].status:
-                name = status.name.rpartition(": ")[2]
-                if name in self.robots:
-                    self._health[name] = [status.level, shorten(status.message)]
-        now_s = time.monotonic()
+        now_s, put = time.monotonic(), self.page_state.put
+        for topic, (_, receive) in self._receivers.items():
+            newest = self._scene.get(topic)
+            message = newest and newest.take()
+            if message is not None:
+                receive(message, now_s)
         if "/localization/poses" not in self._scene:
             self._localization.pause(now_s)
-        elif taken.get("/localization/poses") is not None:
-            self._localize(taken["/localization/poses"], now_s)
         elif not self._localization.is_expected(now_s):
             self.placement.localize("", {})
-        if taken.get("/track/picture/outline") is not None:
-            self.picture.receive_outline(taken["/track/picture/outline"])
-        if taken.get("/track/picture/compressed") is not None:
-            self.picture.receive(taken["/track/picture/compressed"], now_s)
-        self.page_state.put("picture", self.picture.describe(self.placement.frame, now_s))
-        if taken.get("/behavior/markers") is not None:
-            self._drawings.receive(taken["/behavior/markers"], now_s)
-        self.page_state.put("drawings", self._drawings.describe(self.placement.frame, now_s))
-        if taken.get("/hero_sim/markers") is not None:
-            self.page_state.put("ground_truth", find_true_poses(taken["/hero_sim/markers"]))
-        elif "/hero_sim/markers" not in self._scene:
-            self.page_state.put("ground_truth", {})
-        if taken.get("/hero_sim/replay") is not None:
-            self._replay_s = now_s
-            self.page_state.put("replay", find_true_poses(taken["/hero_sim/replay"]))
-        elif now_s - self._replay_s > REPLAY_KEPT_S:
-            self.page_state.put("replay", {})
+        frame = self.placement.frame
+        if (self._grid, frame) != self._shown_grid:
+            # A map_server publishes once, perhaps before the robots are localized.
+            self._shown_grid = self._grid, frame
+            put("grid", self._grid and encode_grid(self._grid, frame))
+        put("picture", self.picture.describe(frame, now_s))
+        put("drawings", self._drawings.describe(frame, now_s))
+        if "/hero_sim/markers" not in self._scene:
+            put("ground_truth", {})
+        if now_s - self._replay_s > REPLAY_KEPT_S:
+            put("replay", {})
+
+    def _receive_transforms(self, message: TFMessage, now_s: float) -> None:
+        for transform in message.transforms:
+            pose = pose_of(transform.transform.translation, transform.transform.rotation)
+            if is_plausible(pose):
+                self.placement.receive_transform(transform.header.frame_id, transform.child_frame_id, pose)
+
+    def _receive_diagnostics(self, message: DiagnosticArray, now_s: float) -> None:
+        for status in message.status:
+            name = status.name.rpartition(": ")[2]
+            if name in self.robots:
+                self._health[name] = [status.level, shorten(status.message)]
+
+    def _receive_replay(self, message: MarkerArray, now_s: float) -> None:
+        self._replay_s = now_s
+        self.page_state.put("replay", find_true_poses(message))
+
+    def _receive_grid(self, message: OccupancyGrid, now_s: float) -> None:
+        self._grid = message
 
     def _localize(self, report: RobotPoses, now_s: float) -> None:
         self._tracked = {"hero_%d" % robot.id for robot in report.robots if robot.state == RobotPose.TRACKED}
@@ -319,7 +297,6 @@ class FleetFeed:
                 poses[name] = pose, odom
                 self.picture.follow(name, robot.stamp.to_sec(), pose)
         self.placement.localize(report.header.frame_id, poses)
-        self.placement.set_robots(self.robots)
 
     def _put_robots(self) -> None:
         poses, ranges, lights, goals = {}, {}, {}, {}
@@ -327,7 +304,7 @@ class FleetFeed:
             track = feed.listener.track
             if track.pose is not None:
                 poses[feed.name] = encode_pose(self.placement.to_map(feed.name, track.pose))
-                ranges[feed.name] = encode_ranges(feed.listener.ranges_m)
+                ranges[feed.name] = [encode_range(range_m) for range_m in feed.listener.ranges_m]
             if feed.light is not None:
                 lights[feed.name] = feed.light
             goal = feed.find_goal(self.placement)
@@ -344,10 +321,22 @@ class FleetFeed:
             self._log_bytes.popleft()
             log.skip(1)
         for _ in range(min(waiting, limit)):
-            line = Log().deserialize(self._log_bytes.popleft())
+            try:
+                line = Log().deserialize(self._log_bytes.popleft())
+            except genpy.DeserializationError:
+                log.skip(1)
+                continue
             label = LABEL.match(line.msg) if line.name in drivers else None
             robot = label.group(1) if label and label.group(1) in self.robots else ""
             log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
+
+
+def follow(sources: Dict[str, Any], wanted: Set[str], open_source: Callable[[str], Any]) -> None:
+    """Open the sources that are wanted and close the others, one by one: other threads read them meanwhile."""
+    for name in sorted(wanted - set(sources)):
+        sources[name] = open_source(name)
+    for name in set(sources) - wanted:
+        sources.pop(name).close()
 
 
 def describe_stop_of_others(stopped: bool, moving: Sequence[str]) -> Optional[StopStatus]:

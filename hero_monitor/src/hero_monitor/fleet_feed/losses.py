@@ -68,37 +68,22 @@ def list_losses(
     losses = []
     silent = sorted(name.strip("/") for name, answers in drivers.items() if not answers)
     if silent:
-        names = ", ".join(silent)
-        cause = "No answer from %s: its robots are unknown" % names
-        if len(silent) > 1:
-            cause = "No answer from %s: their robots are unknown" % names
-        losses.append(
-            Loss("driver", cause, "Switch off robots that move; start the driver again: " + NO_DRIVER)
-        )
+        whose = "its" if len(silent) == 1 else "their"
+        cause = "No answer from %s: %s robots are unknown" % (", ".join(silent), whose)
+        remedy = "Switch off robots that move; start the driver again: " + NO_DRIVER
+        losses.append(Loss("driver", cause, remedy))
     elif not drivers:
         losses.append(Loss("driver", "No driver", "Start it: " + NO_DRIVER))
     if master:
-        losses.append(
-            Loss(
-                "master",
-                "No ROS master (%s): robots and programs that start now do not appear" % master,
-                "Existing connections keep working, and STOP ALL works; start it again: " + NO_DRIVER,
-            )
-        )
+        cause = "No ROS master (%s): robots and programs that start now do not appear" % master
+        remedy = "Existing connections keep working, and STOP ALL works; start it again: " + NO_DRIVER
+        losses.append(Loss("master", cause, remedy))
     if localization.is_lost(now_s):
-        losses.append(
-            Loss(
-                "localization",
-                "Localization is silent: positions are unknown",
-                "Look at its terminal, or start it again: roslaunch hero_localization localization.launch",
-            )
-        )
+        cause = "Localization is silent: positions are unknown"
+        remedy = "Look at its terminal, or start it again: roslaunch hero_localization localization.launch"
+        losses.append(Loss("localization", cause, remedy))
     elif localization.has_lost_camera(now_s):
-        losses.append(
-            Loss(
-                "camera",
-                "The camera measures no robot: positions follow odometry, which drifts",
-                "Is it plugged in, uncovered and lit? Does track run? roslaunch hero_localization camera.launch",
-            )
-        )
+        cause = "The camera measures no robot: positions follow odometry, which drifts"
+        remedy = "Is it plugged in, uncovered and lit? Does track run? roslaunch hero_localization camera.launch"
+        losses.append(Loss("camera", cause, remedy))
     return losses

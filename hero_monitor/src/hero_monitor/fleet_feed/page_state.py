@@ -53,13 +53,8 @@ def encode_pose(pose: Optional[Pose]) -> Optional[List[int]]:
     return [round(value * 1000.0) for value in pose]
 
 
-def encode_ranges(ranges_m: Sequence[float]) -> List[Optional[int]]:
-    """Return proximity ranges in mm: None for nothing in range, 0 for contact, -1 for an invalid reading."""
-    return [encode_range(range_m) for range_m in ranges_m]
-
-
 def encode_range(range_m: float) -> Optional[int]:
-    """Return one range, see encode_ranges; infinities and NaN as in REP 117."""
+    """Return a proximity range (REP 117) in mm: None for nothing in range, 0 for contact, -1 for an invalid reading."""
     if abs(range_m) <= MAX_RIM_RANGE_M:
         return max(0, round(range_m * 1000.0))
     if math.isinf(range_m):
@@ -99,14 +94,6 @@ class LogRing:
         return encode({"missed": max(0, first - number - 1) if number else 0, "lines": new})
 
 
-class Received:
-    """State sent to one page."""
-
-    def __init__(self) -> None:
-        self.versions: Dict[str, int] = {}
-        self.log_number = 0
-
-
 class PageState:
     """The current state."""
 
@@ -124,20 +111,13 @@ class PageState:
         self._versions[name] = self._versions.get(name, 0) + 1
         return True
 
-    def take_updates(self, page: Received) -> Optional[str]:
-        """Return what is new to a page as one JSON object, None without any; marks it as received."""
-        parts = self._take(page, list(self._versions))
-        if page.log_number < self.log.count:
-            parts.append('"log":%s' % self.log.encode_after(page.log_number))
-            page.log_number = self.log.count
-        return "{%s}" % ",".join(parts) if parts else None
+    def take_updates(self, seen: Dict[str, int], names: Optional[Sequence[str]] = None) -> Optional[str]:
+        """Return what is new to a page as one JSON object, None without any; marks it as seen.
 
-    def take_stop(self, page: Received) -> Optional[str]:
-        """Return the same of the status of a stop alone, for a page that is not served."""
-        parts = self._take(page, ["stop"] if "stop" in self._versions else [])
-        return "{%s}" % ",".join(parts) if parts else None
-
-    def _take(self, page: Received, names: Sequence[str]) -> List[str]:
-        new = [name for name in names if page.versions.get(name) != self._versions[name]]
-        page.versions.update((name, self._versions[name]) for name in new)
-        return ['"%s":%s' % (name, self._texts[name]) for name in new]
+        seen: version of each part that the page has; empty for a new page. names: of the parts; None: all.
+        """
+        versions = {**self._versions, "log": self.log.count}
+        new = [name for name in versions if versions[name] != seen.get(name, 0) and (names is None or name in names)]
+        texts = [self._texts[name] if name != "log" else self.log.encode_after(seen.get(name, 0)) for name in new]
+        seen.update((name, versions[name]) for name in new)
+        return "{%s}" % ",".join('"%s":%s' % part for part in zip(new, texts)) if new else None

@@ -7,7 +7,7 @@ Robots without a place are drawn side by side, and the page says so.
 
 from typing import Dict, Iterable, List, Tuple
 
-from hero_node.geometry import Pose, invert_pose, transform_pose
+from hero_node.geometry import Pose, find_frame, invert_pose, transform_pose
 
 APART_M = 1.0
 """Between the origins of robots that are drawn side by side: farther than a short drive."""
@@ -34,7 +34,7 @@ class Placement:
     def localize(self, frame: str, poses: Dict[str, Tuple[Pose, Pose]]) -> None:
         """Place robots by their poses in a frame, and in hero_N/odom at the same time; without any, by /tf_static."""
         self._localized_frame = frame.lstrip("/")
-        self._localized = {robot: transform_pose(pose, invert_pose(odom)) for robot, (pose, odom) in poses.items()}
+        self._localized = {robot: find_frame(pose, odom) for robot, (pose, odom) in poses.items()}
 
     @property
     def is_localized(self) -> bool:

@@ -8,7 +8,7 @@ from std_msgs.msg import ColorRGBA
 
 from hero_client.ros.robot_listener import NewestMessage, RobotListener
 from hero_client.values.readings import read_pose
-from hero_node.geometry import Pose
+from hero_node.geometry import Pose, measure_distance
 
 from .page_state import encode_color
 from .placement import Placement
@@ -59,7 +59,7 @@ class RobotFeed:
         pose = self.listener.track.pose
         if pose is not None:
             here = placement.to_map(self.name, pose)
-            if (goal.x_m - here.x_m) ** 2 + (goal.y_m - here.y_m) ** 2 < REACHED_M**2:
+            if measure_distance(goal, here) < REACHED_M:
                 self._goal = None
                 return None
         return goal

@@ -1,7 +1,6 @@
 """The WebSocket /foxglove: one connection per client, with the access rules of the page."""
 
 import contextlib
-import time
 from typing import Any, Awaitable, Callable, Dict, FrozenSet, List, NamedTuple, Optional, Set, Union
 
 import tornado.ioloop
@@ -9,7 +8,6 @@ import tornado.iostream
 import tornado.web
 import tornado.websocket
 
-from ..serving.connection_limits import TokenAttempts
 from ..serving.server import BaseHandler, PageSocket, Route
 from .hub import Client, Hub, Publish, TopicMessage, TopicType
 from .protocol import SUBPROTOCOLS
@@ -32,7 +30,7 @@ class TopicSource(NamedTuple):
 class Publisher(NamedTuple):
     """Receiver of clients' messages; all return at once."""
 
-    open_client: Callable[[], None]
+    open_client: Callable[[int], None]
     publish: Publish
     close_client: Callable[[int], None]
 
@@ -40,7 +38,6 @@ class Publisher(NamedTuple):
 class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     """The socket of one client."""
 
-    attempts: TokenAttempts
     endpoint: "FoxgloveEndpoint"
     origins: FrozenSet[str]
 
@@ -52,7 +49,8 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         if origin and not self.check_origin(origin):
             raise tornado.web.HTTPError(403)
         if not self.is_logged_in:
-            self._check_token()
+            self.check_token(self.get_query_argument("token", ""))
+            self._gave_token = True
         BaseHandler.prepare(self)
         offered = self.request.headers.get("Sec-WebSocket-Protocol", "").split(",")
         if not {name.strip() for name in offered} & set(SUBPROTOCOLS):
@@ -64,15 +62,6 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     @property
     def is_logged_in(self) -> bool:
         return self._gave_token or super().is_logged_in
-
-    def _check_token(self) -> None:
-        address, now_s = self.request.remote_ip or "", time.monotonic()
-        if not self.attempts.admits(address, now_s):
-            raise tornado.web.HTTPError(429)
-        if not self.access.admits_token(self.get_query_argument("token", "") or ""):
-            self.attempts.count_wrong(address, now_s)
-            raise tornado.web.HTTPError(403)
-        self._gave_token = True
 
     def check_origin(self, origin: str) -> bool:
         """Return whether a page may connect: this server's, and those that a parameter names."""
@@ -129,14 +118,14 @@ class FoxgloveEndpoint:
         self._sockets: List[FoxgloveSocket] = []
         self._tick = tornado.ioloop.PeriodicCallback(self._update, 1000.0 * FLUSH_PERIOD_S)
         values = {"endpoint": self, "origins": frozenset(origin.lower() for origin in origins)}
-        self.route = Route(r"/foxglove/?", FoxgloveSocket, values)
+        self.route: Route = (r"/foxglove/?", FoxgloveSocket, values)
 
     def add(self, socket: FoxgloveSocket) -> None:
         """Serve a client."""
         self._sockets.append(socket)
         self.hub.add(socket.client)
         if self._publisher is not None:
-            self._publisher.open_client()
+            self._publisher.open_client(socket.client.number)
         if not self._tick.is_running():
             self._tick.start()
 

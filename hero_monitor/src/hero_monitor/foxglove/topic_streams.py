@@ -4,18 +4,19 @@ rospy reads each publisher on a thread of its own, and waking it costs several t
 Source: ROS TCPROS and Slave API.
 """
 
+import contextlib
 import errno
-import http.client
 import select
 import socket
 import struct
 import xmlrpc.client
+from http.client import HTTPException
 from io import BytesIO
 from typing import Any, Dict, List, NamedTuple
 from urllib.parse import urlsplit
 from xml.parsers.expat import ExpatError
 
-import rosgraph.network
+from rosgraph.network import ROSHandshakeException, read_ros_handshake_header, write_ros_handshake_header
 
 from hero_node.ros.master import MASTER_TIMEOUT_S, SUCCESS, LimitedTransport
 
@@ -91,29 +92,23 @@ class Stream:
 
 def open_stream(topic: str, node_uri: str, own_name: str) -> Stream:
     """Connect to a node that publishes a topic; blocks, for seconds if the node hangs. Raises: OSError."""
-    try:
-        with xmlrpc.client.ServerProxy(node_uri, transport=LimitedTransport()) as node:
-            code, text, protocol = node.requestTopic(own_name, topic, [["TCPROS"]])
-        if code != SUCCESS or not protocol:
-            raise OSError("%s: %s" % (topic, text))
-        _, host, port = protocol
-    except (http.client.HTTPException, xmlrpc.client.Error, ExpatError, ValueError, TypeError) as error:
-        raise OSError("%s: %s" % (urlsplit(node_uri).netloc, error)) from None
-    sock = socket.create_connection((host, port), MASTER_TIMEOUT_S)
-    try:
-        wish = {"topic": topic, "callerid": own_name, "type": "*", "md5sum": "*", "tcp_nodelay": "0"}
-        rosgraph.network.write_ros_handshake_header(sock, wish)
-        buffer = BytesIO()
-        header = rosgraph.network.read_ros_handshake_header(sock, buffer, READ_LENGTH)
-    except rosgraph.network.ROSHandshakeException as error:
-        sock.close()
-        raise OSError(str(error)) from None
-    except OSError:
-        sock.close()
-        raise
-    if "error" in header:
-        sock.close()
-        raise OSError(header["error"])
+    buffer = BytesIO()
+    with contextlib.ExitStack() as opened:
+        try:
+            with xmlrpc.client.ServerProxy(node_uri, transport=LimitedTransport()) as node:
+                code, text, protocol = node.requestTopic(own_name, topic, [["TCPROS"]])
+            if code != SUCCESS or not protocol:
+                raise OSError("%s: %s" % (topic, text))
+            _, host, port = protocol
+            sock = opened.enter_context(socket.create_connection((host, port), MASTER_TIMEOUT_S))
+            wish = {"topic": topic, "callerid": own_name, "type": "*", "md5sum": "*", "tcp_nodelay": "0"}
+            write_ros_handshake_header(sock, wish)
+            header = read_ros_handshake_header(sock, buffer, READ_LENGTH)
+        except (HTTPException, xmlrpc.client.Error, ExpatError, ROSHandshakeException, ValueError, TypeError) as error:
+            raise OSError("%s: %s" % (urlsplit(node_uri).netloc, error)) from None
+        if "error" in header:
+            raise OSError(header["error"])
+        opened.pop_all()  # the stream keeps the socket open
     return Stream(sock, header, buffer.getvalue())
 
 

@@ -13,7 +13,7 @@ import socket
 import time
 from collections import deque
 from pathlib import Path
-from typing import Any, Awaitable, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple, Type, Union
+from typing import Any, Awaitable, Callable, Deque, Dict, List, NamedTuple, Optional, Tuple, Union
 
 import tornado.httpserver
 import tornado.ioloop
@@ -22,7 +22,7 @@ import tornado.netutil
 import tornado.web
 import tornado.websocket
 
-from ..fleet_feed.page_state import Received, encode
+from ..fleet_feed.page_state import encode
 from .access import Access
 from .connection_limits import TOKEN_PERIOD_S, ConnectionLimits, TokenAttempts
 
@@ -68,16 +68,13 @@ class Actions(NamedTuple):
 
     open_page: Callable[["PageSocket"], None]
     receive: Callable[["PageSocket", Union[str, bytes]], None]
-    close_page: Callable[["PageSocket"], None]
+    close_page: Callable[[int], None]
+    """Takes the page's number."""
     find_picture: Callable[[int], bytes]
 
 
-class Route(NamedTuple):
-    """A handler besides those of the page."""
-
-    pattern: str
-    handler: Type[tornado.web.RequestHandler]
-    values: Dict[str, Any]
+Route = Tuple[str, Any, Dict[str, Any]]
+"""Pattern of a path, handler, and what it gets in addition to what all share."""
 
 
 class BaseHandler(tornado.web.RequestHandler):
@@ -85,13 +82,13 @@ class BaseHandler(tornado.web.RequestHandler):
 
     access: Access
     limits: ConnectionLimits
+    attempts: TokenAttempts
+    actions: Actions
+    pages: List["PageSocket"]
 
-    def initialize(self, access: Access, limits: ConnectionLimits, **others: Any) -> None:
+    def initialize(self, **shared: Any) -> None:
         """Set what all handlers share."""
-        self.access = access
-        self.limits = limits
-        for name, value in others.items():
-            setattr(self, name, value)
+        self.__dict__.update(shared)
 
     def set_default_headers(self) -> None:
         """Restrict the page to its own files and its own socket."""
@@ -116,6 +113,20 @@ class BaseHandler(tornado.web.RequestHandler):
     def is_logged_in(self) -> bool:
         """Whether the browser has given the token, or needs none."""
         return not self.access.needs_token or self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS) is not None
+
+    @property
+    def is_own_page(self) -> bool:
+        """Whether a page of this server makes the request; every browser sends Origin."""
+        return self.access.admits_origin(self.request.headers.get("Origin"), self.request.host)
+
+    def check_token(self, token: Any) -> None:
+        """Refuse a request whose token is wrong, rate-limited per address. Raises: HTTPError."""
+        address, now_s = self.request.remote_ip or "", time.monotonic()
+        if not self.attempts.admits(address, now_s):
+            raise tornado.web.HTTPError(429)
+        if not (isinstance(token, str) and self.access.admits_token(token)):
+            self.attempts.count_wrong(address, now_s)
+            raise tornado.web.HTTPError(403)
 
     def write_error(self, status_code: int, **others: Any) -> None:
         """Send one line that says what is wrong."""
@@ -149,8 +160,6 @@ class FileHandler(BaseHandler):
 class PictureHandler(BaseHandler):
     """A picture of the camera by its number, for browsers that are logged in."""
 
-    actions: Actions
-
     def get(self, number: str) -> None:
         """Send the picture."""
         if not self.is_logged_in:
@@ -165,22 +174,15 @@ class PictureHandler(BaseHandler):
 class LoginHandler(BaseHandler):
     """Exchanges the token for a signed cookie."""
 
-    attempts: TokenAttempts
-
     def post(self) -> None:
-        """Check the token, rate-limited per address."""
-        if not self.access.admits_origin(self.request.headers.get("Origin"), self.request.host):
+        """Check the token."""
+        if not self.is_own_page:
             raise tornado.web.HTTPError(403)
-        address, now_s = self.request.remote_ip or "", time.monotonic()
-        if not self.attempts.admits(address, now_s):
-            raise tornado.web.HTTPError(429)
         try:
             token = json.loads(self.request.body)["token"]
         except (ValueError, TypeError, KeyError, RecursionError):
             token = None
-        if not (isinstance(token, str) and self.access.admits_token(token)):
-            self.attempts.count_wrong(address, now_s)
-            raise tornado.web.HTTPError(403)
+        self.check_token(token)
         self.set_secure_cookie(COOKIE, "in", expires_days=None, httponly=True, samesite="Strict", path="/")
         self.set_status(204)
 
@@ -189,32 +191,24 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     """The socket of one page."""
 
     numbers = itertools.count(1)
-    actions: Actions
-    pages: List["PageSocket"]
 
     def prepare(self) -> Optional[Awaitable[None]]:
-        """Refuse browsers that are not logged in, and pages beyond SOCKETS_MAX."""
+        """Refuse pages of other servers, browsers that are not logged in, and pages beyond SOCKETS_MAX."""
         BaseHandler.prepare(self)
-        if not self.is_logged_in:
+        if not (self.is_logged_in and self.is_own_page):
             raise tornado.web.HTTPError(403)
         if len(self.pages) >= SOCKETS_MAX:
             raise tornado.web.HTTPError(503)
         return None
 
     def check_origin(self, origin: str) -> bool:
-        """Refuse pages of other servers."""
-        return self.access.admits_origin(origin, self.request.host)
-
-    async def get(self, *arguments: Any, **others: Any) -> None:
-        """Refuse requests without Origin, which tornado admits: every browser sends it."""
-        if not self.access.admits_origin(self.request.headers.get("Origin"), self.request.host):
-            raise tornado.web.HTTPError(403)
-        await super().get(*arguments, **others)
+        """Return whether a page of this server opens the socket."""
+        return self.is_own_page
 
     def open(self, *arguments: str, **others: str) -> None:
         """Register a page."""
         self.number = next(PageSocket.numbers)
-        self.seen = Received()
+        self.seen: Dict[str, int] = {}
         self.ground_truth = self.picture = False
         self.visible = True
         self._sent_s = time.monotonic()
@@ -236,7 +230,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Unregister a page."""
         if self in self.pages:
             self.pages.remove(self)
-            self.actions.close_page(self)
+            self.actions.close_page(self.number)
 
     @property
     def ready(self) -> bool:
@@ -296,28 +290,37 @@ class LimitedServer(tornado.httpserver.HTTPServer):
 class Server:
     """The server, from its start to its end."""
 
-    def __init__(self, access: Access, limits: ConnectionLimits, actions: Actions, *routes: Route) -> None:
+    def __init__(
+        self, access: Access, limits: ConnectionLimits, actions: Optional[Actions], *routes: Route
+    ) -> None:
+        """actions: of pages; None: there are no pages, only the routes."""
         # tornado logs each invalid request and cookie: any client could fill the disk.
         logging.getLogger("tornado.general").setLevel(logging.ERROR)
         self.pages: List[PageSocket] = []
-        shared: Dict[str, Any] = {"access": access, "limits": limits}
-        with_attempts = {**shared, "attempts": TokenAttempts()}
-        self._application = tornado.web.Application(
-            [
-                (r"/live", PageSocket, {**shared, "actions": actions, "pages": self.pages}),
-                (r"/login", LoginHandler, with_attempts),
-                (r"/picture/([0-9]{1,9})", PictureHandler, {**shared, "actions": actions}),
-                *((route.pattern, route.handler, {**with_attempts, **route.values}) for route in routes),
-                (r"/(.*)", FileHandler, shared),
-            ],
-            log_function=ignore_request,
+        shared = {
+            "access": access,
+            "limits": limits,
+            "attempts": TokenAttempts(),
+            "actions": actions,
+            "pages": self.pages,
+        }
+        page: List[Route] = [
+            (r"/live", PageSocket, {}),
+            (r"/login", LoginHandler, {}),
+            (r"/picture/([0-9]{1,9})", PictureHandler, {}),
+            (r"/(.*)", FileHandler, {}),
+        ]
+        served = [*routes, *(page if actions is not None else [])]
+        application = tornado.web.Application(
+            [(pattern, handler, {**shared, **values}) for pattern, handler, values in served],
+            log_function=lambda handler: None,  # logs no request: a URL may contain a secret by mistake
             cookie_secret=secrets.token_urlsafe(32),
             websocket_ping_interval=PING_INTERVAL_S,
             websocket_ping_timeout=PING_TIMEOUT_S,
             websocket_max_message_size=MAX_REQUEST_LENGTH,
         )
         self._http = LimitedServer(
-            self._application,
+            application,
             max_body_size=MAX_REQUEST_LENGTH,
             max_header_size=16384,
             idle_connection_timeout=60.0,
@@ -344,7 +347,3 @@ class Server:
         self._http.stop()
         for page in list(self.pages):
             page.close(1001, "the monitor ends")
-
-
-def ignore_request(handler: tornado.web.RequestHandler) -> None:
-    """Log no request: a URL may contain a secret by mistake."""

@@ -1,5 +1,7 @@
 // Programs on the chosen robots, those that run, and the recording. They belong to the monitor: every page shows them.
 
+import { Lines, element, make, setPressed, setText } from "../dom.js";
+
 const UNIT = /_(m_s|rad_s|1_s|m|s|deg|hz)$/;
 const WORDS = {
   linear_m_s: "speed",
@@ -12,17 +14,14 @@ const WORDS = {
   others_m: "to others",
 };
 
-const element = (id) => document.getElementById(id);
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 
 export class ProgramPanel {
   constructor({ connection, map, notice }) {
-    this.connection = connection;
-    this.map = map;
-    this.notice = notice;
+    Object.assign(this, { connection, map, notice });
     this.names = [];
     this.offers = [];
-    this.rows = new Map(); // of programs that run, by number
+    this.rows = new Lines(element("running"), (number) => this.makeRow(number));
     this.recorded = ""; // by the last recording that this page has seen
     element("program").addEventListener("change", () => this.showFields());
     element("start").addEventListener("click", () => this.start());
@@ -60,18 +59,14 @@ export class ProgramPanel {
   showFields() {
     const fields = this.offer ? this.offer.fields.filter((field) => !field.on_map) : [];
     element("fields").replaceChildren(
-      ...fields.map((field) => {
-        const label = document.createElement("label");
-        const input = document.createElement(field.options.length ? "select" : "input");
-        input.name = field.name;
-        if (field.options.length) for (const option of field.options) input.add(new Option(option));
-        else input.type = typeof field.default === "boolean" ? "checkbox" : "number";
-        if (input.type === "number") Object.assign(input, { min: field.low, max: field.high, step: field.whole ? 1 : "any", required: true });
-        if (input.type === "checkbox") input.checked = field.default;
-        else input.value = field.default;
-        const words = WORDS[field.name] || field.name.replace(UNIT, "").replaceAll("_", " ");
-        label.append(field.unit ? `${words}, ${field.unit}` : words, input);
-        return label;
+      ...fields.map(({ name, unit, default: value, choices, limits, step }) => {
+        const words = WORDS[name] || name.replace(UNIT, "").replaceAll("_", " ");
+        let input;
+        if (choices.length) input = make("select", { name }, ...choices.map((choice) => new Option(choice)));
+        else if (limits === null) input = make("input", { name, type: "checkbox", checked: value });
+        else input = make("input", { name, type: "number", min: limits[0], max: limits[1], step, required: true });
+        if (input.type !== "checkbox") input.value = value;
+        return make("label", {}, unit ? `${words}, ${unit}` : words, input);
       }),
     );
   }
@@ -82,20 +77,20 @@ export class ProgramPanel {
     if (this.offers !== programs) {
       const chosen = element("program").value;
       this.offers = programs;
-      const options = (some) => some.map(({ title, program }) => new Option(title, program));
-      const behaviors = document.createElement("optgroup");
-      behaviors.label = "behaviors";
-      behaviors.append(...options(programs.filter((offer) => offer.is_behavior)));
-      element("program").replaceChildren(...options(programs.filter((offer) => !offer.is_behavior)), behaviors);
+      const list = (areBehaviors) =>
+        programs.filter((offer) => offer.is_behavior === areBehaviors).map(({ title, program }) => new Option(title, program));
+      element("program").replaceChildren(...list(false), make("optgroup", { label: "behaviors" }, ...list(true)));
       if (programs.some(({ program }) => program === chosen)) element("program").value = chosen;
       this.showFields();
     }
     element("launcher").hidden = names.length === 0 || programs.length === 0 || !state.isFresh;
     element("stop_some").textContent = `Stop ${names.length === 1 ? names[0] : `these ${names.length}`}`;
-    this.showRunning(state.programs.filter(({ program }) => program !== "record" || state.isFresh));
-    this.recording = state.programs.find(({ program, failure }) => program === "record" && !failure);
+    const isRecording = ({ program, failure }) => program === "record" && !failure;
+    const shown = state.programs.filter((one) => !isRecording(one) && (one.program !== "record" || state.isFresh));
+    this.rows.show(shown, ({ number }) => number, (row, program) => this.fill(row, program));
+    this.recording = state.programs.find(isRecording);
     element("recorder").hidden = !record || !state.hello.control;
-    element("record").setAttribute("aria-pressed", String(Boolean(this.recording)));
+    setPressed(element("record"), Boolean(this.recording));
     const { seconds = 0, bytes = 0, folder = "" } = this.recording || {};
     const length = bytes ? clock(seconds) : "starting";
     if (this.recording) this.recorded = `${length}, ${(bytes / 1e6).toFixed(1)} MB in ${folder}`;
@@ -104,33 +99,17 @@ export class ProgramPanel {
     element("rec").textContent = `rec ${length}`;
   }
 
-  showRunning(programs) {
-    const left = new Set(this.rows.keys());
-    for (const { number, program, title, robots, seconds, ending, failure } of programs) {
-      if (program === "record" && !failure) continue;
-      left.delete(number);
-      const row = this.rows.get(number) || this.addRow(number);
-      const what = robots.length === 1 ? robots[0] : `${robots.length} robots`;
-      const text = failure ? `${title} failed: ${failure}` : `${title}, ${what}, ${clock(seconds)}${ending ? ", ending" : ""}`;
-      if (row.text.textContent !== text) row.text.textContent = text;
-      row.line.classList.toggle("problem", Boolean(failure));
-      row.button.textContent = failure ? "Dismiss" : "End";
-      row.button.setAttribute("aria-label", `${row.button.textContent} ${title}`);
-    }
-    for (const number of left) {
-      this.rows.get(number).line.remove();
-      this.rows.delete(number);
-    }
+  fill({ line, text, button }, { title, robots, seconds, ending, failure }) {
+    const what = robots.length === 1 ? robots[0] : `${robots.length} robots`;
+    setText(text, failure ? `${title} failed: ${failure}` : `${title}, ${what}, ${clock(seconds)}${ending ? ", ending" : ""}`);
+    line.classList.toggle("problem", Boolean(failure));
+    setText(button, failure ? "Dismiss" : "End");
+    button.setAttribute("aria-label", `${button.textContent} ${title}`);
   }
 
-  addRow(number) {
-    const [line, text, button] = ["li", "span", "button"].map((tag) => document.createElement(tag));
-    button.type = "button";
+  makeRow(number) {
+    const [text, button] = [make("span"), make("button", { type: "button" })];
     button.addEventListener("click", () => this.send({ do: "end", number }));
-    line.append(text, button);
-    element("running").append(line);
-    const row = { line, text, button };
-    this.rows.set(number, row);
-    return row;
+    return { line: make("li", {}, text, button), text, button };
   }
 }
