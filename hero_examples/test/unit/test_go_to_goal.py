@@ -68,10 +68,11 @@ def test_a_post_in_the_way_is_avoided_or_named_and_never_touched(tmp_path, avoid
         assert true_paths.stop_within(swarm)
 
 
-class Listener:
-    """What a server would tell clients and the log."""
+class NotedQueue(GoalQueue):
+    """Notes what a server would tell clients and the log."""
 
-    def __init__(self):
+    def __init__(self, robot, avoid):
+        super().__init__(robot, avoid)
         self.accepted, self.progress, self.outcomes = [], [], []
 
     def accept_goal(self, request):
@@ -89,8 +90,7 @@ class Goals:
 
     def __init__(self, arena="empty", avoid=False):
         self.swarm = StepSwarm(1, arena=arena, perfect=True)
-        self.listener = Listener()
-        self.queue = GoalQueue(self.swarm[0], self.listener, avoid)
+        self.queue = NotedQueue(self.swarm[0], avoid)
         self.events = []
 
     def put(self, *goal, timeout_s=60.0, frame="", handle=None):
@@ -118,10 +118,10 @@ def test_a_goal_is_reported_on_the_way_and_at_its_end(goals):
     goals.put(0.2, 0.0)
     assert goals.queue.busy
     goals.drive()
-    (outcome,) = goals.listener.outcomes
+    (outcome,) = goals.queue.outcomes
     assert outcome.reached and outcome.reason == "" and outcome.distance_m < TOLERANCE_M
     assert goals.queue.reached and not goals.queue.busy
-    assert np.diff(goals.listener.progress) == pytest.approx(0.5, abs=0.1) and len(goals.listener.progress) > 4
+    assert np.diff(goals.queue.progress) == pytest.approx(0.5, abs=0.1) and len(goals.queue.progress) > 4
 
 
 @pytest.mark.parametrize("avoid", [True, False])
@@ -138,7 +138,7 @@ def test_a_new_goal_replaces_the_old_one(goals):
     goals.put(0.5, 0.0)
     goals.events = [(1.0, lambda: goals.put(0.0, 0.1))]
     goals.drive()
-    first, second = goals.listener.outcomes
+    first, second = goals.queue.outcomes
     assert not first.reached and first.gave_up and first.reason == "another goal came"
     assert first.elapsed_s < 1.3
     assert second.reached and goals.queue.reached
@@ -158,8 +158,8 @@ def test_a_stream_of_goals_is_followed_without_a_stop(goals, monkeypatch):
         goals.swarm.rows, "send_velocity", lambda row, *velocity: (sent.append(velocity), send(row, *velocity))
     )
     stream(goals, 40, lambda number: goals.put(0.3 + 0.005 * number, 0.0))
-    assert len(goals.listener.accepted) == 40 and goals.queue.reached and not goals.queue.busy
-    assert [outcome.reason for outcome in goals.listener.outcomes] == ["another goal came"] * 39 + [""]
+    assert len(goals.queue.accepted) == 40 and goals.queue.reached and not goals.queue.busy
+    assert [outcome.reason for outcome in goals.queue.outcomes] == ["another goal came"] * 39 + [""]
     assert math.dist(goals.swarm[0].pose[:2], (0.495, 0.0)) < TOLERANCE_M
     assert all(linear_m_s > 0.0 for linear_m_s, _ in sent[:40])
     assert goals.swarm.now_s < 8.0
@@ -169,19 +169,19 @@ def test_of_goals_that_wait_only_the_newest_is_driven_to(goals):
     for y_m in (0.3, 0.2, 0.1):
         goals.put(0.0, y_m)
     goals.drive()
-    assert [request.goal.y_m for request in goals.listener.accepted] == [0.1]
-    assert [outcome.gave_up for outcome in goals.listener.outcomes] == [True, True, False]
+    assert [request.goal.y_m for request in goals.queue.accepted] == [0.1]
+    assert [outcome.gave_up for outcome in goals.queue.outcomes] == [True, True, False]
 
 
 def test_the_time_limit_of_a_goal_begins_with_it_and_names_it(goals):
     stream(goals, 30, lambda number: goals.put(50.0 + number, 0.0, timeout_s=2.0))
-    assert [outcome.gave_up for outcome in goals.listener.outcomes] == [True] * 29 + [False]
-    assert "reach (79, 0): not there after 2 s" in goals.listener.outcomes[-1].reason
+    assert [outcome.gave_up for outcome in goals.queue.outcomes] == [True] * 29 + [False]
+    assert "reach (79, 0): not there after 2 s" in goals.queue.outcomes[-1].reason
 
 
 def test_goals_in_another_frame_start_over(goals):
     stream(goals, 2, lambda number: goals.put(0.2, 0.0, frame=("", "robot")[number]))
-    assert [request.frame for request in goals.listener.accepted] == ["", "robot"]
+    assert [request.frame for request in goals.queue.accepted] == ["", "robot"]
     assert goals.queue.reached and goals.swarm[0].pose.x_m > 0.2
 
 
@@ -189,7 +189,7 @@ def test_a_cancelled_goal_ends_and_another_ones_cancellation_does_not(goals):
     goals.put(0.5, 0.0, handle="mine")
     goals.events = [(1.0, lambda: goals.queue.cancel("another")), (2.0, lambda: goals.queue.cancel("mine"))]
     goals.drive()
-    (outcome,) = goals.listener.outcomes
+    (outcome,) = goals.queue.outcomes
     assert outcome.gave_up and outcome.reason == "cancelled" and 2.0 <= outcome.elapsed_s < 2.3
     goals.put(0.1, 0.0, handle="next")
     goals.drive()
@@ -198,9 +198,9 @@ def test_a_cancelled_goal_ends_and_another_ones_cancellation_does_not(goals):
 
 def test_the_end_of_the_program_gives_up_all_goals(goals):
     goals.put(0.5, 0.0)
-    goals.events = [(1.0, goals.queue.close)]
+    goals.events = [(1.0, goals.queue.give_up)]
     goals.drive()
-    assert [outcome.reason for outcome in goals.listener.outcomes] == ["the program ends"]
+    assert [outcome.reason for outcome in goals.queue.outcomes] == ["the program ends"]
     goals.put(0.1, 0.0)
     assert not goals.queue.drive_to_next(goals.swarm.sleep)
 
@@ -210,7 +210,7 @@ def test_a_goal_out_of_reach_or_in_an_unknown_frame_fails_with_the_reason(goals)
     goals.drive()
     goals.put(0.1, 0.0, frame="nowhere")
     goals.drive()
-    late, lost = goals.listener.outcomes
+    late, lost = goals.queue.outcomes
     assert not late.reached and not late.gave_up and "not there after 1 s" in late.reason
     assert not lost.reached and "nowhere" in lost.reason and math.isnan(lost.distance_m)
 

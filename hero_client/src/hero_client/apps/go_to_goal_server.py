@@ -21,8 +21,10 @@ CLOSE_TIMEOUT_S = 1.0
 """Giving up a goal takes 0.2 s."""
 
 
-class GoToGoalServer(goals.GoalListener):
+class GoToGoalServer(goals.GoalQueue):
     """Drives one robot to its goals; the newest counts, wherever it comes from: see goals.GoalQueue."""
+
+    robot: Robot
 
     def __init__(
         self,
@@ -36,11 +38,9 @@ class GoToGoalServer(goals.GoalListener):
         tolerance_m, timeout_s: of goals that do not give their own. avoid: whether to drive around obstacles that the
         proximity sensors see; otherwise a goal fails before them.
         """
-        self.robot = robot
+        super().__init__(robot, avoid)
         self._tolerance_m, self._timeout_s = tolerance_m, timeout_s
-        self._goals = goals.GoalQueue(robot, self, avoid)
         self._news = threading.Event()
-        self._is_closing = False
         self._log = rospy.loginfo
         self._subscriber = rospy.Subscriber(
             robot.namespace + "/goal", PoseStamped, self._receive_goal, queue_size=1, tcp_nodelay=True
@@ -51,16 +51,6 @@ class GoToGoalServer(goals.GoalListener):
         self._server.start()
         self._thread = threading.Thread(target=self._serve, name="goals", daemon=True)
         self._thread.start()
-
-    @property
-    def busy(self) -> bool:
-        """Whether there is a goal to drive to."""
-        return self._goals.busy
-
-    @property
-    def reached(self) -> bool:
-        """Whether the last goal was reached."""
-        return self._goals.reached
 
     # ---------------------------------------------------------------- callbacks, on ROS's threads
 
@@ -85,7 +75,7 @@ class GoToGoalServer(goals.GoalListener):
             self._put(goals.GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
 
     def _receive_cancel(self, handle: Any) -> None:
-        self._goals.cancel(handle)
+        self.cancel(handle)
         self._news.set()
 
     def put_goal(self, goal: Goal, frame: str = "") -> None:
@@ -94,7 +84,7 @@ class GoToGoalServer(goals.GoalListener):
 
     def _put(self, request: goals.GoalRequest) -> None:
         try:
-            self._goals.put(request)
+            self.put(request)
         except goals.InvalidGoalError as error:
             self._reject(str(error), request.handle)
         self._news.set()
@@ -111,9 +101,9 @@ class GoToGoalServer(goals.GoalListener):
         self._news.clear()
 
     def _serve(self) -> None:
-        while not self._is_closing:
+        while not self._is_closed:
             self._wait()
-            while self._goals.drive_to_next(self._wait):
+            while self.drive_to_next(self._wait):
                 continue
 
     def accept_goal(self, request: goals.GoalRequest) -> None:
@@ -148,8 +138,7 @@ class GoToGoalServer(goals.GoalListener):
 
     def give_up(self) -> None:
         """End the goal and take no more, at once for many servers; the robot is stopped by the time close() returns."""
-        self._is_closing = True
-        self._goals.close()
+        super().give_up()
         self._news.set()
 
     def close(self) -> None:

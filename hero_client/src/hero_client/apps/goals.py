@@ -8,7 +8,8 @@ Goals and cancellations may come from any thread; the one that calls drive_to_ne
 
 import math
 import queue
-from typing import Any, Callable, NamedTuple, Protocol, Tuple
+from abc import ABC, abstractmethod
+from typing import Any, Callable, NamedTuple, Tuple
 
 from hero_node.errors import HeroError
 from hero_node.geometry import yaw_of
@@ -97,33 +98,34 @@ class GoalOutcome(NamedTuple):
     elapsed_s: float
 
 
-class GoalListener(Protocol):
-    """Interface of receivers of each goal's events."""
-
-    def accept_goal(self, request: GoalRequest) -> None:
-        """The robot begins to drive to a goal."""
-
-    def show_progress(self, request: GoalRequest, distance_m: float, elapsed_s: float) -> None:
-        """The robot is on its way; every FEEDBACK_PERIOD_S."""
-
-    def end_goal(self, request: GoalRequest, outcome: GoalOutcome) -> None:
-        """The goal has ended, and the robot is stopped."""
-
-
-class GoalQueue:
+class GoalQueue(ABC):
     """The goals of one robot, which has one at a time.
 
     Attributes:
+        robot: the robot.
         reached: whether the last goal was reached.
     """
 
-    def __init__(self, robot: BaseRobot, listener: GoalListener, avoid: bool = False) -> None:
+    def __init__(self, robot: BaseRobot, avoid: bool = False) -> None:
         """avoid: whether to drive around what the proximity sensors see; otherwise a goal behind it fails."""
+        self.robot = robot
         self.reached = False
-        self._robot, self._listener, self._avoid = robot, listener, avoid
+        self._avoid = avoid
         self._requests: queue.Queue[GoalRequest] = queue.Queue(MAX_QUEUED_GOALS)
         self._cancelled: Any = None
         self._is_closed = False
+
+    @abstractmethod
+    def accept_goal(self, request: GoalRequest) -> None:
+        """The robot begins to drive to a goal."""
+
+    @abstractmethod
+    def show_progress(self, request: GoalRequest, distance_m: float, elapsed_s: float) -> None:
+        """The robot is on its way; every FEEDBACK_PERIOD_S."""
+
+    @abstractmethod
+    def end_goal(self, request: GoalRequest, outcome: GoalOutcome) -> None:
+        """The goal has ended, and the robot is stopped."""
 
     @property
     def busy(self) -> bool:
@@ -141,8 +143,8 @@ class GoalQueue:
         """Give up the goal with this handle."""
         self._cancelled = handle
 
-    def close(self) -> None:
-        """Give up all goals; the program ends."""
+    def give_up(self) -> None:
+        """End the goal and take no more; the program ends."""
         self._is_closed = True
 
     def _find_interruption(self, handle: Any) -> str:
@@ -163,13 +165,13 @@ class GoalQueue:
         return request
 
     def _end_replaced(self, request: GoalRequest, distance_m: float, elapsed_s: float) -> None:
-        self._listener.end_goal(request, GoalOutcome(False, True, REPLACED, distance_m, elapsed_s))
+        self.end_goal(request, GoalOutcome(False, True, REPLACED, distance_m, elapsed_s))
         self._requests.task_done()
 
     def drive_to_next(self, wait: Callable[[float], object]) -> bool:
         """Drive to the next goal until it is reached, fails or is given up; return whether there was one.
 
-        wait: waits for so many seconds, or less if put(), cancel() or close() were called.
+        wait: waits for so many seconds, or less if put(), cancel() or give_up() were called.
         """
         if self._is_closed or self._requests.empty():
             return False
@@ -178,7 +180,7 @@ class GoalQueue:
         return True
 
     def _drive(self, request: GoalRequest, wait: Callable[[float], object]) -> None:
-        start_s = next_feedback_s = self._robot.now_s
+        start_s = next_feedback_s = self.robot.now_s
         distance_m = math.nan
         self.reached = False
 
@@ -187,33 +189,33 @@ class GoalQueue:
             return request.frame != "robot" and self._requests.queue[-1].frame == request.frame
 
         def sleep(duration_s: float) -> bool:
-            end_s = self._robot.now_s + duration_s
+            end_s = self.robot.now_s + duration_s
             while duration_s > 0.0:
                 wait(duration_s)
                 interruption = self._find_interruption(request.handle)
                 if interruption and not (interruption == REPLACED and can_turn_to_next()):
                     return False
-                duration_s = end_s - self._robot.now_s
+                duration_s = end_s - self.robot.now_s
             return True
 
         def on_step(controller: GoToGoalController) -> None:
             nonlocal request, start_s, distance_m, next_feedback_s
-            distance_m, now_s = controller.distance_m, self._robot.now_s
+            distance_m, now_s = controller.distance_m, self.robot.now_s
             if controller.state is State.ACTIVE and not self._requests.empty() and can_turn_to_next():
                 self._end_replaced(request, distance_m, now_s - start_s)
                 request, start_s = self._take_newest(), now_s
                 controller.change_goal(request.goal, request.tolerance_m, request.timeout_s, now_s)
-                self._listener.accept_goal(request)
+                self.accept_goal(request)
             if now_s >= next_feedback_s:
                 next_feedback_s = now_s + FEEDBACK_PERIOD_S
-                self._listener.show_progress(request, distance_m, now_s - start_s)
+                self.show_progress(request, distance_m, now_s - start_s)
 
-        self._listener.accept_goal(request)
+        self.accept_goal(request)
         reason = interruption = ""
         try:
             # A robot that has yet to join is waited for as long as it then may drive.
-            self._robot.wait_until_ready(request.timeout_s, sleep)
-            self._robot.go_to(
+            self.robot.wait_until_ready(request.timeout_s, sleep)
+            self.robot.go_to(
                 *request.goal,
                 request.frame or "odom",
                 self._avoid,
@@ -226,7 +228,7 @@ class GoalQueue:
         except HeroError as error:
             interruption = self._find_interruption(request.handle)
             reason = interruption or str(error)
-        elapsed_s = self._robot.now_s - start_s
-        self._listener.end_goal(
+        elapsed_s = self.robot.now_s - start_s
+        self.end_goal(
             request, GoalOutcome(self.reached, bool(interruption), reason, distance_m, elapsed_s)
         )
