@@ -69,7 +69,7 @@ class Robot(BaseRobot):
         Raises: StaleDataError if it is older than 1 s.
         """
         self._check_fresh("odom")
-        return self._link.messages.read("odom")
+        return self._link.read("odom")
 
     @property
     def encoder(self) -> Encoder:
@@ -78,7 +78,7 @@ class Robot(BaseRobot):
         The first use subscribes and waits up to 5 s. Raises: StaleDataError if it is older than 1 s.
         """
         self._check_asked("encoder")
-        return self._link.messages.read("encoder")
+        return self._link.read("encoder")
 
     @property
     def imu(self) -> Imu:
@@ -90,4 +90,4 @@ class Robot(BaseRobot):
             self._check_asked("imu")
         except StaleDataError as error:
             raise StaleDataError("%s: only robots with the IMU hat publish it" % error) from None
-        return self._link.messages.read("imu")
+        return self._link.read("imu")

@@ -100,8 +100,8 @@ def test_a_command_long_after_the_start_is_lost_and_said_anew_later(ros):
 
 def test_a_robot_without_the_imu_that_was_asked_for_is_ready(monkeypatch):
     monkeypatch.setattr(robot_topics.rospy, "Subscriber", lambda *arguments, **options: None)
-    messages = NewestMessages("/hero_0")
-    messages.subscribe("imu", object)
+    messages = NewestMessages("/hero_0", {"imu": object, "odom": object})
+    messages.subscribe("imu")
     assert messages.find_silent(NEEDED, 1.0) is None
-    messages.subscribe("odom", object)
+    messages.subscribe("odom")
     assert messages.find_silent(NEEDED, 1.0) == "odom"

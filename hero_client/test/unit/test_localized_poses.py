@@ -7,9 +7,9 @@ import pytest
 pytest.importorskip("hero_msgs.msg", reason="needs ROS")
 import rospy
 
-from hero_client.ros.localized_poses import LocalizedPoses
+from hero_client.ros.localized_poses import PoseReport
 from hero_client.values.errors import FrameError, StaleDataError
-from hero_msgs.msg import RobotPose, RobotPoses
+from hero_msgs.msg import RobotPose
 
 SENT_S = 100.0
 """By the clock of localize; that of the program says 7 s when the message comes."""
@@ -21,16 +21,11 @@ def make_pose(robot_id, state=RobotPose.TRACKED, age_s=0.03, position_sd=0.001, 
 
 
 def receive(*robots):
-    message = RobotPoses(robots=robots)
-    message.header.stamp, message.header.frame_id = rospy.Time.from_sec(SENT_S), "map"
-    poses = LocalizedPoses()
-    poses.receive(message, 7.0)
-    return poses
+    return PoseReport("map", SENT_S, 7.0, {robot.id: robot for robot in robots})
 
 
 def test_poses_of_all_robots_come_from_one_message():
     poses = receive(make_pose(0), make_pose(3, RobotPose.LOST, x=4.0))
-    assert poses.frame == "map"
     assert poses.find(0, 7.1) == (1.0, 2.0, 0.5)
     assert poses.find(3, 7.1) == (4.0, 2.0, 0.5)  # covered for a moment: it follows its odometry
 
@@ -46,12 +41,6 @@ def test_poses_of_all_robots_come_from_one_message():
 def test_a_robot_that_was_never_measured_is_named_with_a_remedy(robot, text):
     with pytest.raises(FrameError, match=text):
         receive(make_pose(0), *([robot] if robot else [])).find(3, 7.1)
-
-
-def test_nothing_that_localizes_is_named():
-    assert LocalizedPoses().frame is None
-    with pytest.raises(FrameError, match="hero_3 .* no message on /localization/poses yet, does localize run"):
-        LocalizedPoses().find(3, 7.0)
 
 
 @pytest.mark.parametrize(
@@ -72,4 +61,3 @@ def test_the_age_of_a_pose_is_that_of_its_stamp_and_of_the_silence_since():
     poses = receive(make_pose(3, age_s=0.03))
     assert poses.age_s(3, 7.1) == pytest.approx(0.13)
     assert poses.age_s(0, 7.1) == math.inf
-    assert LocalizedPoses().age_s(3, 7.1) == math.inf

@@ -1,22 +1,22 @@
 """What comes over ROS's topics: how long it is waited for, and what its numbers mean."""
 
 import math
-import threading
 from types import SimpleNamespace
 
 import pytest
 
 pytest.importorskip("rospy", reason="topics are rospy's")
+import rospy
 from sensor_msgs.msg import LaserScan
 
 from hero_client.ros import frames, localized_poses, robot_topics, ros_link
 from hero_client.ros.frames import FrameListener
-from hero_client.ros.localized_poses import LocalizedPoses, PoseListener
+from hero_client.ros.localized_poses import PoseListener
 from hero_client.ros.robot_topics import CommandTopic, NewestMessages
 from hero_client.ros.ros_link import RosLink, ThreadMotion
 from hero_client.values.background_motion import FullWait
 from hero_client.values.errors import FrameError, GoalError, RobotError, StaleDataError
-from hero_msgs.msg import RobotPoses
+from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
 
 
@@ -51,9 +51,9 @@ def test_messages_age_and_the_next_ones_are_counted(monkeypatch, time):
         return SimpleNamespace(unregister=lambda: subscribed.append("left"))
 
     monkeypatch.setattr(robot_topics.rospy, "Subscriber", subscribe)
-    messages = NewestMessages("/hero_0")
+    messages = NewestMessages("/hero_0", {"odom": object})
     for _ in range(2):
-        messages.subscribe("odom", object)
+        messages.subscribe("odom")
     assert subscribed == ["/hero_0/odom"] and messages.age_s("odom") == math.inf
     messages._receive_message("first", "odom")
     time.now_s += 0.4
@@ -117,15 +117,18 @@ def test_a_transform_is_waited_for_until_its_time_is_out(time):
 
 def test_a_pose_of_localize_is_waited_for_if_localize_runs(time):
     listener = PoseListener.__new__(PoseListener)
-    listener._poses, listener._lock, listener._is_expected = LocalizedPoses(), threading.Lock(), False
+    listener._report, listener._is_expected = None, False
+    assert listener.age_s(0) == math.inf
     assert listener.find(0, "map", 2.0) is None and time.now_s == 100.0
     listener._is_expected = True
-    with pytest.raises(FrameError, match="no message on /localization/poses yet"):
+    with pytest.raises(FrameError, match="hero_0 .* no message on /localization/poses yet, does localize run"):
         listener.find(0, "map", 0.5)
     assert time.now_s == pytest.approx(100.5, abs=0.021)
-    message = RobotPoses()
-    message.header.frame_id = "map"
+    robot = RobotPose(id=3, state=RobotPose.TRACKED, stamp=rospy.Time(49.97), x=1.0, y=2.0, yaw=0.5)
+    message = RobotPoses(robots=[robot])
+    message.header.frame_id, message.header.stamp = "map", rospy.Time(50.0)
     listener._receive(message)
+    assert listener.find(3, "map", 0.0) == (1.0, 2.0, 0.5) and listener.age_s(3) == pytest.approx(0.03)
     assert listener.find(0, "world", 2.0) is None and time.now_s < 100.6
     with pytest.raises(FrameError, match="localize does not know it"):
         listener.find(0, "map", 0.0)
@@ -135,7 +138,7 @@ def test_infrared_counts_begin_at_the_front_without_averages():
     link = RosLink.__new__(RosLink)
     # Rear first, counter-clockwise, each reading followed by the average with the next one.
     counts = [100.0 * (index // 2) + index % 2 for index in range(16)]
-    link.messages = SimpleNamespace(read=lambda topic: {"laser": LaserScan(intensities=counts)}[topic])
+    link.read = {"laser": LaserScan(intensities=counts)}.get
     assert link.read_infrared_counts() == [400.0, 500.0, 600.0, 700.0, 0.0, 100.0, 200.0, 300.0]
 
 
@@ -143,7 +146,7 @@ def test_why_a_robot_cannot_be_driven_is_told_in_order():
     link = RosLink.__new__(RosLink)
     link._namespace, link._name, link._robot_id, state = "/hero_3", "hero_3", 3, {}
     link._cmd_vel = SimpleNamespace(connected=False, describe_absence=lambda: "nothing subscribes")
-    link.messages = SimpleNamespace(find_silent=lambda topics, limit_s: "odom" if limit_s < state["age_s"] else None)
+    link.find_silent = lambda topics, limit_s: "odom" if limit_s < state["age_s"] else None
     link._drivers = SimpleNamespace(knows=lambda namespace: state["known"], find=lambda namespace: "/lab/driver")
     state.update(age_s=2.0, known=False)
     assert link.missing() == "nothing subscribes"

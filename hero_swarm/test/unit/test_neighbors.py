@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="messages and the program need ROS")
 from hero_client import Robot, StaleDataError
-from hero_client.ros.ros_link import RosLink
+from hero_client.ros.ros_link import MESSAGE_CLASSES, RosLink
 from hero_client.values.sensing import Neighbors
 from hero_sim.stepped.swarm import StepSwarm
 from hero_swarm.behavior import Random
@@ -28,9 +28,9 @@ class Received:
     def __init__(self, message):
         self.message = message
 
-    def subscribe(self, topic, message_class):
+    def subscribe(self, topic):
         assert topic == "neighbors"
-        assert isinstance(self.message, message_class)
+        assert isinstance(self.message, MESSAGE_CLASSES[topic])
 
     def age_s(self, topic):
         return 0.1
@@ -41,7 +41,8 @@ class Received:
 
 def make_robot(message):
     link = RosLink.__new__(RosLink)  # without a ROS node
-    link._name, link._namespace, link.messages = "hero_7", "/hero_7", Received(message)
+    link._name, link._namespace, received = "hero_7", "/hero_7", Received(message)
+    link.subscribe, link.age_s, link.read = received.subscribe, received.age_s, received.read
     robot = Robot.__new__(Robot)
     robot.robot_id, robot.name, robot.namespace, robot._link = 7, "hero_7", "/hero_7", link
     return robot

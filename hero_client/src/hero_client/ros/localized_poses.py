@@ -1,7 +1,6 @@
 """Poses from hero_localization's program localize: one subscription for all robots of a program."""
 
 import math
-import threading
 import time
 from functools import lru_cache
 from typing import Dict, NamedTuple, Optional
@@ -24,114 +23,84 @@ MAX_POSITION_SD_M = 0.05
 POLL_PERIOD_S = 0.02
 
 
-class _Report(NamedTuple):
-    """The newest message, and when it arrived."""
+class PoseReport(NamedTuple):
+    """The poses of all robots in one message."""
 
     frame: str
     sent_s: float
+    """By the clock of localize, which need not agree with that of this machine."""
     arrived_s: float
+    """By any clock that never steps back, as now_s below."""
     robots: Dict[int, RobotPose]
 
-
-class LocalizedPoses:
-    """The newest poses of all robots. Pure: now_s is any clock that never steps back."""
-
-    def __init__(self) -> None:
-        self._newest: Optional[_Report] = None
-
-    @property
-    def frame(self) -> Optional[str]:
-        """The frame of the poses; None before the first message."""
-        return self._newest.frame if self._newest else None
-
-    def receive(self, message: RobotPoses, now_s: float) -> None:
-        """Take a message of localize."""
-        robots = {robot.id: robot for robot in message.robots}
-        self._newest = _Report(message.header.frame_id, message.header.stamp.to_sec(), now_s, robots)
-
     def find(self, robot_id: int, now_s: float) -> Pose:
-        """Return where a robot is, in the frame of the poses.
+        """Return where a robot is.
 
         Raises: FrameError if it was never measured. StaleDataError if its pose is old, or uncertain.
         """
-        report, name = self._newest, "hero_%d" % robot_id
-        if report is None:
-            raise FrameError("%s has no pose: no message on %s yet, does localize run?" % (name, TOPIC))
-        robot = report.robots.get(robot_id)
+        robot = self.robots.get(robot_id)
+        unknown = "hero_%d has no pose in the frame %s: " % (robot_id, self.frame)
         if robot is None:
-            raise FrameError(
-                "%s has no pose in the frame %s: localize does not know it: name it in its ~robots, or let it join a"
-                " driver" % (name, report.frame)
-            )
+            raise FrameError(unknown + "localize does not know it: name it in its ~robots, or let it join a driver")
         pose = Pose(robot.x, robot.y, robot.yaw)
         if robot.state == RobotPose.UNKNOWN or not is_plausible(pose):
-            raise FrameError(
-                "%s has no pose in the frame %s: it was never measured: is its tag in view of the camera?"
-                % (name, report.frame)
-            )
-        silent_s = now_s - report.arrived_s
+            raise FrameError(unknown + "it was never measured: is its tag in view of the camera?")
+        stale = "the pose of hero_%d in the frame %s is " % (robot_id, self.frame)
+        silent_s, age_s = now_s - self.arrived_s, self.age_s(robot_id, now_s)
         if silent_s > FRESH_S:
             raise StaleDataError(
-                "the pose of %s in the frame %s is old: no message on %s for %.1f s: does localize still run?"
-                % (name, report.frame, TOPIC, silent_s)
+                stale + "old: no message on %s for %.1f s: does localize still run?" % (TOPIC, silent_s)
             )
-        age_s = self.age_s(robot_id, now_s)
         if age_s > FRESH_S:
-            raise StaleDataError(
-                "the pose of %s in the frame %s is %.1f s old, as is its odometry: is the robot on and in reach?"
-                % (name, report.frame, age_s)
-            )
+            raise StaleDataError(stale + "%.1f s old, as is its odometry: is the robot on and in reach?" % age_s)
         if not robot.position_sd <= MAX_POSITION_SD_M:
-            raise StaleDataError(
-                "the pose of %s in the frame %s is uncertain by %.0f mm: it drove unseen: is its tag occluded or out of"
-                " view?" % (name, report.frame, 1e3 * robot.position_sd)
-            )
+            text = "uncertain by %.0f mm: it drove unseen: is its tag occluded or out of view?"
+            raise StaleDataError(stale + text % (1e3 * robot.position_sd))
         return pose
 
     def age_s(self, robot_id: int, now_s: float) -> float:
         """Return how old the pose of a robot is; inf if it has none."""
-        report = self._newest
-        if report is None or robot_id not in report.robots:
-            return math.inf
-        # Both stamps are of the clock of localize, which need not agree with that of this machine.
-        return now_s - report.arrived_s + report.sent_s - report.robots[robot_id].stamp.to_sec()
+        robot = self.robots.get(robot_id)
+        return math.inf if robot is None else now_s - self.arrived_s + self.sent_s - robot.stamp.to_sec()
 
 
 class PoseListener:
     """Subscription to the poses of all robots."""
 
     def __init__(self) -> None:
-        self._poses = LocalizedPoses()
-        self._lock = threading.Lock()
+        self._report: Optional[PoseReport] = None  # replaced, never changed: read on all threads
         self._subscriber = rospy.Subscriber(TOPIC, RobotPoses, self._receive, queue_size=1, tcp_nodelay=True)
         self._is_expected = _is_published(self._subscriber.resolved_name)
 
     def _receive(self, message: RobotPoses) -> None:
-        with self._lock:
-            self._poses.receive(message, time.monotonic())
+        robots = {robot.id: robot for robot in message.robots}
+        stamp_s = message.header.stamp.to_sec()
+        self._report = PoseReport(message.header.frame_id, stamp_s, time.monotonic(), robots)
 
     def find(self, robot_id: int, frame: str, timeout_s: float) -> Optional[Pose]:
         """Return where a robot is in frame; None if localize does not run, or gives poses in another frame.
 
-        A pose that was never there is waited for. Raises: as LocalizedPoses.find().
+        A pose that was never there is waited for. Raises: as PoseReport.find().
         """
         deadline_s = time.monotonic() + timeout_s
         while True:
-            with self._lock:
-                known_frame = self._poses.frame
-                if known_frame != frame and (known_frame is not None or not self._is_expected):
-                    return None
-                try:
-                    return self._poses.find(robot_id, time.monotonic())
-                except FrameError:
-                    if time.monotonic() >= deadline_s or rospy.is_shutdown():
-                        raise
+            report = self._report
+            if report is None and not self._is_expected or report is not None and report.frame != frame:
+                return None
+            try:
+                if report is None:
+                    text = "hero_%d has no pose: no message on %s yet, does localize run?"
+                    raise FrameError(text % (robot_id, TOPIC))
+                return report.find(robot_id, time.monotonic())
+            except FrameError:
+                if time.monotonic() >= deadline_s or rospy.is_shutdown():
+                    raise
             time.sleep(POLL_PERIOD_S)
 
     def age_s(self, robot_id: int) -> float:
         """Return how old the pose of a robot is; inf if it has none."""
-        with self._lock:
-            return self._poses.age_s(robot_id, time.monotonic())
+        report = self._report
+        return math.inf if report is None else report.age_s(robot_id, time.monotonic())
 
 
 def _is_published(topic: str) -> bool:

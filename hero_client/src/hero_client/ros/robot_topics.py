@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from typing import Any, Callable, Dict, Iterable, Optional, Tuple, Type
+from typing import Any, Callable, Dict, Iterable, Mapping, Optional, Tuple, Type
 
 import rospy
 
@@ -20,19 +20,21 @@ POLL_PERIOD_S = 0.02
 class NewestMessages:
     """Subscriptions to a robot's topics, of which the newest message counts."""
 
-    def __init__(self, namespace: str) -> None:
+    def __init__(self, namespace: str, message_classes: Mapping[str, Type[Any]]) -> None:
+        """message_classes: of each topic below the robot's namespace."""
         self._namespace = namespace
+        self._classes = message_classes
         self._newest: Dict[str, Tuple[float, Any]] = {}
         self._counts: Dict[str, int] = {}
         self._arrival = threading.Condition()
         self._subscribers: Dict[str, rospy.Subscriber] = {}
 
-    def subscribe(self, topic: str, message_class: Type[Any]) -> None:
-        """Subscribe to a topic below the robot's namespace, unless that was done before."""
+    def subscribe(self, topic: str) -> None:
+        """Subscribe to a topic, unless that was done before."""
         if topic not in self._subscribers:
             self._subscribers[topic] = rospy.Subscriber(
                 "%s/%s" % (self._namespace, topic),
-                message_class,
+                self._classes[topic],
                 self._receive_message,
                 callback_args=topic,
                 queue_size=1,

@@ -77,24 +77,19 @@ class ThreadMotion(BackgroundMotion):
         wait([self], END_TIMEOUT_S)
 
 
-class RosLink(RobotLink):
-    """One robot over ROS; needs a started node.
-
-    Attributes:
-        messages: the newest message of each topic.
-    """
+class RosLink(NewestMessages, RobotLink):
+    """One robot over ROS; needs a started node."""
 
     clock = ROS_CLOCK
 
     def __init__(self, robot_id: int) -> None:
         """Advertise the commands to the robot with this number."""
         self._robot_id = robot_id
-        self._name = name = "hero_%d" % robot_id
-        self._namespace = "/" + name
+        self._name = "hero_%d" % robot_id
+        super().__init__("/" + self._name, MESSAGE_CLASSES)
         self._drivers = share_drivers()
         self._cmd_vel = CommandTopic(self._namespace + "/velocity_controller/cmd_vel", Twist, self._explain_absence)
         self._led = CommandTopic(self._namespace + "/led", ColorRGBA, self._explain_absence)
-        self.messages = NewestMessages(self._namespace)
 
     def _explain_absence(self) -> str:
         return self._drivers.explain_absence(self._namespace)
@@ -111,42 +106,33 @@ class RosLink(RobotLink):
     def missing(self) -> Optional[str]:
         if not self.connected:
             return self._cmd_vel.describe_absence()
-        silent = self.messages.find_silent(NEEDED, FRESH_S)
+        silent = self.find_silent(NEEDED, FRESH_S)
         if silent is not None:
             return "no message on %s/%s: is the robot on and in reach?" % (self._namespace, silent)
         if not self._drivers.knows(self._namespace):
             return "no driver has reported it yet, so whether it is stopped is not known"
         return None
 
-    def subscribe(self, topic: str) -> None:
-        self.messages.subscribe(topic, MESSAGE_CLASSES[topic])
-
-    def age_s(self, topic: str) -> float:
-        return self.messages.age_s(topic)
-
-    def wait_for_next(self, topic: str, timeout_s: float, count: int = 1) -> None:
-        self.messages.wait_for_next(topic, timeout_s, count)
-
     def read_pose(self) -> Pose:
-        pose = self.messages.read("odom").pose.pose
+        pose = self.read("odom").pose.pose
         return pose_of(pose.position, pose.orientation)
 
     def read_velocity(self) -> Velocity:
-        twist = self.messages.read("odom").twist.twist
+        twist = self.read("odom").twist.twist
         return Velocity(twist.linear.x, twist.angular.z)
 
     def read_ranges(self) -> List[float]:
-        return front_first(self.messages.read("proximity"))
+        return front_first(self.read("proximity"))
 
     def read_infrared_counts(self) -> List[float]:
-        counts = [float(count) for count in self.messages.read("laser").intensities[::2]]  # the others are averages
+        counts = [float(count) for count in self.read("laser").intensities[::2]]  # the others are averages
         return counts[len(counts) // 2 :] + counts[: len(counts) // 2]
 
     def read_distance(self) -> float:
-        return float(self.messages.read("distance").data)
+        return float(self.read("distance").data)
 
     def read_neighbors(self) -> List[Neighbor]:
-        message = self.messages.read("neighbors")
+        message = self.read("neighbors")
         if not message.is_known:
             raise StaleDataError(
                 "%s senses no neighbors, as its own pose is not known or old: does localize run, and is its tag in view"
@@ -200,7 +186,3 @@ class RosLink(RobotLink):
 
     def log_warning(self, text: str) -> None:
         rospy.logwarn(text)
-
-    def close(self) -> None:
-        """Unsubscribe; safe twice."""
-        self.messages.close()
