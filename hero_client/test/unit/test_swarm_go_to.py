@@ -147,23 +147,21 @@ def test_robots_that_overlap_come_apart_within_a_step():
 
 
 def test_each_robot_takes_half_of_the_change_and_looks_at_the_nearest_ones():
-    still = np.zeros((2, 2))
-    places = np.array([(0.0, 0.0), (0.3, 0.0)])
-    wanted = np.array([(0.08, 0.0), (0.0, 0.0)])
-    gap_m = 0.3 - 2.0 * LAW.radius_m
-    # Head on, from rest: together they may close the gap within the horizon, each half of it.
-    found = avoid_others(places, still, wanted, LAW, STEP_S, [0])
-    assert found.tolist() == [pytest.approx((0.5 * gap_m / LAW.horizon_s, 0.0))]
-    fence = (np.array([(-1.0, 0.0)]), np.array([-0.01]))
     none = (np.empty((0, 2)), np.empty(0))
-    assert avoid_others(places, still, wanted, LAW, STEP_S, [0], [fence, none])[0, 0] == pytest.approx(0.01)
-    assert avoid_others(places, still, wanted, LAW, STEP_S, [1], [fence, none]).tolist() == [[0.0, 0.0]]
+    places, ahead = np.array([(0.0, 0.0), (0.3, 0.0)]), np.array((0.08, 0.0))
+    gap_m = 0.3 - 2.0 * LAW.radius_m
+
+    def avoid(own, places, wanted, planes):
+        return avoid_others(own, places, np.zeros_like(places), wanted, LAW, STEP_S, *planes)
+
+    # Head on, from rest: together they may close the gap within the horizon, each half of it.
+    assert avoid(0, places, ahead, none) == pytest.approx((0.5 * gap_m / LAW.horizon_s, 0.0))
+    fence = (np.array([(-1.0, 0.0)]), np.array([-0.01]))
+    assert avoid(0, places, ahead, fence)[0] == pytest.approx(0.01)
+    assert avoid(1, places, np.zeros(2), none).tolist() == [0.0, 0.0]
     crowd = np.vstack((places, [(-0.2, 0.001 * index) for index in range(LAW.neighbors)]))
-    wanted = np.zeros((len(crowd), 2))
-    wanted[0] = 0.08, 0.0
-    is_first_counted = avoid_others(crowd, np.zeros_like(crowd), wanted, LAW, STEP_S, [0])[0, 0] < 0.07
-    assert not is_first_counted and LAW.neighbors == 6, "as many as fit around one are nearer"
-    assert avoid_others(crowd[:-1], np.zeros_like(crowd[:-1]), wanted[:-1], LAW, STEP_S, [0])[0, 0] < 0.07
+    assert avoid(0, crowd, ahead, none)[0] > 0.07 and LAW.neighbors == 6, "as many as fit around one are nearer"
+    assert avoid(0, crowd[:-1], ahead, none)[0] < 0.07
 
 
 def test_where_nothing_is_allowed_all_give_way_by_the_same():

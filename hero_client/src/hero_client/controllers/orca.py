@@ -192,36 +192,27 @@ def avoid_sensed(
 
 
 def avoid_others(
+    own: int,
     places: np.ndarray,
     velocities: np.ndarray,
     wanted: np.ndarray,
     law: AvoidanceLaw,
     step_s: float,
-    robots: Sequence[int],
-    seen: Optional[Sequence[Tuple[np.ndarray, np.ndarray]]] = None,
+    normals: np.ndarray,
+    bounds: np.ndarray,
 ) -> np.ndarray:
-    """Return the velocities (len(robots), 2) of the steered points of the chosen robots.
+    """Return the velocity (2,) of the steered point of the robot at row own that is nearest to wanted (2,).
 
-    places, velocities, wanted: of the steered points of all robots, each (N, 2), in one common frame. step_s: time
-    between two calls. robots: indices of those whose velocity is asked for. seen: for each of all robots half planes
-    of its own, normals and bounds, as avoid_sensed() gives them.
+    places, velocities: of the steered points of all robots, each (N, 2), in one common frame. step_s: time between two
+    calls. normals, bounds: more half planes of this robot, as avoid_sensed() gives them.
     """
-    answers = np.zeros((len(robots), 2))
-    for row, own in enumerate(robots):
-        offsets = places - places[own]
-        distances_m = np.hypot(offsets[:, 0], offsets[:, 1])
-        reach_m = 2.0 * (law.radius_m + law.max_linear_m_s * law.horizon_s)
-        near = [i for i in np.argsort(distances_m, kind="stable") if i != own and distances_m[i] < reach_m]
-        near = near[: law.neighbors]
-        normals = np.zeros((len(near), 2))
-        bounds = np.zeros(len(near))
-        for index, other in enumerate(near):
-            normal, depth = half_plane(
-                offsets[other], velocities[own] - velocities[other], 2.0 * law.radius_m, law.horizon_s, step_s
-            )
-            normals[index] = normal
-            bounds[index] = float(velocities[own] @ normal) + 0.5 * depth
-        if seen is not None:
-            normals, bounds = np.vstack((normals, seen[own][0])), np.append(bounds, seen[own][1])
-        answers[row] = nearest_allowed(wanted[own], normals, bounds, law.max_linear_m_s)
-    return answers
+    offsets = places - places[own]
+    distances_m = np.hypot(offsets[:, 0], offsets[:, 1])
+    reach_m = 2.0 * (law.radius_m + law.max_linear_m_s * law.horizon_s)
+    near = [i for i in np.argsort(distances_m, kind="stable") if i != own and distances_m[i] < reach_m]
+    near = near[: law.neighbors]
+    changes = velocities[own] - velocities
+    planes = [half_plane(offsets[i], changes[i], 2.0 * law.radius_m, law.horizon_s, step_s) for i in near]
+    bounds = np.append([float(velocities[own] @ normal) + 0.5 * depth for normal, depth in planes], bounds)
+    normals = np.vstack((*(normal for normal, _ in planes), normals))
+    return nearest_allowed(wanted, normals, bounds, law.max_linear_m_s)

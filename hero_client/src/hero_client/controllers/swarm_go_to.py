@@ -79,21 +79,18 @@ class SwarmGoToController:
             distance_m < (self._tolerance_m if done else self._dock_law.tolerance_m)
             for done, distance_m in zip(self.arrived, distances_m)
         ]
-        straight = np.array([self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)])
-        wanted, seen = straight.copy(), []
-        for index, pose in enumerate(poses):
-            sensed = [] if ranges is None else ranges[index]
-            wanted[index], normals, bounds = avoid_sensed(pose, sensed, wanted[index], self.law)
-            seen.append((normals, bounds))
-        moving = [index for index, done in enumerate(self.arrived) if not done]
-        allowed = avoid_others(places, velocities, wanted, self.law, self.step_s, moving, seen)
+        straight = [self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)]
         commands = [STOP] * len(poses)
-        for velocity, index in zip(allowed, moving):
+        for index, pose in enumerate(poses):
+            if self.arrived[index]:
+                continue
+            wanted, normals, bounds = avoid_sensed(pose, ranges[index] if ranges else (), straight[index], self.law)
+            velocity = avoid_others(index, places, velocities, wanted, self.law, self.step_s, normals, bounds)
             free = float(np.hypot(*(velocity - straight[index]))) < 0.25 * float(np.hypot(*straight[index]))
             if distances_m[index] < DOCKING_M and free:
-                commands[index] = go_to_point(poses[index], *self.goals[index], self._dock_law)
+                commands[index] = go_to_point(pose, *self.goals[index], self._dock_law)
             else:
-                commands[index] = steer(poses[index], velocity, self.law)
+                commands[index] = steer(pose, velocity, self.law)
         return commands
 
     def _want(self, goal: Tuple[float, float], pose: Pose, distance_m: float, jam: "_Jam") -> np.ndarray:
