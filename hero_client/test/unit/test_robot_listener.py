@@ -1,10 +1,12 @@
 """What is received of a robot becomes a rate, a distance and the nearest obstacle."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
 from hero_client.ros.robot_listener import RateMeter, RobotTrack
+from hero_client.values.readings import read_ranges
 from hero_node.geometry import Pose
 
 
@@ -12,8 +14,7 @@ def test_a_rate_is_the_count_divided_by_the_time():
     meter = RateMeter()
     assert meter.rate_hz(0.0) == 0.0
     for tick in range(1, 11):
-        for _ in range(15):
-            meter.count()
+        meter.total += 15
         rate_hz = meter.rate_hz(tick * 0.5)
     assert rate_hz == pytest.approx(30.0)
 
@@ -21,7 +22,7 @@ def test_a_rate_is_the_count_divided_by_the_time():
 def test_a_robot_that_falls_silent_is_at_zero_within_a_few_seconds():
     meter = RateMeter()
     for tick in range(10):
-        meter.count()
+        meter.total += 1
         meter.rate_hz(tick * 0.5)
     for tick in range(10, 20):
         rate_hz = meter.rate_hz(tick * 0.5)
@@ -32,7 +33,7 @@ def test_a_rate_is_that_of_the_last_three_seconds():
     meter = RateMeter()
     rates_hz = []
     for tick in range(41):
-        meter.count(0 if tick < 20 else 5)
+        meter.total += 0 if tick < 20 else 5
         rates_hz.append(meter.rate_hz(0.5 * tick))
     assert rates_hz[19] == 0.0 and rates_hz[20] == pytest.approx(5.0 / 3.0)
     assert rates_hz[25] == pytest.approx(10.0) == rates_hz[40]
@@ -67,6 +68,7 @@ def test_an_implausible_pose_is_none_and_adds_no_distance(number):
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_ranges_at_invalid_angles_are_not_seen(number):
     track = RobotTrack()
-    for angle_min_rad, increment_rad in ((number, 0.8), (0.0, number)):
-        track.receive_proximity([0.1], angle_min_rad, increment_rad)
-        assert (track.proximity_seen, track.nearest) == (False, None)
+    for angle_min_rad, increment_rad, is_seen in ((0.0, 0.8, True), (number, 0.8, False), (0.0, number, False)):
+        scan = SimpleNamespace(ranges=[0.1], angle_min=angle_min_rad, angle_increment=increment_rad)
+        track.receive_proximity(read_ranges(scan), angle_min_rad, increment_rad)
+        assert track.proximity_seen == is_seen == (track.nearest is not None)

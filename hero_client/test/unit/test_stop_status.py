@@ -3,7 +3,7 @@
 import pytest
 
 from hero_client.ros.drivers import merge
-from hero_client.ros.stop_status import CROSSING_S, NAMES_SHOWN, TIME_LIMIT_S, DriverReply, StopRequest
+from hero_client.ros.stop_status import CROSSING_S, NAMES_SHOWN, TIME_LIMIT_S, StopRequest
 from hero_msgs.msg import Robot, RobotArray
 
 SOON_S, LATE_S = CROSSING_S, TIME_LIMIT_S
@@ -11,11 +11,11 @@ A, B = "/hero_driver", "/hero_driver_b"
 
 
 def make_reply(name, robots=(), stopped=True):
-    """Return a driver's reply; robots: (number, state, stop_state)."""
+    """Return a driver's name and report; robots: (number, state, stop_state)."""
     report = RobotArray(stopped=stopped)
     for number, state, stop_state in robots:
         report.robots.append(Robot(namespace="/hero_%d" % number, state=state, stop_state=stop_state))
-    return DriverReply(name, report)
+    return name, report
 
 
 def rest(*numbers):
@@ -23,17 +23,21 @@ def rest(*numbers):
 
 
 def silent(name):
-    return DriverReply(name, None)
+    return name, None
+
+
+def update(request, replies, all_found, now_s):
+    request.update(dict(replies), all_found, now_s)
 
 
 def show(request, replies, now_s):
-    robots = merge([reply.report for reply in replies if reply.report]).robots
-    return request.describe(replies, robots, now_s)
+    robots = merge([report for _, report in replies if report]).robots
+    return request.describe(dict(replies), robots, now_s)
 
 
 def describe(replies, now_s=LATE_S, stopped=True):
     request = StopRequest(stopped, 0.0)
-    request.update(replies, True, now_s)
+    update(request, replies, True, now_s)
     return show(request, replies, now_s)
 
 
@@ -57,9 +61,9 @@ def test_a_report_that_crosses_the_request_is_not_believed():
 def test_a_stop_is_told_within_one_and_a_half_seconds_of_its_request():
     assert CROSSING_S == 0.15 and TIME_LIMIT_S == 1.4
     request = StopRequest(True, 100.0)
-    request.update([make_reply(A, rest(0))], True, 100.1)
+    update(request, [make_reply(A, rest(0))], True, 100.1)
     assert not request.is_over and show(request, [make_reply(A, rest(0))], 100.1).text == "stopping"
-    request.update([make_reply(A, rest(0))], True, 100.2)
+    update(request, [make_reply(A, rest(0))], True, 100.2)
     assert request.is_over and show(request, [make_reply(A, rest(0))], 100.2).is_final
     assert show(request, [silent(A)], 101.3).text == "stopping" and show(request, [silent(A)], 101.4).level == "error"
 
@@ -117,22 +121,22 @@ def test_of_many_robots_some_are_named_and_the_others_counted():
 def test_a_driver_is_asked_until_it_has_taken_the_stop():
     request = StopRequest(True, 0.0)
     for now_s, reply in ((SOON_S, silent(B)), (600.0, make_reply(B, stopped=False))):
-        request.update([make_reply(A), reply], True, now_s)
+        update(request, [make_reply(A), reply], True, now_s)
         assert (request.is_open_to(A), request.is_open_to(B), request.is_over) == (False, True, False)
-    request.update([make_reply(A), make_reply(B)], True, 601.0)
+    update(request, [make_reply(A), make_reply(B)], True, 601.0)
     assert not request.is_open_to(B)
 
 
 def test_a_driver_that_starts_after_the_stop_is_not_asked():
     request = StopRequest(True, 0.0)
-    request.update([make_reply(A)], True, SOON_S)
+    update(request, [make_reply(A)], True, SOON_S)
     assert request.is_over
     assert not request.is_open_to(B)
 
 
 def test_drivers_that_are_yet_to_be_found_are_waited_for():
     request = StopRequest(True, 0.0)
-    request.update([make_reply(A)], False, SOON_S)
+    update(request, [make_reply(A)], False, SOON_S)
     assert request.is_open_to(B)
 
 
@@ -147,10 +151,10 @@ def test_a_release_is_final_when_no_driver_is_stopped():
 def test_a_release_that_is_not_taken_in_time_is_given_up_by_name():
     request = StopRequest(False, 0.0)
     replies = [silent(A), make_reply(B)]
-    request.update(replies, True, LATE_S - 0.01)
+    update(request, replies, True, LATE_S - 0.01)
     assert show(request, replies, LATE_S - 0.01) == ("warn", "releasing", False)
     assert request.is_open_to(A)
-    request.update(replies, True, LATE_S)
+    update(request, replies, True, LATE_S)
     assert not request.is_open_to(A)
     assert show(request, replies, LATE_S) == (
         "error",
@@ -162,14 +166,14 @@ def test_a_release_that_is_not_taken_in_time_is_given_up_by_name():
 @pytest.mark.parametrize(("stopped", "how"), [(True, "released"), (False, "stopped")])
 def test_what_another_program_changed_later_is_told(stopped, how):
     request = StopRequest(stopped, 0.0)
-    request.update([make_reply(A, stopped=stopped)], True, SOON_S)
+    update(request, [make_reply(A, stopped=stopped)], True, SOON_S)
     status = show(request, [make_reply(A, stopped=not stopped)], LATE_S)
     assert status == ("warn", "another program has %s the robots of hero_driver" % how, True)
 
 
 def test_a_driver_that_falls_silent_after_the_stop_is_named():
     request = StopRequest(True, 0.0)
-    request.update([make_reply(A, rest(0))], True, SOON_S)
+    update(request, [make_reply(A, rest(0))], True, SOON_S)
     assert show(request, [silent(A)], LATE_S).text == "NOT STOPPED: driver hero_driver does not answer"
 
 
@@ -178,6 +182,6 @@ def test_a_stop_is_asked_for_again_and_a_release_is_not(stopped, is_asked_again)
     request = StopRequest(stopped, 0.0)
     assert request.is_open_to(A)
     request.note_asked(A)
-    request.update([make_reply(A, stopped=not stopped)], True, SOON_S)
+    update(request, [make_reply(A, stopped=not stopped)], True, SOON_S)
     assert request.is_open_to(A) == is_asked_again
     assert request.is_open_to(B)

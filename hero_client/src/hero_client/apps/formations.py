@@ -9,6 +9,7 @@
 """
 
 import math
+from itertools import combinations
 from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
@@ -99,14 +100,10 @@ def _read_points(formation: Dict[str, Any], count: int) -> List[Point]:
 
 
 def _check_spacing(places: List[Point], least_spacing_m: float) -> None:
-    for index, first in enumerate(places):
-        for second in places[:index]:
-            apart_m = math.dist(first, second)
-            if apart_m < least_spacing_m:
-                raise FormationError(
-                    "formation: two places are %.3f m apart, but robots need %.2f m: make spacing_m larger"
-                    % (apart_m, least_spacing_m)
-                )
+    apart_m = min((math.dist(*pair) for pair in combinations(places, 2)), default=math.inf)
+    if apart_m < least_spacing_m:
+        text = "formation: two places are %.3f m apart, but robots need %.2f m: make spacing_m larger"
+        raise FormationError(text % (apart_m, least_spacing_m))
 
 
 def _read_number(key: str, value: Any) -> float:

@@ -4,6 +4,7 @@ Sources: termios(3); ECMA-48 for the arrow keys.
 """
 
 import os
+import re
 import sys
 import termios
 import tty
@@ -11,17 +12,13 @@ from typing import IO, Any, List, Optional, Tuple
 
 from hero_node.errors import ProgramError
 
-ARROWS = {
-    "\x1b[A": "up",
-    "\x1b[B": "down",
-    "\x1b[C": "right",
-    "\x1b[D": "left",
-    "\x1bOA": "up",
-    "\x1bOB": "down",
-    "\x1bOC": "right",
-    "\x1bOD": "left",
-}
-"""Sequences that terminals send for the arrow keys, in normal and in application mode."""
+ESCAPE = "\x1b"
+
+KEY = re.compile(ESCAPE + r"(?:[\[O]([0-9;]*.?))?|.", re.DOTALL)
+"""A character, or a sequence that terminals send for other keys, in normal ([) or in application mode (O)."""
+
+ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
+"""Ends of the sequences of the arrow keys."""
 
 STOP_ALL_KEYS = ("\r", "\n")
 RELEASE_KEY = "r"
@@ -86,22 +83,13 @@ class Keyboard:
 
 
 def split_keys(text: str) -> Tuple[List[str], str]:
-    """Return the keys in text, and the rest of it if that may be the start of an arrow key."""
-    keys: List[str] = []
-    while text:
-        if text[0] != "\x1b":
-            keys.append(text[0])
-            text = text[1:]
-        elif text[:3] in ARROWS:
-            keys.append(ARROWS[text[:3]])
-            text = text[3:]
-        elif text in ("\x1b[", "\x1bO"):
-            return keys, text
-        else:
-            text = text[1:]  # a lone escape, or a sequence that means nothing here: its letters are dropped too
-            if text[:1] in ("[", "O"):
-                text = text[1:].lstrip("0123456789;")[1:]
-    return keys, ""
+    """Return the keys in text, and the rest of it if that may be the start of an arrow key.
+
+    A lone escape, and a sequence that means nothing here, are dropped.
+    """
+    whole = text[:-2] if text.endswith((ESCAPE + "[", ESCAPE + "O")) else text
+    found = [ARROWS.get(match[1], match[0]) for match in KEY.finditer(whole)]
+    return [key for key in found if key[0] != ESCAPE], text[len(whole) :]
 
 
 def open_terminal() -> IO[bytes]:

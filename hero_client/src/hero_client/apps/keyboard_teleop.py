@@ -81,24 +81,19 @@ class KeyDrive:
         self._forward_end_s = -math.inf
         self._left_end_s = -math.inf
 
-    def press(self, key: str, now_s: float) -> bool:
-        """Handle a key; return whether it has a meaning here."""
+    def press(self, key: str, now_s: float) -> None:
+        """Handle a key; one that has no meaning here changes nothing."""
+        lower = key.lower()  # caps lock must not take the controls away
         if key in STOP_KEYS:
             self.stop()
-            return True
-        lower = key.lower()  # caps lock must not take the controls away
-        if lower in MOTIONS:
+        elif lower in MOTIONS:
             self._move(lower, now_s)
-            return True
-        if key in "+=" or key in "-_":
+        elif key in "+=-_":
             step_m_s = LINEAR_STEP_M_S if key in "+=" else -LINEAR_STEP_M_S
             self.linear_m_s = min(MAX_LINEAR_M_S, max(MIN_LINEAR_M_S, self.linear_m_s + step_m_s))
-            return True
-        if key in ">." or key in "<,":
+        elif key in ">.<,":
             step_rad_s = ANGULAR_STEP_RAD_S if key in ">." else -ANGULAR_STEP_RAD_S
             self.angular_rad_s = min(MAX_ANGULAR_RAD_S, max(MIN_ANGULAR_RAD_S, self.angular_rad_s + step_rad_s))
-            return True
-        return False
 
     def _move(self, key: str, now_s: float) -> None:
         """Set the parts of the motion that the key gives; the other part expires on its own."""
@@ -181,9 +176,11 @@ class KeyboardTeleop:
             else:
                 names = ", ".join(robot.name for robot in self._swarm)
                 show_text("hero_%s is not among the robots of this teleop: %s\n" % (key, names))
-        elif self._drive.press(key, now_s) and key in STOP_KEYS:
-            self._output.demand_stop()  # also where another program drives the robot
-            self._next_send_s = now_s
+        else:
+            self._drive.press(key, now_s)
+            if key in STOP_KEYS:
+                self._output.demand_stop()  # also where another program drives the robot
+                self._next_send_s = now_s
 
     def _choose(self, robots: List[Robot]) -> None:
         """Drive these robots from now on; those that were driven stop."""

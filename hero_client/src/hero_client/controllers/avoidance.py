@@ -106,10 +106,7 @@ def wander(
     escape_sign = memory.escape_sign
     if nearest_m < (law.free_m if escape_sign else law.stop_m):
         if not escape_sign:
-            if left_m == right_m:
-                escape_sign = 1 if chance < 0.5 else -1
-            else:
-                escape_sign = 1 if left_m > right_m else -1
+            escape_sign = _choose_side(left_m, right_m, 1 if chance < 0.5 else -1)
             return STOP, WanderMemory(escape_sign, STOP_STEPS - 1)
         if memory.stop_steps:
             return STOP, WanderMemory(escape_sign, memory.stop_steps - 1)
@@ -119,13 +116,14 @@ def wander(
     if nearest_m >= law.slow_m:
         return Velocity(law.cruise_m_s, drift_rad_s), WanderMemory(drift_rad_s=drift_rad_s)
     nearness = (law.slow_m - nearest_m) / (law.slow_m - law.stop_m)
-    if left_m == right_m:
-        away_sign = 1 if drift_rad_s >= 0.0 else -1
-    else:
-        away_sign = 1 if left_m > right_m else -1
+    away_sign = _choose_side(left_m, right_m, 1 if drift_rad_s >= 0.0 else -1)
     speed_m_s = law.cruise_m_s * max(0.2, 1.0 - nearness)
     angular_rad_s = away_sign * nearness * law.angular_rad_s
     return Velocity(speed_m_s, angular_rad_s), WanderMemory(drift_rad_s=away_sign * abs(drift_rad_s))
+
+
+def _choose_side(left_m: float, right_m: float, otherwise: int) -> int:
+    return otherwise if left_m == right_m else 1 if left_m > right_m else -1
 
 
 class DetourLaw(NamedTuple):

@@ -3,7 +3,7 @@
 import math
 from typing import Optional, Sequence
 
-from hero_node.geometry import Pose, Velocity, clamp, wrap_angle
+from hero_node.geometry import Pose, Velocity, clamp, invert_pose, transform_pose, wrap_angle
 
 from .motion import DEFAULT_TIMEOUT_S, MotionController
 
@@ -32,23 +32,19 @@ class ForwardController(MotionController):
         self._length_m = length_m
         self._linear_m_s = linear_m_s
         self._start: Optional[Pose] = None
+        self._driven = Pose(0.0, 0.0, 0.0)  # as seen from the start
         self._remaining_m = length_m
 
     def _offset(self, pose: Pose) -> float:
-        if self._start is None:
-            self._start = pose
-        start = self._start
-        driven_m = math.cos(start.yaw_rad) * (pose.x_m - start.x_m) + math.sin(start.yaw_rad) * (
-            pose.y_m - start.y_m
-        )
-        self._remaining_m = self._length_m - driven_m
+        self._start = self._start or pose
+        self._driven = transform_pose(invert_pose(self._start), pose)
+        self._remaining_m = self._length_m - self._driven.x_m
         self.distance_m = abs(self._remaining_m)
         return self.distance_m / TOLERANCE_M
 
     def _approach(self, pose: Pose, ranges: Sequence[float], seen_s: float) -> Velocity:
         speed_m_s = min(self._linear_m_s, max(MIN_LINEAR_M_S, LINEAR_GAIN * self.distance_m))
-        start_yaw_rad = self._start.yaw_rad if self._start else pose.yaw_rad
-        angular_rad_s = clamp(ANGULAR_GAIN * wrap_angle(start_yaw_rad - pose.yaw_rad), 1.0)
+        angular_rad_s = clamp(-ANGULAR_GAIN * self._driven.yaw_rad, 1.0)
         return Velocity(math.copysign(speed_m_s, self._remaining_m), angular_rad_s)
 
 

@@ -96,17 +96,10 @@ def stop_after(steps: Steps, robots: Sequence[Member]) -> Steps:
     yield from send_stops(robots)
 
 
-def drive_for(
-    robots: Sequence[Member], clock: Clock, linear_m_s: float, angular_rad_s: float, duration_s: float
-) -> Steps:
-    """Drive all robots with the same velocities for duration_s."""
-    end_s = clock.now_s + duration_s
-    is_to_continue = True
-    while is_to_continue and end_s - clock.now_s > ROUNDING_S:
-        for robot in robots:
-            robot.check_not_stopped()
-            robot._send_velocity(linear_m_s, angular_rad_s)
-        is_to_continue = yield min(REPEAT_PERIOD_S, end_s - clock.now_s)
+def carry_out(steps: Steps, robots: Sequence[Member]) -> Steps:
+    """Take steps as soon as the robots are ready, and then stop the robots."""
+    yield from wait_for_all(robots)
+    yield from stop_after(steps, robots)
 
 
 class Group(Clock):
@@ -142,10 +135,16 @@ class Group(Clock):
             raise ValueError("a duration must be 0 s or more, not %r" % (duration_s,))
         for robot in self._members:
             robot._end_motion()
-        self._run(wait_for_all(self._members))
-        self._run(
-            stop_after(drive_for(self._members, self._clock, linear_m_s, angular_rad_s, duration_s), self._members)
-        )
+        self._run(carry_out(self._drive_steps(linear_m_s, angular_rad_s, duration_s), self._members))
+
+    def _drive_steps(self, linear_m_s: float, angular_rad_s: float, duration_s: float) -> Steps:
+        end_s = self.now_s + duration_s
+        is_to_continue = True
+        while is_to_continue and end_s - self.now_s > ROUNDING_S:
+            for robot in self._members:
+                robot.check_not_stopped()
+                robot._send_velocity(linear_m_s, angular_rad_s)
+            is_to_continue = yield min(REPEAT_PERIOD_S, end_s - self.now_s)
 
     def stop(self) -> None:
         """Stop at once and cancel motions from start_go_to(); returns once the stops are sent, after 0.1 s."""

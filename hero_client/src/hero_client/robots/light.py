@@ -21,19 +21,20 @@ class Light:
         """Be the light of the robot at link."""
         self._link = link
         self._shown = COLORS["off"]
-        self._keeping: Optional[BackgroundMotion] = None
-        self._blinking: Optional[BackgroundMotion] = None
+        self._motion: Optional[BackgroundMotion] = None
+        self._is_blinking = False
 
     def show(self, color: Color) -> None:
         """Show a color from now on. Raises: ValueError for a color that is not known."""
         rgb = parse_color(color)
-        self._end_blinking()
-        if self._keeping is not None and rgb == self._shown and self._link.connected:
+        if self._is_blinking:
+            self._end_motion()
+        if self._motion is not None and rgb == self._shown and self._link.connected:
             return
         self._shown = rgb
         self._link.send_color(rgb)
-        if self._keeping is None:
-            self._keeping = self._link.start(self._repeat())
+        if self._motion is None:
+            self._motion = self._link.start(self._repeat())
 
     def _repeat(self) -> Steps:
         while (yield REPEAT_PERIOD_S):
@@ -44,9 +45,8 @@ class Light:
         rgb = parse_color(color)
         if not period_s >= MIN_BLINK_PERIOD_S:
             raise ValueError("a period must be at least %g s, not %r" % (MIN_BLINK_PERIOD_S, period_s))
-        self._end_blinking()
-        self._end_keeping()
-        self._blinking = self._link.start(self._alternate(rgb, period_s))
+        self._end_motion()
+        self._motion, self._is_blinking = self._link.start(self._alternate(rgb, period_s)), True
 
     def _alternate(self, rgb: Tuple[float, float, float], period_s: float) -> Steps:
         for shown in itertools.cycle((rgb, COLORS["off"])):
@@ -54,19 +54,14 @@ class Light:
             if not (yield period_s / 2.0):
                 return
 
-    def _end_blinking(self) -> None:
-        if self._blinking is not None:
+    def _end_motion(self) -> None:
+        if self._motion is not None:
             # Its last color is not to come after the next one.
-            self._blinking.cancel_and_wait()
-            self._blinking = None
-
-    def _end_keeping(self) -> None:
-        if self._keeping is not None:
-            self._keeping.cancel_and_wait()
-            self._keeping = None
+            self._motion.cancel_and_wait()
+        self._motion, self._is_blinking = None, False
 
     def close(self) -> None:
         """Send nothing more: switch a light off that blinks, and leave another one to go dark. Safe twice."""
-        if self._blinking is not None:
+        if self._is_blinking:
             self.show("off")
-        self._end_keeping()
+        self._end_motion()

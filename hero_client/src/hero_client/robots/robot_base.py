@@ -22,7 +22,7 @@ from ..values.readings import FRESH_S, Obstacle, find_nearest
 from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, RobotModel
 from ..values.robot_link import RobotLink
 from ..values.sensing import Neighbor
-from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, stop_after, wait_for_all
+from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, carry_out, wait_for_all
 from .light import Light
 
 NEXT_ODOM_S = 5.0
@@ -309,7 +309,7 @@ class BaseRobot(Group):
         """Return forward() as steps. Raises: ValueError for a speed that is not positive."""
         check_speed(distance_m, linear_m_s)
         controller = ForwardController(distance_m, self.now_s, linear_m_s)
-        return self._follow(controller, lambda: "drive %g m" % distance_m)
+        return carry_out(self._follow(controller, lambda: "drive %g m" % distance_m), self._members)
 
     def turn_steps(self, angle_rad: float, angular_rad_s: float) -> Steps:
         """Return turn() as steps. Raises: ValueError for a speed that is not positive."""
@@ -318,7 +318,7 @@ class BaseRobot(Group):
             text = "%s turns by %g rad, %.1f full turns: for degrees, turn(math.radians(%g))"
             self._link.log_warning(text % (self.name, angle_rad, abs(angle_rad) / math.tau, angle_rad))
         controller = TurnController(angle_rad, self.now_s, angular_rad_s)
-        return self._follow(controller, lambda: "turn %g rad" % angle_rad)
+        return carry_out(self._follow(controller, lambda: "turn %g rad" % angle_rad), self._members)
 
     def start_motion(self, steps: Steps) -> BackgroundMotion:
         """Take the steps of a motion in the background, in place of the present one; return the motion."""
@@ -403,7 +403,8 @@ class BaseRobot(Group):
             x_m, y_m = (given if frame == "robot" else controller.goal)[:2]
             return "reach (%g, %g)%s" % (x_m, y_m, "" if frame == "odom" else " in the frame %s" % frame)
 
-        yield from self._follow(controller, describe, read_pose, lambda: on_step(controller))
+        motion = self._follow(controller, describe, read_pose, lambda: on_step(controller))
+        yield from carry_out(motion, self._members)
 
     def _wait_for_pose(self) -> Generator[float, bool, Pose]:
         """Return `pose`. Raises: StaleDataError if it is not fresh for READY_TIMEOUT_S, or at the end."""
@@ -420,20 +421,10 @@ class BaseRobot(Group):
         read_pose: Optional[Callable[[], Pose]] = None,
         on_step: Callable[[], None] = lambda: None,
     ) -> Steps:
-        """Drive as the controller says to its end. Raises: GoalError, StoppedError, RobotNotReadyError.
+        """Drive as the controller says to its end. Raises: GoalError, StoppedError.
 
         describe: returns what the robot is to do, for errors. read_pose: reads a pose that is not the odometry's.
         """
-        yield from wait_for_all(self._members)
-        yield from stop_after(self._obey(controller, describe, read_pose, on_step), self._members)
-
-    def _obey(
-        self,
-        controller: MotionController,
-        describe: Callable[[], str],
-        read_pose: Optional[Callable[[], Pose]],
-        on_step: Callable[[], None],
-    ) -> Steps:
         controller.body_radius_m = self.model.body_radius_m
         while True:
             self.check_not_stopped()

@@ -33,9 +33,7 @@ AnyRobot = TypeVar("AnyRobot", bound=BaseRobot)
 
 
 class BaseSwarm(Group, Generic[AnyRobot]):
-    """Several robots; iterate over them, or take one by its id: swarm[3] is hero_3, not the fourth robot.
-
-    A command to a swarm is given to each of its robots.
+    """Several robots: what Swarm has that needs no ROS.
 
     Attributes:
         robots: list of the robots, in the order of the ids given.

@@ -22,7 +22,7 @@ from hero_node.ros.master import ask_master
 from hero_node.texts import list_names
 
 from ..values.robot_states import STATES
-from .stop_status import TIME_LIMIT_S, DriverReply, StopRequest, StopStatus
+from .stop_status import TIME_LIMIT_S, Replies, StopRequest, StopStatus
 
 USUAL_TOPIC = "/hero_driver/robots"
 SUFFIX = "/robots"
@@ -247,11 +247,14 @@ class Drivers:
         reports = [link.report for link in self._links.values() if link.report is not None]
         return any(robot.namespace == namespace for report in reports for robot in report.robots)
 
-    def _read_fresh(self) -> Dict[str, RobotArray]:
-        """Return the reports by driver, without those of drivers that are silent for longer than the others."""
+    def _find_fresh(self) -> List[_DriverLink]:
+        """Return the drivers that have reported, without those that are silent for longer than the others."""
         links = self._links.values()
         limit_s = max((link.arrival_s for link in links), default=0.0) - FORGET_S
-        newest = {link.driver: link.newest(limit_s) for link in links}
+        return [link for link in links if link.arrival_s > limit_s]
+
+    def _read_fresh(self) -> Dict[str, RobotArray]:
+        newest = {link.driver: link.newest() for link in self._find_fresh()}
         return {driver: report for driver, report in newest.items() if report is not None}
 
     def read(self) -> Optional[RobotArray]:
@@ -310,9 +313,7 @@ class Drivers:
 
         Called for each command, so it only looks the robot up in what was prepared when the report arrived.
         """
-        links = self._links.values()
-        limit_s = max((link.arrival_s for link in links), default=0.0) - FORGET_S
-        return any(namespace in link.stopped_robots and link.arrival_s > limit_s for link in links)
+        return any(namespace in link.stopped_robots for link in self._find_fresh())
 
     def find_model(self, namespace: str) -> str:
         """Return the name of a robot's model; "" while it is not known."""
@@ -346,8 +347,7 @@ class Drivers:
         if request is None:
             return None
         replies = self._read_replies(request, now_s)
-        reports = [reply.report for reply in replies if reply.report is not None]
-        return request.describe(replies, merge(reports).robots, now_s)
+        return request.describe(replies, merge([report for report in replies.values() if report]).robots, now_s)
 
     def wait_for_stop(self, timeout_s: float = TIME_LIMIT_S) -> Optional[StopStatus]:
         """Return the status as soon as the outcome is known, or what is known after timeout_s."""
@@ -367,10 +367,10 @@ class Drivers:
         if status is not None and status.level == "error":
             raise ProgramError(status.text)
 
-    def _read_replies(self, request: StopRequest, now_s: float) -> List[DriverReply]:
+    def _read_replies(self, request: StopRequest, now_s: float) -> Replies:
         since_s = max(request.made_s, now_s - SILENT_S)
-        replies = [DriverReply(link.driver, link.newest(since_s)) for link in self._find_known()]
-        return replies or [DriverReply(driver_of(self._usual), None)]
+        replies = {link.driver: link.newest(since_s) for link in self._find_known()}
+        return replies or {driver_of(self._usual): None}
 
     def _ask(self) -> None:
         """Send what was requested at once, and again while a driver has not taken it (a thread of its own)."""

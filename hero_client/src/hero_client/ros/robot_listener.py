@@ -3,7 +3,6 @@
 Unlike Robot it decodes messages only when asked: a swarm sends far more of them than a program reads.
 """
 
-import math
 from collections import deque
 from typing import Any, Deque, Optional, Sequence, Tuple
 
@@ -51,19 +50,19 @@ class NewestMessage:
 
 
 class RateMeter:
-    """Measures how often something arrived in the last RATE_WINDOW_S."""
+    """Measures how often something arrived in the last RATE_WINDOW_S.
+
+    Attributes:
+        total: how often it arrived so far.
+    """
 
     def __init__(self) -> None:
+        self.total = 0
         self._counts: Deque[Tuple[float, int]] = deque()
-        self._total = 0
-
-    def count(self, more: int = 1) -> None:
-        """Add arrivals."""
-        self._total += more
 
     def rate_hz(self, now_s: float) -> float:
         """Return the rate since about RATE_WINDOW_S ago; call it more often than that."""
-        self._counts.append((now_s, self._total))
+        self._counts.append((now_s, self.total))
         while len(self._counts) > 2 and self._counts[1][0] <= now_s - RATE_WINDOW_S:
             self._counts.popleft()
         (first_s, first), (last_s, last) = self._counts[0], self._counts[-1]
@@ -92,9 +91,9 @@ class RobotTrack:
         self.pose = pose
 
     def receive_proximity(self, ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float) -> None:
-        """Take the newest proximity scan; one without finite angles counts as none."""
-        self.proximity_seen = math.isfinite(angle_min_rad) and math.isfinite(increment_rad)
-        self.nearest = find_nearest(ranges_m, angle_min_rad, increment_rad) if self.proximity_seen else None
+        """Take the newest proximity scan; an invalid one, without ranges, counts as none."""
+        self.proximity_seen = len(ranges_m) > 0
+        self.nearest = find_nearest(ranges_m, angle_min_rad, increment_rad)
 
 
 class RobotListener:
@@ -105,13 +104,10 @@ class RobotListener:
         self.ranges_m: Sequence[float] = ()
         self._odometry = NewestMessage(namespace + "/odom", Odometry)
         self._proximity = NewestMessage(namespace + "/proximity", LaserScan)
-        self._counted = 0
 
     def read_newest(self) -> None:
         """Read what arrived since the last call."""
-        count = self._odometry.count
-        self.track.odometry.count(count - self._counted)
-        self._counted = count
+        self.track.odometry.total = self._odometry.count
         odometry = self._odometry.take()
         if odometry is not None:
             self.track.receive_pose(read_pose(odometry.pose.pose))

@@ -3,7 +3,7 @@
 Pure: knows neither topics nor a clock; times are monotonic.
 """
 
-from typing import List, NamedTuple, Optional, Sequence, Set
+from typing import List, Mapping, NamedTuple, Optional, Sequence, Set
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_node.texts import list_names
@@ -33,12 +33,8 @@ class StopStatus(NamedTuple):
     """Whether the outcome is known; until then the request is repeated."""
 
 
-class DriverReply(NamedTuple):
-    """Report of a driver since the request."""
-
-    name: str
-    report: Optional[RobotArray]
-    """The newest report; None while there is none since the request, or none any more."""
+Replies = Mapping[str, Optional[RobotArray]]
+"""The newest report of each driver by its name; None while there is none since the request, or none any more."""
 
 
 class StopRequest:
@@ -52,7 +48,7 @@ class StopRequest:
         self._taken: Set[str] = set()
         self._asked: Set[str] = set()
 
-    def update(self, replies: Sequence[DriverReply], all_found: bool, now_s: float) -> None:
+    def update(self, replies: Replies, all_found: bool, now_s: float) -> None:
         """Take the replies of the drivers that are known.
 
         The request is over once all have taken it: a driver that starts later is not asked. A release is asked for
@@ -62,10 +58,8 @@ class StopRequest:
         """
         if now_s - self.made_s < CROSSING_S:
             return
-        self._taken.update(
-            reply.name for reply in replies if reply.report is not None and reply.report.stopped == self.stopped
-        )
-        all_taken = all_found and all(reply.name in self._taken for reply in replies)
+        self._taken.update(driver for driver, report in replies.items() if report and report.stopped == self.stopped)
+        all_taken = all_found and self._taken.issuperset(replies)
         self.is_over = self.is_over or all_taken or (not self.stopped and self._is_late(now_s))
 
     def is_open_to(self, driver: str) -> bool:
@@ -84,16 +78,16 @@ class StopRequest:
     def _is_late(self, now_s: float) -> bool:
         return now_s - self.made_s >= TIME_LIMIT_S
 
-    def describe(self, replies: Sequence[DriverReply], robots: Sequence[Robot], now_s: float) -> StopStatus:
+    def describe(self, replies: Replies, robots: Sequence[Robot], now_s: float) -> StopStatus:
         """Return the status now; robots: those of all replies, each once."""
         if now_s - self.made_s < CROSSING_S:
             return StopStatus("warn", "stopping" if self.stopped else "releasing", False)
-        failures = ["driver %s does not answer" % _show(reply.name) for reply in replies if reply.report is None]
+        failures = ["driver %s does not answer" % _show(driver) for driver, report in replies.items() if not report]
         refusing: List[str] = []
         changed: List[str] = []
-        for reply in replies:
-            if reply.report is not None and bool(reply.report.stopped) != self.stopped:
-                (changed if reply.name in self._taken else refusing).append(_show(reply.name))
+        for driver, report in replies.items():
+            if report and report.stopped != self.stopped:
+                (changed if driver in self._taken else refusing).append(_show(driver))
         if changed:
             how = "released" if self.stopped else "stopped"
             return StopStatus("warn", "another program has %s the robots of %s" % (how, ", ".join(changed)), True)
