@@ -31,4 +31,5 @@ def explain_write_errors(path: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise RecordingError("%s cannot be written: %s" % (path, error.strerror or error)) from error
+        text = "%s cannot be written: %s; choose another path"
+        raise RecordingError(text % (path, error.strerror or error)) from error

@@ -12,13 +12,13 @@ from typing import Optional, Sequence, Set
 from hero_node import command_line
 from hero_node.parameters import robot_ids_option
 
-from .bags import BagSet
-from .errors import RecordingError
+from .bags.bag_set import BagSet
+from .bags.tables import TABLES, is_exported, read_rows
+from .bags.topics import Message
+from .errors import RecordingError, explain_write_errors
 from .formats.bag_files import write_mcap, write_ros2
-from .formats.table_files import CONVERTERS, CsvFiles
+from .formats.table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
 from .options import list_of
-from .tables import TABLES, is_exported, read_rows
-from .topics import Message
 
 PART_SUFFIX = ".part"
 
@@ -36,7 +36,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
     parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)
     text = "csv, npz, parquet: tables; mcap, ros2: bags with every message (%(default)s)"
-    parser.add_argument("--format", choices=[*CONVERTERS, *BAG_WRITERS], default="csv", help=text)
+    parser.add_argument("--format", choices=[*TABLE_FORMATS, *BAG_WRITERS], default=CSV, help=text)
     parser.add_argument("--ros2", dest="format", action="store_const", const="ros2", help="short for --format ros2")
     options = parser.parse_args(arguments)
     if options.format in BAG_WRITERS and (options.robots is not None or options.tables != list(TABLES)):
@@ -63,11 +63,12 @@ def write_tables(bags: BagSet, robot_ids: Optional[Set[int]], kinds: Set[str], f
 
 def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str:
     """Write tables into a new folder and return what was written. Raises: RecordingError."""
-    convert = CONVERTERS[options.format]()
+    write = None if options.format == CSV else load_writer(options.format)
     files = CsvFiles(folder)
     write_tables(bags, None if options.robots is None else set(options.robots), set(options.tables), files)
-    for robot_id, kind in files.rows:
-        convert(files.path(robot_id, kind))
+    if write:
+        for robot_id, kind in files.rows:
+            convert_csv(files.path(robot_id, kind), "." + options.format, write)
     robots = {robot_id for robot_id, _ in files.rows}
     return "%d robots, %d tables, %d rows" % (len(robots), len(files.rows), sum(files.rows.values()))
 
@@ -80,12 +81,8 @@ def run(options: argparse.Namespace) -> None:
     if os.path.exists(out):
         raise RecordingError("%s exists already; move it away or choose another --out" % out)
     part = out + PART_SUFFIX
-    try:
+    with explain_write_errors(part):
         os.makedirs(part)
-    except OSError as error:
-        raise RecordingError(
-            "%s cannot be created: %s; choose another --out" % (part, error.strerror)
-        ) from error
     incomplete = os.path.join(part, os.path.basename(out))
     try:
         if options.format in BAG_WRITERS:

@@ -12,11 +12,11 @@ from hero_node import command_line
 from hero_node.parameters import robot_ids_option
 from hero_node.safe_file import replace_file
 
-from . import analysis
-from .bags import BagSet
-from .errors import RecordingError
-from .observations import Observations, RobotObservations
+from .bags.bag_set import BagSet
+from .errors import RecordingError, explain_write_errors
 from .options import list_of
+from .plots import analysis
+from .plots.observations import Observations, RobotObservations
 
 FIGURES = {
     "paths": "/hero_N/odom",
@@ -59,7 +59,7 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
     """Write the figures; return the path of each, or why it is missing. Raises: RecordingError, also if all are."""
     from matplotlib import rc_context
 
-    from .figures import STYLE, Figures
+    from .plots.figures import STYLE, Figures
 
     names = os.path.basename(bags.paths[0])
     if len(bags.paths) > 1:
@@ -74,11 +74,8 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
         if figure is None:
             missing.append("no figure of %s: nothing of %s in the recording" % (name, FIGURES[name]))
             continue
-        try:
-            with replace_file(path) as file:
-                figure.savefig(file, dpi=130, format=options.format)
-        except OSError as error:
-            raise RecordingError("%s cannot be written: %s; choose another --out" % (path, error.strerror)) from error
+        with explain_write_errors(path), replace_file(path) as file:
+            figure.savefig(file, dpi=130, format=options.format)
         paths.append(path)
     if not paths:
         raise RecordingError("%s: %s" % (names, "; ".join(missing)))

@@ -26,11 +26,11 @@ from hero_node.parameters import robot_ids_option
 from hero_node.processes import end_process
 from hero_node.ros.master import ask_master, check_master
 
-from .bags import ACTIVE_SUFFIX
+from .bags.bag_set import ACTIVE_SUFFIX
+from .bags.repair import repair_bag
+from .bags.topics import make_patterns
 from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError
-from .repair import repair_bag
-from .topics import make_patterns
 
 CHECK_PERIOD_S = 0.5
 """Between two checks of the disk; fifty robots fill 3 MB in that time, uncompressed."""

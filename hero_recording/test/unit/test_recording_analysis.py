@@ -18,12 +18,13 @@ from synthetic_bag import (
     write_bag,
 )
 
-from hero_recording import analysis, plot
-from hero_recording.bags import BagSet
+from hero_recording import plot
+from hero_recording.bags.bag_set import BagSet
+from hero_recording.bags.topics import Message, find_robot_topic, is_fleet_topic, make_patterns
 from hero_recording.errors import RecordingError
-from hero_recording.figures import MAX_NAMED, Figures, choose_colors
-from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
-from hero_recording.topics import Message, find_robot_topic, is_fleet_topic, make_patterns
+from hero_recording.plots import analysis
+from hero_recording.plots.figures import MAX_NAMED, Figures, choose_colors
+from hero_recording.plots.observations import Observations, Origin, RobotObservations, StateReport
 
 
 def observe(path, robot_ids=None):
@@ -119,7 +120,8 @@ def test_paths_are_in_the_shared_frame(two_robots):
 
 def test_a_path_is_moved_and_turned_with_the_origin_of_its_time():
     times_s = np.array([0.0, 1.0, 2.0])
-    path = analysis.Path(times_s, np.array([1.0, 1.0, 0.0]), np.array([0.5, 0.5, 1.0]), np.array([0.0, 0.0, 3.0]))
+    columns = ([1.0, 1.0, 0.0], [0.5, 0.5, 1.0], [0.0, 0.0, 3.0])
+    path = analysis.Path(times_s, times_s, *map(np.array, columns))
     origins = [Origin(0.5, 2.0, 0.0, math.pi / 2.0), Origin(2.0, -1.0, -1.0, math.pi)]
     moved = analysis.transform_path(path, origins)
     assert moved.x_m == pytest.approx([1.5, 1.5, -1.0])

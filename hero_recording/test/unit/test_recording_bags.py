@@ -11,9 +11,9 @@ from std_msgs.msg import String
 from synthetic_bag import START_S, write_bag
 
 from hero_recording import disk_guard, plot
-from hero_recording.bags import BagSet
+from hero_recording.bags.bag_set import BagSet
+from hero_recording.bags.repair import CHUNK_MARK, repair_bag
 from hero_recording.errors import RecordingError
-from hero_recording.repair import CHUNK_MARK, repair_bag
 
 
 def cut_off(path, share):

@@ -75,10 +75,11 @@ def test_robots_and_tables_can_be_selected(bag, tmp_path, capsys):
     assert files == ["hero_3/odometry.csv", "hero_3/status.csv"]
 
 
-def test_an_existing_folder_is_refused(bag, tmp_path, capsys):
-    (tmp_path / "out").mkdir()
-    with pytest.raises(RecordingError, match="out exists already"):
-        run_export(capsys, bag, "--out", tmp_path / "out")
+def test_a_path_that_exists_or_cannot_be_written_is_refused(bag, tmp_path, capsys):
+    (tmp_path / "out").write_text("")
+    for out, words in (("out", "exists already"), ("out/x", "x.part cannot be written: .*; choose another path")):
+        with pytest.raises(RecordingError, match=out[:3] + ".*" + words):
+            run_export(capsys, bag, "--out", tmp_path / out)
 
 
 def test_an_interrupted_export_leaves_nothing_behind(bag, tmp_path, capsys, monkeypatch):

@@ -10,9 +10,9 @@ from matplotlib.colors import to_hex
 from synthetic_bag import START_S
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_recording import analysis
-from hero_recording.figures import STATE_COLORS, STYLE, Figures
-from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
+from hero_recording.plots import analysis
+from hero_recording.plots.figures import STATE_COLORS, STYLE, Figures
+from hero_recording.plots.observations import Observations, Origin, RobotObservations, StateReport
 
 PERIOD_S = 0.1
 END_S = 12.0

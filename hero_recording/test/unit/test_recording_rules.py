@@ -13,16 +13,23 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_msgs.msg import Encoder, Motor, Robot, RobotArray
-from hero_recording import analysis, disk_guard, plot, record, step_recorder
-from hero_recording.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, REPORT_GAP_S, SAME_TIME_S, STANDSTILL_S
+from hero_recording import disk_guard, plot, record, step_recorder
+from hero_recording.bags import plain_reader
+from hero_recording.bags.tables import BEAMS, TABLES, read_rows
+from hero_recording.bags.topics import Message
 from hero_recording.errors import RecordingError
-from hero_recording.observations import Observations, Origin, RobotObservations, StateReport
-from hero_recording.readers import plain_reader
+from hero_recording.plots import analysis
+from hero_recording.plots.analysis import (
+    COMMAND_TIMEOUT_S,
+    ODOMETRY_GAP_S,
+    REPORT_GAP_S,
+    SAME_TIME_S,
+    STANDSTILL_S,
+)
+from hero_recording.plots.observations import Observations, Origin, RobotObservations, StateReport
+from hero_recording.plots.series import MAX_VALUE
 from hero_recording.record import CHECK_PERIOD_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
-from hero_recording.series import MAX_VALUE
 from hero_recording.step_recorder import StepRecorder
-from hero_recording.tables import BEAMS, TABLES, read_rows
-from hero_recording.topics import Message
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.stepped.topics import LATCHED
 

@@ -5,10 +5,10 @@ import io
 from pathlib import Path
 from typing import Any, Dict, Tuple
 
-from ..bags import BagSet
+from ..bags.bag_set import BagSet
+from ..bags.topics import RawMessage
 from ..errors import RecordingError, explain_write_errors
 from ..optional import import_optional
-from ..topics import RawMessage
 
 
 def write_mcap(bags: BagSet, path: str) -> int:

@@ -9,14 +9,16 @@ from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
 
+from ..bags.tables import TABLES, TEXT_COLUMNS, Row
 from ..errors import explain_write_errors
 from ..optional import import_optional
-from ..tables import TABLES, TEXT_COLUMNS, Row
 
 BATCH_ROWS = 4096
 """Buffered rows of a table: 8 numbers take some 0.8 MB."""
 
 TIME_COLUMN = "time_s"
+
+TABLE_FORMATS = CSV, NPZ, PARQUET = "csv", "npz", "parquet"
 
 Columns = Dict[str, Any]
 """Arrays by name: numbers as float64, the rest as text."""
@@ -65,33 +67,17 @@ class CsvFiles:
         self.rows[key] = self.rows.get(key, 0) + len(rows)
 
 
-def keep_csv(path: str) -> None:
-    """Leave a table as it is."""
-
-
-def npz_converter() -> Callable[[str], None]:
-    """Return what turns a CSV file into an .npz file, an array per column."""
-    return lambda path: _replace(path, ".npz", lambda target, columns: np.savez_compressed(target, **columns))
-
-
-def parquet_converter() -> Callable[[str], None]:
-    """Return what turns a CSV file into a .parquet file. Raises: RecordingError without pyarrow."""
+def load_writer(name: str) -> Callable[[str, Columns], None]:
+    """Return what writes columns into a file of another format. Raises: RecordingError without its library."""
+    if name == NPZ:
+        return lambda path, columns: np.savez_compressed(path, **columns)
     requirement = "pyarrow<20"  # which takes the numpy of Debian 12, too
-    arrow = import_optional("pyarrow", requirement)
-    parquet = import_optional("pyarrow.parquet", requirement)
-    return lambda path: _replace(
-        path, ".parquet", lambda target, columns: parquet.write_table(arrow.table(columns), target)
-    )
+    arrow, parquet = (import_optional(module, requirement) for module in ("pyarrow", "pyarrow.parquet"))
+    return lambda path, columns: parquet.write_table(arrow.table(columns), path)
 
 
-CONVERTERS: Dict[str, Callable[[], Callable[[str], None]]] = {
-    "csv": lambda: keep_csv,
-    "npz": npz_converter,
-    "parquet": parquet_converter,
-}
-
-
-def _replace(path: str, suffix: str, write: Callable[[str, Columns], None]) -> None:
+def convert_csv(path: str, suffix: str, write: Callable[[str, Columns], None]) -> None:
+    """Replace a CSV file by one with the suffix, with an array per column."""
     target = os.path.splitext(path)[0] + suffix
     with explain_write_errors(target):
         write(target, _read_columns(path))

@@ -5,13 +5,13 @@ from typing import Any, Callable, Dict, Iterable, List, Sequence, Tuple
 
 from tqdm import tqdm
 
-from .errors import RecordingError, explain_bag_errors
+from ..errors import RecordingError, explain_bag_errors
 from .topics import Message, RawMessage
 
 try:
-    from .readers.ros_reader import Reader
+    from .ros_reader import Reader
 except ImportError:  # a PC without ROS
-    from .readers.plain_reader import Reader  # type: ignore[assignment]
+    from .plain_reader import Reader  # type: ignore[assignment]
 
 ACTIVE_SUFFIX = ".active"
 """Of a file that is being written, or was not closed."""

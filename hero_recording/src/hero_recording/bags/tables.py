@@ -11,14 +11,11 @@ from typing import Any, Callable, Dict, List, Tuple
 from hero_client.values.robot_states import STATES
 from hero_node.geometry import yaw_of
 
-from . import topics
+from .topics import find_robot_topic, is_fleet_topic
 
 Row = Tuple[Any, ...]
 Columns = Dict[str, Callable[[Any], Any]]
 """Name of each column after time_s, and the function that reads its value from a message."""
-
-STATUS = "status"
-"""Driver's report on a robot, once a second and at every change."""
 
 BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "left", "rear_left")
 """Of /hero_N/proximity by index: counter-clockwise from the rear."""
@@ -48,16 +45,16 @@ _ODOMETRY: Columns = {
 _TWIST: Columns = {"linear_m_s": attrgetter("linear.x"), "angular_rad_s": attrgetter("angular.z")}
 
 TABLES: Dict[str, Columns] = {
-    topics.ODOMETRY: _ODOMETRY,
-    topics.GROUND_TRUTH: _ODOMETRY,
-    topics.POSE: {
+    "odometry": _ODOMETRY,
+    "ground_truth": _ODOMETRY,
+    "pose": {
         **_PLACE,
         # Of x, y and yaw in the covariance of x, y, z and rotations about x, y, z.
         "x_sd_m": lambda content: math.sqrt(abs(content.pose.covariance[0])),
         "y_sd_m": lambda content: math.sqrt(abs(content.pose.covariance[7])),
         "yaw_sd_rad": lambda content: math.sqrt(abs(content.pose.covariance[35])),
     },
-    topics.ENCODER: {
+    "encoder": {
         "stamp_s": _read_stamp,
         "left_ticks": attrgetter("left_ticks"),
         "right_ticks": attrgetter("right_ticks"),
@@ -66,27 +63,28 @@ TABLES: Dict[str, Columns] = {
         "left_speed_filtered_m_s": attrgetter("left_speed_filtered"),
         "right_speed_filtered_m_s": attrgetter("right_speed_filtered"),
     },
-    topics.PROXIMITY: {
+    "proximity": {
         "stamp_s": _read_stamp,
         **{beam + "_m": _range_reader(index) for index, beam in enumerate(BEAMS)},
     },
-    topics.RANGE: {"stamp_s": _read_stamp, "range_m": attrgetter("range")},
-    topics.VELOCITY_COMMAND: _TWIST,
-    topics.POSITION_COMMAND: _TWIST,
-    topics.MOTOR_COMMAND: {"left_us": attrgetter("left_motor_pwm"), "right_us": attrgetter("right_motor_pwm")},
-    topics.LED: {
+    "range": {"stamp_s": _read_stamp, "range_m": attrgetter("range")},
+    "velocity_command": _TWIST,
+    "position_command": _TWIST,
+    "motor_command": {"left_us": attrgetter("left_motor_pwm"), "right_us": attrgetter("right_motor_pwm")},
+    "led": {
         "red": attrgetter("r"),
         "green": attrgetter("g"),
         "blue": attrgetter("b"),
         "alpha": attrgetter("a"),
     },
-    topics.IMU: {
+    "imu": {
         "stamp_s": _read_stamp,
         **{"orientation_" + axis: attrgetter("orientation." + axis) for axis in "xyzw"},
         **{"angular_raw_" + axis: attrgetter("angular_velocity." + axis) for axis in "xyz"},
         **{"acceleration_raw_" + axis: attrgetter("linear_acceleration." + axis) for axis in "xyz"},
     },
-    STATUS: {
+    # The driver's report on a robot, once a second and at every change.
+    "status": {
         "state": lambda robot: STATES.get(robot.state, str(robot.state)).lower(),
         "address": attrgetter("address"),
         "packets_per_s": attrgetter("packets_per_s"),
@@ -106,14 +104,14 @@ TEXT_COLUMNS = {"state", "address", "last_error"}
 
 def is_exported(topic: str, message_type: str) -> bool:
     """Return whether read_rows() makes rows of a topic."""
-    return topics.find_robot_topic(topic, message_type) is not None or topics.is_fleet_topic(topic, message_type)
+    return find_robot_topic(topic, message_type) is not None or is_fleet_topic(topic, message_type)
 
 
 def read_rows(topic: str, message_type: str, content: Any, time_s: float) -> List[Tuple[int, str, Row]]:
     """Return the rows that a message adds, each with the id of the robot and the kind of the table."""
-    found = topics.find_robot_topic(topic, message_type)
+    found = find_robot_topic(topic, message_type)
     if found is None:
-        sources = [(robot.id, STATUS, robot) for robot in content.robots if robot.id >= 0]
+        sources = [(robot.id, "status", robot) for robot in content.robots if robot.id >= 0]
     else:
         sources = [(found.robot_id, found.kind, content)]
     return [

@@ -4,7 +4,7 @@ from typing import Any, Dict, Iterator, Sequence, Tuple
 
 import rosbag
 
-from ..topics import Message, RawMessage
+from .topics import Message, RawMessage
 
 
 class Reader:

@@ -6,33 +6,21 @@ The patterns are regular expressions: robots that join later are recorded too.
 import re
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence
 
-ODOMETRY = "odometry"
-GROUND_TRUTH = "ground_truth"
-POSE = "pose"
-ENCODER = "encoder"
-PROXIMITY = "proximity"
-RANGE = "range"
-VELOCITY_COMMAND = "velocity_command"
-POSITION_COMMAND = "position_command"
-MOTOR_COMMAND = "motor_command"
-LED = "led"
-IMU = "imu"
-
 ROBOT_TOPICS = {
-    "odom": (ODOMETRY, "nav_msgs/Odometry"),
-    "ground_truth": (GROUND_TRUTH, "nav_msgs/Odometry"),
-    "pose": (POSE, "geometry_msgs/PoseWithCovarianceStamped"),
-    "encoder": (ENCODER, "hero_msgs/Encoder"),
-    "proximity": (PROXIMITY, "sensor_msgs/LaserScan"),
-    "range": (RANGE, "sensor_msgs/Range"),
-    "cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
-    "velocity_controller/cmd_vel": (VELOCITY_COMMAND, "geometry_msgs/Twist"),
-    "position_controller/cmd_vel": (POSITION_COMMAND, "geometry_msgs/Twist"),
-    "cmd_motor": (MOTOR_COMMAND, "hero_msgs/Motor"),
-    "led": (LED, "std_msgs/ColorRGBA"),
-    "imu": (IMU, "sensor_msgs/Imu"),
+    "odom": ("odometry", "nav_msgs/Odometry"),
+    "ground_truth": ("ground_truth", "nav_msgs/Odometry"),
+    "pose": ("pose", "geometry_msgs/PoseWithCovarianceStamped"),
+    "encoder": ("encoder", "hero_msgs/Encoder"),
+    "proximity": ("proximity", "sensor_msgs/LaserScan"),
+    "range": ("range", "sensor_msgs/Range"),
+    "cmd_vel": ("velocity_command", "geometry_msgs/Twist"),
+    "velocity_controller/cmd_vel": ("velocity_command", "geometry_msgs/Twist"),
+    "position_controller/cmd_vel": ("position_command", "geometry_msgs/Twist"),
+    "cmd_motor": ("motor_command", "hero_msgs/Motor"),
+    "led": ("led", "std_msgs/ColorRGBA"),
+    "imu": ("imu", "sensor_msgs/Imu"),
 }
-"""Below /hero_N/: kind and type. A topic of that name with another type belongs to another program."""
+"""Below /hero_N/: kind, which names the table, and type; a topic of another type belongs to another program."""
 
 RAW_ROBOT_TOPICS = ("odom_raw", "laser", "laser_enable")
 """The robot's own messages, from which the driver makes odom and proximity."""

@@ -14,8 +14,8 @@ from typing import Optional
 import rosbag
 from tqdm import tqdm
 
-from .bags import ACTIVE_SUFFIX
-from .errors import RecordingError, explain_bag_errors
+from ..errors import RecordingError, explain_bag_errors
+from .bag_set import ACTIVE_SUFFIX
 
 CHUNK_MARK = b"\4\0\0\0op=\5"
 """In the header of each chunk (wiki.ros.org/Bags/Format/2.0)."""

@@ -33,6 +33,7 @@ class Path(NamedTuple):
     """Poses over time."""
 
     times_s: np.ndarray
+    stamps_s: np.ndarray
     x_m: np.ndarray
     y_m: np.ndarray
     yaw_rad: np.ndarray
@@ -75,8 +76,7 @@ def read_ground_truth(robot: RobotObservations) -> Path:
 
 
 def _read_series(series: Series) -> Path:
-    arrival_s, _, x_m, y_m, yaw_rad, *_ = series.columns()
-    return Path(arrival_s, x_m, y_m, yaw_rad)
+    return Path(*series.columns()[:5])
 
 
 def transform_path(path: Path, origins: Sequence[Origin]) -> Path:
@@ -88,11 +88,10 @@ def transform_path(path: Path, origins: Sequence[Origin]) -> Path:
     which = np.maximum(np.searchsorted(table[:, 0], path.times_s, side="right") - 1, 0)
     _, origin_x, origin_y, yaw_rad = table[which].T
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
-    return Path(
-        path.times_s,
-        origin_x + cosine * path.x_m - sine * path.y_m,
-        origin_y + sine * path.x_m + cosine * path.y_m,
-        wrap(path.yaw_rad + yaw_rad),
+    return path._replace(
+        x_m=origin_x + cosine * path.x_m - sine * path.y_m,
+        y_m=origin_y + sine * path.x_m + cosine * path.y_m,
+        yaw_rad=wrap(path.yaw_rad + yaw_rad),
     )
 
 
@@ -106,7 +105,7 @@ def compute_odometry_errors(robot: RobotObservations) -> Optional[PoseErrors]:
 
     Without an origin, odometry is aligned with the ground truth at its first pose.
     """
-    return _compare(read_path(robot), robot.odometry, robot.ground_truth, is_aligned=not robot.origins)
+    return _compare(read_path(robot), read_ground_truth(robot), is_aligned=not robot.origins)
 
 
 def compute_localization_errors(robot: RobotObservations) -> Optional[PoseErrors]:
@@ -114,26 +113,22 @@ def compute_localization_errors(robot: RobotObservations) -> Optional[PoseErrors
 
     Their frames count as one: the simulator's map is its world.
     """
-    return _compare(read_localized_path(robot), robot.poses, robot.ground_truth, is_aligned=False)
+    return _compare(read_localized_path(robot), read_ground_truth(robot), is_aligned=False)
 
 
-def _compare(path: Path, poses: Series, ground_truth: Series, is_aligned: bool) -> Optional[PoseErrors]:
-    """Return the errors of a path whose stamps are those of poses, after aligning their first ones on request."""
-    if not len(poses) or len(ground_truth) < 2:
+def _compare(path: Path, truth: Path, is_aligned: bool) -> Optional[PoseErrors]:
+    """Return the errors of a path, after aligning its first known pose on request."""
+    if not len(path.times_s) or len(truth.times_s) < 2:
         return None
-    stamp_s = poses.columns()[1]
-    _, true_stamp_s, true_x_m, true_y_m, true_yaw_rad, _, _ = ground_truth.columns()
-    order = np.argsort(true_stamp_s, kind="stable")
-    true_stamp_s = true_stamp_s[order]
-    after = np.clip(np.searchsorted(true_stamp_s, stamp_s), 1, len(true_stamp_s) - 1)
-    apart_s = np.minimum(np.abs(stamp_s - true_stamp_s[after - 1]), np.abs(stamp_s - true_stamp_s[after]))
-    known = apart_s <= SAME_TIME_S
-    if not known.any():
+    truth = Path(*(column[np.argsort(truth.stamps_s, kind="stable")] for column in truth))
+    after = np.clip(np.searchsorted(truth.stamps_s, path.stamps_s), 1, len(truth.stamps_s) - 1)
+    nearest_s = np.minimum(abs(path.stamps_s - truth.stamps_s[after - 1]), abs(path.stamps_s - truth.stamps_s[after]))
+    path = Path(*(column[nearest_s <= SAME_TIME_S] for column in path))
+    if not len(path.times_s):
         return None
-    x_m = np.interp(stamp_s[known], true_stamp_s, true_x_m[order])
-    y_m = np.interp(stamp_s[known], true_stamp_s, true_y_m[order])
-    yaw_rad = np.interp(stamp_s[known], true_stamp_s, np.unwrap(true_yaw_rad[order]))
-    path = Path(*(column[known] for column in path))
+    x_m = np.interp(path.stamps_s, truth.stamps_s, truth.x_m)
+    y_m = np.interp(path.stamps_s, truth.stamps_s, truth.y_m)
+    yaw_rad = np.interp(path.stamps_s, truth.stamps_s, np.unwrap(truth.yaw_rad))
     if is_aligned:
         angle_rad = yaw_rad[0] - path.yaw_rad[0]
         turned = transform_path(path, [Origin(0.0, 0.0, 0.0, angle_rad)])

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Dict, Iterator, List, Sequence, Tuple
 
 from ..optional import import_optional
-from ..topics import Message, RawMessage
+from .topics import Message, RawMessage
 
 
 class Reader:

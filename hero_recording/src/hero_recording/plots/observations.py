@@ -9,24 +9,18 @@ from typing import Any, DefaultDict, Iterable, List, NamedTuple, Optional, Set, 
 
 from hero_node.geometry import pose_of, yaw_of
 
-from .series import Series
-from .tables import STATUS, TABLES, Row, read_rows
-from .topics import (
-    ENCODER,
-    GROUND_TRUTH,
-    ODOMETRY,
-    POSE,
-    POSITION_COMMAND,
+from ..bags.tables import TABLES, Row, read_rows
+from ..bags.topics import (
     STATIC_TRANSFORMS_TOPIC,
     TRANSFORMS_TYPES,
-    VELOCITY_COMMAND,
     Message,
     find_robot_topic,
     is_arena_topic,
     is_fleet_topic,
 )
+from .series import Series
 
-KINDS = (ODOMETRY, GROUND_TRUTH, POSE, ENCODER, VELOCITY_COMMAND, POSITION_COMMAND)
+KINDS = ("odometry", "ground_truth", "pose", "encoder", "velocity_command", "position_command")
 CUBE, CYLINDER = 1, 3
 """Types of visualization_msgs/Marker that walls and round obstacles are drawn with."""
 
@@ -71,16 +65,16 @@ class RobotObservations:
 
     def add(self, kind: str, row: Row) -> None:
         """Store a row of a table."""
-        if kind == STATUS:
-            columns = dict(zip(TABLES[STATUS], row[1:]))
+        if kind == "status":
+            columns = dict(zip(TABLES["status"], row[1:]))
             self.states.append(StateReport(row[0], columns["state"], columns["reconnects"]))
-        elif kind == ENCODER:
+        elif kind == "encoder":
             time_s, _, left_ticks, right_ticks, *_ = row
             self.encoder.add(time_s, left_ticks, right_ticks)
-        elif kind == POSE:
+        elif kind == "pose":
             self.poses.add(*row[:5])
         else:
-            series = {ODOMETRY: self.odometry, GROUND_TRUTH: self.ground_truth}.get(kind, self.commands)
+            series = {"odometry": self.odometry, "ground_truth": self.ground_truth}.get(kind, self.commands)
             series.add(*row)
 
     @property
@@ -132,9 +126,9 @@ class Observations:
             for robot_id, kind, row in read_rows(*message):
                 if self._wants_robot(robot_id):
                     self.robots[robot_id].add(kind, row)
-                    if kind == POSE:
+                    if kind == "pose":
                         self.pose_frame = message.content.header.frame_id.strip("/")
-                    elif kind == GROUND_TRUTH:
+                    elif kind == "ground_truth":
                         self.true_frame = message.content.header.frame_id.strip("/")
 
     def _receive_transforms(self, message: Message) -> None:
