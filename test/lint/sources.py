@@ -5,6 +5,7 @@ and those that must fit a Protocol of theirs; `others` before all others.
 """
 
 import ast
+import gc
 import re
 import subprocess
 import xml.etree.ElementTree as ElementTree
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Dict, List, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
+
+gc.disable()  # it would look through all syntax trees again and again, of which none is garbage
 
 ROS_MODULES = (
     "actionlib angles diagnostic_updater genpy rosbag rosgraph roslaunch roslib rosnode rospy rosservice rostest"

@@ -16,7 +16,8 @@ from hero_node.ros.program import Program
 
 from ..controllers.formation_drive import FormationDrive
 from ..robots.common_frame import CommonFrame
-from ..swarm import REPORT_PERIOD_S, Swarm
+from ..robots.swarm_base import REPORT_PERIOD_S
+from ..swarm import Swarm
 from .robot_choice import ChoiceButtons, RobotChoice
 from .teleop_output import PauseDetector, TeleopOutput
 
