@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, List
 
 if TYPE_CHECKING:  # for editors and mypy
     from hero_node.clock import Clock
+    from hero_node.command_line import run
     from hero_node.errors import HeroError, NodeError, ProgramError
     from hero_node.geometry import Pose, Velocity
     from hero_node.ros.private_parameters import read_parameters
-    from hero_node.ros.program import Program, run
+    from hero_node.ros.program import Program
     from hero_node.ros.script import rate, start_node
 
     from .apps.go_to_goal_server import GoToGoalServer
@@ -95,7 +96,7 @@ _MODULES = {
     "open_swarm": "hero_client.swarm",
     "rate": "hero_node.ros.script",
     "read_parameters": "hero_node.ros.private_parameters",
-    "run": "hero_node.ros.program",
+    "run": "hero_node.command_line",
     "start_node": "hero_node.ros.script",
 }
 

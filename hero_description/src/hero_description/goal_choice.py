@@ -16,8 +16,9 @@ from geometry_msgs.msg import PointStamped, PoseStamped
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from hero_node.command_line import run
 from hero_node.ros.private_parameters import read_parameters
-from hero_node.ros.program import Program, run
+from hero_node.ros.program import Program
 
 from .robots_parameter import given_robots
 from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC

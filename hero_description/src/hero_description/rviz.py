@@ -13,10 +13,11 @@ from typing import Any, Sequence
 
 import rospy
 
+from hero_node.command_line import run
 from hero_node.errors import ProgramError
 from hero_node.parameters import Parameter, choice, flag
 from hero_node.ros.private_parameters import read_parameters
-from hero_node.ros.program import Program, run
+from hero_node.ros.program import Program
 
 from .hero_plus import make_hero_plus
 from .robots_parameter import check_given, given_robots

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Dict, Set
 
 import rospy
 
+from hero_node.command_line import run
 from hero_node.errors import ProgramError
 from hero_node.file_limit import raise_file_limit
-from hero_node.ros.program import Program, run
+from hero_node.ros.program import Program
 
 from .background import Background
 from .control.commander import STOP_PERIOD_S, Commander

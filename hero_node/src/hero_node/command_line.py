@@ -14,6 +14,7 @@ from contextlib import suppress
 from traceback import walk_tb
 from typing import IO, Callable, NoReturn, Optional, Sequence, Type
 
+from .errors import HeroError
 from .texts import make_printable
 
 FAILED = 1
@@ -26,7 +27,10 @@ OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 
 
 def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> NoReturn:
-    """Call main and end the process with its exit status (None: 0); errors are printed as one line."""
+    """Call main and end the process with its exit status (None: 0).
+
+    A HeroError, or one of errors, becomes one line and status 1.
+    """
     sys.exit(call(main, *errors))
 
 
@@ -38,7 +42,7 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
     status = 0
     try:
         status = main() or 0
-    except errors as error:
+    except (HeroError, *errors) as error:
         print_error(str(error) + find_line(error))
         status = FAILED
     except KeyboardInterrupt:

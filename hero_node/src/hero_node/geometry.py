@@ -51,13 +51,7 @@ def invert_pose(pose: Pose) -> Pose:
 
 def find_frame(pose: Pose, seen: Pose) -> Pose:
     """Return where a frame lies in which something at pose is seen at seen."""
-    yaw_rad = pose.yaw_rad - seen.yaw_rad
-    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-    return Pose(
-        pose.x_m - cos * seen.x_m + sin * seen.y_m,
-        pose.y_m - sin * seen.x_m - cos * seen.y_m,
-        wrap_angle(yaw_rad),
-    )
+    return transform_pose(pose, invert_pose(seen))
 
 
 def measure_distance(start: Pose, end: Pose) -> float:

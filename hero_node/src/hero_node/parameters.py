@@ -6,7 +6,7 @@ A wrong value ends the program with one line: the name, the value and what it mu
 import argparse
 import difflib
 import math
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type
 
 from .errors import ProgramError
 from .number_checks import is_number
@@ -33,53 +33,45 @@ class Parameter(NamedTuple):
 
 def number(default: float, low: float, high: float, unit: str = "", text: str = "") -> Parameter:
     """Declare a number in low..high."""
-    return Parameter(
-        default, lambda name, value: check_number(name, value, low, high, unit), text, unit, (low, high)
-    )
+    check = _make_check(lambda value: is_number(value, low, high), float, _describe_limits("a number", low, high, unit))
+    return Parameter(default, check, text, unit, (low, high))
 
 
 def whole_number(default: int, low: int, high: int, unit: str = "", text: str = "") -> Parameter:
     """Declare a whole number in low..high."""
 
-    def check(name: str, value: Any) -> int:
-        if not is_number(value, low, high) or value != int(value):
-            raise make_error(name, value, _describe_limits("a whole number", low, high, unit))
-        return int(value)
+    def is_allowed(value: Any) -> bool:
+        return is_number(value, low, high) and value == int(value)
 
+    check = _make_check(is_allowed, int, _describe_limits("a whole number", low, high, unit))
     return Parameter(default, check, text, unit, (low, high))
 
 
 def flag(default: bool, text: str = "") -> Parameter:
     """Declare true or false."""
-
-    def check(name: str, value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise make_error(name, value, "true or false")
-        return value
-
-    return Parameter(default, check, text)
+    return Parameter(default, _make_check(lambda value: isinstance(value, bool), bool, "true or false"), text)
 
 
 def choice(default: str, choices: Sequence[str], text: str = "") -> Parameter:
     """Declare one of some words."""
-
-    def check(name: str, value: Any) -> str:
-        if value not in choices:
-            raise make_error(name, value, "one of: " + ", ".join(choices))
-        return str(value)
-
+    check = _make_check(lambda value: value in choices, str, "one of: " + ", ".join(choices))
     return Parameter(default, check, text, choices=tuple(choices))
 
 
 def words(default: str, text: str = "") -> Parameter:
     """Declare a text."""
+    return Parameter(default, _make_check(lambda value: isinstance(value, str), str, "a text"), text)
 
-    def check(name: str, value: Any) -> str:
-        if not isinstance(value, str):
-            raise make_error(name, value, "a text")
-        return value
 
-    return Parameter(default, check, text)
+def _make_check(is_allowed: Callable[[Any], bool], kind: Type[Any], allowed: str) -> Callable[[str, Any], Any]:
+    """Return a check that lets values through as this kind; allowed says what they must be."""
+
+    def check(name: str, value: Any) -> Any:
+        if not is_allowed(value):
+            raise make_error(name, value, allowed)
+        return kind(value)
+
+    return check
 
 
 def robot_ids(default: str, text: str = "") -> Parameter:
@@ -109,16 +101,6 @@ def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> D
         else given.get(name, parameter)
         for name, parameter in declared.items()
     }
-
-
-def check_number(name: str, value: Any, low: float, high: float, unit: str = "") -> float:
-    """Return value as a float if it is a number in low..high.
-
-    Raises: ProgramError with the name, the value and the range.
-    """
-    if not is_number(value, low, high):
-        raise make_error(name, value, _describe_limits("a number", low, high, unit))
-    return float(value)
 
 
 def _describe_limits(kind: str, low: float, high: float, unit: str) -> str:

@@ -28,10 +28,6 @@ class TokenBucket:
         """Return how many tokens there are."""
         return min(self._burst, self._tokens + self._per_s * (now_s - self._filled_s))
 
-    def is_full(self, now_s: float) -> bool:
-        """Return whether the bucket is full."""
-        return self.count(now_s) >= self._burst
-
 
 class TokenBuckets:
     """One token bucket for each of many names; those that are full again are forgotten."""
@@ -46,7 +42,7 @@ class TokenBuckets:
         bucket = self._buckets.get(name)
         if bucket is None:
             if len(self._buckets) >= BUCKETS_MAX:
-                self._buckets = {key: kept for key, kept in self._buckets.items() if not kept.is_full(now_s)}
+                self._buckets = {key: kept for key, kept in self._buckets.items() if kept.count(now_s) < self._burst}
             if len(self._buckets) >= BUCKETS_MAX:
                 del self._buckets[next(iter(self._buckets))]  # the oldest
             bucket = self._buckets[name] = TokenBucket(self._burst, self._per_s, now_s)

@@ -1,18 +1,14 @@
 """Other values in the text of a YAML file, whose comments and order stay. Knows no ROS."""
 
-from typing import Any, List, Mapping, NamedTuple
+from typing import Any, List, Mapping, Tuple
 
 import yaml
 
 from .yaml_text import YamlError, parse_yaml
 
 
-class _Edit(NamedTuple):
-    """Replacement of the characters from start to end by text."""
-
-    start: int
-    end: int
-    text: str
+_Edit = Tuple[int, int, str]
+"""First character that is replaced, the first one that is kept again, and the new text."""
 
 
 def dump_yaml(content: Mapping[Any, Any]) -> str:
@@ -66,7 +62,7 @@ def _edit_mapping(text: str, node: yaml.MappingNode, content: Mapping[Any, Any],
     for key_node, value_node in node.value:
         key = loader.construct_object(key_node, deep=True)
         if key not in content:
-            edits.append(_Edit(key_node.start_mark.index - key_node.start_mark.column, _end_line(text, value_node), ""))
+            edits.append((key_node.start_mark.index - key_node.start_mark.column, _end_line(text, value_node), ""))
             continue
         value = added.pop(key)
         if loader.construct_object(value_node, deep=True) == value:
@@ -75,13 +71,13 @@ def _edit_mapping(text: str, node: yaml.MappingNode, content: Mapping[Any, Any],
             _edit_mapping(text, value_node, value, edits)
         else:
             line = yaml.safe_dump(value, default_flow_style=True, width=10**6).split("\n...")[0].strip()
-            edits.append(_Edit(key_node.end_mark.index, _end(value_node), ": " + line))
+            edits.append((key_node.end_mark.index, _end(value_node), ": " + line))
     if added:
         indent = " " * node.start_mark.column
         lines = "".join(indent + line for line in dump_yaml(added).splitlines(keepends=True))
         # At the end of the file, or below the last line of the mapping.
         place = len(text) if not indent else _end_line(text, node)
-        edits.append(_Edit(place, place, lines))
+        edits.append((place, place, lines))
 
 
 def _end(node: yaml.Node) -> int:

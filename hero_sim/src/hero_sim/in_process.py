@@ -35,7 +35,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     parser.add_argument("script", help="a script that uses hero_client")
     parser.add_argument("arguments", nargs=argparse.REMAINDER, help="arguments of the script")
     options = parser.parse_args(argv)
-    return call(lambda: run_script(options), HeroError)
+    return call(lambda: run_script(options))
 
 
 def run_script(options: argparse.Namespace) -> None:
@@ -107,7 +107,7 @@ def replace_ros(swarm: StepSwarm) -> None:
         "Program": SimulatedProgram,
         "open_swarm": open_swarm,
         "read_parameters": read_parameters,
-        "run": lambda main, *errors: command_line.run(main, HeroError, *errors),
+        "run": command_line.run,
     }
     for name, replacement in replacements.items():
         setattr(hero_client, name, replacement)

@@ -22,8 +22,8 @@ from hero_client.ros.drivers import Drivers
 from hero_client.ros.robot_listener import RobotListener, RobotTrack
 from hero_client.ros.stop_status import StopStatus, paint
 from hero_msgs.msg import Robot
+from hero_node import command_line
 from hero_node.ros.program import Program
-from hero_node.ros.program import run as run_program
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
@@ -277,4 +277,4 @@ def show(options: argparse.Namespace) -> int:
 
 def main() -> None:
     """Run the program fleet."""
-    run_program(lambda: show(parse_options(rospy.myargv()[1:])))
+    command_line.run(lambda: show(parse_options(rospy.myargv()[1:])))

@@ -13,13 +13,11 @@ import sys
 import threading
 import time
 from types import FrameType
-from typing import Callable, List, Optional, Sequence, Type
+from typing import List, Optional, Sequence
 
 import rospy
 
-from .. import command_line
 from ..clock import Clock
-from ..errors import HeroError
 from .private_parameters import delete_own_parameters
 from .ros_node import start_ros_node
 
@@ -101,11 +99,3 @@ class Program(Clock):
         self._finished.set()
         delete_own_parameters()
         rospy.signal_shutdown("the program ends")
-
-
-def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> None:
-    """Run main and end the process with its exit status, None: 0.
-
-    A HeroError, or one of errors, becomes one line and status 1.
-    """
-    command_line.run(main, HeroError, *errors)

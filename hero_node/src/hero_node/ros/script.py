@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from types import FrameType
-from typing import Any, Callable, Iterator, NoReturn, Optional, Sequence, Type
+from typing import Any, Callable, NoReturn, Optional, Sequence, Type
 
 import rospkg
 import rospy
@@ -21,18 +21,7 @@ from .ros_node import start_ros_node
 _START = threading.Lock()
 """Threads of a script may open robots at the same time."""
 
-
-def rate(hz: float) -> Iterator[float]:
-    """Repeat the body of a `for` loop hz times per second, until Ctrl-C or the end of the ROS node.
-
-        for time_s in rate(10):
-            robot.drive(0.1, math.sin(time_s))
-
-    Yields the seconds since the start of the loop. A body that takes longer than its period is not made up for.
-
-    Raises: ValueError unless hz is more than 0.
-    """
-    return ROS_CLOCK.rate(hz)
+rate = ROS_CLOCK.rate
 
 
 def start_node(name: str = "hero_program") -> None:
@@ -74,7 +63,7 @@ def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
         except ModuleNotFoundError as error:
             raise ProgramError("%s; script/bootstrap (or rosdep) installs what all programs need" % error) from error
 
-    run(main, HeroError)
+    run(main)
 
 
 def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
