@@ -16,7 +16,7 @@ from .config import DriverConfig
 from .fleet import namespaces
 from .fleet.admission import Admission
 from .fleet.namespaces import Identity
-from .fleet.registry import Decision, FleetRegistry, RobotEvent, RobotRecord, Verdict
+from .fleet.registry import Decision, FleetRegistry, RobotRecord, RobotState, Verdict
 from .peer import Peer
 from .robot_log import RobotLog
 from .robot_status import RobotStatus, describe_robot
@@ -254,7 +254,7 @@ class Gateway(LinkHandler):
         if name is None:
             return
         peer.bridge.declare(topic, name)
-        if peer.record.receive(RobotEvent.DECLARED, now_s):
+        if peer.record.enter(RobotState.READY, now_s):
             self.note_change()
 
     def _stop_late(self, peer: Peer) -> None:

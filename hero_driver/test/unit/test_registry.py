@@ -9,7 +9,6 @@ from hero_driver.fleet.registry import (
     FLAP_S,
     RIVALS_MAX,
     FleetRegistry,
-    RobotEvent,
     RobotState,
     Verdict,
 )
@@ -256,8 +255,8 @@ def test_a_robot_may_take_over_again_when_the_quarrel_is_long_past():
 def test_a_state_is_entered_once():
     fleet = make_fleet()
     record = identify(fleet, 1, T0).record
-    assert record.receive(RobotEvent.DECLARED, T0 + 1.0)
-    assert not record.receive(RobotEvent.DECLARED, T0 + 2.0)
+    assert record.enter(RobotState.READY, T0 + 1.0)
+    assert not record.enter(RobotState.READY, T0 + 2.0)
     assert (record.state, record.since_s) == (RobotState.READY, T0 + 1.0)
 
 

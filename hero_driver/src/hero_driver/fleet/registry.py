@@ -25,33 +25,12 @@ RIVALS_MAX = 16
 
 
 class RobotState(enum.Enum):
-    """As in hero_msgs/Robot."""
+    """As in hero_msgs/Robot. REFUSED is no state of a robot, but what duplicates are shown as."""
 
     JOINING = 0
     READY = 1
     AWAY = 2
     REFUSED = 3
-
-
-class RobotEvent(enum.Enum):
-    """Events of a robot's state."""
-
-    CONNECTED = "a connection said that it is this robot, and was let in"
-    DECLARED = "the robot declared a topic"
-    LOST = "its connection ended"
-
-
-_NEXT_STATES = {
-    (RobotState.JOINING, RobotEvent.CONNECTED): RobotState.JOINING,
-    (RobotState.JOINING, RobotEvent.DECLARED): RobotState.READY,
-    (RobotState.JOINING, RobotEvent.LOST): RobotState.AWAY,
-    (RobotState.READY, RobotEvent.CONNECTED): RobotState.JOINING,
-    (RobotState.READY, RobotEvent.DECLARED): RobotState.READY,
-    (RobotState.READY, RobotEvent.LOST): RobotState.AWAY,
-    (RobotState.AWAY, RobotEvent.CONNECTED): RobotState.JOINING,
-}
-"""A robot begins as JOINING and is forgotten when it was AWAY for the grace period. REFUSED is no state of a robot,
-but what duplicates are shown as."""
 
 
 class Verdict(enum.Enum):
@@ -88,12 +67,11 @@ class RobotRecord:
     refused: Dict[str, str] = field(default_factory=dict)  # address -> reason, of duplicates that are connected
     rivals: Dict[str, float] = field(default_factory=dict)  # host -> when a duplicate from there was first refused
 
-    def receive(self, event: RobotEvent, now_s: float) -> bool:
-        """Enter the next state; return whether it is another one."""
-        last, self.state = self.state, _NEXT_STATES[self.state, event]
-        if self.state is last:
+    def enter(self, state: RobotState, now_s: float) -> bool:
+        """Enter a state; return whether it is another one."""
+        if self.state is state:
             return False
-        self.since_s = now_s
+        self.state, self.since_s = state, now_s
         return True
 
 
@@ -140,7 +118,7 @@ class FleetRegistry:
         record.joined_s = record.last_heard_s = now_s
         record.reconnects += 1
         record.refused.pop(address, None)
-        record.receive(RobotEvent.CONNECTED, now_s)
+        record.enter(RobotState.JOINING, now_s)
         verdict = Verdict.RETURNED if old_link is None else Verdict.TOOK_OVER
         return Decision(verdict, record, old_link)
 
@@ -168,7 +146,7 @@ class FleetRegistry:
             if record.link is link:
                 record.link = None
                 record.last_error = reason
-                record.receive(RobotEvent.LOST, now_s)
+                record.enter(RobotState.AWAY, now_s)
                 return record
         return None
 

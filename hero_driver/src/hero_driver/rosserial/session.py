@@ -126,39 +126,6 @@ Event = Union[
 ]
 
 
-class SessionState(enum.Enum):
-    """State of the handshake."""
-
-    ASKING = "asking"  # the robot has declared nothing yet: ask for its topics again and again
-    DECLARED = "declared"
-    ASKING_AGAIN = "asking again"  # it has declared topics, but seems to have forgotten them: ask once more
-    ENDED = "ended"
-
-
-class _Happening(enum.Enum):
-    REQUESTED = "the session asked for topics"
-    DECLARED = "the robot declared a topic"
-    FORGOTTEN = "the robot shows that it is running without the configuration that it had declared"
-    TIMED_OUT = "the robot was silent for too long"
-
-
-_NEXT_STATES = {
-    (SessionState.ASKING, _Happening.REQUESTED): SessionState.ASKING,
-    (SessionState.ASKING, _Happening.DECLARED): SessionState.DECLARED,
-    (SessionState.ASKING, _Happening.FORGOTTEN): SessionState.ASKING,
-    (SessionState.ASKING, _Happening.TIMED_OUT): SessionState.ENDED,
-    (SessionState.DECLARED, _Happening.DECLARED): SessionState.DECLARED,
-    (SessionState.DECLARED, _Happening.FORGOTTEN): SessionState.ASKING_AGAIN,
-    (SessionState.DECLARED, _Happening.TIMED_OUT): SessionState.ENDED,
-    (SessionState.ASKING_AGAIN, _Happening.REQUESTED): SessionState.DECLARED,
-    (SessionState.ASKING_AGAIN, _Happening.DECLARED): SessionState.DECLARED,
-    (SessionState.ASKING_AGAIN, _Happening.FORGOTTEN): SessionState.ASKING_AGAIN,
-    (SessionState.ASKING_AGAIN, _Happening.TIMED_OUT): SessionState.ENDED,
-    (SessionState.ENDED, _Happening.DECLARED): SessionState.ENDED,
-    (SessionState.ENDED, _Happening.FORGOTTEN): SessionState.ENDED,
-}
-
-
 @dataclass(frozen=True)
 class SessionLimits:
     """Limits of one peer."""
@@ -173,7 +140,6 @@ class Session:
     """The state of one conversation; one per connection, never reused.
 
     Attributes:
-        state: what the session waits for.
         topics: declared topics by id.
         reader: the packet reader, for its counters.
         undeclared_messages: messages on ids that were not declared.
@@ -182,7 +148,6 @@ class Session:
     """
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
-        self.state = SessionState.ASKING
         self.topics: Dict[int, Topic] = {}
         self._messages: Dict[int, Topic] = {}  # those of which messages come
         self._receivers: Dict[int, Topic] = {}  # those that the robot receives
@@ -194,7 +159,8 @@ class Session:
         self._limits = limits
         self.outgoing: List[bytes] = []
         self._last_request_s: Optional[float] = None
-        self._request_due_s = now_s  # where the state is one of asking
+        self._asks_again = False  # it has declared topics, but seems to have forgotten them
+        self._request_due_s = now_s  # while it is asked
         self._undeclared_repeats = 0
         self._changes = 0
         self._requests = 0
@@ -240,16 +206,14 @@ class Session:
     def poll(self, now_s: float) -> List[Event]:
         """Do what is due by now_s; call it at least a few times per second."""
         silent_s = now_s - max(self.last_receive_s, self._listening_s)
-        if silent_s > self._limits.silence_timeout_s and self.state is not SessionState.ENDED:
-            self._enter_next(_Happening.TIMED_OUT)
+        if silent_s > self._limits.silence_timeout_s:
             return [SessionEnded("silent for %.1f s" % silent_s)]
-        is_asking = self.state in (SessionState.ASKING, SessionState.ASKING_AGAIN)
-        if is_asking and now_s >= self._request_due_s:
+        if (self._asks_again or not self.topics) and now_s >= self._request_due_s:
             self.outgoing.append(encode_packet(packets.ID_PUBLISHER, b""))
             self._last_request_s = now_s
             self._requests += 1
             self._request_due_s = now_s + REQUEST_INTERVAL_S
-            self._enter_next(_Happening.REQUESTED)
+            self._asks_again = False
         return []
 
     def forgive_silence(self, now_s: float) -> None:
@@ -288,14 +252,14 @@ class Session:
             self._last_configured_s = now_s
             answer = payloads.encode_time(payloads.split_seconds(time_of_day_s))
             self.outgoing.append(encode_packet(packets.ID_TIME, answer))
-            if self.state is SessionState.ASKING:
+            if not self.topics:
                 due_s = now_s + TIME_WITHOUT_TOPICS_S
                 # Only the first time is it the handshake of a boot; a peer may answer each request like this.
                 self._ask_by(due_s if self._requests < 2 else max(due_s, self._earliest_repeat_s(now_s)))
             return None
         if topic_id == packets.ID_LOG:
             log = payloads.decode_log(payload)
-            if self.state is SessionState.ASKING or now_s - self._last_configured_s > UNCONFIGURED_S:
+            if not self.topics or now_s - self._last_configured_s > UNCONFIGURED_S:
                 self._ask_by(self._earliest_repeat_s(now_s))
             return LogReceived(log)
         if topic_id in _NOT_SERVED:
@@ -304,10 +268,10 @@ class Session:
 
     def _receive_undeclared(self, topic_id: int, now_s: float) -> Optional[Event]:
         self.undeclared_messages += 1
-        if self.state is SessionState.ASKING:
+        if not self.topics:
             self._ask_by(self._earliest_repeat_s(now_s))
             return None
-        if self._undeclared_repeats >= UNDECLARED_REPEATS or self.state is SessionState.ASKING_AGAIN:
+        if self._undeclared_repeats >= UNDECLARED_REPEATS or self._asks_again:
             return None
         self._undeclared_repeats += 1
         self._ask_by(self._earliest_repeat_s(now_s))
@@ -317,13 +281,11 @@ class Session:
         return now_s if self._last_request_s is None else max(now_s, self._last_request_s + REPEAT_INTERVAL_S)
 
     def _ask_by(self, due_s: float) -> None:
-        """Ask for the topics at due_s, or when that was to be done anyway."""
-        if self.state is SessionState.DECLARED or due_s < self._request_due_s:
-            self._request_due_s = due_s
-        self._enter_next(_Happening.FORGOTTEN)
-
-    def _enter_next(self, happening: _Happening) -> None:
-        self.state = _NEXT_STATES[self.state, happening]
+        """Ask for the topics at due_s, or when that was to be done anyway: until there are some, and once more then."""
+        if not self.topics or self._asks_again:
+            due_s = min(due_s, self._request_due_s)
+        self._request_due_s = due_s
+        self._asks_again = bool(self.topics)
 
     def _declare(self, kind: TopicKind, payload: bytes) -> Optional[Event]:
         info = payloads.decode_topic_info(payload)
@@ -331,8 +293,6 @@ class Session:
         if fault is not None:
             return Problem("topic %s refused: %s" % (_shorten(info.name), fault))
         topic = Topic(info, kind)
-        # The robot is answering the last request.
-        self._enter_next(_Happening.DECLARED)
         if self.topics.get(info.topic_id) == topic:
             return None
         if info.topic_id not in self.topics and len(self.topics) >= self._limits.max_topics:
