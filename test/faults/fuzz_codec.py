@@ -30,8 +30,8 @@ class Sink:
     is_wanted = True
 
     def publish(self, payload):
-        """Read the header, where there is one."""
-        message_layouts.read_header(payload)
+        """Read the stamp, where there is one."""
+        message_layouts.read_stamp_ns(payload)
 
 
 def try_bytes(data):

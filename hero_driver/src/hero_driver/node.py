@@ -8,6 +8,7 @@ main() reads the parameters, wires everything and waits.
 
 import errno
 import io
+import logging
 import os
 import queue
 import signal
@@ -31,7 +32,7 @@ from .config import FORMER_STOP, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
 from .kept_stop import KeptStop
 from .reports import FleetStatus, Reporter
-from .ros.log_relay import LogRelay, prepare_logging, tell_of_lost_log_lines
+from .ros.log_relay import LogRelay, tell_of_lost_log_lines
 from .ros.rospy_internals import (
     call_before_shutdown,
     keep_publishers_connected,
@@ -39,7 +40,7 @@ from .ros.rospy_internals import (
 )
 from .ros.worker import Worker
 from .stop_interface import StopInterface
-from .transport import EventLoop, HostNotFoundError, NoAnswerError, TransportSettings
+from .transport import EventLoop, HostNotFoundError, NoAnswerError
 
 NODE_NAME = "hero_driver"
 
@@ -85,8 +86,7 @@ class DriverNode:
                 "error", "a topic or service could not be set up: %s: %s" % (type(error).__name__, error)
             ),
         )
-        settings = TransportSettings(config.host, config.port, config.robots, config.silence_timeout_s)
-        self._loop = EventLoop(settings)
+        self._loop = EventLoop(config.host, config.port, config.robots, config.silence_timeout_s)
         self._gateway = Gateway(
             config, self._loop, log, self._registrar, rospy.get_name(), make_ros_clock(), self._changed.set
         )
@@ -269,7 +269,8 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
             "a driver already runs as %s: end it, or start this one with another name:= and port:= (simulated robots"
             " alone: roslaunch hero_sim hero_sim.launch)" % running
         )
-    prepare_logging()
+    # A log line that cannot be written must not become a dozen lines of traceback.
+    logging.raiseExceptions = False
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     keep_publishers_connected()

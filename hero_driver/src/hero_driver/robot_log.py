@@ -48,8 +48,8 @@ class RobotLog:
                 # Left by an earlier driver or connection: nothing else would end it.
                 self._log.log("warn", "%s tunes itself, without a request from this driver: stopped" % peer.label)
                 self._stop(peer)
-        if line.heartbeat is not None:
-            self._receive_heartbeat(peer, record, line.heartbeat.uptime_s, now_s)
+        if line.uptime_s is not None:
+            self._receive_uptime(peer, record, line.uptime_s, now_s)
         if now_s - peer.log_window_s >= 1.0:
             peer.log_window_s, peer.log_count = now_s, 0
         peer.log_count += 1
@@ -59,7 +59,7 @@ class RobotLog:
         level = "debug" if line.is_routine else LEVELS.get(log.level, "error")
         self._log.log(level, "%s: %s" % (peer.label, line.text))
 
-    def _receive_heartbeat(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
+    def _receive_uptime(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
         booted_s = now_s - uptime_s
         if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
             text = "%s rebooted %.1f s ago" % (peer.label, uptime_s)

@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from hero_driver.transport import EventLoop, LinkHandler, NoAnswerError, TransportSettings, event_loop
+from hero_driver.transport import EventLoop, LinkHandler, NoAnswerError, event_loop
 
 DEADLINE_S = 60.0
 
@@ -56,7 +56,7 @@ def start():
 
     def start_loop(host="127.0.0.1"):
         handler = Handler()
-        handler.loop = EventLoop(TransportSettings(host, 0, (), 1.0))
+        handler.loop = EventLoop(host, 0, (), 1.0)
         handler.loop.open(handler)
         thread = threading.Thread(target=handler.loop.run, daemon=True)
         thread.start()
@@ -125,7 +125,7 @@ def test_a_call_after_the_end_of_the_loop_does_no_harm(start):
 def test_connections_notice_a_peer_that_vanished_and_delay_nothing():
     with socket.socket() as near:
         for timeout_s, idle_s in ((8.0, 4), (1.0, 1)):
-            EventLoop(TransportSettings("", 0, (), timeout_s))._set_options(near)
+            EventLoop("", 0, (), timeout_s)._set_options(near)
             tcp = {
                 socket.TCP_NODELAY: 1,
                 socket.TCP_KEEPIDLE: idle_s,
@@ -163,7 +163,7 @@ class Notes(Handler):
 @pytest.fixture(name="still_loop")
 def make_still_loop():
     """Give a loop that a test turns by hand, and its handler."""
-    loop, handler = EventLoop(TransportSettings("127.0.0.1", 0, (), 1.0)), Notes()
+    loop, handler = EventLoop("127.0.0.1", 0, (), 1.0), Notes()
     loop.open(handler)
     loop._thread_id = threading.get_ident()
     yield loop, handler
@@ -364,7 +364,7 @@ def test_what_woke_the_loop_is_taken_and_wakes_it_once(still_loop):
 
 
 def test_a_loop_that_does_not_run_answers_nobody():
-    loop = EventLoop(TransportSettings("", 0, (), 1.0))
+    loop = EventLoop("", 0, (), 1.0)
     with pytest.raises(NoAnswerError, match="the driver did not answer within 0.0 s"):
         loop.ask(lambda answer: answer("late"), 0.0)
     assert loop._calls.waiting
@@ -386,10 +386,10 @@ def test_the_end_of_a_connection_is_told_once_to_who_dialled_it(still_loop):
 
 
 def test_the_loop_listens_where_it_was_told_to():
-    loop = EventLoop(TransportSettings("127.0.0.2", 0, (), 1.0))
+    loop = EventLoop("127.0.0.2", 0, (), 1.0)
     loop.open(Notes())
     assert loop.listening.host == "127.0.0.2"
-    again = EventLoop(TransportSettings("127.0.0.2", loop.listening.port, (), 1.0))
+    again = EventLoop("127.0.0.2", loop.listening.port, (), 1.0)
     with pytest.raises(OSError, match="in use"):
         again.open(Notes())
     for opened in (loop, again):

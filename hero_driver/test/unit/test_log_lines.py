@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.fleet.log_lines import MAX_TEXT_LENGTH, BootLine, Heartbeat, clean_text, read_log_line
+from hero_driver.fleet.log_lines import MAX_TEXT_LENGTH, BootLine, clean_text, read_log_line
 
 BOOT = "\x1b[94m[/hero_0] Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 127.0.0.1 \x1b[0m"
 
@@ -12,7 +12,7 @@ BOOT = "\x1b[94m[/hero_0] Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 1
 def test_the_boot_line_tells_the_versions():
     line = read_log_line(BOOT)
     assert line.boot == BootLine("v3.8", "v2.5", "v2.3")
-    assert line.heartbeat is None
+    assert line.uptime_s is None
     assert line.text == "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 127.0.0.1"
 
 
@@ -24,12 +24,12 @@ def test_the_boot_line_of_an_older_firmware_has_no_config():
 @pytest.mark.parametrize("name", ["[/hero_0] ", "[hero_12] ", ""])
 def test_the_heartbeat_tells_the_uptime(name):
     line = read_log_line("\x1b[96m%sConected at time 1638\x1b[0m" % name)
-    assert line.heartbeat == Heartbeat(1.638)
+    assert line.uptime_s == 1.638
     assert line.boot is None
 
 
 def test_the_word_spelled_right_is_a_heartbeat_too():
-    assert read_log_line("[/hero_0] Connected at time 4294967295").heartbeat == Heartbeat(4294967.295)
+    assert read_log_line("[/hero_0] Connected at time 4294967295").uptime_s == 4294967.295
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_the_word_spelled_right_is_a_heartbeat_too():
     ],
 )
 def test_what_only_resembles_a_heartbeat_is_none(text):
-    assert read_log_line(text).heartbeat is None
+    assert read_log_line(text).uptime_s is None
 
 
 @pytest.mark.parametrize(

@@ -88,10 +88,10 @@ def test_lines_that_were_dropped_are_counted_once(rosout):
     logger, texts = rosout
     logger.setLevel(logging.INFO)
     relay = LogRelay()
-    relay._worker._calls.refused = 3
+    relay._worker.refused = 3
     for number in range(2):
         relay.log("warn", "line %d" % number)
-    relay._worker._calls.refused = 5
+    relay._worker.refused = 5
     relay.log("warn", "line 2")
     relay.close()
     said = ["line 0 (3 log lines before it were dropped)", "line 1", "line 2 (2 log lines before it were dropped)"]

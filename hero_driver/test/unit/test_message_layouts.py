@@ -65,23 +65,6 @@ def test_a_distance_becomes_a_range_by_rep_117(distance_m, shown_m):
 # Headers.
 
 
-def test_a_header_is_read_with_its_stamp_frame_and_end():
-    header = message_layouts.read_header(build_header(NOW_NS + 5, "hero_0/odom") + b"rest")
-    assert header == (NOW_NS + 5, b"hero_0/odom", 16 + 11)
-
-
-@given(payload=st.binary(max_size=40))
-def test_any_bytes_are_a_header_or_none(payload):
-    header = message_layouts.read_header(payload)
-    assert header is None or (header.end <= len(payload) and payload[16 : header.end] == header.frame_id)
-
-
-def test_a_frame_longer_than_the_message_is_no_header():
-    payload = build_header(NOW_NS, "hero_0/odom")
-    assert message_layouts.read_header(payload[:-1]) is None
-    assert message_layouts.read_header(payload[:12] + b"\xff\xff\xff\xff" + payload[16:]) is None
-
-
 def test_a_new_stamp_changes_sequence_number_and_stamp_and_nothing_else():
     payload = build_encoder(NOW_NS, 1.0, 2.0)
     stamped = message_layouts.restamp(payload, 7, NOW_NS + 3)
@@ -321,6 +304,8 @@ def test_a_scan_that_is_cut_or_too_long_is_refused():
     for length in range(len(payload)):
         assert message_layouts.make_proximity(payload[:length], 0, NOW_NS, 0.2) is None
     assert message_layouts.make_proximity(payload + b"\x00", 0, NOW_NS, 0.2) is None
+    frame_too_long = payload[:12] + b"\xff\xff\xff\xff" + payload[16:]
+    assert message_layouts.make_proximity(frame_too_long, 0, NOW_NS, 0.2) is None
 
 
 def test_numbers_of_messages_begin_anew_after_the_largest():

@@ -16,7 +16,7 @@ from std_msgs.msg import String
 from hero_driver.ros import raw_subscriber, rospy_internals
 from hero_driver.ros.message_types import make_raw_class
 from hero_driver.ros.raw_subscriber import MESSAGE_LENGTH_MAX, MessageStream, RawSubscriber
-from hero_driver.transport import EventLoop, LinkHandler, TransportSettings
+from hero_driver.transport import EventLoop, LinkHandler
 
 DEADLINE_S = 60.0
 RAW_CLASS = make_raw_class(String)
@@ -44,7 +44,7 @@ class Bench:
 
     def __init__(self, monkeypatch):
         self.handler = Handler()
-        self.loop = EventLoop(TransportSettings("", 0, (), 1.0))
+        self.loop = EventLoop("", 0, (), 1.0)
         self.loop.open(self.handler)
         self.loop_thread = threading.Thread(target=self.loop.run, daemon=True)
         self.loop_thread.start()

@@ -104,7 +104,7 @@ def test_a_closed_worker_forgets_what_waits_and_takes_nothing():
     calls = Calls()
     calls.hold()
     calls.submit(1)
-    calls.worker.end()
+    CallQueue.close(calls.worker)
     assert not calls.submit(2, always=True)
     calls.gate.set()
     assert calls.is_ended()
@@ -116,7 +116,7 @@ def test_a_drained_worker_makes_the_calls_that_wait_before_it_ends():
     calls.hold()
     for number in range(5):
         calls.submit(number)
-    calls.worker.end(drain=True)
+    CallQueue.close(calls.worker, drain=True)
     calls.gate.set()
     assert calls.is_ended()
     assert calls.done == list(range(5))
@@ -147,7 +147,7 @@ def test_every_call_of_many_threads_is_made_or_refused():
         thread.start()
     for thread in threads:
         thread.join()
-    calls.worker.end(drain=True)
+    CallQueue.close(calls.worker, drain=True)
     assert calls.is_ended()
     assert len(calls.done) + calls.worker.refused == 1200
 

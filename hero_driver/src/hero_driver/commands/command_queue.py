@@ -7,7 +7,7 @@ Motion waits for older stops of other topics, and for their repeats: each zero T
 
 import collections
 import math
-from typing import Any, ContextManager, Deque, Dict, List, Optional, Tuple
+from typing import Deque, Dict, List, Optional, Tuple
 
 from .velocity_shaper import VelocityShaper
 
@@ -26,18 +26,14 @@ Command = Tuple[str, bytes]
 class CommandQueue:
     """Commands that wait to be sent to one robot."""
 
-    def __init__(self, max_age_s: float, lock: ContextManager[Any]) -> None:
-        """max_age_s: shaped motion commands older than this are dropped.
-
-        lock: held while commands are added or removed: threads of rospy offer while the socket thread takes.
-        """
+    def __init__(self, max_age_s: float) -> None:
+        """max_age_s: shaped motion commands older than this are dropped."""
         self._max_age_s = max_age_s
-        self._shapers: Dict[str, VelocityShaper] = {}  # replaced, never changed: read on all threads
+        self._shapers: Dict[str, VelocityShaper] = {}
         self._offered_s: Dict[str, float] = {}
         self._waits_since_s: Dict[str, float] = {}  # since when a topic's motion waits, newer ones in its place too
         self._resume_s = -math.inf
         self._waiting: Deque[Command] = collections.deque()
-        self._lock = lock
         self._is_idle = True  # after the last take(), and nothing was offered since
         self.dropped = 0
 
@@ -45,10 +41,8 @@ class CommandQueue:
         """Take a checked motion command for the topic called name, which stop_payload stops."""
         shaper = self._shapers.get(name)
         if shaper is None:
-            with self._lock:
-                shaper = self._shapers.get(name) or VelocityShaper(stop_payload)
-                shaper.delay_until(self._resume_s)
-                self._shapers = {**self._shapers, name: shaper}
+            shaper = self._shapers[name] = VelocityShaper(stop_payload)
+            shaper.delay_until(self._resume_s)
         if not shaper.has_motion:
             self._waits_since_s[name] = now_s
         self._offered_s[name] = now_s
@@ -57,11 +51,10 @@ class CommandQueue:
 
     def offer(self, name: str, payload: bytes) -> None:
         """Take anything else."""
-        with self._lock:
-            if len(self._waiting) >= QUEUE_LENGTH:
-                self._waiting.popleft()
-                self.dropped += 1
-            self._waiting.append((name, payload))
+        if len(self._waiting) >= QUEUE_LENGTH:
+            self._waiting.popleft()
+            self.dropped += 1
+        self._waiting.append((name, payload))
         self._is_idle = False
 
     def discard_motion(self, resume_s: float) -> None:
@@ -73,17 +66,11 @@ class CommandQueue:
 
     def clear(self) -> None:
         """Drop all commands: the connection is closed."""
-        with self._lock:
-            self.dropped += len(self._waiting)
-            self._waiting.clear()
-            self._shapers = {}
+        self.dropped += len(self._waiting)
+        self._waiting.clear()
+        self._shapers.clear()
         self._offered_s.clear()
         self._resume_s = -math.inf
-
-    @property
-    def is_idle(self) -> bool:
-        """Whether nothing waits."""
-        return not self._waiting and all(shaper.is_idle for shaper in self._shapers.values())
 
     def take(
         self, in_flight_length: int, motion_acknowledged: bool, stops_only: bool, now_s: float
@@ -104,11 +91,9 @@ class CommandQueue:
                 if payload is not None:
                     commands.append((name, payload))
                 is_idle = is_idle and shaper.is_idle
-        if self._waiting:
-            with self._lock:
-                while self._waiting and in_flight_length < IN_FLIGHT_MAX:
-                    in_flight_length += len(self._waiting[0][1])
-                    commands.append(self._waiting.popleft())
+        while self._waiting and in_flight_length < IN_FLIGHT_MAX:
+            in_flight_length += len(self._waiting[0][1])
+            commands.append(self._waiting.popleft())
         self._is_idle = is_idle and not self._waiting
         return commands
 

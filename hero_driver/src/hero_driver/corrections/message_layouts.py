@@ -51,25 +51,6 @@ ENCODER_TAIL_LENGTH = 11 * 8
 CLAMP_TOLERANCE_M = 1e-4
 
 
-class Header(NamedTuple):
-    """The part of std_msgs/Header that matters here."""
-
-    stamp_ns: int
-    frame_id: bytes
-    end: int  # offset of the first byte behind the header
-
-
-def read_header(payload: bytes) -> Optional[Header]:
-    """Return the header at the start of payload, or None if payload is too short for it."""
-    if len(payload) < _HEADER.size:
-        return None
-    _, secs, nsecs, length = _HEADER.unpack_from(payload)
-    end = _HEADER.size + length
-    if end > len(payload):
-        return None
-    return Header(secs * NS_PER_S + nsecs, payload[_HEADER.size : end], end)
-
-
 def read_stamp_ns(payload: bytes) -> Optional[int]:
     """Return the stamp of a payload that begins with a header, or None if it is too short for one."""
     if len(payload) < _HEADER.size:
@@ -251,10 +232,10 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     sends it for a sensor without calibration, and for nothing else.
     None if payload is not a stock laser message.
     """
-    header = read_header(payload)
-    if header is None or len(payload) - header.end != _STOCK_SCAN_TAIL.size:
+    end = len(payload) - _STOCK_SCAN_TAIL.size  # of the header
+    if end < _HEADER.size or _HEADER.size + _HEADER.unpack_from(payload)[3] != end:
         return None
-    fields = _STOCK_SCAN_TAIL.unpack_from(payload, header.end)
+    fields = _STOCK_SCAN_TAIL.unpack_from(payload, end)
     if fields[7] != STOCK_BEAMS or fields[24] != STOCK_BEAMS:
         return None
     range_min_m, range_max_m = BODY_RADIUS_M + MIN_RIM_RANGE_M, BODY_RADIUS_M + MAX_RIM_RANGE_M
@@ -279,7 +260,7 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
         PROXIMITY_BEAMS,
         *fields[25:41:2],
     )
-    return restamp(payload[: header.end], seq, stamp_ns) + tail
+    return restamp(payload[:end], seq, stamp_ns) + tail
 
 
 _DISTANCE = struct.Struct("<f")

@@ -32,18 +32,12 @@ class BootLine(NamedTuple):
     config: str
 
 
-class Heartbeat(NamedTuple):
-    """Status that a robot logs once a second."""
-
-    uptime_s: float
-
-
 class LogLine(NamedTuple):
     """One log line, read."""
 
     text: str  # without name, colors and control characters, of bounded length
     boot: Optional[BootLine]
-    heartbeat: Optional[Heartbeat]
+    uptime_s: Optional[float]  # in the status that a robot logs once a second
     tunes: Optional[bool]  # True: a controller tunes itself; False: it has ended that; None: nothing of that
     is_routine: bool  # said so often, and so independently of what happens, that it is no news
 
@@ -57,7 +51,7 @@ def clean_text(text: str) -> str:
 def read_log_line(text: str) -> LogLine:
     """Return what a log text of a robot says."""
     body = _NAME.sub("", clean_text(text))
-    boot = heartbeat = None
+    boot = uptime_s = None
     match = _BOOT.search(body)
     if match is not None:
         boot = BootLine(
@@ -66,7 +60,7 @@ def read_log_line(text: str) -> LogLine:
     else:
         match = _HEARTBEAT.match(body)
         if match is not None:
-            heartbeat = Heartbeat(int(match["millis"]) / 1000.0)
+            uptime_s = int(match["millis"]) / 1000.0
     tunes: Optional[bool] = None
     if _TUNES.match(body) is not None:
         tunes = True
@@ -74,4 +68,4 @@ def read_log_line(text: str) -> LogLine:
         tunes = False
     if body.startswith(_NO_IMU):
         body = "no IMU hat, so nothing on imu"
-    return LogLine(body, boot, heartbeat, tunes, heartbeat is not None or body == _PID_RESET)
+    return LogLine(body, boot, uptime_s, tunes, uptime_s is not None or body == _PID_RESET)

@@ -9,8 +9,7 @@ import sys
 import time
 from typing import Dict, List, Tuple
 
-import rospy
-
+from hero_node.command_line import print_error
 from hero_node.token_bucket import TokenBuckets
 
 from .rospy_internals import ROSOUT_LOGGER, list_log_handlers
@@ -28,11 +27,11 @@ HOST_LINES_MAX = 300
 robots that join at once are a hundred lines."""
 
 _LEVELS = {
-    "debug": (logging.DEBUG, rospy.logdebug),
-    "info": (logging.INFO, rospy.loginfo),
-    "warn": (logging.WARNING, rospy.logwarn),
-    "error": (logging.ERROR, rospy.logerr),
-    "fatal": (logging.CRITICAL, rospy.logfatal),
+    "debug": logging.DEBUG,
+    "info": logging.INFO,
+    "warn": logging.WARNING,
+    "error": logging.ERROR,
+    "fatal": logging.CRITICAL,
 }
 
 
@@ -40,7 +39,7 @@ class LogRelay:
     """The log for every other thread of the driver."""
 
     def __init__(self) -> None:
-        self._worker = Worker("log relay", QUEUE_LENGTH, _report_to_terminal)
+        self._worker = Worker("log relay", QUEUE_LENGTH, _report_lost_line)
         self._last: Dict[str, Tuple[float, int]] = {}
         self._robots = TokenBuckets(ROBOT_LINES_MAX, ROBOT_LINES_MAX / THROTTLE_S)
         self._hosts = TokenBuckets(HOST_LINES_MAX, HOST_LINES_MAX / THROTTLE_S)
@@ -50,13 +49,13 @@ class LogRelay:
     def log(self, level: str, text: str) -> None:
         """Log one line at level debug, info, warn, error or fatal."""
         # Robots send a routine line per second each; to hand one over costs more than a burst of their data.
-        number, write = _LEVELS[level]
+        number = _LEVELS[level]
         if not self._logger.isEnabledFor(number):
             return
         dropped = self._worker.refused
         if dropped != self._reported_drops:
             text = "%s (%d log lines before it were dropped)" % (text, dropped - self._reported_drops)
-        if self._worker.submit(lambda: write("%s", text)):
+        if self._worker.submit(lambda: self._logger.log(number, "%s", text)):
             self._reported_drops = dropped
 
     def log_throttled(self, level: str, key: str, text: str, robot: str = "", host: str = "") -> None:
@@ -85,11 +84,6 @@ class LogRelay:
         self._worker.close(drain=True)
 
 
-def prepare_logging() -> None:
-    """Before rospy logs anything: let no line that cannot be written become a dozen lines of traceback."""
-    logging.raiseExceptions = False
-
-
 def tell_of_lost_log_lines() -> None:
     """After rospy has set its logging up: say once, on stderr, what keeps lines out of the log file."""
     told: List[BaseException] = []
@@ -98,23 +92,14 @@ def tell_of_lost_log_lines() -> None:
         error = sys.exc_info()[1]
         if error is not None and not told:
             told.append(error)
-            _write_to_terminal(
-                "hero_driver: the log file cannot be written (%s): lines are lost until it can; make space below"
-                " ROS_LOG_DIR or ~/.ros/log\n" % error
+            print_error(
+                "the log file cannot be written (%s): lines are lost until it can; make space below ROS_LOG_DIR or"
+                " ~/.ros/log" % error
             )
 
     for handler in list_log_handlers():
         handler.handleError = tell  # type: ignore[method-assign]
 
 
-def _write_to_terminal(text: str) -> None:
-    try:
-        sys.stderr.write(text)
-    except OSError:
-        # The terminal, or the disk that it goes to, cannot be written: there is nowhere to log to.
-        return
-
-
-def _report_to_terminal(error: BaseException) -> None:
-    """Tell of a log line that could not be logged, where logging cannot."""
-    sys.stderr.write("hero_driver: a log line was lost: %s: %s\n" % (type(error).__name__, error))
+def _report_lost_line(error: BaseException) -> None:
+    print_error("a log line was lost: %s: %s" % (type(error).__name__, error))

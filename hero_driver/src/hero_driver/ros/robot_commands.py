@@ -8,7 +8,6 @@ Thread of the sockets.
 
 import functools
 import math
-import threading
 import time
 from typing import Callable, Dict, Optional, Protocol
 
@@ -64,7 +63,7 @@ class RobotCommands:
         self, namespace: str, owner: CommandOwner, loop: EventLoop, log: LogRelay, settings: CommandSettings
     ) -> None:
         """Take the commands for the robot in namespace."""
-        self.queue = CommandQueue(settings.command_max_age_s, threading.Lock())
+        self.queue = CommandQueue(settings.command_max_age_s)
         self.refused = 0
         self.light = NO_LIGHT
         self.was_told_to_tune = False

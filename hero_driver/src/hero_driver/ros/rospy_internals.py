@@ -9,7 +9,8 @@ import socket
 import threading
 import time
 import traceback
-from typing import Any, Callable, FrozenSet, List, NamedTuple, Optional, Sequence, Tuple
+from types import SimpleNamespace
+from typing import Any, Callable, FrozenSet, List, Optional, Tuple
 
 import rosgraph
 import rospy
@@ -57,13 +58,8 @@ def keep_publishers_connected() -> None:
     tcpros_pubsub.robust_connect_subscriber = connect_and_look_again
 
 
-class NoConnections(NamedTuple):
-    """Stands for the connections of a topic that is not registered."""
-
-    connections: Sequence[Any] = ()
-
-
-NO_CONNECTIONS = NoConnections()
+NO_CONNECTIONS = SimpleNamespace(connections=())
+"""Stands for what open_publisher() returns, where a topic is not registered."""
 
 
 def open_publisher(name: str, raw_class: Any) -> Tuple[Any, Any]:

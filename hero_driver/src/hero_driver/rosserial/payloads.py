@@ -64,21 +64,13 @@ class _Cursor:
         self._position = end
         return self._data[start:end]
 
-    def read_uint16(self, field: str) -> int:
-        value: int = _UINT16.unpack(self.read_bytes(2, field))[0]
-        return value
-
-    def read_uint32(self, field: str) -> int:
-        value: int = _UINT32.unpack(self.read_bytes(4, field))[0]
-        return value
-
-    def read_int32(self, field: str) -> int:
-        value: int = _INT32.unpack(self.read_bytes(4, field))[0]
+    def read_number(self, layout: struct.Struct, field: str) -> int:
+        value: int = layout.unpack(self.read_bytes(layout.size, field))[0]
         return value
 
     def read_text(self, field: str) -> str:
         # Peers are not trusted to send UTF-8: what cannot be read stays visible as an escape.
-        return self.read_bytes(self.read_uint32(field), field).decode("utf-8", "backslashreplace")
+        return self.read_bytes(self.read_number(_UINT32, field), field).decode("utf-8", "backslashreplace")
 
     def finish(self) -> None:
         left = len(self._data) - self._position
@@ -111,11 +103,11 @@ def decode_topic_info(payload: Bytes) -> TopicInfo:
     """
     cursor = _Cursor(payload, "TopicInfo")
     info = TopicInfo(
-        cursor.read_uint16("topic_id"),
+        cursor.read_number(_UINT16, "topic_id"),
         cursor.read_text("topic_name"),
         cursor.read_text("message_type"),
         cursor.read_text("md5sum"),
-        cursor.read_int32("buffer_size"),
+        cursor.read_number(_INT32, "buffer_size"),
     )
     cursor.finish()
     return info

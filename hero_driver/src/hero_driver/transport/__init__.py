@@ -5,7 +5,7 @@ is written with one send. Other threads hand over work with EventLoop.call_soon(
 """
 
 from .call_queue import Call, CallQueue
-from .event_loop import THE_DRIVER_ENDS, CallLater, EventLoop, NoAnswerError, Reader, TransportSettings
+from .event_loop import THE_DRIVER_ENDS, CallLater, EventLoop, NoAnswerError, Reader
 from .link import Address, HostNotFoundError, Link, LinkHandler
 
 __all__ = [
@@ -20,5 +20,4 @@ __all__ = [
     "LinkHandler",
     "NoAnswerError",
     "Reader",
-    "TransportSettings",
 ]

@@ -12,7 +12,7 @@ import select
 import socket
 import threading
 import time
-from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple, TypeVar
+from typing import Callable, Dict, List, Optional, Sequence, Set, Tuple, TypeVar
 
 from hero_node.file_limit import raise_file_limit
 
@@ -57,16 +57,6 @@ class NoAnswerError(Exception):
     """The loop did not answer in time: it hangs or has ended."""
 
 
-class TransportSettings(NamedTuple):
-    """Addresses, and limits of connections."""
-
-    host: str  # empty: do not listen
-    port: int  # 0: any free one
-    dial: Tuple[Address, ...]
-    user_timeout_s: float
-    """After this time without acknowledgement the kernel gives a connection up (TCP_USER_TIMEOUT)."""
-
-
 class Reader:
     """Another socket that the loop reads besides the robots' connections."""
 
@@ -89,8 +79,14 @@ class Reader:
 class EventLoop(LinkOwner):
     """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
 
-    def __init__(self, settings: TransportSettings) -> None:
-        self._settings = settings
+    def __init__(self, host: str, port: int, dial: Sequence[Address], user_timeout_s: float) -> None:
+        """Listen on host (empty: do not) and port (0: any free one), and connect to the addresses of dial.
+
+        user_timeout_s: without acknowledgement the kernel gives a connection up after this time (TCP_USER_TIMEOUT).
+        """
+        self._host, self._port = host, port
+        self._dial = dial
+        self._user_timeout_ms = int(user_timeout_s * 1000)
         self._handler = LinkHandler()
         # selectors does the same, but what it adds in Python is a twentieth of all that the driver does.
         self._epoll = select.epoll()
@@ -119,12 +115,12 @@ class EventLoop(LinkOwner):
         Raises: OSError if the address cannot be bound.
         """
         self._handler = handler
-        if self._settings.host:
-            self._listener = _listen(self._settings.host, self._settings.port)
+        if self._host:
+            self._listener = _listen(self._host, self._port)
             self.listening = Address(*self._listener.getsockname()[:2])
             self._listen_on(self._listener)
         self._register(self._wake_receiver.fileno(), READ, self._take_wake)
-        for address in self._settings.dial:
+        for address in self._dial:
             start_dialer(address, self._hand_over, self._warn_network, self._ended)
         self.call_later(POLL_INTERVAL_S, self._poll)
 
@@ -260,11 +256,10 @@ class EventLoop(LinkOwner):
         # may wait for an acknowledgement.
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-        user_timeout_ms = int(self._settings.user_timeout_s * 1000)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, max(1, user_timeout_ms // 2000))
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, max(1, self._user_timeout_ms // 2000))
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 1)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3)
-        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, user_timeout_ms)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, self._user_timeout_ms)
 
     def _register(self, descriptor: int, mask: int, serve: Callable[[int], None]) -> None:
         """Call serve(what descriptor is ready for, neither READ nor WRITE where it broke) when mask says so."""
