@@ -7,9 +7,8 @@ import timeit
 import emulated_swarm
 from measuring import measure_machine_us, print_machine
 
-from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
-from hero_driver.corrections.robot_models import STOCK
-from hero_driver.corrections.tick_odometry import WheelGeometry
+from hero_driver.corrections.correction_settings import CorrectionSettings
+from hero_driver.corrections.robot_corrections import RobotCorrections
 from hero_driver.ros.message_types import apply_aliases
 from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, TopicDeclared
@@ -42,7 +41,6 @@ def main():
     burst_packets = packets.PacketReader().receive_bytes(bursts[0])
     session = Session(SessionLimits(), 0.0)
     declared = session.receive_bytes(emulated_swarm.declare(0), 0.0, 0.0)
-    settings = CorrectionSettings("ticks", {STOCK: WheelGeometry()}, (0.0,) * 6, (0.0,) * 6, "robot", 0.05, 5.0)
 
     def write():
         for _ in bursts:
@@ -63,7 +61,7 @@ def main():
 
     def correct():
         sink = NoSink()
-        corrections = RobotCorrections("/hero_0", settings, sink.publish)
+        corrections = RobotCorrections("/hero_0", CorrectionSettings(), sink.publish)
         for event in declared:
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info

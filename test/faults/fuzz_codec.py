@@ -9,18 +9,14 @@ import atheris
 
 with atheris.instrument_imports():
     from hero_driver.corrections import message_layouts
-    from hero_driver.corrections.robot_corrections import CorrectionSettings, RobotCorrections
-    from hero_driver.corrections.robot_models import STOCK
-    from hero_driver.corrections.tick_odometry import WheelGeometry
+    from hero_driver.corrections.correction_settings import CorrectionSettings
+    from hero_driver.corrections.robot_corrections import RobotCorrections
     from hero_driver.fleet import log_lines
     from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
     from hero_driver.rosserial.session import LogReceived, MessagesReceived, Session, SessionLimits
 
 MAX_TOPICS = 64
 ARRIVAL_NS = 1795240942 * 10**9
-SETTINGS = CorrectionSettings(
-    "ticks", {STOCK: WheelGeometry()}, (1e-4,) * 6, (1e-4,) * 6, "robot", 0.05, 5.0
-)
 TYPES = {"hero_common/Encoder": "hero_msgs/Encoder", "tf/tfMessage": "tf2_msgs/TFMessage"}
 
 
@@ -38,7 +34,7 @@ def try_bytes(data):
     """Let one robot send data, cut as its first byte says, and correct the messages in it."""
     session = Session(SessionLimits(max_topics=MAX_TOPICS), 0.0)
     sink = Sink()
-    corrections = RobotCorrections("/hero_0", SETTINGS, sink.publish)
+    corrections = RobotCorrections("/hero_0", CorrectionSettings(), sink.publish)
     step = 1 + (data[0] if data else 0)
     for index, start in enumerate(range(1, len(data), step)):
         for event in session.receive_bytes(data[start : start + step], 0.01 * index, 1795240942.0):

@@ -67,13 +67,13 @@ class Gateway(LinkHandler):
         self._clock_ns = clock_ns
         self._on_change = on_change
         self._node = node
-        self._admission = Admission(config.admission_limits)
+        self._admission = Admission(config)
         self._sender = CommandSender(loop.call_later, self)
         self._stops = StopDelivery(loop.call_later, self)
         self._robot_log = RobotLog(log, self._stops.begin)
         self._transforms = TransformPublisher(config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
-            self, loop, log, self._transforms, registrar, config.correction_settings, config.command_settings
+            self, loop, log, self._transforms, registrar, config, config, 2 * config.max_topics
         )
         self.peers: Dict[Link, Peer] = {}
         self.fleet = FleetRegistry(config.grace_s)
@@ -96,7 +96,7 @@ class Gateway(LinkHandler):
             self.refused_connections += 1
             return refusal
         now_s = time.monotonic()
-        session = Session(self._config.session_limits, now_s)
+        session = Session(self._config, now_s)
         peer = Peer(link, session, self._admission.limit_rate(now_s))
         self.peers[link] = peer
         self.poll_link(link, now_s)

@@ -12,10 +12,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest import mock
 
-from corrected_robot import make_settings
 
 from hero_driver import command_sender, stop_delivery
 from hero_driver.commands.command_settings import CommandSettings
+from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.fleet.namespaces import identify
 from hero_driver.transport.event_loop import POLL_INTERVAL_S
@@ -102,8 +102,9 @@ class CommandedRobot:
             log=SimpleNamespace(log_throttled=lambda level, key, text: self.lines.append(text)),
             transforms=SimpleNamespace(add=None),
             registrar=SimpleNamespace(submit=lambda job, **_: True),  # nothing is registered with a master
-            corrections=make_settings(),
-            commands=CommandSettings(False, True, 0.25, 0.5, 5.0, command_max_age_s=10.0, max_names=100),
+            corrections=CorrectionSettings(),
+            commands=CommandSettings(allow_self_tuning=True, command_max_age_s=10.0),
+            max_names=100,
         )
         self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), context)
         self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)

@@ -1,10 +1,9 @@
-"""One robot whose messages go through a RobotCorrections, for the tests of correction_settings."""
+"""One robot whose messages go through a RobotCorrections, for the tests of corrections."""
 
 from robot_messages import build_burst, read_odometry, read_transform
 
-from hero_driver.corrections.robot_corrections import TRANSFORMS, CorrectionSettings, RobotCorrections
-from hero_driver.corrections.robot_models import HERO_PLUS, PLUS_WHEELS, STOCK
-from hero_driver.corrections.tick_odometry import WheelGeometry
+from hero_driver.corrections.correction_settings import CorrectionSettings
+from hero_driver.corrections.robot_corrections import TRANSFORMS, RobotCorrections
 from hero_driver.corrections.wheel_motion import WheelMotion
 
 TYPES = {
@@ -14,20 +13,6 @@ TYPES = {
     "/hero_0/imu": "sensor_msgs/Imu",
     "/tf": "tf2_msgs/TFMessage",
 }
-
-
-def make_settings(**changes):
-    """Return the driver's default settings with changes."""
-    values = {
-        "odometry": "ticks",
-        "geometries": {STOCK: WheelGeometry(), HERO_PLUS: PLUS_WHEELS},
-        "pose_covariance": (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
-        "twist_covariance": (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2),
-        "stamps": "robot",
-        "max_future_s": 0.05,
-        "max_age_s": 5.0,
-    }
-    return CorrectionSettings(**{**values, **changes})
 
 
 class ListSink:
@@ -49,7 +34,7 @@ class ListSink:
 
 def make_corrections(namespace, outputs, **settings):
     """Return corrections whose transforms come to the list outputs, as (name, payload)."""
-    return RobotCorrections(namespace, make_settings(**settings), ListSink(TRANSFORMS, outputs).publish)
+    return RobotCorrections(namespace, CorrectionSettings(**settings), ListSink(TRANSFORMS, outputs).publish)
 
 
 def make_handler(corrections, name, message_type, outputs, is_wanted=lambda name: True):

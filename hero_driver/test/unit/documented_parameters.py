@@ -12,19 +12,6 @@ from hero_driver.config import PARAMETERS
 from hero_node.parameter_list import make_list, write_default
 
 
-def make_yaml():
-    """Return the text of config/hero_driver.yaml."""
-    lines = [
-        "# All parameters of the driver with their defaults.",
-        "",
-    ]
-    for name, parameter in PARAMETERS.items():
-        unit = " (%s)" % parameter.unit if parameter.unit else ""
-        lines += textwrap.wrap(parameter.text + unit, 100, initial_indent="# ", subsequent_indent="# ")
-        lines.append("%s: %s" % (name, write_default(parameter)))
-    return "\n".join(lines) + "\n"
-
-
 GROUPS = {
     "Connections": ("host", "port", "robots", "allow"),
     "Limits": ("max_*",),
@@ -47,21 +34,40 @@ Floats in YAML need a point: `1.0e-4`, not `1e-4`. To change them, edit a copy o
 """
 
 
+def list_groups():
+    """Return titles, and the names of the parameters below each."""
+    # Exact names before patterns: max_age_s belongs to the stamps, not to the limits.
+    exact = {name for patterns in GROUPS.values() for name in patterns}
+    left = list(PARAMETERS)
+    for title, patterns in GROUPS.items():
+        own = []
+        for pattern in patterns:
+            own += [name for name in left if name == pattern or (name not in exact and fnmatch.fnmatch(name, pattern))]
+            left = [name for name in left if name not in own]
+        if own:
+            yield title, own
+
+
+def make_yaml():
+    """Return the text of config/hero_driver.yaml."""
+    lines = [
+        "# All parameters of the driver with their defaults.",
+        "",
+    ]
+    for name in (name for _, names in list_groups() for name in names):
+        parameter = PARAMETERS[name]
+        unit = " (%s)" % parameter.unit if parameter.unit else ""
+        lines += textwrap.wrap(parameter.text + unit, 100, initial_indent="# ", subsequent_indent="# ")
+        lines.append("%s: %s" % (name, write_default(parameter)))
+    return "\n".join(lines) + "\n"
+
+
 def make_page():
     """Return the text of docs/driver_parameters.md."""
     items = dict(zip(PARAMETERS, make_list(PARAMETERS)))
     lines = [PAGE_HEAD]
-    # Exact names before patterns: max_age_s belongs to the stamps, not to the limits.
-    for title, patterns in GROUPS.items():
-        exact = {name for others in GROUPS.values() for name in others}
-        chosen = [
-            name
-            for name in items
-            if name in patterns
-            or (name not in exact and any(fnmatch.fnmatch(name, pattern) for pattern in patterns))
-        ]
-        if chosen:
-            lines += ["## " + title, "", *(items.pop(name) for name in chosen), ""]
+    for title, names in list_groups():
+        lines += ["## " + title, "", *(items[name] for name in names), ""]
     return "\n".join(lines[:-1]) + "\n"
 
 

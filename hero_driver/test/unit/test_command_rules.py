@@ -34,7 +34,7 @@ class Bench:
         monkeypatch.setattr(robot_commands, "RawSubscriber", self.make_subscriber)
         monkeypatch.setattr(robot_commands, "read_caller", lambda sender: sender or "")
         self.owner = SimpleNamespace(stopped=False, stop_robot=self.stop, send_commands=self.sent.append)
-        given = CommandSettings(True, False, 0.25, 0.5, 5.0, command_max_age_s=10.0, max_names=100)._replace(**settings)
+        given = CommandSettings(**{"clamp": True, "command_max_age_s": 10.0, **settings})
         loop = SimpleNamespace(call_later=lambda delay_s, call: self.later.append((self.now_s + delay_s, call)))
         log = SimpleNamespace(log_throttled=lambda level, key, text: self.lines.append(text))
         self.commands = RobotCommands("/hero_1", self.owner, loop, log, given)

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.config import PARAMETERS, DriverConfig, read_config
+from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.transport import Address
 from hero_node.errors import ProgramError
 
@@ -63,16 +64,13 @@ def test_values_come_where_they_belong():
     )
     assert (config.host, config.port, config.clamp, config.odometry) == ("10.42.0.1", 0, True, "robot")
     assert type(config.silence_timeout_s) is float
-    assert config.session_limits.max_topics == 10
-    assert config.session_limits.silence_timeout_s == 8.0
-    assert config.session_limits.max_payload_length == 4096
-    assert config.wheel_geometry.wheel_separation_m == 0.0635
-    assert config.wheel_geometry.wheel_diameter_m == 0.0492
-    assert config.wheel_geometry.ticks_per_turn == 288.0
+    assert config.max_topics == 10
+    assert config.silence_timeout_s == 8.0
+    assert config.max_payload_length == 4096
+    assert config.find_geometry("/hero_0", "hero") == WheelGeometry(0.0492, 0.0635, 288.0)
     networks = (ipaddress.ip_network("10.42.0.0/24"), ipaddress.ip_network("fe80::/10"))
-    limits = config.admission_limits
-    assert (limits.allow, limits.max_connections, limits.max_unidentified) == (networks, 400, 7)
-    assert limits.max_connections_per_address == 400
+    assert (config.allow, config.max_connections, config.max_unidentified) == (networks, 400, 7)
+    assert config.max_connections_per_address == 400
 
 
 # Unknown names.
@@ -213,16 +211,16 @@ def test_any_value_is_taken_or_refused_in_one_line(name, value):
 def test_wheels_of_calibrated_robots_are_read_from_their_files(tmp_path):
     (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nwheels_m: [0.049, 0.0495, 0.0641]\n")
     (tmp_path / "hero_4.yaml").write_text("robot: hero_4\nmotor_centers_us: [1500, 1510]\n")
-    settings = read_config({"calibration_folder": str(tmp_path)}).correction_settings
+    settings = read_config({"calibration_folder": str(tmp_path)})
     assert list(settings.own_wheels) == ["hero_3"]
     wheels = settings.find_geometry("hero_3", "hero")
     assert wheels.wheel_diameter_m == pytest.approx(0.04925) and wheels.wheel_separation_m == 0.0641
     assert wheels.diameter_ratio == pytest.approx(0.0495 / 0.049) and wheels.ticks_per_turn == 288.0
     (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nwheels_m: [0.01, 0.01, 1.0]\nticks_per_turn: 1\n")
-    wheels = read_config({"calibration_folder": str(tmp_path)}).correction_settings.find_geometry("hero_3", "hero")
+    wheels = read_config({"calibration_folder": str(tmp_path)}).find_geometry("hero_3", "hero")
     assert (wheels.wheel_diameter_m, wheels.wheel_separation_m, wheels.ticks_per_turn) == (0.01, 1.0, 1.0)
     (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nmodel: hero_plus\nwheels_m: [0.05, 0.05, 0.0641]\n")
-    wheels = read_config({"calibration_folder": str(tmp_path)}).correction_settings
+    wheels = read_config({"calibration_folder": str(tmp_path)})
     assert wheels.own_wheels["hero_3"].model == "hero_plus"
 
 
@@ -230,8 +228,8 @@ def test_hero_plus_has_its_own_wheels_and_keeps_its_ticks_when_calibrated(tmp_pa
     (tmp_path / "hero_7.yaml").write_text("robot: hero_7\nwheels_m: [0.0501, 0.0499, 0.0652]\n")
     (tmp_path / "hero_8.yaml").write_text("robot: hero_8\nwheels_m: [0.05, 0.05, 0.065]\nticks_per_turn: 100\n")
     given = {"calibration_folder": str(tmp_path), "hero_plus": "4 7-8", "ticks_per_turn": 300.0}
-    settings = read_config(given).correction_settings
-    assert settings.given_plus == {"hero_4", "hero_7", "hero_8"}
+    settings = read_config(given)
+    assert settings.hero_plus == ("hero_4", "hero_7", "hero_8")
     assert settings.find_geometry("hero_4", "hero_plus").ticks_per_turn == 96.0
     assert settings.find_geometry("hero_5", "hero").ticks_per_turn == 300.0
     assert settings.find_geometry("hero_7", "hero_plus").wheel_separation_m == 0.0652

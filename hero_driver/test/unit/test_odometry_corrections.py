@@ -281,7 +281,7 @@ def test_arbitrary_bytes_never_raise_and_are_counted(name, payload):
     ],
 )
 def test_ticks_are_those_of_the_model_that_the_robot_is(md5sum, given_plus, model):
-    robot = CorrectedRobot(given_plus=frozenset(given_plus))
+    robot = CorrectedRobot(hero_plus=tuple(given_plus))
     robot.corrections.note_encoder(md5sum)
     robot.receive_burst(NOW_NS, (0.0, 0.0))
     (odometry,) = list_odometry(robot.receive_burst(NOW_NS + 34 * MS, (20.0, 20.0)))

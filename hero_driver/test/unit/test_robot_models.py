@@ -7,7 +7,7 @@ import pytest
 from corrected_robot import CorrectedRobot
 from robot_messages import MS, NOW_NS
 
-from hero_driver.corrections.robot_corrections import OwnWheels
+from hero_driver.corrections.correction_settings import OwnWheels
 from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5
 
 STOCK_ENCODER_MD5 = "b5586cdbae9b740afc6a1f403a2d7dde"
@@ -39,7 +39,7 @@ def drive(robot):
     ],
 )
 def test_of_a_robot_that_looks_like_its_model_nothing_is_said(md5sum, given_plus, topic):
-    assert declare(CorrectedRobot(given_plus={given_plus}), md5sum, topic) == []
+    assert declare(CorrectedRobot(hero_plus={given_plus}), md5sum, topic) == []
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_of_a_robot_that_looks_like_its_model_nothing_is_said(md5sum, given_plus
     ],
 )
 def test_a_wrongly_listed_robot_is_told_of_with_the_remedy(given_plus, topic, conflict):
-    robot = CorrectedRobot(given_plus={given_plus})
+    robot = CorrectedRobot(hero_plus={given_plus})
     (found,) = declare(robot, STOCK_ENCODER_MD5, topic)
     assert re.search(conflict, found)
     robot.reconnect(rebooted=True)

@@ -4,6 +4,7 @@ A wrong value ends the program with one line: the name, the value and what it mu
 """
 
 import argparse
+import dataclasses
 import difflib
 import math
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type
@@ -77,6 +78,17 @@ def _make_check(is_allowed: Callable[[Any], bool], kind: Type[Any], allowed: str
 def robot_ids(default: str, text: str = "") -> Parameter:
     """Declare ids of robots; "all" becomes None. See parse_robot_ids()."""
     return Parameter(default, parse_robot_ids, text)
+
+
+def declare(parameter: Parameter) -> Any:
+    """Return the field of a dataclass that holds a parameter; find_declared() finds it again."""
+    return dataclasses.field(default=parameter.default, metadata={"parameter": parameter})
+
+
+def find_declared(settings: Type[Any]) -> Dict[str, Parameter]:
+    """Return the parameters that a dataclass and its bases declare, by the names of their fields."""
+    fields = dataclasses.fields(settings)
+    return {field.name: field.metadata["parameter"] for field in fields if "parameter" in field.metadata}
 
 
 def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> Dict[str, Any]:

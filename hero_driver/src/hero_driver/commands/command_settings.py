@@ -1,16 +1,38 @@
-"""The parameters that commands to a robot depend on, as in config.DriverConfig. Pure."""
+"""The parameters that commands to a robot depend on. Pure."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
+
+from hero_node.parameters import declare, flag, number
 
 
-class CommandSettings(NamedTuple):
+@dataclass(frozen=True)
+class CommandSettings:
     """Permissions and time limits of commands."""
 
-    clamp: bool
-    allow_self_tuning: bool
-    orphan_stop_s: float
-    silent_stop_s: float
-    service_timeout_s: float
-    command_max_age_s: float
-    max_names: int
-    """Topics and services of one robot over all its connections."""
+    clamp: bool = declare(flag(False, "limit velocities to those of the firmware (0.20 m/s, 8.0 rad/s)"))
+    allow_self_tuning: bool = declare(
+        flag(
+            False,
+            "allow pid_calibration: the robot spins for up to a minute and keeps no gains; without driver or Wi-Fi it"
+            " never stops",
+        )
+    )
+    orphan_stop_s: float = declare(
+        number(0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends")
+    )
+    silent_stop_s: float = declare(
+        number(
+            0.5,
+            0.0,
+            10.0,
+            "s",
+            "silence, of at least four periods, after which the robot of a program that sent at least six commands is"
+            " stopped; 0: never",
+        )
+    )
+    service_timeout_s: float = declare(
+        number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call")
+    )
+    command_max_age_s: float = declare(
+        number(2.0, 0.1, 60.0, "s", "age at which a motion command that could not be sent is dropped; stops are kept")
+    )

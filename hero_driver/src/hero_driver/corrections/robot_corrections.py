@@ -6,9 +6,7 @@ Takes payloads and times of arrival, and publishes payloads. Topics that are not
 import collections
 import functools
 import itertools
-from dataclasses import dataclass, field
 from typing import (
-    AbstractSet,
     Any,
     Callable,
     DefaultDict,
@@ -16,8 +14,6 @@ from typing import (
     Dict,
     Iterator,
     List,
-    Mapping,
-    NamedTuple,
     Optional,
     Protocol,
     Sequence,
@@ -29,9 +25,10 @@ from hero_node.geometry import Pose
 
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
-from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, STOCK, describe_conflict
+from .correction_settings import CorrectionSettings
+from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, describe_conflict
 from .stamps import NS_PER_S, StampFilter
-from .tick_odometry import TickOdometry, WheelGeometry
+from .tick_odometry import TickOdometry
 from .transforms import AddTransform, TransformCorrector
 from .wheel_motion import WheelMotion
 
@@ -77,49 +74,6 @@ Handler = Callable[[bytes, int], None]
 
 _Waiting = Tuple[Callable[[Any, bytes], None], Any, bytes]
 """Odometry, or its transform, that waits for the encoder reading of its burst: what writes it, and its arguments."""
-
-
-class OwnWheels(NamedTuple):
-    """A robot's calibrated wheels."""
-
-    diameter_m: float
-    separation_m: float
-    diameter_ratio: float
-    ticks_per_turn: Optional[float] = None
-    """None: as all of its model."""
-    model: str = ""
-    """Of the robot that was calibrated; empty: not known."""
-
-
-@dataclass(frozen=True)
-class CorrectionSettings:
-    """The parameters that matter here, as in config.DriverConfig."""
-
-    odometry: str
-    geometries: Mapping[str, WheelGeometry]
-    """Wheels by model."""
-    pose_covariance: Tuple[float, ...]
-    twist_covariance: Tuple[float, ...]
-    stamps: str
-    max_future_s: float
-    max_age_s: float
-    own_wheels: Mapping[str, OwnWheels] = field(default_factory=dict)
-    """Of robots whose wheels were calibrated, by name, such as hero_3."""
-    given_plus: AbstractSet[str] = frozenset()
-    """Names of robots that are HeRo+ without the Encoder message that tells so."""
-
-    def find_model(self, namespace: str, encoder_md5: str) -> str:
-        """Return the model of the robot in namespace, whose Encoder message has this md5."""
-        is_plus = encoder_md5 == PLUS_ENCODER_MD5 or namespace.strip("/") in self.given_plus
-        return HERO_PLUS if is_plus else STOCK
-
-    def find_geometry(self, namespace: str, model: str) -> WheelGeometry:
-        """Return the wheels of the robot in namespace, which is of this model."""
-        geometry, own = self.geometries[model], self.own_wheels.get(namespace.strip("/"))
-        if own is None or own.model not in ("", model):
-            return geometry
-        ticks_per_turn = own.ticks_per_turn or geometry.ticks_per_turn
-        return WheelGeometry(own.diameter_m, own.separation_m, ticks_per_turn, own.diameter_ratio)
 
 
 class RobotCorrections:

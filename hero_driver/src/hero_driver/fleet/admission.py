@@ -3,8 +3,9 @@
 import collections
 import ipaddress
 from dataclasses import dataclass
-from typing import Counter, Optional, Tuple, Union
+from typing import Any, Counter, Optional, Tuple, Union
 
+from hero_node.parameters import Parameter, declare, make_error, whole_number
 from hero_node.token_bucket import TokenBuckets
 
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
@@ -21,16 +22,37 @@ NEW_ROBOTS_PER_S = 5.0
 20 calls to the ROS master. One hundred simulated robots that are restarted every 30 s stay below it."""
 
 
+def _read_networks(name: str, value: Any) -> Tuple[Network, ...]:
+    allowed = "a list of networks such as 10.42.0.0/24"
+    if not isinstance(value, (list, tuple)) or not all(isinstance(entry, str) for entry in value):
+        raise make_error(name, value, allowed)
+    networks = []
+    for entry in value:
+        try:
+            networks.append(ipaddress.ip_network(entry))
+        except ValueError as error:
+            raise make_error(name, entry, "%s (%s)" % (allowed, error)) from error
+    return tuple(networks)
+
+
 @dataclass(frozen=True)
 class AdmissionLimits:
-    """The parameters of the same names, see config.DriverConfig."""
+    """Parameters that limit connections."""
 
-    allow: Tuple[Network, ...] = ()  # empty: every address
-    max_connections: int = 200
-    max_connections_per_address: int = 200
-    max_unidentified: int = 100
-    max_packets_per_s: int = 5000
-    max_bytes_per_s: int = 2000000
+    allow: Tuple[Network, ...] = declare(
+        Parameter((), _read_networks, "networks (CIDR) that robots may connect from; empty: all")
+    )
+    max_connections: int = declare(whole_number(400, 1, 5000, "", "connections in total"))
+    max_connections_per_address: int = declare(whole_number(400, 1, 5000, "", "connections per address"))
+    max_unidentified: int = declare(
+        whole_number(200, 1, 5000, "", "connections that have not identified themselves")
+    )
+    max_packets_per_s: int = declare(
+        whole_number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211")
+    )
+    max_bytes_per_s: int = declare(
+        whole_number(2000000, 1000, 100000000, "bytes/s", "bytes per robot; stock robots send 44051")
+    )
 
 
 class Admission:

@@ -13,7 +13,8 @@ from ..commands.command_settings import CommandSettings
 from ..commands.service_requests import is_success, read_set_odom_pose
 from ..commands.velocity_shaper import STOP_PAYLOADS
 from ..corrections import message_layouts
-from ..corrections.robot_corrections import TRANSFORMS, CorrectionSettings, RobotCorrections
+from ..corrections.correction_settings import CorrectionSettings
+from ..corrections.robot_corrections import TRANSFORMS, RobotCorrections
 from ..fleet.namespaces import Identity
 from ..rosserial.session import Topic, TopicKind
 from ..transport import EventLoop
@@ -47,6 +48,8 @@ class BridgeContext(NamedTuple):
     registrar: Worker
     corrections: CorrectionSettings
     commands: CommandSettings
+    max_names: int
+    """Topics and services of one robot over all its connections."""
 
 
 class RobotBridge:
@@ -59,7 +62,8 @@ class RobotBridge:
             identity.namespace, context.owner, context.loop, context.log, context.commands
         )
         self._loop = context.loop
-        self._settings = context.commands
+        self._service_timeout_s = context.commands.service_timeout_s
+        self._max_names = context.max_names
         self._registrar = context.registrar
         self._endpoints = Endpoints(self.label, context.log.log_throttled)
         self._closed = False
@@ -116,7 +120,7 @@ class RobotBridge:
         """The robot declared topic, which is called name in ROS."""
         info, kind = topic.info, topic.kind
         if name not in self._names:
-            if len(self._names) >= self._settings.max_names:
+            if len(self._names) >= self._max_names:
                 text = "topic %s refused: more than %d names (2 * max_topics)" % (name, len(self._names))
                 self._endpoints.report_error("names", text)
                 return
@@ -233,7 +237,7 @@ class RobotBridge:
         self._take_input(requests, name, layout, lambda: self._endpoints.serve(name, layout, known_service.call))
 
     def _make_service(self, name: str, ros_type: str) -> RobotService:
-        service = RobotService(name, ros_type, self._settings.service_timeout_s, self, self._loop)
+        service = RobotService(name, ros_type, self._service_timeout_s, self, self._loop)
         self._services[name] = service
         return service
 

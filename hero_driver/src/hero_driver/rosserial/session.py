@@ -11,6 +11,8 @@ import re
 from dataclasses import dataclass, field
 from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
 
+from hero_node.parameters import declare, number, whole_number
+
 from . import packets, payloads
 from .errors import PacketTooLongError, PayloadError, TopicIdError
 from .packets import Bytes, PacketReader, encode_packet
@@ -34,6 +36,9 @@ UNDECLARED_REPEATS = 5
 """Requests that undeclared ids may cause while the robot has declared something else."""
 
 BUFFER_LENGTH_MIN = 1
+
+NAME_LENGTH_MAX = 128
+"""Of topics and types."""
 
 # \Z, because $ would let a line break at the end through.
 _MESSAGE_TYPE = re.compile(r"[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*\Z")
@@ -128,12 +133,15 @@ Event = Union[
 
 @dataclass(frozen=True)
 class SessionLimits:
-    """Limits of one peer."""
+    """Parameters that limit one peer."""
 
-    max_payload_length: int = packets.DEFAULT_MAX_PAYLOAD_LENGTH
-    max_topics: int = 64
-    max_name_length: int = 128
-    silence_timeout_s: float = 6.0
+    max_topics: int = declare(whole_number(64, 1, 1000, "", "topic ids that one robot may declare"))
+    max_payload_length: int = declare(
+        whole_number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
+    )
+    silence_timeout_s: float = declare(
+        number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
+    )
 
 
 class Session:
@@ -319,12 +327,11 @@ class Session:
 
     def _find_error(self, info: TopicInfo) -> Optional[str]:
         """Return what is wrong with a declaration, or None."""
-        limit = self._limits.max_name_length
-        if len(info.name) > limit:
-            return "its name has %d characters, more than %d" % (len(info.name), limit)
+        if len(info.name) > NAME_LENGTH_MAX:
+            return "its name has %d characters, more than %d" % (len(info.name), NAME_LENGTH_MAX)
         if not _NAME.match(info.name) or "//" in info.name or info.name.endswith("/"):
             return "its name is not a ROS name"
-        if len(info.message_type) > limit or not _MESSAGE_TYPE.match(info.message_type):
+        if len(info.message_type) > NAME_LENGTH_MAX or not _MESSAGE_TYPE.match(info.message_type):
             return "its type %s is not of the form package/Type" % _shorten(info.message_type)
         if not _MD5SUM.match(info.md5sum):
             return "its md5 %s is not 32 hexadecimal digits" % _shorten(info.md5sum)

@@ -187,12 +187,6 @@ def test_an_id_may_be_declared_again_at_the_limit_of_topics():
     assert session.topics[100].info.name == "/hero_0/b"
 
 
-def test_longer_names_are_taken_where_they_are_allowed():
-    session = open_session(max_name_length=256)
-    (event,) = receive(session, declare_twist(100, "/hero_0/" + "x" * 200))
-    assert type(event) is TopicDeclared
-
-
 # What may be sent.
 
 
