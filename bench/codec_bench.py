@@ -66,7 +66,7 @@ def main():
             if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
                 info = event.topic.info
                 ros_type = apply_aliases(info.message_type)
-                event.topic.receive = corrections.handler_for(info.name, ros_type, (sink, sink))
+                event.topic.receive = corrections.handler_for(info.name, ros_type, lambda *_: sink)
         for index, of_burst in enumerate(messages):
             for topic, payload in of_burst:
                 topic.receive(payload, start_ns + index * BURST_NS)

@@ -1,6 +1,6 @@
 """Sends pending commands: takes from each robot's command queue the commands that may be sent now.
 
-Runs on the thread of the sockets, except wake(). A robot that does not acknowledge is asked again later and
+Runs on the thread of the sockets. A robot that does not acknowledge is asked again later and
 delays no other.
 """
 
@@ -22,17 +22,6 @@ class CommandSender:
         """Take the loop's call_later(delay_s, call)."""
         self._call_later = call_later
         self._owner = owner
-
-    def send_message(self, peer: Peer, topic_id: int, payload: bytes) -> None:
-        """Send one message now, if the connection declared its id and it fits."""
-        if peer.link.closed:
-            return
-        try:
-            packet = peer.session.encode_message(topic_id, payload)
-        except RosserialError as error:
-            self._owner.warn_robot(peer, str(error))
-            return
-        peer.link.send_packet(packet)
 
     def send_commands(self, namespace: str) -> None:
         """Send the commands of a robot that may go out; retry later with the remainder."""
@@ -71,7 +60,10 @@ class CommandSender:
             if topic_id is None:
                 bridge.commands.refused += 1
                 continue
-            self.send_message(peer, topic_id, payload)
+            try:
+                link.send_packet(peer.session.encode_message(topic_id, payload))
+            except RosserialError as error:  # it does not fit
+                self._owner.warn_robot(peer, str(error))
             if bridge.is_motion(name):
                 peer.motion_mark = link.handed_length
                 acknowledged = False

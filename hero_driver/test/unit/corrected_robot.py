@@ -39,8 +39,14 @@ def make_corrections(namespace, outputs, **settings):
 
 def make_handler(corrections, name, message_type, outputs, is_wanted=lambda name: True):
     """Return the handler of a topic whose messages, and those derived from them, come to the list outputs, too."""
-    names = (name, *corrections.derive_topics(name, message_type))
-    return corrections.handler_for(name, message_type, [ListSink(name, outputs, is_wanted(name)) for name in names])
+    return corrections.handler_for(name, message_type, lambda topic, _: ListSink(topic, outputs, is_wanted(topic)))
+
+
+def list_topics(corrections, name, message_type):
+    """Return the topics that the messages of a topic become, with their types."""
+    topics = {}
+    corrections.handler_for(name, message_type, topics.setdefault)
+    return topics
 
 
 class CorrectedRobot:

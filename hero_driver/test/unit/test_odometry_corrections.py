@@ -4,7 +4,7 @@ import math
 from collections import Counter
 
 import pytest
-from corrected_robot import TYPES, CorrectedRobot, list_odometry, list_payloads, list_transforms
+from corrected_robot import TYPES, CorrectedRobot, list_odometry, list_payloads, list_topics, list_transforms
 from hypothesis import given
 from hypothesis import strategies as st
 from robot_messages import (
@@ -66,9 +66,9 @@ def test_the_robots_own_odometry_is_there_unchanged_under_another_name():
     robot = CorrectedRobot()
     payload = build_odometry(NOW_NS, 1.0, 2.0, 0.5)
     assert robot.receive("/hero_0/odom", payload, NOW_NS) == [("/hero_0/odom_raw", payload)]
-    assert robot.corrections.derive_topics("/hero_0/odom", "nav_msgs/Odometry") == {
-        "/hero_0/odom_raw": "nav_msgs/Odometry"
-    }
+    assert list_topics(robot.corrections, "/hero_0/odom", "nav_msgs/Odometry") == {
+        "/hero_0/odom": "nav_msgs/Odometry", "/hero_0/odom_raw": "nav_msgs/Odometry"
+    }  # fmt: skip
 
 
 def test_odometry_has_covariances_and_the_velocity_of_the_wheels():

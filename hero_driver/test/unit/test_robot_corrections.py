@@ -3,7 +3,7 @@
 import struct
 
 import pytest
-from corrected_robot import TYPES, CorrectedRobot, list_payloads, list_transforms
+from corrected_robot import TYPES, CorrectedRobot, list_payloads, list_topics, list_transforms
 from robot_messages import (
     MS,
     NOW_NS,
@@ -90,9 +90,9 @@ def test_the_stock_scan_passes_untouched_and_proximity_is_made_of_it():
         assert name == "/hero_0/proximity"
         assert (read_seq(proximity), read_stamp_ns(proximity)) == (number, stamp_ns)
         assert len(read_scan(proximity)[2]) == 8
-    assert robot.corrections.derive_topics("/hero_0/laser", "sensor_msgs/LaserScan") == {
-        "/hero_0/proximity": "sensor_msgs/LaserScan"
-    }
+    assert list_topics(robot.corrections, "/hero_0/laser", "sensor_msgs/LaserScan") == {
+        "/hero_0/laser": "sensor_msgs/LaserScan", "/hero_0/proximity": "sensor_msgs/LaserScan"
+    }  # fmt: skip
 
 
 def test_a_scan_that_is_not_the_stock_one_passes_and_gives_no_proximity():
@@ -122,14 +122,15 @@ def test_topics_that_nothing_is_known_of_pass_untouched():
     assert robot.receive("/hero_0/battery", b"\x00\x00\x80\x3f", NOW_NS) == [
         ("/hero_0/battery", b"\x00\x00\x80\x3f")
     ]
-    assert robot.corrections.derive_topics("/hero_0/battery", "std_msgs/Float32") == {}
+    topics = list_topics(robot.corrections, "/hero_0/battery", "std_msgs/Float32")
+    assert topics == {"/hero_0/battery": "std_msgs/Float32"}
 
 
 @pytest.mark.parametrize("name", TYPES)
 def test_a_known_name_with_another_type_passes_untouched(name):
     robot = CorrectedRobot({name: "std_msgs/String"})
     assert robot.receive(name, b"\x00\x00\x00\x00", NOW_NS) == [(name, b"\x00\x00\x00\x00")]
-    assert robot.corrections.derive_topics(name, "std_msgs/String") == {}
+    assert list_topics(robot.corrections, name, "std_msgs/String") == {name: "std_msgs/String"}
     assert robot.corrections.refused == 0
 
 
@@ -170,7 +171,8 @@ def test_odometry_and_a_reading_up_to_10_ms_apart_are_of_one_burst(apart_ms, bel
 def test_a_distance_passes_and_is_a_range_where_one_is_wanted(is_wanted):
     name = "/hero_0/distance"
     robot = CorrectedRobot({name: "std_msgs/Float32"}, is_wanted=lambda topic: is_wanted)
-    assert robot.corrections.derive_topics(name, "std_msgs/Float32") == {"/hero_0/range": "sensor_msgs/Range"}
+    topics = list_topics(robot.corrections, name, "std_msgs/Float32")
+    assert topics == {name: "std_msgs/Float32", "/hero_0/range": "sensor_msgs/Range"}
     for number in range(2):
         outputs = robot.receive(name, struct.pack("<f", 0.5), NOW_NS + number)
         assert outputs[0] == (name, struct.pack("<f", 0.5))

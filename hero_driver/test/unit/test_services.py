@@ -21,7 +21,7 @@ class Robot:
         self.now_s = 100.0
         self.timers = []
         monkeypatch.setattr(services.time, "monotonic", lambda: self.now_s)
-        self.service = RobotService(NAME, "hero_msgs/SetOdom", TIMEOUT_S, self, self)
+        self.service = RobotService(NAME, "hero_msgs/SetOdom", TIMEOUT_S, lambda *sent: self.send_request(*sent), self)
 
     def send_request(self, service, request):
         self.requests.append(request)

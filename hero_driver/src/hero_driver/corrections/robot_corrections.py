@@ -11,12 +11,10 @@ from typing import (
     Callable,
     DefaultDict,
     Deque,
-    Dict,
     Iterator,
     List,
     Optional,
     Protocol,
-    Sequence,
     Set,
     Tuple,
 )
@@ -110,7 +108,6 @@ class RobotCorrections:
         self._uses_estimate = False
         self._odom_name = namespace + "/odom"
         self._odom_seqs = self._seqs[self._odom_name]
-        self._raw_name = namespace + "/odom_raw"
         self._proximity_name = namespace + "/proximity"
         self._odom_sink: Sink = _NoSink()
         self._has_encoder = False
@@ -186,36 +183,27 @@ class RobotCorrections:
         calibrated_model = "" if own is None else own.model
         return describe_conflict(self.model, self._models[0], calibrated_model, is_listed, self._declared)
 
-    def derive_topics(self, name: str, message_type: str) -> Dict[str, str]:
-        """Return the topics, with types, that exist besides the one called name."""
-        if name == self._odom_name and message_type == "nav_msgs/Odometry":
-            return {self._raw_name: message_type}
-        if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
-            return {self._proximity_name: message_type}
-        if name == self._namespace + "/distance" and message_type == "std_msgs/Float32":
-            return {self._namespace + "/range": "sensor_msgs/Range"}
-        return {}
-
-    def handler_for(self, name: str, message_type: str, sinks: Sequence[Sink]) -> Handler:
+    def handler_for(self, name: str, message_type: str, sink_for: Callable[[str, str], Sink]) -> Handler:
         """Return what takes the payloads of the topic called name.
 
-        sinks: of this topic, and of those that derive_topics() gives, in its order; none for TRANSFORMS.
+        sink_for(name, type) gives the sink of a topic that they become: this one, and some another one besides; none is
+        asked for TRANSFORMS.
         """
         if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
             return self.transforms.correct
-        sink = sinks[0]
+        sink = sink_for(name, message_type)
         if name == self._odom_name and message_type == "nav_msgs/Odometry":
             self._odom_sink = sink
-            return functools.partial(self._correct_odometry, sinks[1])
+            return functools.partial(self._correct_odometry, sink_for(self._namespace + "/odom_raw", message_type))
         if name == self._namespace + "/encoder" and message_type == "hero_msgs/Encoder":
             self._hears_encoder = True
             self._has_encoder = self._uses_ticks
             self._uses_estimate = self._has_encoder and self.odometry.has_reading
             return functools.partial(self._correct_encoder, name, sink)
         if name == self._namespace + "/laser" and message_type == "sensor_msgs/LaserScan":
-            return functools.partial(self._correct_laser, sink, sinks[1])
+            return functools.partial(self._correct_laser, sink, sink_for(self._proximity_name, message_type))
         if name == self._namespace + "/distance" and message_type == "std_msgs/Float32":
-            return functools.partial(self._add_range, sink, sinks[1])
+            return functools.partial(self._add_range, sink, sink_for(self._namespace + "/range", "sensor_msgs/Range"))
         if name == self._namespace + "/imu" and message_type == "sensor_msgs/Imu":
             return functools.partial(self._correct_stamped, name, sink)
         return lambda payload, _: sink.publish(payload)

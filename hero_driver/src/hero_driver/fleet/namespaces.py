@@ -3,9 +3,7 @@
 import re
 from typing import NamedTuple, Optional
 
-_ROBOT_NAME = re.compile(r"^/?(?P<name>[a-zA-Z][a-zA-Z0-9_]*?)_(?P<number>\d{1,6})/.")
-
-HERO_PREFIX = "hero"
+_ROBOT_NAME = re.compile(r"/?hero_(0|[1-9][0-9]{0,5})/.")
 
 TF_TOPICS = frozenset(("/tf", "tf"))
 
@@ -25,12 +23,7 @@ class Identity(NamedTuple):
 def identify(topic_name: str) -> Optional[Identity]:
     """Return the HeRo that a topic name belongs to, None if it belongs to none."""
     match = _ROBOT_NAME.match(topic_name)
-    if match is None or match["name"] != HERO_PREFIX:
-        return None
-    number = int(match["number"])
-    if str(number) != match["number"]:
-        return None
-    return Identity("/%s_%d" % (HERO_PREFIX, number), number)
+    return None if match is None else Identity("/hero_" + match[1], int(match[1]))
 
 
 def resolve(topic_name: str, identity: Identity) -> Optional[str]:

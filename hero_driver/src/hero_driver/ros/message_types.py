@@ -4,9 +4,10 @@ The firmware speaks of hero_common, the package that this suite's hero_msgs repl
 tf package of old; both have equals with the same md5.
 """
 
+import functools
 import importlib.util
 import os
-from typing import Any, Dict, Tuple
+from typing import Any, Tuple
 
 import genpy
 import roslib.message
@@ -47,43 +48,28 @@ class RawMessage(genpy.Message):
         return self
 
 
-_raw_classes: Dict[Any, Any] = {}
-
-
+@functools.lru_cache(maxsize=None)
 def make_raw_class(message_class: Any) -> Any:
     """Return the class that carries messages of message_class as bytes; the same one for every call."""
-    raw_class = _raw_classes.get(message_class)
-    if raw_class is None:
-        raw_class = type(
-            "Raw" + message_class.__name__,
-            (RawMessage,),
-            {
-                "__slots__": [],
-                "_type": message_class._type,
-                "_md5sum": message_class._md5sum,
-                "_full_text": message_class._full_text,
-            },
-        )
-        _raw_classes[message_class] = raw_class
-    return raw_class
+    fields = {
+        "__slots__": [],
+        "_type": message_class._type,
+        "_md5sum": message_class._md5sum,
+        "_full_text": message_class._full_text,
+    }
+    return type("Raw" + message_class.__name__, (RawMessage,), fields)
 
 
+@functools.lru_cache(maxsize=None)
 def make_raw_service(service_class: Any) -> Any:
     """Return the service class that carries requests and answers of service_class as bytes."""
-    raw_class = _raw_classes.get(service_class)
-    if raw_class is None:
-        raw_class = type(
-            "Raw" + service_class.__name__,
-            (object,),
-            {
-                "_type": service_class._type,
-                "_md5sum": service_class._md5sum,
-                "_request_class": make_raw_class(service_class._request_class),
-                "_response_class": make_raw_class(service_class._response_class),
-            },
-        )
-        _raw_classes[service_class] = raw_class
-    return raw_class
+    fields = {
+        "_type": service_class._type,
+        "_md5sum": service_class._md5sum,
+        "_request_class": make_raw_class(service_class._request_class),
+        "_response_class": make_raw_class(service_class._response_class),
+    }
+    return type("Raw" + service_class.__name__, (object,), fields)
 
 
 def find_message_class(type_name: str, md5sum: str) -> Any:

@@ -76,7 +76,6 @@ class RobotBridge:
         self._layouts: Dict[str, Layout] = {}  # as declared last, of what the robot takes
         self._publisher_layouts: Dict[str, Layout] = {}  # and of what it sends
         self._names: Set[str] = set()
-        self._subscribed_types: Dict[str, str] = {}
 
     # The connection's life.
 
@@ -140,7 +139,6 @@ class RobotBridge:
                 topic.receive = _convert_first(convert, topic.receive)
             self._submit(lambda: self._endpoints.advertise(name, layout, publishers, replaced))
         elif kind is TopicKind.SUBSCRIBER:
-            self._subscribed_types[name] = ros_type
             self._take_input(topic, name, layout, lambda: self._subscribe(name, layout))
         elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
             self._declare_service_half(topic, name)
@@ -200,19 +198,19 @@ class RobotBridge:
             md5sums = " or ".join([message_layouts.MD5SUMS[ros_type], *known])
             self._endpoints.report_error(name, text % (name, topic.info.message_type, layout.md5sums[0], md5sums))
             return []
-        if name == TRANSFORMS:
-            if ros_type != TRANSFORM_TYPE:
-                text = "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE)
-                self._endpoints.report_error(name, text)
-            else:
-                topic.receive = self.corrections.handler_for(name, ros_type, ())
+        if name == TRANSFORMS and ros_type != TRANSFORM_TYPE:
+            text = "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE)
+            self._endpoints.report_error(name, text)
             return []
-        topics = {name: ros_type, **self.corrections.derive_topics(name, ros_type)}
-        for publisher_name in topics:
-            self._publishers.setdefault(publisher_name, RawPublisher(QUEUE_LENGTH, self._loop.call_later))
-        publishers = [self._publishers[publisher_name] for publisher_name in topics]
-        topic.receive = self.corrections.handler_for(name, ros_type, publishers)
-        return list(zip(topics, topics.values(), publishers))
+        publishers: List[Tuple[str, str, RawPublisher]] = []
+
+        def choose(name: str, message_type: str) -> RawPublisher:
+            publisher = self._publishers.setdefault(name, RawPublisher(QUEUE_LENGTH, self._loop.call_later))
+            publishers.append((name, message_type, publisher))
+            return publisher
+
+        topic.receive = self.corrections.handler_for(name, ros_type, choose)
+        return publishers
 
     def _declare_service_half(self, topic: Topic, name: str) -> None:
         self._service_halves[name, topic.kind] = topic
@@ -231,15 +229,11 @@ class RobotBridge:
         layout = Layout(ros_type, (requests.info.md5sum, answers.info.md5sum))
         service = self._services.get(name)
         if service is None or self._layouts.get(name) != layout:
-            service = self._make_service(name, ros_type)
+            service = RobotService(name, ros_type, self._service_timeout_s, self.send_request, self._loop)
+            self._services[name] = service
         known_service = service
         answers.receive = lambda payload, _: self._receive_answer(known_service, payload)
         self._take_input(requests, name, layout, lambda: self._endpoints.serve(name, layout, known_service.call))
-
-    def _make_service(self, name: str, ros_type: str) -> RobotService:
-        service = RobotService(name, ros_type, self._service_timeout_s, self, self._loop)
-        self._services[name] = service
-        return service
 
     def send_request(self, service: RobotService, request: bytes) -> Optional[str]:
         """Send a request of one of the robot's services; return why it cannot be sent, None if it is on its way."""
@@ -261,7 +255,7 @@ class RobotBridge:
 
     def is_motion(self, name: str) -> bool:
         """Return whether messages on the topic called name move the robot."""
-        return self._subscribed_types.get(name) in STOP_PAYLOADS
+        return name in self._layouts and self._layouts[name].message_type in STOP_PAYLOADS
 
     # Jobs of the registrar; these may block.
 

@@ -8,7 +8,7 @@ the next call. Everything here runs on the thread of the sockets, except RobotSe
 import collections
 import functools
 import time
-from typing import Callable, Deque, Optional, Protocol, Tuple
+from typing import Callable, Deque, Optional, Tuple
 
 import rospy
 
@@ -31,22 +31,22 @@ class _Call:
         self.answer((b"", reason))
 
 
-class ServiceOwner(Protocol):
-    """The robot's end of its services, on the thread of the sockets."""
-
-    def send_request(self, service: "RobotService", request: bytes) -> Optional[str]:
-        """Send a request to the robot; return why it cannot be sent, None if it is on its way."""
-
-
 class RobotService:
     """One service of one robot, over all its connections."""
 
-    def __init__(self, name: str, service_type: str, timeout_s: float, owner: ServiceOwner, loop: EventLoop) -> None:
-        """owner sends the requests of calls, which come on other threads than loop's."""
+    def __init__(
+        self,
+        name: str,
+        service_type: str,
+        timeout_s: float,
+        send: Callable[["RobotService", bytes], Optional[str]],
+        loop: EventLoop,
+    ) -> None:
+        """send(this service, request), on loop's thread, returns why a request cannot be sent, None if it is."""
         self.name = name
         self.service_type = service_type
         self._timeout_s = timeout_s
-        self._owner = owner
+        self._send = send
         self._loop = loop
         self._waiting: Deque[_Call] = collections.deque()
         self._current: Optional[_Call] = None
@@ -105,7 +105,7 @@ class RobotService:
             self._current = call
             # A call that had to wait for its turn gets half of the time limit at least.
             call.due_s = max(call.due_s, now_s + self._timeout_s / 2.0)
-            refusal = self._owner.send_request(self, call.request)
+            refusal = self._send(self, call.request)
             if refusal is not None:
                 self._current = None
                 call.fail("cannot be called: %s" % refusal)

@@ -5,17 +5,9 @@ functions raise PayloadError so that the session can turn it into such an event.
 """
 
 
-class RosserialError(Exception):
-    """Base of everything that the rosserial core raises."""
+class RosserialError(ValueError):
+    """What cannot be encoded, or must not be sent to this peer; the text says why."""
 
 
-class PacketTooLongError(RosserialError, ValueError):
-    """A payload does not fit the length that a packet or the peer's buffer can hold."""
-
-
-class TopicIdError(RosserialError, ValueError):
-    """A topic id lies outside 0..65535, or this connection did not declare it."""
-
-
-class PayloadError(RosserialError, ValueError):
+class PayloadError(RosserialError):
     """Bytes are not a payload of the kind that they were read as."""

@@ -11,7 +11,7 @@ import struct
 from typing import Callable, List, NamedTuple, Tuple, Union
 from zlib import adler32
 
-from .errors import PacketTooLongError, TopicIdError
+from .errors import RosserialError
 
 Bytes = Union[bytes, bytearray, memoryview]
 
@@ -87,13 +87,13 @@ def _make_splitter(length: int) -> Callable[[Bytes], Tuple[bytes, ...]]:
 def encode_packet(topic_id: int, payload: Bytes) -> bytes:
     """Return the packet that carries payload under topic_id.
 
-    Raises: TopicIdError for an id outside 0..65535, PacketTooLongError for more than 65535 bytes of payload.
+    Raises: RosserialError for an id outside 0..65535, or more than 65535 bytes of payload.
     """
     if not 0 <= topic_id <= 0xFFFF:
-        raise TopicIdError("topic id %r is outside 0..65535" % (topic_id,))
+        raise RosserialError("topic id %r is outside 0..65535" % (topic_id,))
     length = len(payload)
     if length > MAX_PAYLOAD_LENGTH:
-        raise PacketTooLongError("a payload of %d bytes does not fit a packet (at most 65535)" % length)
+        raise RosserialError("a payload of %d bytes does not fit a packet (at most 65535)" % length)
     header = _HEADER.pack(SYNC, length, _LENGTH_CHECKSUMS[length], topic_id)
     checksum = 255 - (topic_id + (topic_id >> 8) + sum_bytes(payload) & 0xFF)
     return b"".join((header, payload, bytes((checksum,))))

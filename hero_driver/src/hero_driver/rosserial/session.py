@@ -14,7 +14,7 @@ from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
 from hero_node.parameters import declare, number, whole_number
 
 from . import packets, payloads
-from .errors import PacketTooLongError, PayloadError, TopicIdError
+from .errors import PayloadError, RosserialError
 from .packets import Bytes, PacketReader, encode_packet
 from .payloads import Log, TopicInfo
 
@@ -236,15 +236,15 @@ class Session:
     def encode_message(self, topic_id: int, payload: Bytes) -> bytes:
         """Return the packet that sends payload to the robot.
 
-        Raises: TopicIdError unless this connection declared topic_id as something that the robot receives
-        (the robot indexes an array with the id unchecked, node_handle.h:326), PacketTooLongError for more
-        than the robot's buffer (unchecked too, node_handle.h:232).
+        Raises: RosserialError unless this connection declared topic_id as something that the robot receives
+        (the robot indexes an array with the id unchecked, node_handle.h:326), and for more than the robot's
+        buffer (unchecked too, node_handle.h:232).
         """
         topic = self._receivers.get(topic_id)
         if topic is None:
-            raise TopicIdError("id %d was not declared as something that this robot receives" % topic_id)
+            raise RosserialError("id %d was not declared as something that this robot receives" % topic_id)
         if len(payload) > topic.info.buffer_length:
-            raise PacketTooLongError(
+            raise RosserialError(
                 "%s: a message of %d bytes does not fit the robot's buffer of %d bytes"
                 % (topic.info.name, len(payload), topic.info.buffer_length)
             )
