@@ -9,12 +9,12 @@ Changes nothing. Ends within about 5 s whatever hangs; the exit status is 1 if a
 import argparse
 import json
 import os
-import threading
 from typing import Dict, List, Optional, Sequence
 
 import rospy
 
 from hero_node import command_line
+from hero_node.ros.ros_node import end_ros_node
 from hero_node.texts import make_printable
 
 from .checkup import computer, graph, localization, network
@@ -101,8 +101,5 @@ def run(options: argparse.Namespace) -> int:
 def main() -> None:
     """Run the program check."""
     status = command_line.call(lambda: run(parse_options(rospy.myargv()[1:])))
-    # A master that hangs would block the end of the node, as would threads that wait for a name server.
-    leaving = threading.Thread(target=rospy.signal_shutdown, args=("done",), daemon=True)
-    leaving.start()
-    leaving.join(LEAVE_TIMEOUT_S)
-    os._exit(status)
+    end_ros_node("done", LEAVE_TIMEOUT_S)
+    os._exit(status)  # although threads may still wait for a name server

@@ -9,6 +9,7 @@ only when the table is drawn, which keeps fifty robots cheap. Only worker thread
 
 import argparse
 import contextlib
+import math
 import shutil
 import sys
 import time
@@ -133,13 +134,11 @@ class FleetProgram:
         self._options = options
         self._fleet = FleetListener()
         self._order = ORDERS[0]
-        self._start_s = time.monotonic()
+        self._end_s = math.inf if options.seconds is None else time.monotonic() + options.seconds
         self._rows: List[RobotRow] = []
 
     def _seconds_left(self) -> float:
-        if self._options.seconds is None:
-            return float("inf")
-        return float(self._start_s + self._options.seconds - time.monotonic())
+        return self._end_s - time.monotonic()
 
     def _going(self) -> bool:
         return self._seconds_left() > 0.0 and self._program.running
@@ -219,7 +218,7 @@ class FleetProgram:
         """Return all lines: the table, the state of a stop, and the keys."""
         size = shutil.get_terminal_size()
         left_s = self._seconds_left()
-        ending = "" if left_s == float("inf") else "   ends in %.0f s" % left_s
+        ending = "" if left_s == math.inf else "   ends in %.0f s" % left_s
         last = "%s (now by %s)%s" % (KEYS_HELP, self._order, ending)
         stop = "" if status is None else paint(status.level, status.text[: size.columns])
         return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
