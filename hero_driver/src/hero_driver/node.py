@@ -97,8 +97,11 @@ class DriverNode:
         self._is_closed = threading.Event()
 
     def open(self) -> None:
-        """Listen, dial and serve. Raises: OSError if the port cannot be had."""
-        self._loop.open(self._gateway)
+        """Listen, dial and serve. Raises: ProgramError if the port cannot be had."""
+        try:
+            self._loop.open(self._gateway)
+        except OSError as error:
+            raise ProgramError(_explain_bind_error(self._config, error)) from error
         self._gateway.open()
         since = self._kept.read_since() if self._config.start_stopped == "as_before" else ""
         self._stop_interface.open(bool(since) or self._config.start_stopped == "always", since)
@@ -223,29 +226,20 @@ def main(argv: Optional[List[str]] = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
         sys.stdout.reconfigure(line_buffering=True)
-    # The driver handles signals itself: robots are stopped before ROS goes down.
     log = LogRelay()
     try:
         _enter_ros(argv, log)
+        node = DriverNode(read_config(_read_private_parameters()), log)
+        sys.setswitchinterval(SWITCH_INTERVAL_S)
+        # The driver handles signals itself: robots are stopped before ROS goes down.
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, lambda *_: node.end())
+        call_before_shutdown(node.end)
+        node.open()
     except KeyboardInterrupt:
         return 130
     except ProgramError as error:
-        sys.stderr.write("hero_driver cannot start: %s\n" % error)
-        return 2
-    try:
-        config = read_config(_read_private_parameters())
-    except ProgramError as error:
         rospy.logfatal("hero_driver cannot start: %s", error)
-        return 2
-    sys.setswitchinterval(SWITCH_INTERVAL_S)
-    node = DriverNode(config, log)
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda *_: node.end())
-    call_before_shutdown(node.end)
-    try:
-        node.open()
-    except OSError as error:
-        rospy.logfatal("hero_driver cannot start: %s", _explain_bind_error(config, error))
         return 2
     try:
         return node.spin()

@@ -37,8 +37,6 @@ class RobotLog:
             if len(peer.early_logs) < EARLY_LINES_MAX:
                 peer.early_logs.append(log)
             return
-        if peer.refused:
-            return
         record = peer.record
         if line.boot is not None:
             record.firmware, record.hardware, record.config = line.boot
