@@ -186,8 +186,8 @@ class RobotCorrections:
     def handler_for(self, name: str, message_type: str, sink_for: Callable[[str, str], Sink]) -> Handler:
         """Return what takes the payloads of the topic called name.
 
-        sink_for(name, type) gives the sink of a topic that they become: this one, and some another one besides; none is
-        asked for TRANSFORMS.
+        sink_for(name, type) returns the sink of a topic. It is asked for this topic and for the one derived from it, if
+        there is one; not for TRANSFORMS.
         """
         if name == TRANSFORMS and message_type == "tf2_msgs/TFMessage":
             return self.transforms.correct

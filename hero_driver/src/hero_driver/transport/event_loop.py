@@ -12,7 +12,7 @@ import select
 import socket
 import threading
 import time
-from typing import Callable, Dict, List, Optional, Sequence, Set, Tuple, TypeVar
+from typing import Callable, Dict, List, Optional, Protocol, Sequence, Set, Tuple, TypeVar
 
 from hero_node.file_limit import raise_file_limit
 
@@ -57,23 +57,20 @@ class NoAnswerError(Exception):
     """The loop did not answer in time: it hangs or has ended."""
 
 
-class Reader:
+class Reader(Protocol):
     """Another socket that the loop reads besides the robots' connections."""
 
     def fileno(self) -> int:
         """Return the socket's file descriptor, the same one until close()."""
-        raise NotImplementedError
 
     def read(self) -> bool:
         """Read what there is, without waiting; return whether to continue. On the loop's thread."""
-        raise NotImplementedError
 
     def resume(self) -> None:
         """Be told that data may have come in a pause in which the loop did not run."""
 
     def close(self) -> None:
         """Release the socket: read() returned False or raised, or the loop ends."""
-        raise NotImplementedError
 
 
 class EventLoop(LinkOwner):

@@ -6,7 +6,7 @@ import functools
 import socket
 import struct
 import termios
-from typing import Any, Callable, Deque, NamedTuple, Optional
+from typing import Any, Callable, Deque, NamedTuple, Optional, Protocol
 
 READ_LENGTH = 4096
 """Read at once from one robot: two bursts. What looks like a packet at every second byte costs 1 ms at this length,
@@ -83,20 +83,17 @@ class LinkHandler:
         raise NotImplementedError
 
 
-class LinkOwner:
+class LinkOwner(Protocol):
     """Interface of the loop that owns a link."""
 
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run call on the loop's thread, soon; from any thread."""
-        raise NotImplementedError
 
     def watch(self, link: "Link") -> None:
         """Wait for what link needs now: to be read, to be written, or both."""
-        raise NotImplementedError
 
     def close_link(self, link: "Link", reason: str) -> None:
         """Close link and tell the handler; safe to call twice."""
-        raise NotImplementedError
 
 
 class Link:
