@@ -3,7 +3,7 @@
 import itertools
 
 import pytest
-from commanded_robot import MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
+from commanded_robot import LIGHT, MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -12,6 +12,8 @@ from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 
 GATE_S = 0.050
 """The firmware drops a velocity that it reads within this time after the last one that it took."""
+
+LIGHT_PAYLOAD = b"\x01" * 16
 
 phases = st.floats(0.0, 0.051)
 networks = st.floats(0.0, 0.2)
@@ -133,3 +135,14 @@ def test_a_command_that_may_go_does_not_wait_for_the_timer_of_another():
         assert robot.peer.send_due
         robot.drive(0.1, POSITION)
         assert len(robot.writes) == written + 1
+
+
+def test_a_command_too_long_for_the_robot_is_reported_and_costs_no_other():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock)
+        for payload in (bytes(65536), LIGHT_PAYLOAD):
+            robot.bridge.commands.queue.offer(LIGHT, payload)
+        robot.send_commands("/hero_1")
+        clock.run(0.1)
+    assert len(robot.warnings) == 1 and "65536 bytes does not fit the robot's buffer" in robot.warnings[0]
+    assert [payload for _, name, payload in robot.taken if name == LIGHT] == [LIGHT_PAYLOAD]

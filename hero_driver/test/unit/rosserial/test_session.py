@@ -94,6 +94,16 @@ def test_only_the_time_request_of_a_boot_is_followed_after_200_ms():
     assert request_times_s + again_s == pytest.approx([T0 + 1.5, T0 + 2.0])
 
 
+def test_a_peer_that_only_asks_for_the_time_cannot_put_a_request_off():
+    session = open_session()
+    request_times_s = []
+    for step in range(1, 40):
+        receive(session, TIME_REQUEST, T0 + step * 0.1)
+        session.poll(T0 + step * 0.1)
+        request_times_s += [step * 0.1] * len(list_requests(session))
+    assert request_times_s == pytest.approx([0.3, 0.8, 1.3, 1.8, 2.3, 2.8, 3.3, 3.8])
+
+
 def test_undeclared_data_is_answered_by_at_most_two_requests_a_second():
     session = open_session()
     request_times_s = []
