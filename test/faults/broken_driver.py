@@ -12,7 +12,7 @@ import time
 
 from hero_driver import node
 from hero_driver.gateway import Gateway
-from hero_driver.transport import EventLoop
+from hero_driver.transport.event_loop import EventLoop
 
 PARTS = {"loop": (EventLoop, "_run_once"), "open_link": (Gateway, "open_link")}
 

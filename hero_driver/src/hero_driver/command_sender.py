@@ -8,7 +8,7 @@ import time
 
 from .peer import Peer, PeerOwner
 from .rosserial.errors import RosserialError
-from .transport import CallLater
+from .transport.event_loop import CallLater
 
 HEARD_S = 0.5
 """A robot that has stopped sending for so long gets no motion commands: it would take them late, all at once. Pauses of

@@ -28,7 +28,7 @@ from .corrections.correction_settings import CorrectionSettings, OwnWheels
 from .corrections.robot_models import HERO_PLUS, STOCK
 from .fleet.admission import AdmissionLimits
 from .rosserial.session import SessionLimits
-from .transport import Address
+from .transport.link import Address
 
 DEFAULT_PORT = 11411
 

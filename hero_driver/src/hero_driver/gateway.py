@@ -35,7 +35,8 @@ from .rosserial.session import (
     TopicDeclared,
 )
 from .stop_delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
-from .transport import THE_DRIVER_ENDS, EventLoop, Link, LinkHandler
+from .transport.event_loop import THE_DRIVER_ENDS, EventLoop
+from .transport.link import Link, LinkHandler
 
 NS_PER_S = 10**9
 

@@ -40,7 +40,8 @@ from .ros.rospy_internals import (
 )
 from .ros.worker import Worker
 from .stop_interface import StopInterface
-from .transport import EventLoop, HostNotFoundError, NoAnswerError
+from .transport.event_loop import EventLoop, NoAnswerError
+from .transport.link import HostNotFoundError
 
 NODE_NAME = "hero_driver"
 

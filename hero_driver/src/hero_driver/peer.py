@@ -13,7 +13,7 @@ from .ros.robot_bridge import RobotBridge
 from .ros.robot_commands import NO_LIGHT
 from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
-from .transport import Link
+from .transport.link import Link
 
 
 @dataclass

@@ -26,7 +26,7 @@ from .peer import Peer, PeerOwner
 from .ros.message_types import apply_aliases
 from .rosserial.errors import RosserialError
 from .rosserial.session import Topic
-from .transport import CallLater
+from .transport.event_loop import CallLater
 
 BURST_LIGHTS = 62
 """Light commands in front of the zeros that end a self-tuning: 1488 bytes. Measured: 40 of 40 tunings ended."""

@@ -16,7 +16,7 @@ from .kept_stop import KeptStop
 from .ros.log_relay import LogRelay
 from .ros.rospy_internals import find_connection, is_latched_before, list_publishers
 from .ros.worker import Worker
-from .transport import EventLoop, NoAnswerError
+from .transport.event_loop import EventLoop, NoAnswerError
 
 ANSWER_WAIT_S = 0.5
 """The thread of the sockets answers within milliseconds; a service call must not hang where it does not."""

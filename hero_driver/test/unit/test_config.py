@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hero_driver.config import PARAMETERS, DriverConfig, read_config
 from hero_driver.corrections.tick_odometry import WheelGeometry
-from hero_driver.transport import Address
+from hero_driver.transport.link import Address
 from hero_node.errors import ProgramError
 
 NUMBERS = [name for name, parameter in PARAMETERS.items() if parameter.limits]

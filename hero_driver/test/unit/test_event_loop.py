@@ -9,7 +9,9 @@ import threading
 
 import pytest
 
-from hero_driver.transport import EventLoop, LinkHandler, NoAnswerError, event_loop
+from hero_driver.transport import event_loop
+from hero_driver.transport.event_loop import EventLoop, NoAnswerError
+from hero_driver.transport.link import LinkHandler
 
 DEADLINE_S = 60.0
 

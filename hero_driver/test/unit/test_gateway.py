@@ -9,7 +9,7 @@ import pytest
 from hero_driver import gateway
 from hero_driver.config import read_config
 from hero_driver.gateway import Gateway
-from hero_driver.transport import Address
+from hero_driver.transport.link import Address
 
 sys.path.append(str(Path(__file__).parents[1] / "rostest"))
 from fake_robot import PUB, STOCK_DECLARATIONS, FakeRobot

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from hero_driver.transport import Address, Link
+from hero_driver.transport.link import Address, Link
 from hero_driver.transport.link import UNSENT_MAX
 
 

@@ -16,7 +16,8 @@ from std_msgs.msg import String
 from hero_driver.ros import raw_subscriber, rospy_internals
 from hero_driver.ros.message_types import make_raw_class
 from hero_driver.ros.raw_subscriber import MESSAGE_LENGTH_MAX, MessageStream, RawSubscriber
-from hero_driver.transport import EventLoop, LinkHandler
+from hero_driver.transport.event_loop import EventLoop
+from hero_driver.transport.link import LinkHandler
 
 DEADLINE_S = 60.0
 RAW_CLASS = make_raw_class(String)

@@ -5,7 +5,7 @@ import rospy
 
 from hero_driver.ros import services
 from hero_driver.ros.services import RobotService
-from hero_driver.transport import NoAnswerError
+from hero_driver.transport.event_loop import NoAnswerError
 
 NAME = "/hero_0/set_odom"
 TIMEOUT_S = 4.0

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from hero_driver.ros.worker import Worker
-from hero_driver.transport import CallQueue
+from hero_driver.transport.call_queue import CallQueue
 
 DEADLINE_S = 60.0
 

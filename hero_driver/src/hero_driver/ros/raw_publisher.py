@@ -11,7 +11,7 @@ import collections
 import struct
 from typing import Any, Callable, Deque, Dict, List
 
-from ..transport import CallLater
+from ..transport.event_loop import CallLater
 from .rospy_internals import NO_CONNECTIONS, open_publisher, send, unregister
 
 RETRY_S = 0.01

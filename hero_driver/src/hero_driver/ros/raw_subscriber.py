@@ -18,7 +18,7 @@ from typing import Any, Callable, FrozenSet, Optional
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
 
-from ..transport import EventLoop, Reader
+from ..transport.event_loop import EventLoop, Reader
 from .rospy_internals import (
     count_read,
     find_connection,

@@ -17,7 +17,7 @@ from ..corrections.correction_settings import CorrectionSettings
 from ..corrections.robot_corrections import TRANSFORMS, RobotCorrections
 from ..fleet.namespaces import Identity
 from ..rosserial.session import Topic, TopicKind
-from ..transport import EventLoop
+from ..transport.event_loop import EventLoop
 from . import message_types
 from .endpoints import QUEUE_LENGTH, Endpoints, Layout
 from .log_relay import LogRelay

@@ -18,7 +18,7 @@ from ..commands.service_requests import find_request_error
 from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_twist
 from ..corrections.wheel_motion import WheelMotion
 from ..robot_constants import MAX_WATCHDOG_S
-from ..transport import EventLoop
+from ..transport.event_loop import EventLoop
 from .log_relay import LogRelay
 from .raw_subscriber import RawSubscriber
 from .rospy_internals import read_caller

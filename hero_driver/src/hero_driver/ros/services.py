@@ -12,7 +12,7 @@ from typing import Callable, Deque, Optional, Tuple
 
 import rospy
 
-from ..transport import EventLoop, NoAnswerError
+from ..transport.event_loop import EventLoop, NoAnswerError
 
 Answer = Tuple[bytes, str]
 """The robot's answer, and empty text; or nothing, and why there is none."""

@@ -9,7 +9,7 @@ from typing import Callable, List
 from tf2_msgs.msg import TFMessage
 
 from ..corrections import message_layouts
-from ..transport import CallLater
+from ..transport.event_loop import CallLater
 from .message_types import make_raw_class
 from .raw_publisher import RawPublisher
 

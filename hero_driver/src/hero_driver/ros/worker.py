@@ -3,7 +3,7 @@
 import threading
 from typing import Callable
 
-from ..transport import CallQueue
+from ..transport.call_queue import CallQueue
 
 SHUTDOWN_WAIT_S = 0.5
 

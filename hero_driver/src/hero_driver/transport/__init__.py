@@ -3,21 +3,3 @@
 One thread runs the loop and calls a LinkHandler with bytes; it knows nothing of packets beyond that each one
 is written with one send. Other threads hand over work with EventLoop.call_soon() and ask(). Nothing here blocks.
 """
-
-from .call_queue import Call, CallQueue
-from .event_loop import THE_DRIVER_ENDS, CallLater, EventLoop, NoAnswerError, Reader
-from .link import Address, HostNotFoundError, Link, LinkHandler
-
-__all__ = [
-    "THE_DRIVER_ENDS",
-    "Address",
-    "Call",
-    "CallLater",
-    "CallQueue",
-    "EventLoop",
-    "HostNotFoundError",
-    "Link",
-    "LinkHandler",
-    "NoAnswerError",
-    "Reader",
-]
