@@ -14,7 +14,7 @@ import shutil
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Dict, List, Optional, Sequence, Set
+from typing import Dict, Iterator, List, Optional, Sequence, Set
 
 import rospy
 
@@ -96,34 +96,24 @@ class FleetListener:
         return RobotRow(robot, track, track.odometry.rate_hz(now_s))
 
 
-class Screen:
-    """A terminal: the table in place, and keys."""
-
-    def __init__(self, keyboard: Keyboard) -> None:
-        self._keyboard = keyboard
-
-    def __enter__(self) -> "Screen":
-        self._keyboard.__enter__()
+@contextlib.contextmanager
+def take_screen(keyboard: Keyboard) -> Iterator[None]:
+    """Read keys, and draw on the terminal's other screen, until the context ends."""
+    with keyboard:
         sys.stdout.write(ENTER_SCREEN)
-        return self
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):  # the terminal may be closed
+                sys.stdout.write(LEAVE_SCREEN)
+                sys.stdout.flush()
 
-    def __exit__(self, kind, error, traceback) -> None:  # type: ignore[no-untyped-def]
-        with contextlib.suppress(OSError):  # the terminal may be closed
-            sys.stdout.write(LEAVE_SCREEN)
-            sys.stdout.flush()
-        self._keyboard.__exit__(kind, error, traceback)
 
-    def draw(self, lines: Sequence[str]) -> None:
-        """Draw the lines over what was there, without a flicker."""
-        text = "".join(line + CLEAR_LINE_END + "\r\n" for line in lines[:-1]) + lines[-1] + CLEAR_LINE_END
-        sys.stdout.write(HOME + text + CLEAR_SCREEN_END)
-        sys.stdout.flush()
-
-    def wait_for_keys(self, program: Program, timeout_s: float) -> Optional[List[str]]:
-        """Return the keys pressed within the time; None if the terminal is closed."""
-        if program.wait_readable([self._keyboard.fileno()], timeout_s):
-            return self._keyboard.read_keys()
-        return []
+def draw(lines: Sequence[str]) -> None:
+    """Draw the lines over what was there, without a flicker."""
+    text = "".join(line + CLEAR_LINE_END + "\r\n" for line in lines[:-1]) + lines[-1] + CLEAR_LINE_END
+    sys.stdout.write(HOME + text + CLEAR_SCREEN_END)
+    sys.stdout.flush()
 
 
 class FleetProgram:
@@ -198,13 +188,15 @@ class FleetProgram:
 
     def run_screen(self, keyboard: Keyboard) -> int:
         """Show the table in place until the time is over or a key ends it."""
-        with Screen(keyboard) as screen:
+        with take_screen(keyboard):
             while self._going():
                 self._read()
                 status = self._fleet.drivers.stop_status()
-                screen.draw(self._make_screen(status))
+                draw(self._make_screen(status))
                 period_s = DRAW_PERIOD_S if status is None or status.is_final else ASKING_DRAW_PERIOD_S
-                keys = screen.wait_for_keys(self._program, min(period_s, self._seconds_left()))
+                keys: Optional[List[str]] = []
+                if self._program.wait_readable([keyboard.fileno()], min(period_s, self._seconds_left())):
+                    keys = keyboard.read_keys()  # None: the terminal is closed
                 for key in keys or ():
                     self._press(key)
                 if keys is None or "q" in keys:

@@ -131,14 +131,25 @@ def test_robots_are_listened_to_while_they_are_there_and_not_refused(world):
     assert refused.track.pose is None and not refused.is_heard
 
 
+class Keyboard:
+    """Keys of a world."""
+
+    def __init__(self, world):
+        self.read_keys = lambda: world.keys.pop(0)
+        self.fileno = lambda: 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        pass
+
+
 def run_screen(world, monkeypatch, reads, **options):
     """Run with a terminal in which these keys are read; return what was drawn."""
     drawn, world.keys = [], list(reads)
-    keyboard = SimpleNamespace(
-        fileno=lambda: 0, read_keys=lambda: world.keys.pop(0), __enter__=lambda: None, __exit__=lambda *error: None
-    )
     monkeypatch.setattr(module.sys.stdout, "write", drawn.append)
-    return world.start(**options).run_screen(keyboard), "".join(drawn)
+    return world.start(**options).run_screen(Keyboard(world)), "".join(drawn)
 
 
 def test_keys_stop_release_order_and_quit(world, monkeypatch):
@@ -172,11 +183,8 @@ def test_a_program_that_leaves_robots_driving_ends_with_an_error(world, monkeypa
 
     program._fleet.drivers.check_stop = fail
     world.keys = [["q"]]
-    keyboard = SimpleNamespace(
-        fileno=lambda: 0, read_keys=lambda: world.keys.pop(0), __enter__=lambda: None, __exit__=lambda *error: None
-    )
     with pytest.raises(ProgramError):
-        program.run_screen(keyboard)
+        program.run_screen(Keyboard(world))
 
 
 def test_a_robot_has_moved_from_half_its_body_or_a_radian_on():
