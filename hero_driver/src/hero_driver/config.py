@@ -1,7 +1,7 @@
 """The node's private parameters: read once, checked, frozen.
 
-The rooms declare those that they depend on, DriverConfig the others. From the declarations docs/driver_parameters.md and
-config/hero_driver.yaml are generated.
+The rooms declare those that they depend on, DriverConfig the others. docs/driver_parameters.md and
+config/hero_driver.yaml are generated from these declarations.
 """
 
 import dataclasses

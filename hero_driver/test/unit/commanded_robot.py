@@ -12,11 +12,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest import mock
 
-
 from hero_driver import command_sender, stop_delivery
 from hero_driver.commands.command_settings import CommandSettings
-from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
+from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.fleet.namespaces import identify
 from hero_driver.transport.event_loop import POLL_INTERVAL_S
 from hero_driver.peer import Peer

@@ -11,7 +11,6 @@ import textwrap
 from hero_driver.config import PARAMETERS
 from hero_node.parameter_list import make_list, write_default
 
-
 GROUPS = {
     "Connections": ("host", "port", "robots", "allow"),
     "Limits": ("max_*",),

@@ -4,8 +4,7 @@ import socket
 
 import pytest
 
-from hero_driver.transport.link import Address, Link
-from hero_driver.transport.link import UNSENT_MAX
+from hero_driver.transport.link import UNSENT_MAX, Address, Link
 
 
 def read_quick_acknowledge(sock):

@@ -6,7 +6,6 @@ import yaml
 
 from .yaml_text import YamlError, parse_yaml
 
-
 _Edit = Tuple[int, int, str]
 """First character that is replaced, the first one that is kept again, and the new text."""
 

@@ -13,7 +13,6 @@ from typing import (
     Deque,
     Iterator,
     List,
-    Optional,
     Protocol,
     Set,
     Tuple,

@@ -6,7 +6,7 @@ functions raise PayloadError so that the session can turn it into such an event.
 
 
 class RosserialError(ValueError):
-    """What cannot be encoded, or must not be sent to this peer; the text says why."""
+    """Something cannot be encoded, or must not be sent to this peer; the text says why."""
 
 
 class PayloadError(RosserialError):
