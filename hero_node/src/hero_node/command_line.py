@@ -12,7 +12,7 @@ import signal
 import sys
 from contextlib import suppress
 from traceback import walk_tb
-from typing import IO, Callable, NoReturn, Optional, Sequence, Type
+from typing import IO, Callable, NoReturn, Optional, Sequence, Tuple, Type
 
 from .errors import HeroError
 from .texts import make_printable
@@ -39,10 +39,11 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Names of files need not be text of the terminal's encoding.
         sys.stdout.reconfigure(errors="backslashreplace")
+    expected: Tuple[Type[Exception], ...] = (HeroError, *errors)
     status = 0
     try:
         status = main() or 0
-    except (HeroError, *errors) as error:
+    except expected as error:
         print_error(str(error) + find_line(error))
         status = FAILED
     except KeyboardInterrupt:
