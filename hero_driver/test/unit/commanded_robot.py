@@ -17,11 +17,11 @@ from hero_driver.commands.command_settings import CommandSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.fleet.namespaces import identify
-from hero_driver.transport.event_loop import POLL_INTERVAL_S
 from hero_driver.peer import Peer
 from hero_driver.ros import robot_bridge, robot_commands
 from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import Session, SessionLimits
+from hero_driver.transport.event_loop import POLL_INTERVAL_S
 
 sys.path.append(str(Path(__file__).parents[1] / "rostest"))
 from fake_motors import FakeMotors
