@@ -1,8 +1,9 @@
-"""A peer that misbehaves for a while, from its own address, and reconnects when it is disconnected.
+"""Peers that misbehave for a while, one after the other, and reconnect when they are disconnected.
 
-bad_peer.py KIND --port PORT [--source ADDRESS] [--victim N]
-It prints a line when it is first connected. It ends at SIGINT with one line of JSON: how often it connected, was thrown
-out, and how many bytes it sent.
+bad_peer.py --port PORT [--host HOST] [--victim N]
+A line on stdin, `KIND ADDRESS`, starts one, with an address and a process of its own; it is answered when that is first
+connected. The next line ends it, and is answered with one line of JSON: how often it connected, was thrown out, and how
+many bytes it sent.
 """
 
 import argparse
@@ -15,6 +16,7 @@ import select
 import signal
 import socket
 import struct
+import sys
 import time
 
 import emulated_swarm
@@ -47,9 +49,9 @@ def make_burst(number):
 class Peer:
     """Connections from one address until end()."""
 
-    def __init__(self, options):
+    def __init__(self, options, source):
         self.address = (options.host, options.port)
-        self.source = options.source
+        self.source = source
         self.victim = options.victim
         self.is_over = False
         self.connects = self.thrown_out = self.refused = self.sent_length = 0
@@ -289,23 +291,32 @@ KINDS = {
 }
 
 
-def main():
-    """Run from the command line."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("--host", default="127.0.0.1")
-    parser.add_argument("--port", type=int, required=True)
-    parser.add_argument("--source", default="127.0.0.66")
-    parser.add_argument("--victim", type=int, default=0)
-    peer = Peer(parser.parse_args())
-    kind = KINDS[parser.parse_args().kind]
+def misbehave(kind, peer):
+    """Be a peer of a kind until SIGINT; end this process."""
     signal.signal(signal.SIGINT, lambda *_: peer.end())
     with contextlib.suppress(OSError):
-        kind(peer)
+        KINDS[kind](peer)
     names = ("connects", "thrown_out", "refused", "sent_length")
     print(json.dumps({name: getattr(peer, name) for name in names}), flush=True)
     # Its sockets end with it, without a word.
     os._exit(0)
+
+
+def main():
+    """Run from the command line."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--port", type=int, required=True)
+    parser.add_argument("--victim", type=int, default=0)
+    options = parser.parse_args()
+    for line in sys.stdin:
+        kind, source = line.split()
+        pid = os.fork()
+        if pid == 0:
+            misbehave(kind, Peer(options, source))
+        sys.stdin.readline()
+        os.kill(pid, signal.SIGINT)
+        os.waitpid(pid, 0)
 
 
 if __name__ == "__main__":

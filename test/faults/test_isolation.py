@@ -47,10 +47,11 @@ BAD_PEERS = {
 
 
 class Scene:
-    """A driver, twenty good robots, a listener to all of them and a commander, each a process of its own."""
+    """A driver, twenty good robots, a listener to all of them, a commander and bad peers, each a process of its own."""
 
-    def __init__(self, driver, listener, swarm, commander):
+    def __init__(self, driver, peers, listener, swarm, commander):
         self.driver = driver
+        self.peers = peers
         self.listener = listener
         self.swarm = swarm
         self.commander = commander
@@ -76,9 +77,10 @@ def scene(master):
     robots = ["--count", str(GOOD_ROBOTS)]
     with DriverProcess({"grace_s": 1.0}, name="isolating_driver") as driver:
         port = str(driver.address[1])
-        with start_python("listener.py", *robots) as listener, Program(
-            sys.executable, str(BENCH / "ros_load.py"), "command", *robots
-        ) as commander:
+        path = {"PYTHONPATH": ":".join(sys.path)}
+        with start_python("bad_peer.py", "--port", port, environment=path) as peers, start_python(
+            "listener.py", *robots
+        ) as listener, Program(sys.executable, str(BENCH / "ros_load.py"), "command", *robots) as commander:
             listener.read()
             wait_until_commanded(GOOD_ROBOTS)
             with Program(
@@ -90,7 +92,7 @@ def scene(master):
                 "100000",
                 *robots,
             ) as swarm:
-                started = Scene(driver, listener, swarm, commander)
+                started = Scene(driver, peers, listener, swarm, commander)
                 wait_for(lambda: not listener.ask("silent"), "all robots at the listener")
                 wait_for(
                     lambda: count_robots_names(driver) == EMULATED_NAMES * GOOD_ROBOTS,
@@ -132,16 +134,11 @@ def test_a_misbehaving_peer_costs_other_robots_no_message(scene, effort, record,
     before = count_holdings(scene.driver)
     scene.end_window()
     # Each from an address of its own: what one has used up of its allowance does not tame the next.
-    source = "127.0.0.%d" % (100 + list(BAD_PEERS).index(kind))
-    arguments = ["--port", scene.driver.address[1], "--source", source]
-    with start_python(
-        "bad_peer.py", kind, *arguments, environment={"PYTHONPATH": ":".join(sys.path)}
-    ) as peer:
-        peer.read()
-        scene.hear(seconds)
-        joined_s = join_and_leave(scene.driver)
-        worst = count_holdings(scene.driver).describe_growth(before)
-        did = peer.interrupt()
+    scene.peers.ask("%s 127.0.0.%d" % (kind, 100 + list(BAD_PEERS).index(kind)))
+    scene.hear(seconds)
+    joined_s = join_and_leave(scene.driver)
+    worst = count_holdings(scene.driver).describe_growth(before)
+    did = scene.peers.ask("end")
     window = scene.end_window()
     assert did["connects"], did
     assert (window["silent"], window["lost"], window["disordered"]) == ([], 0, 0), (window, did)
