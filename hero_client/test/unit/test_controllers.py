@@ -156,7 +156,8 @@ def test_only_what_the_body_would_touch_is_in_its_path():
     assert find_in_path(rear, backward=True)[1] == pytest.approx((0.05, -0.75 * math.pi))
     # 45 degrees aside: touched only if nearer than the body is wide; to the side: never.
     assert find_in_path([INF, 0.06, 0.04] + [INF] * 5) == (INF, None)
-    assert find_in_path([INF, 0.0] + [INF] * 6)[0] < 0.02
+    assert find_in_path([INF, 0.0] + [INF] * 6)[0] == pytest.approx(0.017, abs=0.001)
+    assert find_in_path([0.0] + [INF] * 7)[0] == pytest.approx(0.01)
 
 
 def cast_in_box(pose, half_m):

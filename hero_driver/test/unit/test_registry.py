@@ -340,3 +340,14 @@ def test_an_id_is_kept_for_a_robot_that_was_heard_after_its_duplicate_came():
         record.last_heard_s = heard_s
         assert fleet.is_reserved(record, "10.0.0.2") == is_reserved
         assert not fleet.is_reserved(record, "10.0.0.3")
+
+
+def test_a_robot_may_return_to_an_address_at_which_it_was_refused_once():
+    fleet, wifi, other = make_fleet(), "10.0.0.1", "10.0.0.2"
+    identify(fleet, 1, T0, host=wifi)
+    # Its old connection was heard a moment ago, and never again.
+    assert identify(fleet, 2, T0 + 1.0, host=other).verdict is Verdict.REFUSED
+    assert identify(fleet, 3, T0 + 4.0, host=other).verdict is Verdict.TOOK_OVER
+    for number, host in ((4, wifi), (5, other)):
+        fleet.leave(number - 1, "switched off", T0 + 10.0 * number)
+        assert identify(fleet, number, T0 + 10.0 * number + 1.0, host=host).verdict is Verdict.RETURNED, host

@@ -16,11 +16,12 @@ from hero_node.geometry import wrap_angle
 
 
 class Stage:
-    """A robot that turns delay_s after a command, and whose odometry of every 10 ms arrives 15 ms late."""
+    """A robot that turns delay_s after a command; its odometry of every 10 ms has noise, and arrives 15 ms late."""
 
     def __init__(self, monkeypatch, delay_s=0.1, yaw_rad=3.1, ends_s=1e9):
         self.now_s, self.delay_s, self.ends_s = 100.0, delay_s, ends_s
         self.yaw_rad, self.commands, self.stopped, self.receive = yaw_rad, [], 0, None
+        self.noise_rad = 0.003
         rospy = measure_delay.rospy
         monkeypatch.setattr(rospy, "get_time", lambda: self.now_s)
         monkeypatch.setattr(rospy, "Subscriber", self.subscribe)
@@ -45,7 +46,9 @@ class Stage:
             message = Odometry()
             message.header.stamp = Time.from_sec(self.now_s - 0.015)
             orientation = message.pose.pose.orientation
-            orientation.z, orientation.w = math.sin(self.yaw_rad / 2.0), math.cos(self.yaw_rad / 2.0)
+            self.noise_rad = -self.noise_rad
+            half_rad = (self.yaw_rad + self.noise_rad) / 2.0
+            orientation.z, orientation.w = math.sin(half_rad), math.cos(half_rad)
             self.receive(message)
         return self.now_s < self.ends_s
 
@@ -54,7 +57,7 @@ class Stage:
         return measure_delay.measure(self, robot, turns)
 
 
-@pytest.mark.parametrize("yaw_rad", [3.1, -3.1, 0.0])
+@pytest.mark.parametrize("yaw_rad", [math.pi, -3.1, 0.0])
 def test_delays_of_messages_and_motions_are_measured_to_both_sides(monkeypatch, yaw_rad):
     stage = Stage(monkeypatch, yaw_rad=yaw_rad)
     found = stage.measure(4)

@@ -103,6 +103,8 @@ class ScriptedMonitor:
     def _receive(self, page, text):
         request = json.loads(text)
         self.requests.append(request)
+        if self.is_silent:
+            return
         if request["do"] in ("stop", "release"):
             stopped = request["do"] == "stop"
             status = {"level": "info", "text": "stopped, all wheels at rest", "is_final": True, "reads": 0}

@@ -266,6 +266,14 @@ class TouchTest(unittest.TestCase):
         self.monitor.is_silent = False
         self.page.wait_for_text("#ready", "3 of 3 ready")
 
+    def test_who_presses_stop_all_again_and_again_reads_that_nothing_answers(self):
+        self.silence_monitor()
+        for _ in range(4):
+            self.tap(self.find("stop"))
+            self.advance(500)
+        self.assertEqual(self.page.banner(), ("error", "NOT STOPPED: the monitor does not answer"))
+        self.assertEqual(len(self.monitor.requested("stop")), 4)
+
     def test_a_page_that_was_suspended_stops_driving_and_knows_nothing(self):
         self.page.choose("hero_0")
         button = self.page.find("#pad [aria-label='forward']").rect

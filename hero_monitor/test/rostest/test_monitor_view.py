@@ -32,6 +32,18 @@ import("/map/labels.js").then(({ placeLabels }) => {
   done([boxes.filter(Boolean).length - 1, overlaps.length, boxes[7] !== null]);
 });
 """
+MEASURE_TURNS = """
+const done = arguments[0];
+import("/history.js").then(({ History, QUANTITIES }) => {
+  const measure = (lastMs, lastX) => {
+    const history = new History();
+    history.steps = [[0, 0, 3100], [500, 0, 3130], [lastMs, lastX, -3123]].map(([ms, x, yaw]) =>
+      ({ ms, samples: { hero_0: { x, y: 0, yaw, nearest: null, odom: 29 } } }));
+    return history.valueAt(2, "hero_0", QUANTITIES.turn);
+  };
+  done([measure(1000, 0), measure(3500, 0), measure(3501, 0), measure(1000, 500), measure(1000, 501)]);
+});
+"""
 READ_PIXELS = """
 const canvas = document.getElementById("canvas"), ratio = devicePixelRatio;
 const { width, height } = canvas.getBoundingClientRect();
@@ -126,6 +138,13 @@ class ViewTest(unittest.TestCase):
         self.page.choose("hero_1")
         self.assertFalse(self.page.find("#summary").is_displayed())
         self.assertEqual(self.page.run(count), 1)
+
+    def test_a_turn_over_pi_is_measured_and_none_over_a_gap_or_a_jump(self):
+        usual, slow, gap, jump, beyond = self.page.browser.execute_async_script(MEASURE_TURNS)
+        self.assertAlmostEqual(usual, 0.060, delta=0.001)
+        self.assertAlmostEqual(slow, 0.060 / 3.5, delta=0.001)
+        self.assertAlmostEqual(jump, usual)
+        self.assertEqual((gap, beyond), (None, None))
 
     def test_the_table_hides_details_until_they_are_asked_for(self):
         def heads():

@@ -112,6 +112,15 @@ def test_a_topic_with_another_type_is_another_channel(hub):
     assert reader.channel("/flag")["schemaName"] == POSE.name
 
 
+def test_a_topic_that_comes_back_has_no_latched_message_of_its_former_type(hub):
+    first, later = Reader(hub), Reader(hub)
+    first.subscribe(1, "/flag")
+    hub.deliver([make_message("/flag", b"a flag", latched_by="/a")])
+    hub.update_topics({"/pose": POSE, "/flag": POSE})
+    later.subscribe(2, "/flag")
+    assert later.take() == []
+
+
 def test_a_later_client_gets_latched_messages_too(hub):
     first, second = Reader(hub), Reader(hub)
     first.subscribe(1, "/pose")

@@ -79,6 +79,14 @@ def test_a_header_in_two_pieces_is_served_once_it_is_whole(server, length):
     assert server.take()[2] == HEADER
 
 
+@pytest.mark.parametrize("length", [3, 5, len(HEADER) - 1])
+def test_a_header_that_ends_before_its_length_is_not_served(server, length):
+    server.open()
+    client = server.connect(HEADER[:length])
+    client.shutdown(socket.SHUT_WR)
+    assert is_closed(client) and server.served.empty()
+
+
 def test_a_hundred_waiting_in_the_middle_delay_no_other(server):
     server.open()
     for _ in range(100):

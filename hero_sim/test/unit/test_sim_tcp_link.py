@@ -138,6 +138,23 @@ def test_an_abandoned_connection_gets_no_end(driver):
     driver.link.abandon(0)
 
 
+def test_of_too_many_abandoned_connections_the_first_ends(driver, monkeypatch):
+    monkeypatch.setattr(tcp_link, "_MAX_ABANDONED", 1)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        driver.link._address = listener.getsockname()
+        driver.link.abandon(0)
+        driver.link.connect(0)
+        later, _ = listener.accept()
+    with later:
+        driver.poll_until(lambda: driver.events.seen.count("made") == 2)
+        driver.link.abandon(0)
+        driver.socket.settimeout(60.0)
+        assert driver.socket.recv(1) == b""
+        later.settimeout(0.05)
+        with pytest.raises(socket.timeout):
+            later.recv(1)
+
+
 def test_robots_connect_from_addresses_of_their_own():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -64,6 +64,19 @@ def test_a_robot_without_a_fresh_pose_is_stopped_and_ignored():
     assert not linear_m_s[0, 1:].any() and not angular_rad_s[0, 1:].any()
 
 
+def test_robots_of_old_poses_are_kept_apart_where_they_have_driven_to_since():
+    age_s, far_m = 0.4, np.array([[(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]])
+    linear_m_s, angular_rad_s = np.array([[0.1, 0.1]]), np.array([[1.0, -1.0]])
+    old = np.array([[(0.0, 0.0, 0.0), (0.22, 0.02, math.pi)]])
+    arcs_rad = old[..., 2] + 0.5 * age_s * angular_rad_s
+    moved = age_s * np.stack((linear_m_s * np.cos(arcs_rad), linear_m_s * np.sin(arcs_rad), angular_rad_s), axis=-1)
+    keep_apart = SafetyFilter(ROBOTS)
+    keep_apart(far_m, linear_m_s, angular_rad_s)
+    found = keep_apart(old, linear_m_s, angular_rad_s, np.full((1, 2), age_s))
+    assert found[0] == pytest.approx(SafetyFilter(ROBOTS)(old + moved, linear_m_s, angular_rad_s)[0], abs=0.005)
+    assert np.abs(found[0] - linear_m_s).max() > 0.1, "or they would not have met"
+
+
 def test_a_speed_that_was_no_number_once_disturbs_nobody_later():
     poses = np.array([[(0.0, 0.0, 0.0), (0.4, 0.0, 0.0)]])
     speeds, ages_s = np.full((1, 2), 0.1), np.full((1, 2), 0.1)

@@ -115,6 +115,7 @@ def test_the_firewall_commands_name_the_interface_and_the_port():
         ([LAN, WIFI], None, ["0.0.0.0"], OK, "10.42.0.1:11411"),
         ([LAN, WIFI], None, ["127.0.0.1"], WARN, "open on 127.0.0.1 only"),
         ([LAN, WIFI], None, ["192.168.7.2"], WARN, "connect to one of these, port 11411: 192.168.7.2 (eth0)"),
+        ([LAN, WIFI], None, ["127.0.0.1", "10.42.0.1"], OK, "10.42.0.1:11411"),
         ([LAN, WIFI], None, ["::"], OK, "192.168.7.2 (eth0), 10.42.0.1 (wlan0)"),
         ([LAN], None, [], WARN, "192.168.7.2 (eth0)"),
         ([], None, [], WARN, "no network"),
