@@ -115,5 +115,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> List[str]:
-    """Return the names that an interactive shell completes."""
     return __all__

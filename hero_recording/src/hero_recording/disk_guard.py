@@ -4,7 +4,7 @@ import os
 import shutil
 from typing import Optional
 
-from .errors import RecordingError
+from .errors import RecordingError, explain_write_errors
 
 MB = 10**6
 
@@ -19,13 +19,9 @@ def prepare_folder(folder: str, limit_mb: float) -> float:
 
     Raises: RecordingError if it cannot be created or written to, or less than the limit is free.
     """
-    try:
+    with explain_write_errors(folder):
         os.makedirs(folder, exist_ok=True)
         free_mb = read_free_mb(folder)
-    except OSError as error:
-        raise RecordingError(
-            "%s cannot be created or read: %s; choose another folder" % (folder, error.strerror)
-        ) from error
     if not os.access(folder, os.W_OK | os.X_OK):
         raise RecordingError("%s is not writable; choose another folder" % folder)
     if free_mb < limit_mb:

@@ -10,7 +10,6 @@ class TeleopOutput:
     """Lets motions pass, and one stop after a motion: then other programs may drive the robots. Pure."""
 
     def __init__(self) -> None:
-        """Start silent."""
         self._is_moving = False
 
     def demand_stop(self) -> None:
@@ -27,7 +26,6 @@ class PauseDetector:
     """Notices that a program did not run: input that waited meanwhile is old. Pure."""
 
     def __init__(self, now_s: float) -> None:
-        """Begin to watch."""
         self._ran_s = now_s
 
     def is_paused(self, now_s: float) -> bool:

@@ -21,7 +21,6 @@ class CommonFrame:
     """
 
     def __init__(self, frame: str) -> None:
-        """Know no pose yet."""
         self.frame = frame
         self.missing: Dict[str, Optional[str]] = {}
 

@@ -18,7 +18,6 @@ class Light:
     """The light of one robot."""
 
     def __init__(self, link: RobotLink) -> None:
-        """Be the light of the robot at link."""
         self._link = link
         self._shown = COLORS["off"]
         self._motion: Optional[BackgroundMotion] = None

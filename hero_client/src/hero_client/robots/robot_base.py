@@ -47,7 +47,6 @@ class BaseRobot(Group):
     """
 
     def __init__(self, robot_id: int, link: RobotLink) -> None:
-        """Be the robot with this number at link."""
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
         self.namespace = "/" + self.name

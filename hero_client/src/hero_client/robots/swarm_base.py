@@ -40,7 +40,6 @@ class BaseSwarm(Group, Generic[AnyRobot]):
     """
 
     def __init__(self, robots: Sequence[AnyRobot], clock: Clock) -> None:
-        """Hold these robots, which live in the time of clock."""
         self.robots = list(robots)
         self._clock = clock
         self._members = self.robots

@@ -113,7 +113,7 @@ def read_rows(topic: str, message_type: str, content: Any, time_s: float) -> Lis
     if found is None:
         sources = [(robot.id, "status", robot) for robot in content.robots if robot.id >= 0]
     else:
-        sources = [(found.robot_id, found.kind, content)]
+        sources = [(*found, content)]
     return [
         (robot_id, kind, (time_s, *(read(source) for read in TABLES[kind].values())))
         for robot_id, kind, source in sources

@@ -4,7 +4,7 @@ The patterns are regular expressions: robots that join later are recorded too.
 """
 
 import re
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 ROBOT_TOPICS = {
     "odom": ("odometry", "nav_msgs/Odometry"),
@@ -69,13 +69,6 @@ class RawMessage(NamedTuple):
     """When the recorder received it, since 1970."""
 
 
-class RobotTopic(NamedTuple):
-    """A topic of one robot."""
-
-    robot_id: int
-    kind: str
-
-
 def make_patterns(robot_ids: Optional[Sequence[int]], with_raw: bool, extra: Sequence[str]) -> List[str]:
     """Return the regular expressions of the topics to record; robot_ids None: all robots, including later ones."""
     robots = r"[0-9]+" if robot_ids is None else "(%s)" % "|".join(map(str, robot_ids))
@@ -83,13 +76,13 @@ def make_patterns(robot_ids: Optional[Sequence[int]], with_raw: bool, extra: Seq
     return ["/hero_%s/(%s)" % (robots, "|".join(names)), *SHARED_PATTERNS, *extra]
 
 
-def find_robot_topic(topic: str, message_type: str) -> Optional[RobotTopic]:
-    """Return the robot and the kind of a topic; None if it is no robot's, or of another type."""
+def find_robot_topic(topic: str, message_type: str) -> Optional[Tuple[int, str]]:
+    """Return the id of the robot and the kind of a topic; None if it is no robot's, or of another type."""
     match = _ROBOT_TOPIC.fullmatch(topic)
     if match is None:
         return None
     kind, expected_type = ROBOT_TOPICS.get(match.group(2), ("", ""))
-    return RobotTopic(int(match.group(1)), kind) if kind and message_type == expected_type else None
+    return (int(match.group(1)), kind) if kind and message_type == expected_type else None
 
 
 def is_fleet_topic(topic: str, message_type: str) -> bool:

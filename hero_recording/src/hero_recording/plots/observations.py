@@ -106,7 +106,8 @@ class Observations:
         """Return whether receive() uses a topic."""
         found = find_robot_topic(topic, message_type)
         if found is not None:
-            return found.kind in KINDS and self._wants_robot(found.robot_id)
+            robot_id, kind = found
+            return kind in KINDS and self._wants_robot(robot_id)
         return (
             is_fleet_topic(topic, message_type)
             or (topic == STATIC_TRANSFORMS_TOPIC and message_type in TRANSFORMS_TYPES)
