@@ -64,7 +64,7 @@ def test_a_robot_without_a_fresh_pose_is_stopped_and_ignored():
     assert not linear_m_s[0, 1:].any() and not angular_rad_s[0, 1:].any()
 
 
-def test_robots_of_old_poses_are_kept_apart_where_they_have_driven_to_since():
+def test_robots_of_old_poses_are_kept_apart_where_they_have_driven_to():
     age_s, far_m = 0.4, np.array([[(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]])
     linear_m_s, angular_rad_s = np.array([[0.1, 0.1]]), np.array([[1.0, -1.0]])
     old = np.array([[(0.0, 0.0, 0.0), (0.22, 0.02, math.pi)]])
