@@ -6,7 +6,7 @@ reduced to what differs from its defaults.
 """
 
 from colorsys import hls_to_rgb
-from typing import Any, Collection, Dict, List, Sequence, Tuple
+from typing import Any, Collection, Dict, List, Mapping, Sequence, Tuple
 
 import yaml
 
@@ -21,6 +21,9 @@ ABOVE_PIXELS_PER_M = 300
 PLUS_DESCRIPTION = "hero_plus_description"
 """Parameter that holds the URDF of HeRo+."""
 
+MARKERS = 10000
+"""Single markers that wait for their transform; RViz drops the oldest, of walls for good."""
+
 ORBITS = {"orbit": (2.6, 1.0, 4.71, 0.0), "close": (0.27, 0.45, 0.6, 0.02)}
 """Distance (m), pitch and yaw (rad) of the camera, height of the focal point above the fixed frame (m)."""
 
@@ -33,112 +36,80 @@ def color_of(robot_id: int) -> Tuple[float, float, float]:
     return hls_to_rgb((robot_id * 137.508 + 24.0) / 360.0, 0.42, 0.7)
 
 
+def make_display(kind: str, name: str, settings: Mapping[str, Any], enabled: bool = True) -> Dict[str, Any]:
+    """Return a display of one of RViz's own kinds."""
+    return {"Class": "rviz/" + kind, "Name": name, "Enabled": enabled, **settings}
+
+
 def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
     """Return the displays of one robot: model, path by odometry, proximity, and of a HeRo+ the distance ahead."""
     color = "; ".join("%d" % (255 * part) for part in color_of(int(name.rpartition("_")[2])))
-    distance = {"Class": "rviz/Range", "Name": name + " distance", "Enabled": True, "Topic": "/%s/range" % name}
+    model = {
+        "Robot Description": PLUS_DESCRIPTION if is_plus else "robot_description",
+        "TF Prefix": name,
+        "Update Interval": 0,
+    }
+    path = {
+        "Topic": "/%s/odom" % name,
+        "Unreliable": False,
+        "Queue Size": 100,  # of slow graphics, which draw a few times a second
+        "Keep": 300,
+        "Position Tolerance": 0.02,
+        "Angle Tolerance": 7.0,
+        "Covariance": {"Value": False},
+        # Without heads, each as long as the way to the next: a line.
+        "Shape": make_arrow(color, (0.025, 0.0025), (0.0001, 0.0001)),
+    }
+    proximity = {
+        "Topic": "/%s/proximity" % name,
+        "Style": "Spheres",
+        "Size (m)": 0.012,
+        "Color Transformer": "FlatColor",
+        "Color": color,
+        "Decay Time": 0,
+    }
+    distance = {"Topic": "/%s/range" % name, "Color": color, "Alpha": 0.3}
     return [
-        *([{**distance, "Color": color, "Alpha": 0.3}] if is_plus else []),
-        {
-            "Class": "rviz/RobotModel",
-            "Name": name,
-            "Enabled": True,
-            "Robot Description": PLUS_DESCRIPTION if is_plus else "robot_description",
-            "TF Prefix": name,
-            "Update Interval": 0,
-        },
-        {
-            "Class": "rviz/Odometry",
-            "Name": name + " path",
-            "Enabled": True,
-            "Topic": "/%s/odom" % name,
-            "Unreliable": False,
-            "Queue Size": 100,  # of slow graphics, which draw a few times a second
-            "Keep": 300,
-            "Position Tolerance": 0.02,
-            "Angle Tolerance": 7.0,
-            "Covariance": {"Value": False},
-            # Arrows without heads, each as long as the way to the next: a line.
-            "Shape": {
-                "Value": "Arrow",
-                "Color": color,
-                "Alpha": 0.8,
-                "Shaft Length": 0.025,
-                "Shaft Radius": 0.0025,
-                "Head Length": 0.0001,
-                "Head Radius": 0.0001,
-            },
-        },
-        {
-            "Class": "rviz/LaserScan",
-            "Name": name + " proximity",
-            "Enabled": True,
-            "Topic": "/%s/proximity" % name,
-            "Style": "Spheres",
-            "Size (m)": 0.012,
-            "Color Transformer": "FlatColor",
-            "Color": color,
-            "Decay Time": 0,
-        },
+        *([make_display("Range", name + " distance", distance)] if is_plus else []),
+        make_display("RobotModel", name, model),
+        make_display("Odometry", name + " path", path),
+        make_display("LaserScan", name + " proximity", proximity),
     ]
+
+
+def make_arrow(color: str, shaft_m: Tuple[float, float], head_m: Tuple[float, float]) -> Dict[str, Any]:
+    """Return the shape of an Odometry display; shaft_m, head_m: length and radius."""
+    return {
+        "Value": "Arrow",
+        "Color": color,
+        "Alpha": 0.8,
+        **dict(zip(("Shaft Length", "Shaft Radius", "Head Length", "Head Radius"), shaft_m + head_m)),
+    }
 
 
 def make_ground_truth_display(name: str) -> Dict[str, Any]:
     """Return the display of a simulated robot's ground truth: an arrow above the model."""
-    return {
-        "Class": "rviz/Odometry",
-        "Name": name + " ground truth",
-        "Enabled": True,
+    settings = {
         "Topic": "/%s/ground_truth" % name,
         "Keep": 1,
         "Position Tolerance": 0,
         "Angle Tolerance": 0,
         "Covariance": {"Value": False},
-        "Shape": {
-            "Value": "Arrow",
-            "Color": "60; 60; 60",
-            "Alpha": 0.8,
-            "Shaft Length": 0.045,
-            "Shaft Radius": 0.002,
-            "Head Length": 0.015,
-            "Head Radius": 0.007,
-        },
+        "Shape": make_arrow("60; 60; 60", (0.045, 0.002), (0.015, 0.007)),
     }
+    return make_display("Odometry", name + " ground truth", settings)
 
 
-def make_localization_displays(names: Sequence[str]) -> List[Dict[str, Any]]:
-    """Return the displays of what hero_localization publishes: occupancy grid, and poses with their errors."""
-    poses = [
-        {
-            "Class": "rviz/PoseWithCovariance",
-            "Name": name + " pose",
-            "Enabled": True,
-            "Topic": "/%s/pose" % name,
-            "Shape": "Axes",
-            "Axes Length": 0.06,
-            "Axes Radius": 0.003,
-            "Covariance": {"Value": True, "Orientation": {"Value": False}, "Position": {"Value": True, "Scale": 3}},
-        }
-        for name in names
-    ]
-    grid = {"Class": "rviz/Map", "Name": "occupancy grid", "Enabled": True, "Topic": "/map", "Alpha": 0.6}
-    return [grid, *poses]
-
-
-def make_picture_display() -> Dict[str, Any]:
-    """Return the display of the overhead camera's image, which RViz enables even if its file says no."""
-    return {"Class": "rviz/Image", "Name": "camera's image", "Enabled": True, "Image Topic": "/track/picture"}
-
-
-def make_marker_display(name: str, topic: str) -> Dict[str, Any]:
-    """Return a display of a visualization_msgs/MarkerArray."""
-    return {
-        "Class": "rviz/MarkerArray",
-        "Name": name,
-        "Enabled": True,
-        "Marker Topic": topic,
-        "Queue Size": 10000,  # single markers that wait for their transform; RViz drops the oldest, of walls for good
+def make_pose_display(name: str) -> Dict[str, Any]:
+    """Return the display of a robot's pose by hero_localization, with its error."""
+    settings = {
+        "Topic": "/%s/pose" % name,
+        "Shape": "Axes",
+        "Axes Length": 0.06,
+        "Axes Radius": 0.003,
+        "Covariance": {"Value": True, "Orientation": {"Value": False}, "Position": {"Value": True, "Scale": 3}},
     }
+    return make_display("PoseWithCovariance", name + " pose", settings)
 
 
 def make_view(view: str) -> Dict[str, Any]:
@@ -174,42 +145,26 @@ def make_config(
 
     view: one of FRAMES, which holds the fixed frame if none is given; picture: with that of the overhead camera.
     """
-    displays: List[Dict[str, Any]] = [
-        {
-            "Class": "rviz/Grid",
-            "Name": "Grid",
-            "Enabled": True,
-            "Cell Size": 0.1,
-            "Plane Cell Count": 40,
-            "Color": "200; 200; 200",
-            "Alpha": 0.5,
-        },
-        make_marker_display("arena (simulated)", "/hero_sim/arena"),
-        make_marker_display("robots of a replay", "/hero_sim/replay"),
-        make_marker_display("objects (simulated)", "/hero_sim/object_markers"),
-        make_marker_display("names, rings, lights", LIGHTS_TOPIC),
-        make_marker_display("selected robot", CHOICE_TOPIC),
-        make_marker_display("swarm behavior", "/behavior/markers"),
-    ]
+    grid = {"Cell Size": 0.1, "Plane Cell Count": 40, "Color": "200; 200; 200", "Alpha": 0.5}
+    displays = [make_display("Grid", "Grid", grid)]
+    for name, topic in (
+        ("arena (simulated)", "/hero_sim/arena"),
+        ("robots of a replay", "/hero_sim/replay"),
+        ("objects (simulated)", "/hero_sim/object_markers"),
+        ("names, rings, lights", LIGHTS_TOPIC),
+        ("selected robot", CHOICE_TOPIC),
+        ("swarm behavior", "/behavior/markers"),
+    ):
+        displays.append(make_display("MarkerArray", name, {"Marker Topic": topic, "Queue Size": MARKERS}))
     for name in names:
         displays += make_robot_displays(name, name in hero_plus)
-    displays.append(
-        {
-            "Class": "rviz/Group",
-            "Name": "ground truth (simulated)",
-            "Enabled": True,
-            "Displays": [make_ground_truth_display(name) for name in names],
-        }
-    )
-    displays.append(
-        {
-            "Class": "rviz/Group",
-            "Name": "localization",
-            "Enabled": view == "map",
-            "Displays": make_localization_displays(names),
-        }
-    )
-    displays += [make_picture_display()] if picture else []
+    ground_truths = [make_ground_truth_display(name) for name in names]
+    displays.append(make_display("Group", "ground truth (simulated)", {"Displays": ground_truths}))
+    localization = [make_display("Map", "occupancy grid", {"Topic": "/map", "Alpha": 0.6})]
+    localization += [make_pose_display(name) for name in names]
+    displays.append(make_display("Group", "localization", {"Displays": localization}, enabled=view == "map"))
+    if picture:  # RViz enables an image even if its file says no
+        displays.append(make_display("Image", "camera's image", {"Image Topic": "/track/picture"}))
     config = {
         "Panels": [
             {"Class": "rviz/Displays", "Name": "Displays"},

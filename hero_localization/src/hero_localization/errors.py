@@ -6,7 +6,7 @@ class LocalizationError(Exception):
 
 
 class DetectorError(LocalizationError):
-    """A detector that is not installed, or does not know the family."""
+    """A detector that is not installed, or has ended."""
 
 
 class CalibrationError(LocalizationError):

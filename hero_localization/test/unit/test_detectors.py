@@ -110,20 +110,6 @@ def test_center_is_where_the_diagonals_cross():
     assert tag.side_px == pytest.approx(math.sqrt((10.0 + 30.0) / 2.0 * 30.0)), "the area of a trapezium"
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"backend": "zbar"}, "zbar.*apriltag, aruco"),
-        ({"family": "25h9"}, "25h9.*16h5, 36h11"),
-        ({"decimate": 0.5}, "decimation 0.5"),
-        ({"decimate": float("nan")}, "decimation nan"),
-    ],
-)
-def test_wrong_options_of_a_detector_are_named(given, words):
-    with pytest.raises(DetectorError, match=words):
-        create_detector(**given)
-
-
 def test_default_detector_is_installed():
     assert [tag.tag_id for tag in create_detector().detect(picture(5))] == [5]
 

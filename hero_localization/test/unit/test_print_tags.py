@@ -115,7 +115,6 @@ def test_file_is_written_with_all_pages_and_told(arguments, pages, told, tmp_pat
     ("arguments", "words"),
     [
         ([], "nothing to print"),
-        (["--robots", "3", "--family", "25h9"], "--family 25h9: known are"),
         (["--robots", "30", "--family", "16h5"], "tag 30: family 16h5 has 0 to 29"),
         (["--robots", "3", "--size", "48"], "--size 48: it must be from 5 to 45.9 mm"),
         (["--robots", "3", "--size", "nan"], "--size nan"),
@@ -135,10 +134,13 @@ def test_wrong_options_are_named(arguments, words):
         print_tags.run(print_tags.parse_options(arguments))
 
 
-def test_ids_must_be_named(capsys):
+@pytest.mark.parametrize(
+    ("arguments", "words"), [(["--robots", "all"], "name the ids"), (["--family", "25h9"], "'16h5', '36h11'")]
+)
+def test_ids_and_a_known_family_must_be_named(arguments, words, capsys):
     with pytest.raises(SystemExit):
-        print_tags.parse_options(["--robots", "all"])
-    assert "name the ids" in capsys.readouterr().err
+        print_tags.parse_options(arguments)
+    assert words in capsys.readouterr().err
 
 
 def draw(sheet, x_mm=100.0, y_mm=150.0, family="36h11"):

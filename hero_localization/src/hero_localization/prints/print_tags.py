@@ -17,7 +17,7 @@ from hero_node.parameters import robot_ids_option
 from hero_node.safe_file import replace_file
 
 from ..errors import LocalizationError
-from .tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
+from .tag_images import DEFAULT_SIZE_M, FAMILIES, REFERENCE_SIZE_M, draw_tag
 
 PAPERS_MM = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 EDGE_MM = 12.0
@@ -55,9 +55,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--robots", type=_read_ids, default=(), metavar="IDS", help=text)
     text = "squares for the floor, e.g. 100-103"
     parser.add_argument("--references", type=_read_ids, default=(), metavar="IDS", help=text)
-    parser.add_argument(
-        "--family", default="36h11", help="family of the tags: 36h11 (default), or 16h5 as in the stock suite"
-    )
+    text = "family of the tags: 36h11 (default), or 16h5 as in the stock suite"
+    parser.add_argument("--family", choices=sorted(FAMILIES), default="36h11", help=text)
     text = "side of the black square on robots, mm (%(default)g)"
     parser.add_argument("--size", type=float, default=1e3 * DEFAULT_SIZE_M, metavar="MM", help=text)
     text = "the same of reference tags, mm (%(default)g)"
@@ -179,8 +178,6 @@ def _draw_tag(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float) ->
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Rectangle
 
-    from .tag_images import draw_tag
-
     cells = draw_tag(family, sheet.tag_id)
     cell_mm, left_mm, top_mm = (
         sheet.size_mm / len(cells),
@@ -206,8 +203,6 @@ def _draw_tag(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float) ->
 
 def _draw_disc(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float) -> None:
     from matplotlib.patches import Circle, Polygon
-
-    from .tag_images import FAMILIES
 
     radius_mm = sheet.outer_mm / 2.0
     axes.add_patch(Circle((x_mm, y_mm), radius_mm, fill=False, linewidth=LINE, linestyle=(0, (4, 4))))
@@ -251,10 +246,6 @@ def run(options: argparse.Namespace) -> None:
             raise LocalizationError("%s is missing; install it: apt install python3-%s" % (module, package))
     from matplotlib.backends.backend_pdf import PdfPages
 
-    from .tag_images import FAMILIES, draw_tag
-
-    if options.family not in FAMILIES:
-        raise LocalizationError("--family %s: known are %s" % (options.family, ", ".join(sorted(FAMILIES))))
     sheets = list_sheets(options, FAMILIES[options.family].cells)
     if not sheets and not options.board:
         raise LocalizationError("nothing to print: name --robots 0-9, --references 100-103, or --board")

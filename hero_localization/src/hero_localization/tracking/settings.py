@@ -5,7 +5,7 @@ Pure but for the file. Lengths in m, angles in degrees, pixels as in camera_mode
 
 import math
 import os
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
+from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
@@ -19,8 +19,8 @@ from hero_node.yaml_text import YamlError, parse_yaml, read_text
 from ..camera.camera_model import Camera, Intrinsics
 from ..camera.device_controls import POWER_LINES_HZ, DeviceControls
 from ..errors import SettingsError
-from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
-from .detectors import DEFAULT_BACKEND
+from ..prints.tag_images import DEFAULT_SIZE_M, FAMILIES, REFERENCE_SIZE_M
+from .detectors import BACKENDS, DEFAULT_BACKEND
 from .tag_pose import DEFAULT_HEIGHT_M, MountedTag, ReferenceTag, TagLayout
 
 DEFAULT_PATH = "~/hero_localization/camera.yaml"
@@ -153,8 +153,8 @@ def _build(content: Mapping[str, Any]) -> Settings:
     )
     lens = _build_lens(content["lens"]) if "lens" in content else None
     return Settings(
-        _word(content, "detector", DEFAULT_BACKEND),
-        _word(content, "family", "36h11"),
+        _choice(content, "detector", DEFAULT_BACKEND, BACKENDS),
+        _choice(content, "family", "36h11", FAMILIES),
         _number(content, "decimate", 2.0, 1.0, 8.0),
         layout,
         lens,
@@ -183,10 +183,10 @@ def _number(content: Mapping[str, Any], key: str, default: float, low: float, hi
     return float(value)
 
 
-def _word(content: Mapping[str, Any], key: str, default: str) -> str:
+def _choice(content: Mapping[str, Any], key: str, default: str, known: Iterable[str]) -> str:
     value = content.get(key, default)
-    if not isinstance(value, (str, int)):
-        raise ValueError("%s is %s, but must be a word such as %s" % (key, shorten(value), default))
+    if value not in list(known):
+        raise ValueError("%s is %s, but must be one of: %s" % (key, shorten(value), ", ".join(sorted(known))))
     return str(value)
 
 
