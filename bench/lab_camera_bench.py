@@ -23,10 +23,11 @@ from hero_localization.errors import CalibrationError
 from hero_localization.filter.pose_filter import Measurement
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_localization.prints.boards import Board
+from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors
 from hero_localization.tracking.settings import Settings
 from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, find_smallest_side
+from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagLayout, find_smallest_side
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
 from hero_node.geometry import Pose
@@ -81,7 +82,7 @@ def place_tags(lab: LabCamera, random: np.random.RandomState) -> List[LabTag]:
 
 def create_search(lab: LabCamera) -> TagSearch:
     """Return the search as track runs it."""
-    smallest_px = find_smallest_side(find_camera(lab), MountedTag())
+    smallest_px = find_smallest_side(find_camera(lab), DEFAULT_SIZE_M, DEFAULT_HEIGHT_M)
     return TagSearch(
         create_detector("apriltag", "36h11", 2.0), *lab.lens.size_px, create_fine_detectors("36h11"), smallest_px
     )
@@ -123,7 +124,7 @@ def measure_tags(seeds: int) -> None:
             tags = place_tags(lab, random)
             results.append(run_search(lab, tags, [lab.render(tags, random) for _ in range(RENDERED)], FRAMES))
         share, cpu_ms = np.mean(results, axis=0)
-        smallest_px = find_smallest_side(find_camera(lab), MountedTag())
+        smallest_px = find_smallest_side(find_camera(lab), DEFAULT_SIZE_M, DEFAULT_HEIGHT_M)
         print("  %-32s %6.2f %% %6.1f ms %5.0f px" % (name, 100.0 * share, cpu_ms, smallest_px), flush=True)
 
 
@@ -147,7 +148,7 @@ class Scene(NamedTuple):
 
     camera: Camera
     seen: List[TagCorners]
-    places: Dict[int, ReferenceTag]
+    places: Dict[int, Pose]
 
 
 def _make_lab(random: np.random.RandomState, lens: LabLens, height_m: float, **faults: float) -> LabCamera:
@@ -172,22 +173,19 @@ def see_references(seed: int, lens: LabLens, height_m: float, **faults: float) -
         frames.append(detector.detect(image))
     errors_m = random.normal(0.0, TAPE_SD_M, (len(tags), 2))
     places = {
-        tag.tag_id: ReferenceTag(Pose(tag.x_m + x_m, tag.y_m + y_m, 0.0), REFERENCE_M)
+        tag.tag_id: Pose(tag.x_m + x_m, tag.y_m + y_m, 0.0)
         for tag, (x_m, y_m) in zip(tags, errors_m)
     }
     return Scene(find_camera(lab), refine_corners(image, average_tags(frames), "36h11"), places)
 
 
-def _move(places: Dict[int, ReferenceTag], change: Callable[[int, float, float], Tuple[float, float]]):  # type: ignore
-    return {
-        tag_id: tag._replace(pose=Pose(*change(tag_id, tag.pose.x_m, tag.pose.y_m), 0.0))
-        for tag_id, tag in places.items()
-    }
+def _move(places: Dict[int, Pose], change: Callable[[int, float, float], Tuple[float, float]]):  # type: ignore
+    return {tag_id: Pose(*change(tag_id, pose.x_m, pose.y_m), 0.0) for tag_id, pose in places.items()}
 
 
 def list_mistakes(
-    places: Dict[int, ReferenceTag], random: np.random.RandomState
-) -> Iterator[Tuple[str, str, Dict[int, ReferenceTag]]]:
+    places: Dict[int, Pose], random: np.random.RandomState
+) -> Iterator[Tuple[str, str, Dict[int, Pose]]]:
     """Yield mistakes of people, what a message must name, and the places with it; an empty one: nothing is wrong."""
     one, other = sorted(random.choice(sorted(places), 2, replace=False))
     yield "no mistake", "", places
@@ -202,8 +200,8 @@ def list_mistakes(
     for off_mm in (5, 6, 8, 10, 20, 100):
         angle_rad, wrong = random.uniform(0.0, math.tau), int(random.choice(sorted(places)))
         right, off_m = places[wrong], 1e-3 * off_mm
-        x_m, y_m = right.pose.x_m + off_m * math.cos(angle_rad), right.pose.y_m + off_m * math.sin(angle_rad)
-        moved = {**places, wrong: right._replace(pose=Pose(x_m, y_m, 0.0))}
+        x_m, y_m = right.x_m + off_m * math.cos(angle_rad), right.y_m + off_m * math.sin(angle_rad)
+        moved = {**places, wrong: Pose(x_m, y_m, 0.0)}
         yield "one %d mm off" % off_mm, "%d " % wrong, moved  # alone or beside one that may be it as well
 
 
@@ -244,9 +242,8 @@ class Lab:
             LabTag(index, *place, self.random.uniform(-3, 3)) for index, place in enumerate(ROBOT_PLACES_M)
         ]
         self.floor = [LabTag(100 + i, *place, 0.0, REFERENCE_M, 0.0) for i, place in enumerate(REFERENCES_M)]
-        references = {tag.tag_id: ReferenceTag(Pose(tag.x_m, tag.y_m, 0.0), REFERENCE_M) for tag in self.floor}
-        seen = {tag_id: tag.pose for tag_id, tag in references.items()}
-        settings = Settings(layout=TagLayout(references=references), seen_references=seen)
+        references = {tag.tag_id: Pose(tag.x_m, tag.y_m, 0.0) for tag in self.floor}
+        settings = Settings(layout=TagLayout(references=references), seen_references=references)
         self.tracker, self.search = Tracker(settings, find_camera(self.lab)), create_search(self.lab)
         self.localizer = SwarmLocalizer()
         self.localizer.add_robots(range(len(self.robots)))

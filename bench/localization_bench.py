@@ -28,9 +28,10 @@ from hero_localization.prints.boards import Board
 from hero_localization.simulated_camera.board_renderer import BoardRenderer, list_board_places
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
+from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector
 from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout, fit_squares, locate
+from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagLayout, fit_squares, locate
 from hero_localization.tracking.tag_search import TagSearch
 from hero_node.geometry import Pose, measure_distance, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
@@ -94,7 +95,7 @@ class Scene:
         floor = [PrintedTag(100 + index, 0.1, 0.0, *place) for index, place in enumerate(REFERENCES_M)]
         measured = [np.array((tag.x_m, tag.y_m)) + random.normal(0.0, tape_m, 2) for tag in floor]
         self.references = {
-            tag.tag_id: ReferenceTag(Pose(float(x_m), float(y_m), 0.0)) for tag, (x_m, y_m) in zip(floor, measured)
+            tag.tag_id: Pose(float(x_m), float(y_m), 0.0) for tag, (x_m, y_m) in zip(floor, measured)
         }
         with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
             file.write(describe_arena())
@@ -177,17 +178,16 @@ def find_layout(scene: Scene, camera: Camera) -> Tuple[TagLayout, float]:
 
     def see(stamp_s: float, tags: List[TagCorners]) -> None:
         ours = [tag for tag in tags if tag.tag_id in seen]
-        mount = MountedTag()
-        for fit in fit_squares(camera, ours, [mount.size_m] * len(ours), [mount.height_m] * len(ours)):
+        for fit in fit_squares(camera, ours, DEFAULT_HEIGHT_M):
             seen[fit.tag_id].append((stamp_s, fit.pose))
 
     scene.drive(CALIBRATION_DRIVE, see)
     mounts, delays_s, off = {}, [], Measured([], [])
     for tag in scene.mounts:
         result = calibrate_robot(seen[tag.tag_id], scene.odometry[tag.tag_id])
-        mounts[tag.tag_id] = MountedTag(x_m=result.x_m, y_m=result.y_m, yaw_rad=result.yaw_rad)
+        mounts[tag.tag_id] = result.mount
         delays_s.append(result.delay_s)
-        off.add((result.x_m, result.y_m, result.yaw_rad), (tag.x_m, tag.y_m, tag.yaw_rad))
+        off.add(result.mount, (tag.x_m, tag.y_m, tag.yaw_rad))
         if result.problems:
             print("hero_%d: %s" % (tag.tag_id, "; ".join(result.problems)))
     delay_s = float(np.median(delays_s))
@@ -202,7 +202,7 @@ class StockMethod:
         self._camera = camera
         known = [tag for tag in tags if tag.tag_id in scene.references]
         rays = camera.lens.undistort(np.array([tag.center for tag in known]))
-        places_m = np.array([scene.references[tag.tag_id].pose[:2] for tag in known])
+        places_m = np.array([scene.references[tag.tag_id][:2] for tag in known])
         self._floor = cv2.findHomography(rays, places_m)[0]
 
     def locate(self, method: str, tag: TagCorners) -> Tuple[float, float, float]:
@@ -212,7 +212,7 @@ class StockMethod:
             corners_m = cv2.perspectiveTransform(rays[:, None], self._floor)[:, 0]
             center, up = corners_m.mean(axis=0), corners_m[:2].sum(axis=0) - corners_m[2:].sum(axis=0)
             return float(center[0]), float(center[1]), math.atan2(up[1], up[0])
-        half_m = MountedTag().size_m / 2.0
+        half_m = DEFAULT_SIZE_M / 2.0
         square = half_m * np.array(((-1, 1, 0), (1, 1, 0), (1, -1, 0), (-1, -1, 0)), dtype=float)
         lens = self._camera.lens
         _, turn, shift = cv2.solvePnP(

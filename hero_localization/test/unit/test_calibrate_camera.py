@@ -14,11 +14,12 @@ from hero_localization.camera.frame_source import Frame
 from hero_localization.errors import CalibrationError
 from hero_localization.nodes import calibrate_camera
 from hero_localization.tracking import settings
+from hero_node.geometry import Pose
 
 FOUND = {
-    0: RobotCalibration(0.001, -0.002, math.radians(3.0), 0.060, 0.001, 0.001, []),
-    1: RobotCalibration(0.002, 0.0, 0.0, 0.070, 0.001, 0.001, []),
-    2: RobotCalibration(0.0, 0.001, math.pi, 0.200, 0.001, 0.001, ["the tag is on upside down"]),
+    0: RobotCalibration(Pose(0.001, -0.002, math.radians(3.0)), 0.060, 0.001, 0.001, []),
+    1: RobotCalibration(Pose(0.002, 0.0, 0.0), 0.070, 0.001, 0.001, []),
+    2: RobotCalibration(Pose(0.0, 0.001, math.pi), 0.200, 0.001, 0.001, ["the tag is on upside down"]),
 }
 
 

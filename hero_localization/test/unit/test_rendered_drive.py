@@ -21,7 +21,7 @@ from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 from hero_localization.tracking import settings
 from hero_localization.tracking.detectors import create_detector
 from hero_localization.tracking.settings import Settings
-from hero_localization.tracking.tag_pose import ReferenceTag, TagLayout
+from hero_localization.tracking.tag_pose import TagLayout
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
 from hero_node import geometry
@@ -90,7 +90,7 @@ class TrackedCamera:
             PrintedTag(first_reference + index, 0.1, 0.0, x_m + place_m[0], place_m[1])
             for index, place_m in enumerate(PLACES_M)
         ]
-        references = {tag.tag_id: ReferenceTag(geometry.Pose(tag.x_m, tag.y_m, 0.0)) for tag in floor}
+        references = {tag.tag_id: geometry.Pose(tag.x_m, tag.y_m, 0.0) for tag in floor}
         self.renderer = CameraRenderer(options, load_arena(scene.path), [PrintedTag(0)], floor, first_reference)
         lens = Intrinsics(options.width_px, options.height_px, self.renderer.view.matrix, self.renderer.view.distortion)
         detector = create_detector(decimate=1.0)

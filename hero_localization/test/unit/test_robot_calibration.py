@@ -58,8 +58,8 @@ def drive(parts=FULL, mount=MOUNT, delay_s=0.08, seed=0, noise_m=0.0007, noise_r
 def test_place_and_yaw_of_the_tag_and_the_delay_are_found(mount, seed):
     found = calibrate_robot(*drive(mount=mount, seed=seed))
     assert found.problems == []
-    assert (found.x_m, found.y_m) == pytest.approx(mount[:2], abs=0.0005)
-    assert abs(wrap_angle(found.yaw_rad - mount.yaw_rad)) < 0.012
+    assert (found.mount.x_m, found.mount.y_m) == pytest.approx(mount[:2], abs=0.0005)
+    assert abs(wrap_angle(found.mount.yaw_rad - mount.yaw_rad)) < 0.012
     assert found.delay_s == pytest.approx(0.08, abs=0.003)
     assert found.delay_error_s < 0.003 and found.rms_m < 0.0012
 
@@ -81,7 +81,7 @@ def test_error_of_the_delay_is_stated_as_large_as_it_is():
 def test_tag_on_upside_down_is_named():
     found = calibrate_robot(*drive(mount=Pose(0.002, 0.0, math.pi - 0.05)))
     assert any("upside down" in problem for problem in found.problems)
-    assert abs(wrap_angle(found.yaw_rad - math.pi + 0.05)) < 0.012
+    assert abs(wrap_angle(found.mount.yaw_rad - math.pi + 0.05)) < 0.012
 
 
 def test_tag_far_from_the_robots_center_is_named():
@@ -142,7 +142,7 @@ def test_the_drive_turns_to_both_sides_and_ends_where_it_begins():
     assert all(not turn_rad or not step_m for turn_rad, step_m in zip(turns_rad, steps_m)), "one after the other"
     assert 11.0 < sum(duration_s for duration_s, _, _ in CALIBRATION_DRIVE) < 12.0
     found = calibrate_robot(*drive(CALIBRATION_DRIVE))
-    assert found.problems == [] and (found.x_m, found.y_m) == pytest.approx(MOUNT[:2], abs=0.0005)
+    assert found.problems == [] and (found.mount.x_m, found.mount.y_m) == pytest.approx(MOUNT[:2], abs=0.0005)
 
 
 @pytest.mark.parametrize("delay_s", [-0.08, 0.0, 0.25, 0.48])

@@ -45,7 +45,7 @@ def test_without_a_file_the_camera_is_uncalibrated(path):
     assert found.lens is None and found.camera is None
     assert (found.family, found.detector) == ("36h11", DEFAULT_BACKEND)
     assert found.layout.find_robot(7) == 7
-    assert found.layout.default_mount.size_m == 0.04
+    assert found.layout.size_m == 0.04
 
 
 def test_what_calibrations_write_is_read_again(path):
@@ -68,7 +68,7 @@ def test_what_people_wrote_stays_when_a_calibration_writes(path):
     assert found.family == "16h5" and found.layout.objects == {9: "box"}
     assert found.layout.find_robot(3) == 0 and found.layout.find_robot(9) is None
     assert found.layout.find_mount(3).yaw_rad == pytest.approx(math.pi / 2.0)
-    assert found.layout.references[20].pose == pytest.approx((0.5, 0.5, math.pi / 2.0))
+    assert found.layout.references[20] == pytest.approx((0.5, 0.5, math.pi / 2.0))
 
 
 def test_only_what_a_calibration_finds_changes_in_the_text(path):
@@ -211,9 +211,9 @@ def test_what_a_file_leaves_out_has_its_default(path):
     found = settings.load(path)
     assert (found.decimate, found.delay_s, found.controls) == (2.0, 0.0, (None, None, None, None))
     assert settings.Settings()[2:] == (2.0, TagLayout(), None, None, 0.0, {}, (None, None, None, None))
-    assert found.layout.default_mount[:2] == (0.04, 0.076)
-    assert found.layout.references[100] == (Pose(1.0, 2.0, math.pi / 2.0), 0.1, 0.0)
-    assert found.layout.mounts[3] == pytest.approx((0.04, 0.076, 0.01, 0.02, -math.pi / 2.0))
+    assert found.layout[-3:] == (0.04, 0.076, 0.1)
+    assert found.layout.references[100] == Pose(1.0, 2.0, math.pi / 2.0)
+    assert found.layout.mounts[3] == pytest.approx((0.01, 0.02, -math.pi / 2.0))
 
 
 def test_a_place_of_the_camera_must_turn_without_mirroring_or_scaling(path):

@@ -236,7 +236,7 @@ def test_written_camera_file_holds_the_view_and_the_tags(tmp_path):
     settings = camera_file.load(path)
     points_m = np.array([(0.3, 0.2, 0.076), (-1.0, 0.5, 0.0)])
     assert np.abs(settings.camera.project(points_m) - View(SMALL).project(points_m)).max() < 1e-6
-    assert settings.layout.mounts[3].x_m == 0.002 and settings.layout.default_mount.size_m == 0.048
+    assert settings.layout.mounts[3].x_m == 0.002 and settings.layout.size_m == 0.048
     assert sorted(settings.seen_references) == sorted(settings.layout.references) == [100, 101, 102, 103]
 
 

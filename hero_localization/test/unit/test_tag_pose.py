@@ -11,8 +11,6 @@ from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import (
     SYSTEMATIC_M,
     SYSTEMATIC_RAD,
-    MountedTag,
-    ReferenceTag,
     TagLayout,
     find_smallest_side,
     fit_squares,
@@ -50,22 +48,22 @@ def assert_near(found, expected, tolerance=1e-6):
 def test_robots_wear_the_tag_of_their_number(pose):
     seen = locate(CAMERA, [see(12, pose)], TagLayout())
     assert_near(seen.robots[12].pose, pose)
-    assert seen.robots[12].size_share == pytest.approx(1.0, abs=1e-6)
+    assert seen.robots[12].size_m == pytest.approx(0.04, abs=1e-6)
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 1.5, math.pi, -2.0])
 def test_robots_pose_is_that_of_its_center_not_of_the_tag(yaw_rad):
-    mount = MountedTag(0.05, 0.09, 0.012, -0.005, yaw_rad)
+    mount = Pose(0.012, -0.005, yaw_rad)
     robot = Pose(0.7, 0.3, 2.0)
-    tag = transform_pose(robot, Pose(mount.x_m, mount.y_m, mount.yaw_rad))
-    seen = locate(CAMERA, [see(4, tag, 0.05, 0.09)], TagLayout(mounts={4: mount}))
+    tag = transform_pose(robot, mount)
+    seen = locate(CAMERA, [see(4, tag, 0.05, 0.09)], TagLayout(mounts={4: mount}, size_m=0.05, height_m=0.09))
     assert_near(seen.robots[4].pose, robot)
 
 
 def test_covariance_holds_what_noise_of_the_corners_does():
     random, pose = np.random.RandomState(0), Pose(0.9, -0.3, 1.0)
     tags = [see(1, pose, noise_px=random.normal(0.0, 0.1, (4, 2))) for _ in range(2000)]
-    found = fit_squares(CAMERA, tags, [0.04] * 2000, [0.076] * 2000)
+    found = fit_squares(CAMERA, tags, 0.076)
     spread = np.std([fit.pose for fit in found], axis=0)
     systematic = np.array((SYSTEMATIC_M, SYSTEMATIC_M, SYSTEMATIC_RAD))
     modeled = np.sqrt(np.diagonal(found[0].covariance) - systematic**2)
@@ -74,7 +72,7 @@ def test_covariance_holds_what_noise_of_the_corners_does():
 
 def test_tag_off_the_robots_center_makes_its_place_depend_on_the_heading():
     near, far = (
-        locate(CAMERA, [see(1, Pose(0.0, 0.0, 0.0))], TagLayout(default_mount=MountedTag(x_m=x_m)))
+        locate(CAMERA, [see(1, Pose(0.0, 0.0, 0.0))], TagLayout(mounts={1: Pose(x_m, 0.0, 0.0)}))
         .robots[1]
         .covariance
         for x_m in (0.0, 0.1)
@@ -88,19 +86,19 @@ def test_ids_are_looked_up_among_references_objects_and_robots():
     layout = TagLayout(
         tag_robots={40: 2},
         objects={9: "box"},
-        references={1: ReferenceTag(Pose(1.0, 0.5, 0.0))},
-        mounts={9: MountedTag(0.06, 0.12)},
+        references={1: Pose(1.0, 0.5, 0.0)},
+        mounts={9: Pose(0.02, 0.0, math.pi)},
     )
     tags = [
         see(0, Pose(0.1, 0.2, 0.3)),
         see(40, Pose(0.5, 0.2, 0.3)),
         see(1, Pose(1.0, 0.5, 0.0), 0.1, 0.0),
-        see(9, Pose(-0.5, 0.2, 0.3), 0.06, 0.12),
+        see(9, Pose(-0.5, 0.2, 0.3)),
     ]
     seen = locate(CAMERA, tags, layout)
     assert set(seen.robots) == {0, 2} and set(seen.objects) == {"box"} and set(seen.references) == {1}
     assert_near(seen.robots[2].pose, Pose(0.5, 0.2, 0.3))
-    assert_near(seen.objects["box"].pose, Pose(-0.5, 0.2, 0.3))
+    assert_near(transform_pose(seen.objects["box"].pose, Pose(0.02, 0.0, math.pi)), Pose(-0.5, 0.2, 0.3))
     assert_near(seen.references[1].pose, Pose(1.0, 0.5, 0.0))
     assert not seen.unknown and not seen.doubled and not seen.misshapen
 
@@ -118,7 +116,7 @@ def test_the_own_id_of_a_robot_that_wears_another_tag_is_unknown():
 
 
 def test_robots_wear_the_tag_of_their_id_unless_told_otherwise():
-    layout = TagLayout(tag_robots={40: 2, 3: 7}, objects={9: "box"}, references={1: ReferenceTag(Pose(1.0, 0.5, 0.0))})
+    layout = TagLayout(tag_robots={40: 2, 3: 7}, objects={9: "box"}, references={1: Pose(1.0, 0.5, 0.0)})
     assert layout.find_tags((0, 2, 7)) == {0: 0, 2: 40, 7: 3}
     assert layout.find_tags((1, 3, 9)) == {}, "these tags stand for something else"
 
@@ -139,7 +137,7 @@ def test_print_that_is_a_little_small_gives_the_same_pose():
     """As printers make it that fit the page."""
     seen = locate(CAMERA, [see(3, Pose(0.8, 0.4, 1.0), 0.0388)], TagLayout())
     assert_near(seen.robots[3].pose, Pose(0.8, 0.4, 1.0))
-    assert seen.robots[3].size_share == pytest.approx(0.97, abs=1e-6)
+    assert seen.robots[3].size_m == pytest.approx(0.0388, abs=1e-6)
 
 
 def test_picture_without_tags_shows_nothing():
@@ -202,7 +200,7 @@ def test_tags_may_measure_15_percent_more_or_less_than_their_print(share, is_rig
 
 def test_uncertainty_is_that_of_the_corners_and_what_calibration_leaves():
     tag = see(1, Pose(0.1, 0.0, 0.4))
-    (found,) = fit_squares(CAMERA, [tag], [0.04], [0.076])
+    (found,) = fit_squares(CAMERA, [tag], 0.076)
     side_px = np.linalg.norm(tag.corners - np.roll(tag.corners, 1, axis=0), axis=1).mean()
     corner_m = 0.1 * 0.04 / side_px
     place_m2, yaw_rad2 = corner_m**2 / 4.0 + 0.0007**2, (corner_m / 0.04) ** 2 / 2.0 + 0.003**2
@@ -213,19 +211,19 @@ def test_the_smallest_side_is_that_of_the_tag_seen_from_farthest():
     matrix = np.array(((1390.0, 0.0, 959.5), (0.0, 1390.0, 539.5), (0.0, 0.0, 1.0)))
     straight = Intrinsics(1920, 1080, matrix, np.zeros(5))
     down = Camera(straight, np.diag((1.0, -1.0, -1.0)), np.array((0.1, 0.0, 2.2)))
-    assert find_smallest_side(down, MountedTag()) == pytest.approx(1390.0 * 0.04 / (2.2 - 0.076))
-    assert find_smallest_side(down, MountedTag(0.05, 0.2)) == pytest.approx(1390.0 * 0.05 / 2.0)
+    assert find_smallest_side(down, 0.04, 0.076) == pytest.approx(1390.0 * 0.04 / (2.2 - 0.076))
+    assert find_smallest_side(down, 0.05, 0.2) == pytest.approx(1390.0 * 0.05 / 2.0)
     tilted = down._replace(rotation=TILT @ down.rotation)
     depth_m = 2.124 / math.cos(0.1 + math.atan(0.47 * 1080.0 / 1390.0)) * math.cos(math.atan(0.47 * 1080.0 / 1390.0))
-    assert find_smallest_side(tilted, MountedTag()) == pytest.approx(1390.0 * 0.04 / depth_m, rel=0.12)
+    assert find_smallest_side(tilted, 0.04, 0.076) == pytest.approx(1390.0 * 0.04 / depth_m, rel=0.12)
     up = down._replace(rotation=np.eye(3))
-    assert find_smallest_side(up, MountedTag()) == math.inf
+    assert find_smallest_side(up, 0.04, 0.076) == math.inf
 
 
-def test_objects_and_robots_may_be_mounted_each_in_its_own_way():
-    layout = TagLayout(mounts={4: MountedTag(0.05)}, default_mount=MountedTag(0.03))
-    assert layout.find_mount(4).size_m == 0.05 and layout.find_mount(5).size_m == 0.03
-    assert MountedTag() == (0.04, 0.076, 0.0, 0.0, 0.0) and ReferenceTag(Pose(0.0, 0.0, 0.0))[1:] == (0.1, 0.0)
+def test_tags_are_centered_unless_they_are_calibrated():
+    layout = TagLayout(mounts={4: Pose(0.01, 0.0, 0.0)})
+    assert layout.find_mount(4).x_m == 0.01 and layout.find_mount(5) == (0.0, 0.0, 0.0)
+    assert (layout.size_m, layout.height_m, layout.reference_size_m) == (0.04, 0.076, 0.1)
 
 
 def test_center_and_side_of_a_tag_are_those_of_its_print_in_perspective():

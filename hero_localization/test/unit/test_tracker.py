@@ -6,7 +6,7 @@ import pytest
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.tracking.settings import Settings
 from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import MountedTag, ReferenceTag, TagLayout
+from hero_localization.tracking.tag_pose import TagLayout
 from hero_localization.tracking.tracker import Problem, Tracker
 from hero_node.geometry import Pose
 
@@ -16,16 +16,15 @@ CAMERA = Camera(
     np.diag((1.0, -1.0, -1.0)),
     np.array((0.0, 0.0, 2.2)),
 )
-REFERENCES = {100 + index: ReferenceTag(Pose(0.3 * index, 0.4, 0.0)) for index in range(3)}
+REFERENCES = {100 + index: Pose(0.3 * index, 0.4, 0.0) for index in range(3)}
 LAYOUT = TagLayout(
-    tag_robots={5: 1}, mounts={5: MountedTag(x_m=0.01)}, objects={9: "box"}, references=REFERENCES
+    tag_robots={5: 1}, mounts={5: Pose(0.01, 0.0, 0.0)}, objects={9: "box"}, references=REFERENCES
 )
-SEEN = {tag_id: tag.pose for tag_id, tag in REFERENCES.items()}
 SQUARE = 0.5 * np.array(((-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)))
 
 
 def make_tracker(**changes):
-    return Tracker(Settings(layout=LAYOUT, camera=CAMERA, seen_references=SEEN)._replace(**changes), CAMERA)
+    return Tracker(Settings(layout=LAYOUT, camera=CAMERA, seen_references=REFERENCES)._replace(**changes), CAMERA)
 
 
 def see(tag_id, x_m, y_m, size_m=0.04, height_m=0.076):
@@ -34,7 +33,7 @@ def see(tag_id, x_m, y_m, size_m=0.04, height_m=0.076):
 
 
 def see_references(moved_m, ids=REFERENCES):
-    places = {tag_id: REFERENCES[tag_id].pose for tag_id in ids}
+    places = {tag_id: REFERENCES[tag_id] for tag_id in ids}
     return [see(tag_id, place.x_m + moved_m, place.y_m, 0.1, 0.0) for tag_id, place in places.items()]
 
 
@@ -87,7 +86,7 @@ def test_small_tags_are_named():
     tracker = make_tracker()
     tracker.take([see(0, 0.0, 0.0, size_m=0.012)], 1.0, 0)
     assert Problem("camera", text, False) in tracker.list_problems()
-    tracker = make_tracker(layout=TagLayout(default_mount=MountedTag(size_m=0.012)))
+    tracker = make_tracker(layout=TagLayout(size_m=0.012))
     assert Problem("camera", text, False) in tracker.list_problems(), "before any is found"
 
 

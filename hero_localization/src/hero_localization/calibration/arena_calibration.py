@@ -7,12 +7,13 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
 import cv2
 import numpy as np
 
-from hero_node.geometry import Pose
+from hero_node.geometry import Pose, measure_distance
 
 from ..camera.camera_model import Camera, Intrinsics
 from ..errors import CalibrationError
+from ..prints.tag_images import REFERENCE_SIZE_M
 from ..tracking.tag_corners import TagCorners
-from ..tracking.tag_pose import ReferenceTag, TagPose, fit_squares
+from ..tracking.tag_pose import TagPose, fit_squares, list_corners
 
 MIN_TAGS = 4
 MIN_EXTENT_M = 0.3
@@ -79,9 +80,9 @@ def average_tags(frames: Sequence[Sequence[TagCorners]]) -> List[TagCorners]:
 
 
 def calibrate_arena(
-    lens: Intrinsics, tags: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+    lens: Intrinsics, tags: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float = REFERENCE_SIZE_M
 ) -> ArenaCalibration:
-    """Return the camera pose from the image of the reference tags; other tags are ignored.
+    """Return the camera pose from the image of the reference tags, of size_m; other tags are ignored.
 
     Only the places of the tags' centers count; their yaw is found with the camera.
 
@@ -96,22 +97,22 @@ def calibrate_arena(
             % (len(seen), len(references), ", ".join(map(str, missing)) or "more", MIN_TAGS)
         )
     _check_extent(seen, references)
-    camera = _fit(lens, seen, references)
+    camera = _fit(lens, seen, references, size_m)
     if camera is None or _compute_rms(measure_residuals(camera, seen, references), ()) > SUSPICIOUS_RMS_M:
-        _refuse_mistakes(lens, seen, references)
+        _refuse_mistakes(lens, seen, references, size_m)
     if camera is None:
         raise CalibrationError(
             "no camera above the floor sees the reference tags like this: check the ids and places in the camera file"
         )
     residuals_m = measure_residuals(camera, seen, references)
     left_out: List[int] = []
-    wrong = _find_wrong_tag(lens, seen, references)
+    wrong = _find_wrong_tag(lens, seen, references, size_m)
     suspects = wrong.tag_ids if wrong is not None else []
     if wrong is not None and len(suspects) == 1:
         left_out, camera = suspects, wrong.camera_without
         residuals_m = measure_residuals(camera, seen, references)
     if _compute_rms(residuals_m, left_out) < WORST_RESIDUAL_M:  # or it is no matter of scale
-        _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], references)
+        _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], references, size_m)
     problems = _judge(residuals_m, left_out, missing)
     if wrong is not None and len(suspects) > 1:
         text = "tag %s is about %.0f mm from its place: measure them again"
@@ -119,18 +120,18 @@ def calibrate_arena(
     return ArenaCalibration(camera, residuals_m, left_out, problems)
 
 
-def _refuse_mistakes(lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
+def _refuse_mistakes(
+    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
+) -> None:
     """Try mistakes that users make with places. Raises: CalibrationError that names those that explain all."""
-    mirrored = {
-        tag_id: tag._replace(pose=Pose(tag.pose.x_m, -tag.pose.y_m, 0.0)) for tag_id, tag in references.items()
-    }
+    mirrored = {tag_id: Pose(pose.x_m, -pose.y_m, 0.0) for tag_id, pose in references.items()}
     tried = [("y the wrong way (seen from above, y points left of x)", mirrored)]
     for one, other in itertools.combinations(sorted(tag.tag_id for tag in seen), 2):
         swapped = {**references, one: references[other], other: references[one]}
         tried.append(("tags %d and %d swapped" % (one, other), swapped))
     causes = []
     for cause, places in tried:
-        camera = _fit(lens, seen, places)
+        camera = _fit(lens, seen, places, size_m)
         if camera is not None and _compute_rms(measure_residuals(camera, seen, places), ()) < WORST_RESIDUAL_M:
             causes.append(cause)
     if causes:
@@ -146,7 +147,7 @@ class _WrongTag(NamedTuple):
 
 
 def _find_wrong_tag(
-    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
 ) -> Optional[_WrongTag]:
     """Return the tags without one of which the others agree by far better; None if there is none, or none to spare."""
     if len(seen) <= MIN_TAGS:
@@ -155,7 +156,7 @@ def _find_wrong_tag(
     squares_m2: Dict[int, float] = {}
     for tag in seen:
         others = [other for other in seen if other is not tag]
-        camera = _fit(lens, others, references)
+        camera = _fit(lens, others, references, size_m)
         if camera is None:
             continue
         rest_m = _compute_rms(measure_residuals(camera, others, references), ())
@@ -171,10 +172,11 @@ def _find_wrong_tag(
     return found._replace(tag_ids=sorted(suspects, key=squares_m2.__getitem__))
 
 
-def _check_sizes(camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
+def _check_sizes(
+    camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
+) -> None:
     """Compare the tags' measured size with the printed one. Raises: CalibrationError if places are out of scale."""
-    shares = [fit.size_m / references[fit.tag_id].size_m for fit in fit_references(camera, seen, references)]
-    share = float(np.median(shares))
+    share = float(np.median([fit.size_m / size_m for fit in fit_references(camera, seen, references)]))
     if not abs(share - 1.0) <= MAX_SCALE_ERROR:
         raise CalibrationError(
             "reference tags measure %.1f %% of their size: measure the places again, is the tape right? and the side of"
@@ -209,8 +211,8 @@ def _compute_rms(residuals_m: Mapping[int, float], left_out: Sequence[int]) -> f
     return math.sqrt(sum(residual_m**2 for residual_m in used_m) / len(used_m))
 
 
-def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> None:
-    places_m = np.array([references[tag.tag_id].pose[:2] for tag in seen])
+def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Pose]) -> None:
+    places_m = np.array([references[tag.tag_id][:2] for tag in seen])
     extent_m = float(np.ptp(places_m, axis=0).max())
     if extent_m > MAX_FIELD_M:
         raise CalibrationError("the reference tags lie %g m apart: write their places in m, not in mm or cm" % extent_m)
@@ -221,11 +223,13 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Reference
         )
 
 
-def _fit(lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]) -> Optional[Camera]:
+def _fit(
+    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
+) -> Optional[Camera]:
     """Return the camera above the floor that sees the tags like this best; None if there is none."""
     known = [references[tag.tag_id] for tag in seen]
     # The yaws are not known: centers first.
-    points_m = np.array([(*tag.pose[:2], tag.height_m) for tag in known])
+    points_m = np.array([(*pose[:2], 0.0) for pose in known])
     pixels = np.array([tag.center for tag in seen])
     for _ in range(_YAW_ROUNDS):
         try:
@@ -237,36 +241,20 @@ def _fit(lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, 
         rotation = cv2.Rodrigues(turn)[0]
         camera = Camera(lens, rotation, (-rotation.T @ shift).ravel())
         yaws_rad = [fit.pose.yaw_rad for fit in fit_references(camera, seen, references)]
-        turned = [tag._replace(pose=tag.pose._replace(yaw_rad=yaw)) for tag, yaw in zip(known, yaws_rad)]
-        points_m = np.vstack([_list_corners(tag) for tag in turned])
+        turned = [pose._replace(yaw_rad=yaw_rad) for pose, yaw_rad in zip(known, yaws_rad)]
+        points_m = np.vstack([list_corners(pose, size_m, 0.0) for pose in turned])
         pixels = np.vstack([tag.corners for tag in seen])
     return camera if HEIGHTS_M[0] <= camera.position_m[2] <= HEIGHTS_M[1] else None
 
 
-def _list_corners(tag: ReferenceTag) -> np.ndarray:
-    half_m = tag.size_m / 2.0
-    square_m = half_m * np.array(((1, 1), (1, -1), (-1, -1), (-1, 1)))
-    cos, sin = math.cos(tag.pose.yaw_rad), math.sin(tag.pose.yaw_rad)
-    places_m = square_m @ np.array(((cos, sin), (-sin, cos))) + tag.pose[:2]
-    return np.column_stack((places_m, np.full(4, tag.height_m)))
-
-
-def fit_references(
-    camera: Camera, tags: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
-) -> List[TagPose]:
+def fit_references(camera: Camera, tags: Sequence[TagCorners], references: Mapping[int, Pose]) -> List[TagPose]:
     """Return where the camera sees the reference tags; other tags are ignored."""
-    seen = [tag for tag in tags if tag.tag_id in references]
-    known = [references[tag.tag_id] for tag in seen]
-    return fit_squares(camera, seen, [tag.size_m for tag in known], [tag.height_m for tag in known])
+    return fit_squares(camera, [tag for tag in tags if tag.tag_id in references], 0.0)
 
 
 def measure_residuals(
-    camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, ReferenceTag]
+    camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, Pose]
 ) -> Dict[int, float]:
     """Return how far (m) from its place each reference tag is seen, by id."""
-    return {
-        fit.tag_id: math.hypot(
-            fit.pose.x_m - references[fit.tag_id].pose.x_m, fit.pose.y_m - references[fit.tag_id].pose.y_m
-        )
-        for fit in fit_references(camera, seen, references)
-    }
+    fits = fit_references(camera, seen, references)
+    return {fit.tag_id: measure_distance(fit.pose, references[fit.tag_id]) for fit in fits}

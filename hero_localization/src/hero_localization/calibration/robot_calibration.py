@@ -44,16 +44,14 @@ class RobotCalibration(NamedTuple):
     """The tag on its robot, and the camera's stamps.
 
     Attributes:
-        x_m, y_m, yaw_rad: of the tag in base_link; yaw of its print's upper edge.
+        mount: pose of the tag in base_link; yaw of its print's upper edge.
         delay_s: the poses were true so long before their stamps.
         delay_error_s: standard deviation of the delay.
         rms_m: how far the poses lie from those of the drive with such a tag.
         problems: what speaks against using it; empty: it is good.
     """
 
-    x_m: float
-    y_m: float
-    yaw_rad: float
+    mount: Pose
     delay_s: float
     delay_error_s: float
     rms_m: float
@@ -92,7 +90,8 @@ def calibrate_robot(
     at = np.column_stack(
         [np.interp(stamps_s - delay_s, odometry_s, counted[:, column]) for column in range(3)]
     )
-    x_m, y_m, yaw_rad, rms_m = _fit_mount(tags, at)
+    mount, rms_m = _fit_mount(tags, at)
+    off_m = math.hypot(mount.x_m, mount.y_m)
     problems = []
     if rms_m > GOOD_RMS_M:
         problems.append(
@@ -103,11 +102,11 @@ def calibrate_robot(
         problems.append(
             "the delay is known to %.0f ms only: let the robot turn to and fro" % (1e3 * delay_error_s)
         )
-    if math.hypot(x_m, y_m) > CENTERED_M:
-        problems.append("the tag sits %.0f mm from the robot's center" % (1e3 * math.hypot(x_m, y_m)))
-    if is_upside_down(yaw_rad):
+    if off_m > CENTERED_M:
+        problems.append("the tag sits %.0f mm from the robot's center" % (1e3 * off_m))
+    if is_upside_down(mount.yaw_rad):
         problems.append("the tag is on upside down: the upper edge of its print points to the robot's rear")
-    return RobotCalibration(x_m, y_m, yaw_rad, delay_s, delay_error_s, rms_m, problems)
+    return RobotCalibration(mount, delay_s, delay_error_s, rms_m, problems)
 
 
 def _join(poses: Sequence[Tuple[float, Pose]]) -> Tuple[np.ndarray, np.ndarray]:
@@ -148,8 +147,8 @@ def _find_delay(
     return delay_s, math.sqrt(2.0 * variance / curvature)
 
 
-def _fit_mount(tags: np.ndarray, at: np.ndarray) -> Tuple[float, float, float, float]:
-    """Return x, y (m) and yaw (rad) of the tag in base_link, and the residual (m rms).
+def _fit_mount(tags: np.ndarray, at: np.ndarray) -> Tuple[Pose, float]:
+    """Return the pose of the tag in base_link, and the residual (m rms).
 
     With the tag's yaw for the heading, what odometry drove between two images is known but for the tag's yaw on the
     robot and a factor: the tag's place is linear in the start, these two, and its place seen from itself.
@@ -168,5 +167,5 @@ def _fit_mount(tags: np.ndarray, at: np.ndarray) -> Tuple[float, float, float, f
     _, turn, offset = fit = np.linalg.lstsq(design, places, rcond=None)[0]
     rms_m = float(np.sqrt((np.abs(design @ fit - places) ** 2).mean()))
     yaw_rad = -math.atan2(turn.imag, turn.real)
-    mount = offset * np.exp(1j * yaw_rad)
-    return float(mount.real), float(mount.imag), wrap_angle(yaw_rad), rms_m
+    place = offset * np.exp(1j * yaw_rad)
+    return Pose(float(place.real), float(place.imag), wrap_angle(yaw_rad)), rms_m

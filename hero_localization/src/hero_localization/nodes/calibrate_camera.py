@@ -10,7 +10,7 @@ import argparse
 import math
 import sys
 from functools import partial
-from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -51,7 +51,7 @@ from ..tracking.detector_process import DetectorProcess
 from ..tracking.detectors import find_print_mistake
 from ..tracking.settings import Settings
 from ..tracking.tag_corners import TagCorners
-from ..tracking.tag_pose import MountedTag, fit_squares
+from ..tracking.tag_pose import fit_squares
 
 MAX_VIEWS = 25
 ENOUGH_VIEWS = 20
@@ -197,9 +197,10 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
     if lens is None:
         raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
     lens.check_size(*frame.gray.shape)
+    layout = settings.layout
     tags = refine_corners(frame.gray, average_tags(frames), settings.family)
     try:
-        result = calibrate_arena(lens, tags, settings.layout.references)
+        result = calibrate_arena(lens, tags, layout.references, layout.reference_size_m)
     except CalibrationError as error:
         hint = find_print_mistake(frame.gray, settings.family)
         raise CalibrationError("%s%s" % (error, "; " + hint if hint else "")) from None
@@ -207,7 +208,7 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
         say("tag %d: %.1f mm%s" % (tag_id, 1e3 * residual_m, " (left out)" if tag_id in result.left_out else ""))
     height_m = result.camera.position_m[2]
     say("residual %.1f mm rms; the camera is %.2f m above the floor" % (1e3 * result.rms_m, height_m))
-    fits = fit_references(result.camera, tags, settings.layout.references)
+    fits = fit_references(result.camera, tags, layout.references)
     parts = camera_file.describe_camera(result.camera, {fit.tag_id: fit.pose for fit in fits})
     return _finish(options.file, parts, result.problems)
 
@@ -237,9 +238,9 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
             "hero_%d: tag %.1f mm ahead, %.1f mm left, turned by %.1f degrees; delay %.0f ms; %.1f mm rms"
             % (
                 robot_id,
-                1e3 * result.x_m,
-                1e3 * result.y_m,
-                math.degrees(result.yaw_rad),
+                1e3 * result.mount.x_m,
+                1e3 * result.mount.y_m,
+                math.degrees(result.mount.yaw_rad),
                 1e3 * result.delay_s,
                 1e3 * result.rms_m,
             )
@@ -247,10 +248,8 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
         problems += ["hero_%d: %s" % (robot_id, problem) for problem in result.problems]
     if not results:
         raise CalibrationError("; ".join(problems))
-    mounts: Dict[int, Union[MountedTag, RobotCalibration]] = {**settings.layout.mounts, **results}
-    described = {
-        tag_id: camera_file.describe_pose(Pose(mount.x_m, mount.y_m, mount.yaw_rad)) for tag_id, mount in mounts.items()
-    }
+    mounts = {**settings.layout.mounts, **{tag_id: result.mount for tag_id, result in results.items()}}
+    described = {tag_id: camera_file.describe_pose(mount) for tag_id, mount in mounts.items()}
     delay_s = float(np.median([result.delay_s for result in results.values()]))
     return _finish(options.file, {"mounts": described, "delay_s": round(delay_s, 4)}, problems)
 
@@ -259,7 +258,7 @@ def _watch_robot(
     settings: Settings, images: Images, program: Program, robot_id: int, tag_id: int
 ) -> RobotCalibration:
     """Drive one robot, and return how its tag sits. Raises: CalibrationError if it cannot be seen; HeroError."""
-    camera, mount = settings.camera, settings.layout.find_mount(tag_id)
+    camera = settings.camera
     assert camera is not None
     odometry: List[Tuple[float, Pose]] = []
     seen: List[Tuple[float, Pose]] = []
@@ -268,7 +267,7 @@ def _watch_robot(
         found = images.find_tags(settings, settings.decimate, frame) if frame is not None else []
         tags = [tag for tag in found if tag.tag_id == tag_id]
         if frame is not None and len(tags) == 1:
-            pose = fit_squares(camera, tags, [mount.size_m], [mount.height_m])[0].pose
+            pose = fit_squares(camera, tags, settings.layout.height_m)[0].pose
             if is_plausible(pose):
                 seen.append((frame.stamp_s, pose))
         return len(tags)

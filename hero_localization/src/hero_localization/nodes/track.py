@@ -50,7 +50,7 @@ class TrackNode:
         self._logged_s: Dict[str, float] = {}
         self._publisher = rospy.Publisher("~measured_poses", RobotPoses, queue_size=5)
         self._objects = rospy.Publisher("~objects", ObjectPoses, queue_size=5)
-        self._pictures = PictureOutput(self._frame_id, self._settings.layout.default_mount.height_m)
+        self._pictures = PictureOutput(self._frame_id, self._settings.layout.height_m)
         self._diagnostics = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=2)
         rospy.Subscriber(parameters["poses_topic"], RobotPoses, self._expect, queue_size=2, tcp_nodelay=True)
         image, device, size_px = (str(parameters[name]) for name in ("image", "device", "size_px"))
@@ -95,7 +95,7 @@ class TrackNode:
         tracker.camera.lens.check_size(height_px, width_px)
         if self._process is None:
             settings = self._settings
-            smallest_px = find_smallest_side(tracker.camera, settings.layout.default_mount)
+            smallest_px = find_smallest_side(tracker.camera, settings.layout.size_m, settings.layout.height_m)
             self._process = DetectorProcess(
                 settings.detector, settings.family, settings.decimate, width_px, height_px, smallest_px
             )

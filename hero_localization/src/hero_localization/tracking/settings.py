@@ -21,9 +21,10 @@ from ..camera.device_controls import POWER_LINES_HZ, DeviceControls
 from ..errors import SettingsError
 from ..prints.tag_images import DEFAULT_SIZE_M, FAMILIES, REFERENCE_SIZE_M
 from .detectors import BACKENDS, DEFAULT_BACKEND
-from .tag_pose import DEFAULT_HEIGHT_M, MountedTag, ReferenceTag, TagLayout
+from .tag_pose import DEFAULT_HEIGHT_M, TagLayout
 
 DEFAULT_PATH = "~/hero_localization/camera.yaml"
+POSE_FORM = "[x_m, y_m, yaw_deg]"
 
 
 class Settings(NamedTuple):
@@ -131,25 +132,18 @@ def _build(content: Mapping[str, Any]) -> Settings:
     for key in content:
         if key not in known:
             raise ValueError("unknown key %s; known are: %s" % (key, ", ".join(known)))
-    size_m = _number(content, "tag_size_m", DEFAULT_SIZE_M, 0.005, 1.0)
-    height_m = _number(content, "tag_height_m", DEFAULT_HEIGHT_M, 0.0, 1.0)
-    reference_size_m = _number(content, "reference_size_m", REFERENCE_SIZE_M, 0.005, 1.0)
-
-    def read_mount(value: Any) -> MountedTag:
-        return MountedTag(size_m, height_m, *_pose(value))
-
     tag_robots = _by_tag(content, "tag_robots", "the number of a robot", _whole_number)
     for robot in tag_robots.values():
         if list(tag_robots.values()).count(robot) > 1:
             raise ValueError("tag_robots names robot %d more than once, but a robot wears one tag" % robot)
     layout = TagLayout(
         tag_robots=tag_robots,
-        mounts=_by_tag(content, "mounts", "[x_m, y_m, yaw_deg]", read_mount),
-        default_mount=MountedTag(size_m, height_m),
+        mounts=_by_tag(content, "mounts", POSE_FORM, _pose),
         objects=_by_tag(content, "objects", "a name", _name),
-        references=_by_tag(
-            content, "references", "[x_m, y_m, yaw_deg]", lambda value: ReferenceTag(_pose(value), reference_size_m)
-        ),
+        references=_by_tag(content, "references", POSE_FORM, _pose),
+        size_m=_number(content, "tag_size_m", DEFAULT_SIZE_M, 0.005, 1.0),
+        height_m=_number(content, "tag_height_m", DEFAULT_HEIGHT_M, 0.0, 1.0),
+        reference_size_m=_number(content, "reference_size_m", REFERENCE_SIZE_M, 0.005, 1.0),
     )
     lens = _build_lens(content["lens"]) if "lens" in content else None
     return Settings(
@@ -160,7 +154,7 @@ def _build(content: Mapping[str, Any]) -> Settings:
         lens,
         _build_camera(content["camera"], lens) if "camera" in content else None,
         _number(content, "delay_s", 0.0, -1.0, 5.0),
-        _by_tag(content, "seen_references", "[x_m, y_m, yaw_deg]", _pose),
+        _by_tag(content, "seen_references", POSE_FORM, _pose),
         _build_controls(content),
     )
 

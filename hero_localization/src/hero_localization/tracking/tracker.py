@@ -6,10 +6,9 @@ from typing import Deque, Dict, List, Mapping, NamedTuple, Optional, Sequence, S
 
 import numpy as np
 
-from hero_node.geometry import Pose, transform_pose
+from hero_node.geometry import Pose, measure_distance, transform_pose
 
 from ..camera.camera_model import Camera
-from .moved_references import find_moved_references
 from .settings import Settings
 from .tag_corners import TagCorners
 from .tag_pose import Sightings, find_smallest_side, locate
@@ -18,6 +17,9 @@ RATE_FRAMES = 30
 
 KEPT_S = 2.0
 """A problem of a tag is named for so long after it was last seen."""
+
+MOVED_M = 0.005
+"""A camera turned by a tenth of a degree shifts everything by 4 mm."""
 
 MOVED_S = 0.5
 """A camera that shakes is no camera that moved."""
@@ -70,7 +72,7 @@ class Tracker:
         self.sightings: Optional[Sightings] = None
         self._settings = settings
         self.camera = camera
-        self._smallest_px = find_smallest_side(camera, settings.layout.default_mount)
+        self._smallest_px = find_smallest_side(camera, settings.layout.size_m, settings.layout.height_m)
         self._images: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
         self._shade = math.nan
         self._tag_problems: Dict[int, Tuple[float, str]] = {}
@@ -111,9 +113,8 @@ class Tracker:
         layout = self._settings.layout
         places: Dict[int, np.ndarray] = {}
         for robot, tag_id in layout.find_tags(robots).items():
-            mount = layout.find_mount(tag_id)
-            place = transform_pose(robots[robot], Pose(mount.x_m, mount.y_m, 0.0))
-            places[tag_id] = np.array((place.x_m, place.y_m, mount.height_m))
+            place = transform_pose(robots[robot], layout.find_mount(tag_id))
+            places[tag_id] = np.array((place.x_m, place.y_m, layout.height_m))
         if not places:
             return {}
         pixels = self.camera.project(np.array(list(places.values())))
@@ -139,13 +140,13 @@ class Tracker:
             text = "measures %.0f %% of its size: print it at 100 %%, or set tag_size_m" % (100.0 * share)
             note[tag_id] = (stamp_s, text)
         seen = {tag_id: sighting.pose for tag_id, sighting in sightings.references.items()}
-        moved_m = find_moved_references(seen, self._settings.seen_references)
+        moved = find_moved_references(seen, self._settings.seen_references)
         known = seen.keys() & self._settings.seen_references.keys()
         if len(known) >= MIN_REFERENCES:
-            self.is_moved = 2 * len(moved_m) > len(known)
+            self.is_moved = 2 * len(moved) > len(known)
         for tag_id in known:
             since_s = self._moved_since_s.get(tag_id, math.inf)
-            self._moved_since_s[tag_id] = min(since_s, stamp_s) if tag_id in moved_m else math.inf
+            self._moved_since_s[tag_id] = min(since_s, stamp_s) if tag_id in moved else math.inf
         for tag_id in self._settings.seen_references:
             # Time goes back when a recording is played again.
             is_new = not self._reference_seen_s.get(tag_id, math.inf) <= stamp_s
@@ -211,3 +212,12 @@ class Tracker:
             if abs(newest_s - stamp_s) <= KEPT_S:  # time goes back when a recording is played again
                 problems.append(Problem("tag %d" % tag_id, text, False))
         return problems
+
+
+def find_moved_references(seen: Mapping[int, Pose], at_calibration: Mapping[int, Pose]) -> Set[int]:
+    """Return the reference tags that are not seen where the calibration saw them.
+
+    All of them: the camera moved. One: that tag moved.
+    """
+    known = seen.keys() & at_calibration.keys()
+    return {tag_id for tag_id in known if not measure_distance(at_calibration[tag_id], seen[tag_id]) <= MOVED_M}
