@@ -64,9 +64,11 @@ def test_process_answers_also_where_sockets_have_a_default_timeout():
 
 
 @pytest.mark.slow
-def test_detector_that_cannot_be_made_is_named():
-    with pytest.raises(DetectorError, match="9h9"):
-        DetectorProcess("aruco", "9h9", 2.0, WIDTH_PX, HEIGHT_PX)
+def test_detector_that_cannot_be_made_is_named(tmp_path, monkeypatch):
+    (tmp_path / "apriltag.py").write_text("raise ImportError")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(DetectorError, match="apt install python3-apriltag"):
+        DetectorProcess("apriltag", "36h11", 2.0, WIDTH_PX, HEIGHT_PX)
 
 
 def test_process_that_died_is_named(process):
@@ -171,12 +173,13 @@ def test_only_apriltag_has_fine_detectors(backend, fine, monkeypatch):
     assert made == [((backend, "16h5", 1.5), 6, 4, fine, 9.0)]
 
 
-def test_a_detector_that_cannot_be_made_is_told_to_the_parent():
-    memory, connection = make_memory(np.zeros((4, 6), np.uint8)), FakeConnection(("zbar", "16h5", 1.5, 6, 4, 9.0))
+def test_a_detector_that_cannot_be_made_is_told_to_the_parent(monkeypatch):
+    monkeypatch.setitem(sys.modules, "apriltag", None)
+    memory, connection = make_memory(np.zeros((4, 6), np.uint8)), FakeConnection(("apriltag", "16h5", 1.5, 6, 4, 9.0))
     detector_process.serve(connection, memory)
     os.close(memory)
     (problem,) = connection.sent
-    assert "zbar" in problem
+    assert "apt install python3-apriltag" in problem
 
 
 def test_the_process_ends_with_its_connection(monkeypatch):

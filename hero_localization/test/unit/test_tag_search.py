@@ -309,19 +309,19 @@ def test_windows_grow_with_the_time_since_a_tag_was_seen(center, monkeypatch):
 
 
 def test_tiles_cover_the_image_with_room_for_a_tag_on_each_border():
-    tiles = _list_tiles(1920, 1080, 96)
+    tiles = _list_tiles(1920, 1080)
     assert tiles[0] == (0, 0, 576, 456) and tiles[-1] == (1440, 720, 1920, 1080) and len(tiles) == 12
     assert [tile[0] for tile in tiles[:4]] == [0, 480, 960, 1440], "row by row"
-    assert _list_tiles(640, 480, 96) == [
+    assert _list_tiles(640, 480) == [
         (0, 0, 416, 336), (320, 0, 640, 336), (0, 240, 416, 480), (320, 240, 640, 480),
     ]  # fmt: skip
-    assert _list_tiles(320, 240, 96) == [(0, 0, 320, 240)]
+    assert _list_tiles(320, 240) == [(0, 0, 320, 240)]
 
 
 @pytest.mark.parametrize(("step_s", "sweep_s"), [(0.05, 2.0), (0.1, 2.0), (0.2, 2.0), (0.4, 4.0)])
 def test_the_tiles_take_turns_within_two_seconds(step_s, sweep_s, monkeypatch):
     search, _, windows = make_logged_search((900.0, 500.0), monkeypatch)
-    tiles = [(left, top, right - left, bottom - top) for left, top, right, bottom in _list_tiles(1920, 1080, 96)]
+    tiles = [(left, top, right - left, bottom - top) for left, top, right, bottom in _list_tiles(1920, 1080)]
     # A gap of more than 0.2 s counts as that.
     for frame in range(1, round(sweep_s / step_s) + 2):
         search.search(FRAME, frame * step_s)

@@ -73,6 +73,37 @@ class _Track(NamedTuple):
     first_s: float
 
 
+class _Frame:
+    """One image, and the tags that were found in it so far."""
+
+    def __init__(self, gray: np.ndarray, stamp_s: float) -> None:
+        self.stamp_s = stamp_s
+        self.found: List[TagCorners] = []
+        self._gray = gray
+
+    def search(self, detector: TagDetector, left: int, top: int, right: int, bottom: int) -> List[TagCorners]:
+        """Search a window, and return its tags; those that were not found in another one already are added."""
+        seen = detector.detect(self._gray[top:bottom, left:right], (left, top))
+        for tag in seen:
+            same = (other for other in self.found if other.tag_id == tag.tag_id)
+            if not any(float(np.linalg.norm(other.center - tag.center)) < other.side_px / 2.0 for other in same):
+                self.found.append(tag)
+        return seen
+
+    def search_around(
+        self, detector: TagDetector, tag_id: int, center: np.ndarray, side_px: float, half_px: float
+    ) -> bool:
+        """Search a square for a tag, and return whether it is there."""
+        if not np.isfinite(center).all():
+            return False
+        height, width = self._gray.shape
+        left, top = (max(0, math.floor(place - half_px)) for place in center)
+        right, bottom = (min(limit, math.ceil(place + half_px)) for place, limit in zip(center, (width, height)))
+        if min(right - left, bottom - top) < side_px:
+            return False
+        return any(tag.tag_id == tag_id for tag in self.search(detector, left, top, right, bottom))
+
+
 class TagSearch:
     """Finds tags in the frames of one camera."""
 
@@ -83,7 +114,6 @@ class TagSearch:
         height_px: int,
         fine_detectors: Sequence[TagDetector] = (),
         smallest_px: float = math.inf,
-        overlap_px: int = OVERLAP_PX,
     ) -> None:
         """fine_detectors: two that find smaller tags at more cost; smallest_px: side of the smallest tag expected."""
         self._detector = detector
@@ -92,7 +122,7 @@ class TagSearch:
         self._tracks: List[_Track] = []
         self._lost: Dict[int, _Track] = {}
         self._size_px = np.array((width_px, height_px))
-        self._tiles = _list_tiles(width_px, height_px, overlap_px)
+        self._tiles = _list_tiles(width_px, height_px)
         self._next_tile = 0
         self._due = 0.0
         self._nearby_px = 0.0
@@ -117,14 +147,14 @@ class TagSearch:
             # Time went back, as when a recording is replayed: stamps tell no more for how long a tag is lost.
             self._tracks, self._lost, self._hard = [], {}, {}
         places = {tag_id: np.array(place, dtype=float) for tag_id, place in (expected or {}).items()}
-        found: List[TagCorners] = []
+        frame = _Frame(gray, stamp_s)
         for track in self._tracks:
             elapsed_s = stamp_s - track.stamp_s
             # First where it was: what is known from elsewhere is newer than the frame.
             centers = [track.center, *([places[track.tag_id]] if track.tag_id in places else [])]
             windows_s = (NARROW_S, elapsed_s) if elapsed_s > NARROW_S else (elapsed_s,)
             any(
-                self._look_for(gray, track.tag_id, center, track.side_px, window_s, stamp_s, found)
+                self._look_for(frame, track.tag_id, center, track.side_px, window_s)
                 for window_s in windows_s
                 for center in centers
             )
@@ -133,61 +163,30 @@ class TagSearch:
             # Lost for long, or too small for the tiles: where it is expected, it costs no more than a window.
             side_px = self._sides_px.get(tag_id, self._smallest_px)
             if tag_id not in tracked and math.isfinite(side_px):
-                self._look_for(gray, tag_id, place, side_px, MAX_STEP_S, stamp_s, found)
-        for detector, (left, top, right, bottom) in self._take_tiles(stamp_s):
-            _add_new(found, detector.detect(gray[top:bottom, left:right], (left, top)))
-        self._search_nearby(gray, stamp_s, places, found)
-        self._follow(found, stamp_s)
+                self._look_for(frame, tag_id, place, side_px, MAX_STEP_S)
+        for detector, tile in self._take_tiles(stamp_s):
+            frame.search(detector, *tile)
+        self._search_nearby(frame, places)
+        self._follow(frame)
         self._previous_s = stamp_s
-        return found
+        return frame.found
 
     def _look_for(
-        self,
-        gray: np.ndarray,
-        tag_id: int,
-        center: np.ndarray,
-        side_px: float,
-        elapsed_s: float,
-        stamp_s: float,
-        found: List[TagCorners],
+        self, frame: _Frame, tag_id: int, center: np.ndarray, side_px: float, elapsed_s: float
     ) -> bool:
-        """Search a window for a tag, and return whether it is there; what else is there is added to found, too."""
+        """Search a window for a tag that was last seen elapsed_s ago, and return whether it is there."""
         slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
         half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
         count = 1 + (side_px < FINE_BELOW_PX) + (side_px < FINEST_BELOW_PX)
         first, found_s = self._hard.get(tag_id, (0, -math.inf))
         for index, detector in enumerate(self._detectors[:count]):
-            if index < first and stamp_s < found_s + FINE_S:
+            if index < first and frame.stamp_s < found_s + FINE_S:
                 continue
-            if self._detect(detector, gray, center, half_px, side_px, tag_id, found):
-                if index != first or stamp_s >= found_s + FINE_S:
-                    self._hard[tag_id] = index, stamp_s
+            if frame.search_around(detector, tag_id, center, side_px, half_px):
+                if index != first or frame.stamp_s >= found_s + FINE_S:
+                    self._hard[tag_id] = index, frame.stamp_s
                 return True
         return False
-
-    @staticmethod
-    def _detect(
-        detector: TagDetector,
-        gray: np.ndarray,
-        center: np.ndarray,
-        half_px: float,
-        side_px: float,
-        tag_id: int,
-        found: List[TagCorners],
-    ) -> bool:
-        """Search a square, and return whether a tag is there."""
-        if not np.isfinite(center).all():
-            return False
-        height, width = gray.shape
-        left, top = (max(0, math.floor(place - half_px)) for place in center)
-        right, bottom = (
-            min(limit, math.ceil(place + half_px)) for place, limit in zip(center, (width, height))
-        )
-        if min(right - left, bottom - top) < side_px:
-            return False
-        seen = detector.detect(gray[top:bottom, left:right], (left, top))
-        _add_new(found, seen)
-        return any(tag.tag_id == tag_id for tag in seen)
 
     def _take_tiles(self, stamp_s: float) -> List[Tuple[TagDetector, Tuple[int, int, int, int]]]:
         """Return the tiles to be searched in this frame, and the detector for each."""
@@ -205,20 +204,18 @@ class TagSearch:
         turns = [divmod((first + index) % total, len(self._tiles)) for index in range(count)]
         return [(self._sweeps[sweep], self._tiles[tile]) for sweep, tile in turns]
 
-    def _search_nearby(
-        self, gray: np.ndarray, stamp_s: float, places: Mapping[int, np.ndarray], found: List[TagCorners]
-    ) -> None:
+    def _search_nearby(self, frame: _Frame, places: Mapping[int, np.ndarray]) -> None:
         """Search around the places of lost tags, one after another, as far as there are pixels left for it."""
         image_px = float(self._size_px.prod())
         if not self._lost:
             self._nearby_px = min(self._nearby_px, NEARBY_START_IMAGES * image_px)
         is_found = False
         for tag_id, track in list(self._lost.items()):
-            seen = {tag.tag_id for tag in found}
+            seen = {tag.tag_id for tag in frame.found}
             if not is_found and not seen.isdisjoint(self._lost):
                 # What covered one may have covered others.
                 is_found, self._nearby_px = True, image_px
-            lost_s = stamp_s - track.stamp_s
+            lost_s = frame.stamp_s - track.stamp_s
             if lost_s <= 0.0 or lost_s > (NEARBY_EXPECTED_S if tag_id in places else NEARBY_S):
                 del self._lost[tag_id]
                 continue
@@ -231,12 +228,12 @@ class TagSearch:
                 return
             self._nearby_px -= cost_px
             self._lost[tag_id] = self._lost.pop(tag_id)  # the next one comes first next time
-            self._detect(detector, gray, track.center, half_px, track.side_px, tag_id, found)
+            frame.search_around(detector, tag_id, track.center, track.side_px, half_px)
 
-    def _follow(self, found: List[TagCorners], stamp_s: float) -> None:
-        old = list(self._tracks)
+    def _follow(self, frame: _Frame) -> None:
+        old, stamp_s = list(self._tracks), frame.stamp_s
         self._tracks = []
-        for tag in found:
+        for tag in frame.found:
             center, side_px, first_s = tag.center, tag.side_px, stamp_s
             self._sides_px[tag.tag_id] = side_px
             same = [track for track in old if track.tag_id == tag.tag_id]
@@ -257,22 +254,14 @@ class TagSearch:
                 self._lost[track.tag_id] = track
 
 
-def _list_tiles(width_px: int, height_px: int, overlap_px: int) -> List[Tuple[int, int, int, int]]:
+def _list_tiles(width_px: int, height_px: int) -> List[Tuple[int, int, int, int]]:
     """Return left, top, right and bottom of tiles that cover the image."""
     edges = [
         [round(size * index / math.ceil(size / tile)) for index in range(math.ceil(size / tile) + 1)]
         for size, tile in zip((width_px, height_px), TILE_PX)
     ]
     return [
-        (left, top, min(right + overlap_px, width_px), min(bottom + overlap_px, height_px))
+        (left, top, min(right + OVERLAP_PX, width_px), min(bottom + OVERLAP_PX, height_px))
         for top, bottom in zip(edges[1], edges[1][1:])
         for left, right in zip(edges[0], edges[0][1:])
     ]
-
-
-def _add_new(found: List[TagCorners], seen: List[TagCorners]) -> None:
-    """Add to found the tags that were not found in another window already."""
-    for tag in seen:
-        same = (other for other in found if other.tag_id == tag.tag_id)
-        if not any(float(np.linalg.norm(other.center - tag.center)) < other.side_px / 2.0 for other in same):
-            found.append(tag)
