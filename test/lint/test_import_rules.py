@@ -48,7 +48,7 @@ ROOMS = {
     "hero_localization.filter": {"errors"},
     "hero_localization.mapping": {"errors", "filter"},
     "hero_localization.calibration": {"errors", "prints", "camera", "tracking", "filter"},
-    "hero_localization.simulated_camera": {"errors", "prints"},
+    "hero_localization.simulated_camera": {"errors", "prints", "camera", "tracking"},
     "hero_recording.bags": {"errors", "optional"},
     "hero_recording.formats": {"bags", "errors", "optional"},
     "hero_recording.plots": {"bags"},

@@ -205,14 +205,10 @@ def test_a_source_came_last_when_it_was_opened(source, monkeypatch, receivers):
     assert source.lens is None and source.problem == source.warning == ""
 
 
-def test_an_item_is_waited_for_and_handed_over_once():
-    newest = frame_source.Newest()
-    newest.keep(1)
-    newest.keep(2)
-    assert newest.take(0.0) == 2 and newest.take(0.0) is None
-    thread = threading.Timer(0.0, newest.keep, (3,))
+def test_an_image_is_waited_for(source):
+    thread = threading.Timer(0.0, source.receive, (make_image("mono8", 1),))
     thread.start()
-    assert newest.take(TIMEOUT_S) == 3
+    assert source.poll(TIMEOUT_S).number == 9
     thread.join()
 
 

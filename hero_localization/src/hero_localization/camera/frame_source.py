@@ -5,7 +5,7 @@ import math
 import os
 import threading
 import time
-from typing import Any, Generic, NamedTuple, Optional, Tuple, TypeVar
+from typing import Any, NamedTuple, Optional, Tuple
 
 import cv2
 import numpy as np
@@ -17,8 +17,6 @@ from hero_node.geometry import clamp
 from ..errors import FrameSourceError
 from .camera_model import Intrinsics
 from .device_controls import ControlPort, DeviceControls, apply_controls
-
-T = TypeVar("T")
 
 _DEPTHS = {"mono8": 1, "8UC1": 1, "bgr8": 3, "8UC3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
 _TO_GRAY = {
@@ -57,28 +55,6 @@ class Frame(NamedTuple):
     """Of the source's images: gaps are those that did not get here."""
 
 
-class Newest(Generic[T]):
-    """Hands over what arrives on other threads, of which only the newest counts: frames, or the tags in them."""
-
-    def __init__(self) -> None:
-        self._arrival = threading.Condition()
-        self._newest: Optional[T] = None
-
-    def keep(self, item: T) -> None:
-        """Put item in the place of what has not been taken yet."""
-        with self._arrival:
-            self._newest = item
-            self._arrival.notify()
-
-    def take(self, timeout_s: float) -> Optional[T]:
-        """Return the newest item, or the next one; None if none comes within timeout_s."""
-        with self._arrival:
-            if self._newest is None:
-                self._arrival.wait(timeout_s)
-            item, self._newest = self._newest, None
-            return item
-
-
 class FrameSource:
     """Images of a camera.
 
@@ -107,15 +83,22 @@ class LiveSource(FrameSource):
 
     def __init__(self) -> None:
         super().__init__()
-        self._newest: Newest[Any] = Newest()
+        self._arrival = threading.Condition()
+        self._newest: Any = None
 
     def _keep(self, received: Any) -> None:
+        """Put an image that arrived on another thread in the place of what was not polled yet."""
         self.arrived_s = rospy.get_time()
-        self._newest.keep(received)
+        with self._arrival:
+            self._newest = received
+            self._arrival.notify()
 
     def poll(self, timeout_s: float) -> Any:
         """Return the newest image, unless an earlier call did; None if none comes in time or is usable."""
-        received = self._newest.take(timeout_s)
+        with self._arrival:
+            if self._newest is None:
+                self._arrival.wait(timeout_s)
+            received, self._newest = self._newest, None
         return None if received is None else self._decode(received)
 
     def _decode(self, received: Any) -> Any:

@@ -1,7 +1,7 @@
 """The map that a swarm makes: scans of all robots, each at the pose that its robot had then. Pure."""
 
 from collections import deque
-from typing import Deque, Dict, NamedTuple, Sequence, Tuple
+from typing import Deque, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -21,15 +21,6 @@ class _Robot:
     def __init__(self) -> None:
         self.poses: StampedHistory[Pose] = StampedHistory(KEPT_S, interpolate_pose)
         self.scans: Deque[Tuple[float, Sequence[float]]] = deque(maxlen=MAX_WAITING)
-
-
-class Box(NamedTuple):
-    """Rows and columns of cells: first and end of both."""
-
-    row: int
-    column: int
-    row_end: int
-    column_end: int
 
 
 class SwarmMap:
@@ -67,14 +58,12 @@ class SwarmMap:
                     count += 1
         return count
 
-    def take_change(self) -> Tuple[np.ndarray, Box]:
-        """Return the map in percent (see OccupancyGrid.to_percent) and what of it changed since the last call.
-
-        A box without cells: nothing.
-        """
+    def take_change(self) -> Tuple[np.ndarray, Optional[Tuple[slice, slice]]]:
+        """Return the map in percent (see OccupancyGrid.to_percent), and the rows and columns that changed since."""
         percent = self.grid.to_percent()
-        rows, columns = np.nonzero(percent != self._published)
+        changed = np.nonzero(percent != self._published)
         self._published = percent
-        if not len(rows):
-            return percent, Box(0, 0, 0, 0)
-        return percent, Box(int(rows.min()), int(columns.min()), int(rows.max()) + 1, int(columns.max()) + 1)
+        if not len(changed[0]):
+            return percent, None
+        rows, columns = (slice(int(places.min()), int(places.max()) + 1) for places in changed)
+        return percent, (rows, columns)

@@ -89,7 +89,7 @@ class MapNode:
 
     def _publish(self) -> None:
         with self._lock:
-            percent, box = self._map.take_change()
+            percent, changed = self._map.take_change()
             frontiers_m, share = self._grid.find_frontiers(), self._grid.known_share
         stamp = rospy.get_rostime()
         message = MapMessage()
@@ -99,10 +99,10 @@ class MapNode:
         message.info = MapMetaData(stamp, self._grid.cell_m, columns, rows, origin)
         message.data = percent.ravel().tolist()
         self._publisher.publish(message)
-        if box.row_end > box.row and self._updates.get_num_connections():
-            update = OccupancyGridUpdate(header=message.header, x=box.column, y=box.row)
-            update.width, update.height = box.column_end - box.column, box.row_end - box.row
-            update.data = percent[box.row : box.row_end, box.column : box.column_end].ravel().tolist()
+        if changed is not None and self._updates.get_num_connections():
+            part, (first_row, first_column) = percent[changed], (place.start for place in changed)
+            height, width = part.shape
+            update = OccupancyGridUpdate(message.header, first_column, first_row, width, height, part.ravel().tolist())
             self._updates.publish(update)
         places = [PoseMessage(Point(*place_m, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)) for place_m in frontiers_m]
         self._frontiers.publish(PoseArray(message.header, places))

@@ -178,15 +178,15 @@ class CameraNode:
 
     def run(self) -> None:
         """Publish images until ROS ends."""
-        for frame in list_frames(self._options, rospy.get_time(), self._seed):
-            wait_s = frame.arrival_s - rospy.get_time()
+        for taken_s, arrival_s in list_frames(self._options, rospy.get_time(), self._seed):
+            wait_s = arrival_s - rospy.get_time()
             if wait_s > 0.0:
                 rospy.sleep(wait_s)
             if rospy.is_shutdown():
                 return
-            if rospy.get_time() - frame.arrival_s < MISSED_S:
-                stamp_s = rospy.get_time() if self._stamps_arrival else frame.stamp_s
-                self._publish(rospy.Time.from_sec(stamp_s), frame.stamp_s)
+            if rospy.get_time() - arrival_s < MISSED_S:
+                stamp_s = rospy.get_time() if self._stamps_arrival else taken_s
+                self._publish(rospy.Time.from_sec(stamp_s), taken_s)
 
     def _publish(self, stamp: rospy.Time, taken_s: float) -> None:
         if not self._scene.is_complete:

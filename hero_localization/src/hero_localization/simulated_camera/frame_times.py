@@ -1,22 +1,17 @@
 """Times at which the camera takes its images, and at which they arrive. Pure; deterministic by seed."""
 
-from typing import Iterator, NamedTuple
+from typing import Iterator, Tuple
 
 import numpy as np
 
 from .view import CameraOptions
 
 
-class Frame(NamedTuple):
-    """One image that arrives."""
+def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> Iterator[Tuple[float, float]]:
+    """Yield the middle of the exposure and the arrival of images from start_s on, without end.
 
-    stamp_s: float
-    """The middle of its exposure: what its header says."""
-    arrival_s: float
-
-
-def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> Iterator[Frame]:
-    """Yield the images from start_s on, without end; dropped ones are left out. None overtakes another."""
+    Dropped ones are left out. None overtakes another.
+    """
     random = np.random.RandomState(seed)
     index, arrival_s = 0, -np.inf
     while True:
@@ -26,4 +21,4 @@ def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> 
         index += 1
         if not is_dropped:
             arrival_s = max(arrival_s, stamp_s + options.delay_s + late_s)
-            yield Frame(stamp_s, float(arrival_s))
+            yield stamp_s, float(arrival_s)

@@ -1,17 +1,16 @@
 """The simulated lab: its reference tags, the camera above its arena, and the camera file that describes both."""
 
-import math
-import os
 from typing import List, Sequence
 
 import numpy as np
-import yaml
 
-from hero_node.safe_file import write_file
+from hero_node.geometry import Pose
 from hero_sim.world.arena import Arena
 
+from ..camera.camera_model import Camera, Intrinsics
 from ..errors import SettingsError
 from ..prints.tag_images import FAMILIES, REFERENCE_SIZE_M
+from ..tracking import settings as camera_file
 from .view import CameraOptions, PrintedTag, View, tag_corners
 
 REFERENCES = 4
@@ -87,28 +86,14 @@ def write_camera_file(
     path: str, view: View, options: CameraOptions, tags: Sequence[PrintedTag], references: Sequence[PrintedTag]
 ) -> None:
     """Write a camera file as calibrations without any error would. Raises: SettingsError."""
-    content = {
+    mounts, places = ({tag.tag_id: Pose(tag.x_m, tag.y_m, tag.yaw_rad) for tag in part} for part in (tags, references))
+    lens = Intrinsics(options.width_px, options.height_px, view.matrix, view.distortion)
+    parts = {
         "family": tags[0].family,
         "tag_size_m": tags[0].size_m,
-        "references": {tag.tag_id: _describe_place(tag) for tag in references},
-        "mounts": {tag.tag_id: _describe_place(tag) for tag in tags},
-        "lens": {
-            "width_px": options.width_px,
-            "height_px": options.height_px,
-            "matrix": view.matrix.ravel().tolist(),
-            "distortion": view.distortion.tolist(),
-        },
-        "camera": {"rotation": view.rotation.ravel().tolist(), "position_m": view.position_m.tolist()},
-        "seen_references": {tag.tag_id: _describe_place(tag) for tag in references},
+        "references": {tag_id: camera_file.describe_pose(pose) for tag_id, pose in places.items()},
+        "mounts": {tag_id: camera_file.describe_pose(pose) for tag_id, pose in mounts.items()},
+        "delay_s": 0.0,
+        **camera_file.describe_camera(Camera(lens, view.rotation, view.position_m), places),
     }
-    path = os.path.expanduser(path)
-    try:
-        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-        write_file(path, str(yaml.safe_dump(content, sort_keys=False, default_flow_style=None)).encode())
-    except OSError as error:
-        raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
-
-
-def _describe_place(tag: PrintedTag) -> List[float]:
-    """Return x, y (m) and yaw (degrees) as the file holds them."""
-    return [round(float(tag.x_m), 5), round(float(tag.y_m), 5), round(math.degrees(tag.yaw_rad), 3)]
+    camera_file.update(path, parts)

@@ -98,7 +98,7 @@ def describe_camera(camera: Camera, seen: Mapping[int, Pose]) -> Dict[str, Any]:
 
 def describe_pose(pose: Pose) -> List[float]:
     """Return x, y (m) and yaw (degrees) as the file holds them."""
-    return [round(pose.x_m, 5), round(pose.y_m, 5), round(math.degrees(pose.yaw_rad), 3)]
+    return [round(float(pose.x_m), 5), round(float(pose.y_m), 5), round(math.degrees(pose.yaw_rad), 3)]
 
 
 def _read(path: str) -> str:
