@@ -15,6 +15,7 @@ from hero_client.values.readings import is_plausible, read_pose
 from hero_node.geometry import Pose
 
 from ..filter.pose_filter import Measurement
+from .outputs import IN_PLANE
 
 _HEADER = struct.Struct("<3I")
 _LENGTH = struct.Struct("<I")
@@ -142,7 +143,7 @@ class PoseInput:
             return
         covariance = self._default_covariance
         if has_covariance:
-            covariance = np.array(content.pose.covariance).reshape(6, 6)[np.ix_((0, 1, 5), (0, 1, 5))]
+            covariance = np.array(content.pose.covariance).reshape(6, 6)[np.ix_(IN_PLANE, IN_PLANE)]
             if not covariance.any():  # not filled in
                 covariance = self._default_covariance
         # A stamp of zero says that the sender does not know the time: that of arrival is the best there is.

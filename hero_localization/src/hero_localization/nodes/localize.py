@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any, Dict, List, Optional
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_client import Program, ProgramError, read_parameters, run
 from hero_client.ros.drivers import share_drivers
@@ -21,7 +20,7 @@ from hero_node.parameters import number, robot_ids, words
 from ..filter.pose_filter import Measurement, make_covariance
 from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
 from .inputs import OdometryInput, PoseInput
-from .outputs import Outputs, name_status
+from .outputs import Outputs
 
 DIAGNOSTICS_PERIOD_S = 1.0
 UNKNOWN_S = 3.0
@@ -116,18 +115,12 @@ class LocalizationNode:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
             self._outputs.publish_diagnostics(robots, self._list_unknown_robots(now_s))
 
-    def _list_unknown_robots(self, now_s: float) -> List[DiagnosticStatus]:
-        """Return a warning for each tag that is seen on a robot which no driver knows."""
+    def _list_unknown_robots(self, now_s: float) -> List[int]:
+        """Return the robots whose tags are seen, but which no driver knows."""
         if self._chosen is not None:
             return []
         return [
-            DiagnosticStatus(
-                DiagnosticStatus.WARN,
-                name_status("hero_%d" % robot_id),
-                "its tag is seen, but no driver knows the robot: is it on, and is tag %d its own?" % robot_id,
-                "hero_%d" % robot_id,
-                [],
-            )
+            robot_id
             for robot_id, seen_s in sorted(self._unknown_s.copy().items())
             if abs(now_s - seen_s) < UNKNOWN_S and robot_id not in self._inputs
         ]

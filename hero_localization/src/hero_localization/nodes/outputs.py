@@ -1,9 +1,8 @@
 """Outputs to ROS: poses of robots in the common frame, as messages and on tf, and diagnostics."""
 
 import math
-from typing import Dict, Sequence
+from typing import Dict, Iterable, List, Sequence
 
-import diagnostic_updater
 import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -13,7 +12,11 @@ from tf2_msgs.msg import TFMessage
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
 
+from ..filter.pose_filter import Estimate
 from ..filter.swarm_localizer import LocalizedRobot
+
+IN_PLANE = (0, 1, 5)
+"""Of the entries of a covariance (x, y, z, and rotations about them), those of x, y and yaw."""
 
 
 class Outputs:
@@ -49,53 +52,50 @@ class Outputs:
             transforms.append(self._make_transform(robot.robot_id, stamp_s, robot.odom_origin))
             publisher = self._robots[robot.robot_id]
             if publisher.get_num_connections():
-                publisher.publish(self._make_message(robot))
+                publisher.publish(self._make_message(robot.estimate))
         if transforms:
             self._tf.publish(TFMessage(transforms))
 
     def _make_transform(self, robot_id: int, stamp_s: float, origin: Pose) -> TransformStamped:
-        transform = TransformStamped()
-        transform.header.stamp = rospy.Time.from_sec(stamp_s)
-        transform.header.frame_id = self._frame
-        transform.child_frame_id = "hero_%d/odom" % robot_id
+        transform = TransformStamped(child_frame_id="hero_%d/odom" % robot_id)
+        transform.header.stamp, transform.header.frame_id = rospy.Time.from_sec(stamp_s), self._frame
         transform.transform.translation.x = origin.x_m
         transform.transform.translation.y = origin.y_m
         transform.transform.rotation = _make_quaternion(origin.yaw_rad)
         return transform
 
-    def _make_message(self, robot: LocalizedRobot) -> PoseWithCovarianceStamped:
+    def _make_message(self, estimate: Estimate) -> PoseWithCovarianceStamped:
+        stamp_s, pose, covariance = estimate
         message = PoseWithCovarianceStamped()
-        if robot.estimate is not None:
-            stamp_s, pose, covariance = robot.estimate
-            message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp_s), self._frame
-            message.pose.pose.position.x, message.pose.pose.position.y = pose.x_m, pose.y_m
-            message.pose.pose.orientation = _make_quaternion(pose.yaw_rad)
-            entries = [0.0] * 36
-            for row, place in enumerate((0, 1, 5)):  # of x, y and rotation about z
-                for column, other in enumerate((0, 1, 5)):
-                    entries[6 * place + other] = float(covariance[row, column])
-            message.pose.covariance = entries
+        message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp_s), self._frame
+        message.pose.pose.position.x, message.pose.pose.position.y = pose.x_m, pose.y_m
+        message.pose.pose.orientation = _make_quaternion(pose.yaw_rad)
+        entries = np.zeros((6, 6))
+        entries[np.ix_(IN_PLANE, IN_PLANE)] = covariance
+        message.pose.covariance = entries.ravel().tolist()
         return message
 
-    def publish_diagnostics(self, robots: Sequence[LocalizedRobot], more: Sequence[DiagnosticStatus] = ()) -> None:
-        """Publish the state of each robot, and other statuses."""
-        if not self._diagnostics.get_num_connections():
-            return
-        message = DiagnosticArray(status=list(more))
-        message.header.stamp = rospy.get_rostime()
+    def publish_diagnostics(self, robots: Iterable[LocalizedRobot], unknown: Iterable[int]) -> None:
+        """Publish the state of each robot, and a warning for each tag of a robot that no driver knows."""
+        text = "its tag is seen, but no driver knows the robot: is it on, and is tag %d its own?"
+        statuses = [make_status("hero_%d" % robot_id, DiagnosticStatus.WARN, text % robot_id) for robot_id in unknown]
         for robot in robots:
-            status = diagnostic_updater.DiagnosticStatusWrapper()
-            status.name = name_status("hero_%d" % robot.robot_id)
-            status.hardware_id = "hero_%d" % robot.robot_id
             level = DiagnosticStatus.WARN if robot.problem else DiagnosticStatus.OK
-            status.summary(level, robot.problem or robot.state.name.lower())
-            message.status.append(status)
-        self._diagnostics.publish(message)
+            text = robot.problem or robot.state.name.lower()
+            statuses.append(make_status("hero_%d" % robot.robot_id, level, text))
+        publish_statuses(self._diagnostics, statuses)
 
 
-def name_status(part: str) -> str:
-    """Return the name of a part's diagnostic status: that of this node, and the part."""
-    return "%s: %s" % (rospy.get_name().strip("/"), part)
+def make_status(part: str, level: int, text: str) -> DiagnosticStatus:
+    """Return the diagnostic status of a part of what this node works on, such as a robot."""
+    return DiagnosticStatus(level, "%s: %s" % (rospy.get_name().strip("/"), part), text, part, [])
+
+
+def publish_statuses(publisher: rospy.Publisher, statuses: List[DiagnosticStatus]) -> None:
+    """Publish statuses as a diagnostic_msgs/DiagnosticArray."""
+    message = DiagnosticArray(status=statuses)
+    message.header.stamp = rospy.get_rostime()
+    publisher.publish(message)
 
 
 def make_robot_pose(robot_id: int, state: int, stamp: rospy.Time, pose: Pose, covariance: np.ndarray) -> RobotPose:

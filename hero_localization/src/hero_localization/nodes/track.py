@@ -23,7 +23,7 @@ from ..tracking import settings as camera_file
 from ..tracking.detector_process import DetectorProcess
 from ..tracking.tag_pose import Sightings, find_smallest_side
 from ..tracking.tracker import Tracker
-from .outputs import make_robot_pose, name_status
+from .outputs import make_robot_pose, make_status, publish_statuses
 from .picture_output import PictureOutput
 
 SILENT_S = 2.0
@@ -124,15 +124,12 @@ class TrackNode:
         statuses: List[DiagnosticStatus] = []
         for name, text, is_error in self._list_problems(now_s):
             level = DiagnosticStatus.ERROR if is_error else DiagnosticStatus.WARN
-            statuses.append(DiagnosticStatus(name=name_status(name), level=level, message=text))
+            statuses.append(make_status(name, level, text))
             self._log(name, text, is_error, now_s)
-        camera = name_status("camera")
-        if not any(status.name == camera for status in statuses) and self._tracker is not None:
+        if not any(status.hardware_id == "camera" for status in statuses) and self._tracker is not None:
             text = "%s, %d tags" % (self._tracker.describe_rate(), len(self._tracker.found))
-            statuses.append(DiagnosticStatus(name=camera, level=DiagnosticStatus.OK, message=text))
-        message = DiagnosticArray(status=statuses)
-        message.header.stamp = rospy.get_rostime()
-        self._diagnostics.publish(message)
+            statuses.append(make_status("camera", DiagnosticStatus.OK, text))
+        publish_statuses(self._diagnostics, statuses)
 
     def _log(self, name: str, text: str, is_error: bool, now_s: float) -> None:
         """Log a problem unless its last line, with other figures perhaps, is younger than LOG_PERIOD_S."""
