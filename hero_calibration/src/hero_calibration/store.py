@@ -4,12 +4,11 @@ import math
 import os
 import re
 from contextlib import suppress
-from datetime import date
 from typing import Any, Dict, List, NamedTuple, Tuple
 
 from hero_node.number_checks import is_number
 from hero_node.safe_file import lock_file, write_file
-from hero_node.texts import make_printable
+from hero_node.texts import make_printable, shorten
 from hero_node.yaml_edit import replace_values
 from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
@@ -17,8 +16,6 @@ from .errors import CalibrationError
 
 PREVIOUS = ".previous"
 """Goes before the suffix of the previous file."""
-
-MAX_SHOWN = 60
 
 Range = Tuple[int, float, float, str]
 
@@ -109,10 +106,10 @@ def load(path: str) -> KeptCalibration:
     for key in content:
         if key not in ("robot", "date", *OTHERS, *known):
             names = ", ".join(("robot", "date", *OTHERS, *known))
-            raise _refuse(path, "unknown key %s; known are %s" % (_shorten(key), names))
+            raise _refuse(path, "unknown key %s; known are %s" % (shorten(key), names))
     match = re.fullmatch(r"hero_([0-9]{1,9})", str(content["robot"]))
     if match is None:
-        raise _refuse(path, "robot must be hero_N, not %s" % _shorten(content["robot"]))
+        raise _refuse(path, "robot must be hero_N, not %s" % shorten(content["robot"]))
     values = {key: _read_numbers(path, key, content[key], allowed) for key, allowed in known.items() if key in content}
     others = {key: content[key] for key in OTHERS if key in content}
     return KeptCalibration(int(match.group(1)), make_printable(str(content.get("date", ""))), values, others)
@@ -122,17 +119,12 @@ def _read_numbers(path: str, key: str, found: Any, allowed: Range) -> List[float
     count, low, high, meaning = allowed
     text = "%s must be %d numbers from %g to %g (%s)" % (key, count, low, high, meaning)
     if not isinstance(found, list) or len(found) != count:
-        raise _refuse(path, "%s, not %s" % (text, _shorten(found)))
+        raise _refuse(path, "%s, not %s" % (text, shorten(found)))
     for number in found:
         is_unknown = key in RESULTS and isinstance(number, float) and math.isnan(number)
         if not is_unknown and not is_number(number, low, high):
-            raise _refuse(path, "%s, not %s" % (text, _shorten(number)))
+            raise _refuse(path, "%s, not %s" % (text, shorten(number)))
     return [float(number) for number in found]
-
-
-def _shorten(found: Any) -> str:
-    """Return what was found, for an error; a list may even contain itself."""
-    return repr(found)[:MAX_SHOWN] if isinstance(found, (str, int, float, date)) else "a " + type(found).__name__
 
 
 def _refuse(path: str, reason: str) -> CalibrationError:

@@ -134,12 +134,17 @@ def test_a_robot_that_fails_is_stopped_and_the_others_go_on(capsys):
     session, tried, moved = FakeSession(3), [], []
     session.hear()
 
-    def evaluate(probe, is_last):
+    def evaluate(probe, count, is_last):
+        assert count == len(moved)
         tried.append((probe.robot_id, is_last))
         if probe.robot_id == 1 or (probe.robot_id == 2 and len(tried) < 4):
             raise CalibrationError("bad data")
 
-    session.repeat("motors", 3, lambda probes: moved.append([probe.robot_id for probe in probes]), evaluate)
+    def move(probes):
+        moved.append([probe.robot_id for probe in probes])
+        return len(moved)
+
+    session.repeat("motors", 3, move, evaluate)
     assert moved == [[0, 1, 2], [1, 2], [1]] and tried[-1] == (1, True)
     assert [probe.robot_id for probe in session.active] == [0, 2]
     assert (
@@ -149,10 +154,10 @@ def test_a_robot_that_fails_is_stopped_and_the_others_go_on(capsys):
     )
     assert "hero_1 once more: motors: bad data" in capsys.readouterr().out
     silent = FakeSession(1)
-    silent.repeat("motors", 3, lambda probes: None, evaluate)
+    silent.repeat("motors", 3, move, evaluate)
     silent.probes[0].robot_id = 1
-    silent.repeat("motors", 3, lambda probes: moved.append("moved"), evaluate)
-    assert silent.probes[0].failure.startswith("motors: nothing received") and moved.count("moved") == 1
+    silent.repeat("motors", 3, move, evaluate)
+    assert silent.probes[0].failure.startswith("motors: nothing received") and moved[3:] == [[0], [1]]
     session.settle()
     assert session.time_s == pytest.approx(100.0 + SETTLE_S) and session.probes[0].sent == ["stop"]
     session.end_s = session.time_s + 0.5

@@ -49,19 +49,19 @@ def calibrate_motors(session: Session) -> Dict[int, MotorResult]:
     """Calibrate all active robots; return the results by robot."""
     say("motors: pulses are swept up and down, about 40 s")
     pulses_us = dead_zone.list_pulses()
-    start_times_s: List[float] = []
     results: Dict[int, MotorResult] = {}
 
-    def sweep(probes: Sequence[Probe]) -> None:
-        start_times_s.clear()
+    def sweep(probes: Sequence[Probe]) -> List[float]:
+        start_times_s = []
         for pulse_us in pulses_us:
             for probe in probes:
                 probe.set_pulses(pulse_us)
             start_times_s.append(session.now_s())
             session.pause(dead_zone.PULSE_S)
         session.settle()
+        return start_times_s
 
-    def evaluate(probe: Probe, _is_last: bool) -> None:
+    def evaluate(probe: Probe, start_times_s: List[float], _is_last: bool) -> None:
         speeds_m_s = dead_zone.measure_sweep(probe.read_wheels(), start_times_s)
         result = evaluate_sweep(pulses_us, speeds_m_s)
         probe.write("motor_centers_us", result.to_file()["motor_centers_us"])

@@ -106,11 +106,10 @@ def write_gains(probe: Probe, gains: Sequence[Gains]) -> None:
 
 def _test(session: Session) -> Dict[int, List[Response]]:
     """Turn all active robots to the left and to the right; return the responses of both wheels by robot."""
-    start_times_s: List[float] = []
     results: Dict[int, List[Response]] = {}
 
-    def turn(probes: Sequence[Probe]) -> None:
-        start_times_s.clear()
+    def turn(probes: Sequence[Probe]) -> List[float]:
+        start_times_s: List[float] = []
         for angular_rad_s in (ANGULAR_RAD_S, -ANGULAR_RAD_S):
             session.settle()
             start_times_s.append(session.now_s())
@@ -119,8 +118,9 @@ def _test(session: Session) -> Dict[int, List[Response]]:
                     probe.drive(angular_rad_s)
                 session.pause(COMMAND_PERIOD_S)
         session.settle()
+        return start_times_s
 
-    def evaluate(probe: Probe, is_last: bool) -> None:
+    def evaluate(probe: Probe, start_times_s: List[float], is_last: bool) -> None:
         results[probe.robot_id] = evaluate_test(probe.read_wheels(), start_times_s, may_be_late=is_last)
 
     session.repeat("velocity", TRIES, turn, evaluate)

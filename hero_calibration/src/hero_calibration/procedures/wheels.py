@@ -45,6 +45,9 @@ NOMINAL_M = np.array((DIAMETER_M, DIAMETER_M, WHEEL_SEPARATION_M))
 Drive = Tuple[float, float, float]
 """m/s, rad/s, s."""
 
+Stop = Tuple[float, Dict[int, Optional[Pose]]]
+"""Time (s), and the places of the robots that were tracked."""
+
 
 class Leg(NamedTuple):
     """Motion of a robot from one stop to the next."""
@@ -116,27 +119,21 @@ def calibrate_wheels(session: Session, ask: Optional[Ask] = None) -> Dict[int, W
         session.for_each("wheels", lambda probe: results.update({probe.robot_id: fit_wheels(legs[probe.robot_id])}))
         return results
     say("wheels: squares to the left and to the right, about 1 min")
-    stops_s: List[float] = []
-    places: List[Dict[int, Optional[Pose]]] = []
 
-    def drive(probes: Sequence[Probe]) -> None:
-        stops_s.clear()
-        places.clear()
-        _stop_and_look(session, stops_s, places)
+    def drive(probes: Sequence[Probe]) -> List[Stop]:
+        stops = [_stop_and_look(session)]
         for part in [*_list_square(1.0), *_list_square(-1.0)]:
             _drive(session, probes, part)
-            _stop_and_look(session, stops_s, places)
+            stops.append(_stop_and_look(session))
+        return stops
 
-    def evaluate(probe: Probe, _is_last: bool) -> None:
-        poses = [seen[probe.robot_id] for seen in places]
-        if None in poses:
-            raise CalibrationError("localize does not track it: is its tag in view? Or measure by --tape")
-        spans = zip(stops_s, stops_s[1:], poses, poses[1:])
-        legs = [
-            Leg(_take_ticks(probe, start_s, end_s), transform_pose(invert_pose(start), end))
-            for start_s, end_s, start, end in spans
-            if start is not None and end is not None
-        ]
+    def evaluate(probe: Probe, stops: List[Stop], _is_last: bool) -> None:
+        legs = []
+        for (start_s, starts), (end_s, ends) in zip(stops, stops[1:]):
+            start, end = starts[probe.robot_id], ends[probe.robot_id]
+            if start is None or end is None:
+                raise CalibrationError("localize does not track it: is its tag in view? Or measure by --tape")
+            legs.append(Leg(_take_ticks(probe, start_s, end_s), transform_pose(invert_pose(start), end)))
         results[probe.robot_id] = fit_wheels(legs)
 
     session.repeat("wheels", TRIES, drive, evaluate)
@@ -157,10 +154,10 @@ def _drive(session: Session, probes: Sequence[Probe], part: Drive) -> None:
     session.settle()
 
 
-def _stop_and_look(session: Session, stops_s: List[float], places: List[Dict[int, Optional[Pose]]]) -> None:
+def _stop_and_look(session: Session) -> Stop:
     session.pause(MEASURE_S)
-    stops_s.append(session.now_s())
-    places.append({probe.robot_id: probe.find_place(session.now_s() - MEASURE_S / 2.0) for probe in session.probes})
+    now_s = session.now_s()
+    return now_s, {probe.robot_id: probe.find_place(now_s - MEASURE_S / 2.0) for probe in session.probes}
 
 
 def _take_ticks(probe: Probe, start_s: float, end_s: float) -> np.ndarray:

@@ -5,13 +5,15 @@ clock of this computer: a subclass has the time (ros_session).
 """
 
 from abc import ABC, abstractmethod
-from typing import Callable, List, Optional, Sequence
+from typing import Callable, List, Optional, Sequence, TypeVar
 
 from hero_client.values.background_motion import SEND_TIME_S
 from hero_node.command_line import say
 
 from ..errors import CalibrationError, EndedError
 from .probe import Probe
+
+T = TypeVar("T")
 
 POLL_S = 0.02
 SETTLE_S = 0.6
@@ -92,21 +94,24 @@ class Session(ABC):
         self,
         step: str,
         tries: int,
-        move: Callable[[Sequence[Probe]], None],
-        evaluate: Callable[[Probe, bool], None],
+        move: Callable[[Sequence[Probe]], T],
+        evaluate: Callable[[Probe, T, bool], None],
     ) -> None:
         """Move robots and evaluate their data; those whose data is unusable try again, and fail in the end.
 
-        Wi-Fi stalls for a second now and then, and delays readings and commands. evaluate receives whether this is the
-        last try.
+        Wi-Fi stalls for a second now and then, and delays readings and commands. evaluate receives what move returned,
+        and whether this is the last try.
         """
         waiting = self.active
         for left in reversed(range(tries)):
             again: List[Probe] = []
+            moved = move(waiting)
 
-            def try_evaluating(probe: Probe, is_last: bool = not left, again: List[Probe] = again) -> None:
+            def try_evaluating(
+                probe: Probe, moved: T = moved, is_last: bool = not left, again: List[Probe] = again
+            ) -> None:
                 try:
-                    evaluate(probe, is_last)
+                    evaluate(probe, moved, is_last)
                 except CalibrationError as error:
                     if is_last:
                         raise
@@ -114,7 +119,6 @@ class Session(ABC):
                     say("%s once more: %s: %s" % (probe.name, step, error))
                     again.append(probe)
 
-            move(waiting)
             self.for_each(step, try_evaluating, waiting)
             waiting = again
             if not waiting:

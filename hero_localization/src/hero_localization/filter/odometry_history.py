@@ -100,13 +100,8 @@ class OdometryHistory:
 
 
 def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:
-    return Odometry(
-        interpolate_pose(start.pose, end.pose, share),
-        start.distance_m + share * (end.distance_m - start.distance_m),
-        start.turned_rad + share * (end.turned_rad - start.turned_rad),
-        start.heading_rad + share * (end.heading_rad - start.heading_rad),
-        start.untold_s + share * (end.untold_s - start.untold_s),
-    )
+    sums = (before + share * (after - before) for before, after in zip(start[1:], end[1:]))
+    return Odometry(interpolate_pose(start.pose, end.pose, share), *sums)
 
 
 def _turn_between(start: Pose, end: Pose) -> float:
