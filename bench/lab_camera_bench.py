@@ -20,7 +20,7 @@ from hero_localization.calibration.lens_calibration import BoardView, calibrate_
 from hero_localization.calibration.print_fit import refine_corners
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import CalibrationError
-from hero_localization.filter.pose_filter import Measurement
+from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_localization.prints.boards import Board
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
@@ -264,7 +264,7 @@ class Lab:
         sightings = self.tracker.take(tags, self.now_s, 0, expected)
         for robot_id, seen in sightings.robots.items():
             if not self.tracker.is_moved:
-                measurement = Measurement(self.now_s, seen.pose, seen.covariance)
+                measurement = StampedPose(self.now_s, seen.pose, seen.covariance)
                 self.lines += self.localizer.add_measurement(robot_id, measurement)
         if self.tracker.is_moved:
             self.localizer.distrust(self.now_s, list(sightings.robots))

@@ -9,7 +9,7 @@ from typing import Callable, Dict, List, Tuple
 
 import numpy as np
 
-from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilter, make_covariance
+from hero_localization.filter.pose_filter import Outcome, PoseFilter, StampedPose, make_covariance
 from hero_node.geometry import Pose, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
 
@@ -72,11 +72,11 @@ class SteppedRobots:
             robot.drive(*self.drive(self.swarm.now_s))
         self.swarm.sleep(duration_s)
 
-    def take(self) -> List[Measurement]:
+    def take(self) -> List[StampedPose]:
         """Measure all robots."""
         noise = self.random.normal(0.0, NOISE_SD, self.biases.shape)
         poses = self.true + self.biases + noise
-        return [Measurement(self.swarm.now_s, Pose(*map(float, pose)), self.covariance) for pose in poses]
+        return [StampedPose(self.swarm.now_s, Pose(*map(float, pose)), self.covariance) for pose in poses]
 
     def list_errors(self) -> np.ndarray:
         """Return errors of x, y (m) and yaw, with the reported standard deviations, (N, 5)."""
@@ -97,7 +97,7 @@ def measure_ages() -> None:
     for age_s in AGES_S:
         robots = SteppedRobots(AGE_ROBOTS, 2, lambda now_s: (0.2, 1.5 * math.sin(now_s)))
         robots.biases[:] = 0.0  # motion capture
-        waiting: List[List[Measurement]] = []
+        waiting: List[List[StampedPose]] = []
         outcomes: List[Outcome] = []
         errors: List[np.ndarray] = []
         while robots.swarm.now_s < AGE_S:

@@ -22,13 +22,13 @@ from hero_localization.calibration.arena_calibration import average_tags, calibr
 from hero_localization.calibration.lens_calibration import calibrate_lens, find_board
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
 from hero_localization.camera.camera_model import Camera, Intrinsics
-from hero_localization.filter.pose_filter import Estimate, Measurement
+from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_localization.prints.boards import Board
+from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.simulated_camera.board_renderer import BoardRenderer, list_board_places
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
-from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagLayout, fit_squares, locate
@@ -294,7 +294,7 @@ class Localization:
                 self.errors.add(estimate.pose, true)
         return arrived
 
-    def _list_estimates(self, now_s: float) -> Dict[int, Estimate]:
+    def _list_estimates(self, now_s: float) -> Dict[int, StampedPose]:
         robots = self._localizer.list_robots(now_s)
         return {robot.robot_id: robot.estimate for robot in robots if robot.estimate is not None}
 
@@ -302,7 +302,7 @@ class Localization:
         before = self._list_estimates(now_s)
         lines: Dict[int, List[str]] = {}
         for robot, sighting in locate(self._camera, tags, self._layout).robots.items():
-            measurement = Measurement(taken_s - self._delay_s, sighting.pose, sighting.covariance)
+            measurement = StampedPose(taken_s - self._delay_s, sighting.pose, sighting.covariance)
             lines[robot] = self._localizer.add_measurement(robot, measurement)
         for robot, (_, after, _) in self._list_estimates(now_s).items():
             if robot in before and not lines.get(robot):

@@ -15,7 +15,7 @@ from hero_client.values.errors import FrameError
 from hero_node.geometry import Pose
 from hero_sim.stepped.swarm import StepSwarm
 
-from .filter.pose_filter import Estimate, Measurement, PoseFilter, make_covariance
+from .filter.pose_filter import PoseFilter, StampedPose, make_covariance
 from .filter.swarm_localizer import PUBLISH_RATE_HZ
 from .mapping.swarm_map import SwarmMap
 
@@ -49,7 +49,7 @@ class StepLocalization:
         self._covariance = make_covariance(camera.noise_sd_m, camera.noise_sd_rad)
         self._filters = [PoseFilter() for _ in swarm.robots]
         self._images: List[Deque[Tuple[float, Pose]]] = [deque() for _ in swarm.robots]
-        self._published: List[Optional[Estimate]] = [None] * count
+        self._published: List[Optional[StampedPose]] = [None] * count
         self._published_s = [0.0] * count
         for robot in swarm.robots:
             robot.localize_by(partial(self.find_pose, robot.row))
@@ -91,7 +91,7 @@ class StepLocalization:
             images.append((now_s, Pose(*pose)))
             while images and images[0][0] <= now_s - self._camera.delay_s:
                 taken_s, measured = images.popleft()
-                pose_filter.add_measurement(Measurement(taken_s, measured, self._covariance))
+                pose_filter.add_measurement(StampedPose(taken_s, measured, self._covariance))
             if now_s >= self._published_s[row] + 1.0 / PUBLISH_RATE_HZ:
                 self._published_s[row], self._published[row] = now_s, pose_filter.estimate()
 

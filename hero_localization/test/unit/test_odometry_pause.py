@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_localization.filter.pose_filter import SYSTEMATIC, Measurement, Outcome, PoseFilter
+from hero_localization.filter.pose_filter import SYSTEMATIC, Outcome, PoseFilter, StampedPose
 from hero_node.geometry import Pose, transform_pose
 
 COVARIANCE = np.diag((1e-6, 1e-6, 3.6e-5))
@@ -17,9 +17,9 @@ def pause(before, after, pause_s, seen_in_pause=()):
     """Return a filter of a robot at ZERO whose odometry comes at 1 s and again after the pause."""
     pose_filter = PoseFilter()
     pose_filter.add_odometry(1.0, before)
-    assert pose_filter.add_measurement(Measurement(1.0, ZERO, COVARIANCE)) is Outcome.FIRST
+    assert pose_filter.add_measurement(StampedPose(1.0, ZERO, COVARIANCE)) is Outcome.FIRST
     for since_s, pose in seen_in_pause:
-        pose_filter.add_measurement(Measurement(1.0 + since_s, pose, COVARIANCE))
+        pose_filter.add_measurement(StampedPose(1.0 + since_s, pose, COVARIANCE))
     pose_filter.add_odometry(1.0 + pause_s, after)
     return pose_filter
 
@@ -36,7 +36,7 @@ def test_after_a_pause_pose_and_uncertainty_follow_what_was_driven(pause_s):
         else:
             assert sd_x_m > 0.01 * driven.x_m and sd_yaw_rad > 0.02
             off = transform_pose(driven, Pose(0.01 * driven.x_m, 0.0, 0.03))
-            measured = Measurement(1.0 + pause_s, off, COVARIANCE)
+            measured = StampedPose(1.0 + pause_s, off, COVARIANCE)
             assert pose_filter.add_measurement(measured) is Outcome.USED
 
 
@@ -48,7 +48,7 @@ def test_a_robot_that_restarts_in_a_pause_is_where_the_next_pose_shows_it(pause_
         assert found.pose == pytest.approx(ZERO) and pose_filter.odometry.jumps == 1
         assert found.covariance[0, 0] > 0.3**2 and found.covariance[2, 2] > 3.0**2
         pose = Pose(0.1, -0.2, 1.5)
-        measured = Measurement(1.0 + pause_s, pose, COVARIANCE)
+        measured = StampedPose(1.0 + pause_s, pose, COVARIANCE)
         assert pose_filter.add_measurement(measured) is Outcome.USED
         assert pose_filter.pose() == pytest.approx(pose, abs=1e-4)
         expected = COVARIANCE + np.diag(SYSTEMATIC)
@@ -62,12 +62,12 @@ def test_what_was_driven_before_a_pose_in_a_pause_does_not_count_twice():
         found, since_s = pose_filter.estimate(), 5.0 - seen_s
         assert found.pose.x_m == pytest.approx(0.25, abs=0.001)
         assert math.sqrt(found.covariance[0, 0]) == pytest.approx(0.2 * since_s, rel=0.05)
-        measured = Measurement(6.0, Pose(0.25 + 0.2 * since_s, 0.0, 0.0), COVARIANCE)
+        measured = StampedPose(6.0, Pose(0.25 + 0.2 * since_s, 0.0, 0.0), COVARIANCE)
         assert pose_filter.add_measurement(measured) is Outcome.USED
 
 
 def test_an_image_of_the_first_moment_of_a_pause_is_dropped():
     pose_filter = pause(ZERO, ZERO, 0.05)
-    assert pose_filter.add_measurement(Measurement(1.15, Pose(0.02, 0.0, 0.0), COVARIANCE)) is Outcome.WAITING
+    assert pose_filter.add_measurement(StampedPose(1.15, Pose(0.02, 0.0, 0.0), COVARIANCE)) is Outcome.WAITING
     assert pose_filter.add_odometry(6.0, Pose(0.3, 0.0, 0.0)) == [], "it is not late"
     assert pose_filter.pose() == pytest.approx((0.3, 0.0, 0.0))

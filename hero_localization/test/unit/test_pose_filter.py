@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hero_localization.filter.pose_filter import REPLAYED_S, Measurement, Outcome, PoseFilter
+from hero_localization.filter.pose_filter import REPLAYED_S, Outcome, PoseFilter, StampedPose
 from hero_localization.filter.stamped_history import interpolate_pose
 from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
@@ -66,7 +66,7 @@ class Drive:
         x_m, y_m, yaw_rad = self.true_pose(stamp_s)
         noise_m, noise_rad = self.random.normal(0.0, NOISE_M, 2), self.random.normal(0.0, NOISE_RAD)
         pose = Pose(x_m + noise_m[0], y_m + noise_m[1], wrap_angle(yaw_rad + noise_rad))
-        return Measurement(stamp_s, pose, COVARIANCE)
+        return StampedPose(stamp_s, pose, COVARIANCE)
 
 
 def follow(drive, pose_filter, is_seen=lambda stamp_s: True, delay_s=DELAY_S, stamp_error_s=0.0):
@@ -116,7 +116,7 @@ def test_poses_of_any_age_are_used_and_right_to_a_millimeter(age_s):
     events += [(0.01 * index + age_s, 1, 0.01 * index) for index in range(790)]
     for _, kind, event in sorted(events):
         if kind == 1:
-            measured = Measurement(event, drive.true_pose(event), np.diag((1e-7, 1e-7, 1e-5)))
+            measured = StampedPose(event, drive.true_pose(event), np.diag((1e-7, 1e-7, 1e-5)))
             used = (Outcome.FIRST, Outcome.USED, Outcome.WAITING)
             assert event < 0.1 or pose_filter.add_measurement(measured) in used
             continue
@@ -133,7 +133,7 @@ def test_poses_count_without_waiting_once_odometry_has_ended():
     pose_filter = PoseFilter()
     pose_filter.add_odometry(1.0, Pose(0.0, 0.0, 0.0))
     pose = Pose(0.3, 0.1, 0.5)
-    outcomes = [pose_filter.add_measurement(Measurement(1.1 + 0.1 * i, pose, COVARIANCE)) for i in range(4)]
+    outcomes = [pose_filter.add_measurement(StampedPose(1.1 + 0.1 * i, pose, COVARIANCE)) for i in range(4)]
     assert outcomes == [Outcome.WAITING, Outcome.WAITING, Outcome.USED, Outcome.USED]
     np.testing.assert_allclose(pose_filter.pose(), pose)
 
@@ -142,9 +142,9 @@ def test_slip_explains_no_more_than_what_odometry_counted():
     pose_filter = PoseFilter()
     pose_filter.add_odometry(1.0, Pose(0.0, 0.0, 0.0))
     pose_filter.add_odometry(1.3, Pose(0.05, 0.0, 0.0))
-    assert pose_filter.add_measurement(Measurement(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)) is Outcome.FIRST
-    assert pose_filter.add_measurement(Measurement(1.3, Pose(0.3, 0.0, 0.0), COVARIANCE)) is Outcome.OUTLIER
-    assert pose_filter.add_measurement(Measurement(1.3, Pose(-0.04, 0.0, 0.0), COVARIANCE)) is Outcome.USED
+    assert pose_filter.add_measurement(StampedPose(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)) is Outcome.FIRST
+    assert pose_filter.add_measurement(StampedPose(1.3, Pose(0.3, 0.0, 0.0), COVARIANCE)) is Outcome.OUTLIER
+    assert pose_filter.add_measurement(StampedPose(1.3, Pose(-0.04, 0.0, 0.0), COVARIANCE)) is Outcome.USED
 
 
 def test_a_late_pose_gives_the_same_as_if_it_had_come_in_order():
@@ -217,7 +217,7 @@ def test_the_pose_of_a_robot_moved_by_hand_is_reset_and_reported():
         stamp_s = 5.0 + CAMERA_S * index
         pose_filter.add_odometry(stamp_s, drive.samples[-1].odometry)
         pose = Pose(-0.5, 0.5, -1.0)
-        outcomes.append(pose_filter.add_measurement(Measurement(stamp_s, pose, COVARIANCE)))
+        outcomes.append(pose_filter.add_measurement(StampedPose(stamp_s, pose, COVARIANCE)))
     assert outcomes.count(Outcome.MOVED) == 1
     assert outcomes[0] is Outcome.OUTLIER and outcomes[-1] is Outcome.USED
     np.testing.assert_allclose(pose_filter.estimate().pose, pose, atol=1e-3)
@@ -229,7 +229,7 @@ def test_a_robot_off_by_degrees_is_set_right_but_was_moved_by_no_hand():
         stamp_s = CAMERA_S * index
         pose_filter.add_odometry(stamp_s, Pose(0.0, 0.0, 0.0))
         pose = Pose(0.0, 0.0, 0.0 if index < 30 else 0.06)
-        outcomes.append(pose_filter.add_measurement(Measurement(stamp_s, pose, COVARIANCE)))
+        outcomes.append(pose_filter.add_measurement(StampedPose(stamp_s, pose, COVARIANCE)))
     assert outcomes[30:34] == [Outcome.OUTLIER] * 3 + [Outcome.USED]
     assert pose_filter.estimate().pose.yaw_rad == pytest.approx(0.06, abs=0.002)
 
@@ -283,7 +283,7 @@ def test_a_robot_unseen_for_minutes_goes_on_by_its_odometry():
 
 def test_a_pose_without_odometry_or_from_long_ago_is_left_out():
     pose_filter = PoseFilter()
-    pose = Measurement(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
+    pose = StampedPose(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
     assert pose_filter.add_measurement(pose) is Outcome.NO_ODOMETRY
     assert pose_filter.estimate() is None
     for index in range(100):
@@ -296,31 +296,31 @@ def test_a_pose_without_odometry_or_from_long_ago_is_left_out():
 @pytest.mark.parametrize("pose", [Pose(math.nan, 0.0, 0.0), Pose(0.0, math.inf, 0.0)])
 def test_a_pose_that_is_not_finite_is_refused(pose):
     with pytest.raises(ValueError, match="finite"):
-        PoseFilter().add_measurement(Measurement(0.0, pose, COVARIANCE))
+        PoseFilter().add_measurement(StampedPose(0.0, pose, COVARIANCE))
 
 
 @pytest.mark.parametrize("covariance", [np.zeros((3, 3)), np.eye(2), np.full((3, 3), math.nan), np.ones((3, 3))])
 def test_a_covariance_that_is_none_is_refused(covariance):
     with pytest.raises(ValueError, match="covariance"):
-        PoseFilter().add_measurement(Measurement(0.0, Pose(0.0, 0.0, 0.0), covariance))
+        PoseFilter().add_measurement(StampedPose(0.0, Pose(0.0, 0.0, 0.0), covariance))
 
 
 def test_after_a_long_occlusion_a_pose_of_the_last_second_is_used():
     for readings in range(20, 50):
         filter_ = PoseFilter()
         filter_.add_odometry(0.0, Pose(0.0, 0.0, 0.0))
-        filter_.add_measurement(Measurement(0.0, ORIGIN, COVARIANCE))
+        filter_.add_measurement(StampedPose(0.0, ORIGIN, COVARIANCE))
         for number in range(1, readings):
             filter_.add_odometry(0.1 * number, Pose(0.0, 0.0, 0.0))
         seen_s = 0.1 * (readings - 1) - 0.9 * REPLAYED_S
-        assert filter_.add_measurement(Measurement(seen_s, ORIGIN, COVARIANCE)) is Outcome.USED
+        assert filter_.add_measurement(StampedPose(seen_s, ORIGIN, COVARIANCE)) is Outcome.USED
 
 
 def start_filter(pose=ZERO, covariance=COVARIANCE, stamp_s=1.0):
     """Return a filter that was told by odometry and by one measured pose where its robot is."""
     pose_filter = PoseFilter()
     pose_filter.add_odometry(stamp_s, Pose(0.0, 0.0, 0.0))
-    assert pose_filter.add_measurement(Measurement(stamp_s, pose, covariance)) is Outcome.FIRST
+    assert pose_filter.add_measurement(StampedPose(stamp_s, pose, covariance)) is Outcome.FIRST
     return pose_filter
 
 
@@ -333,7 +333,7 @@ def test_one_true_pose_of_a_thousand_is_an_outlier(off, outcome):
         shift = np.zeros(3)
         shift[axis] = off * math.sqrt(2.0 * COVARIANCE[axis, axis])
         x_m, y_m, yaw_rad = np.array((0.5, -0.5, 3.1)) + shift
-        measured = Measurement(1.01, Pose(x_m, y_m, wrap_angle(yaw_rad)), COVARIANCE)
+        measured = StampedPose(1.01, Pose(x_m, y_m, wrap_angle(yaw_rad)), COVARIANCE)
         assert pose_filter.add_measurement(measured) is outcome, axis
 
 
@@ -350,16 +350,16 @@ def test_slip_explains_at_most_six_centimeters_or_34_degrees():
     ):
         pose_filter = start_filter()
         pose_filter.add_odometry(1.1, step)
-        assert pose_filter.add_measurement(Measurement(1.1, end, COVARIANCE)) is outcome, (step, end)
+        assert pose_filter.add_measurement(StampedPose(1.1, end, COVARIANCE)) is outcome, (step, end)
 
 
 def hold(counted_m, came_m, elapsed_s):
     """Return by how much the robot goes on by odometry after so long a way that the camera did not see."""
-    pose_filter, start = start_filter(stamp_s=0.9), Measurement(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
+    pose_filter, start = start_filter(stamp_s=0.9), StampedPose(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
     pose_filter.add_odometry(1.0, start.pose)
     assert pose_filter.add_measurement(start) is Outcome.USED
     pose_filter.add_odometry(1.0 + elapsed_s, Pose(counted_m, 0.0, 0.0))
-    measured = Measurement(1.0 + elapsed_s, Pose(came_m, 0.0, 0.0), COVARIANCE)
+    measured = StampedPose(1.0 + elapsed_s, Pose(came_m, 0.0, 0.0), COVARIANCE)
     assert pose_filter.add_measurement(measured) is Outcome.USED
     before = pose_filter.pose()
     pose_filter.add_odometry(1.05 + elapsed_s, Pose(counted_m + 0.01, 0.0, 0.2))
@@ -394,7 +394,7 @@ def test_four_outliers_over_a_tenth_of_a_second_that_agree_move_the_robot():
         pose_filter, outcomes = start_filter(), []
         for time_s, x_m in zip(times_s, places_m):
             pose_filter.add_odometry(1.0 + time_s, Pose(0.0, 0.0, 0.0))
-            outcomes.append(pose_filter.add_measurement(Measurement(1.0 + time_s, Pose(x_m, 0.0, 0.0), COVARIANCE)))
+            outcomes.append(pose_filter.add_measurement(StampedPose(1.0 + time_s, Pose(x_m, 0.0, 0.0), COVARIANCE)))
         return outcomes
 
     out, moved = Outcome.OUTLIER, Outcome.MOVED
@@ -418,7 +418,7 @@ def test_no_hand_moves_a_robot_by_less_than_a_centimeter_or_six_degrees():
         pose_filter = start_filter()
         for index in range(4):
             pose_filter.add_odometry(1.1 + 0.035 * index, Pose(0.0, 0.0, 0.0))
-            found = pose_filter.add_measurement(Measurement(1.1 + 0.035 * index, pose, COVARIANCE))
+            found = pose_filter.add_measurement(StampedPose(1.1 + 0.035 * index, pose, COVARIANCE))
         assert found is outcome, pose
         assert pose_filter.pose() == pytest.approx(pose, abs=1e-3)
 
@@ -432,7 +432,7 @@ def test_a_covariance_is_taken_if_it_is_one():
         if abs(smallest) < 1e-6:
             continue
         try:
-            PoseFilter().add_measurement(Measurement(0.0, ZERO, covariance))
+            PoseFilter().add_measurement(StampedPose(0.0, ZERO, covariance))
         except ValueError as error:
             assert smallest < 0.0 and "covariance" in str(error)
         else:
@@ -441,16 +441,16 @@ def test_a_covariance_is_taken_if_it_is_one():
     assert min(count) > 50
     for stamp_s in (math.nan, math.inf):
         with pytest.raises(ValueError, match="finite"):
-            PoseFilter().add_measurement(Measurement(stamp_s, ZERO, COVARIANCE))
+            PoseFilter().add_measurement(StampedPose(stamp_s, ZERO, COVARIANCE))
 
 
 def test_a_pose_waits_a_quarter_of_a_second_for_odometry():
     used, waiting = Outcome.USED, Outcome.WAITING
     for ahead_s, outcome in ((0.0, used), (0.01, waiting), (0.24, waiting), (0.26, used)):
-        assert start_filter().add_measurement(Measurement(1.0 + ahead_s, ZERO, COVARIANCE)) is outcome, ahead_s
+        assert start_filter().add_measurement(StampedPose(1.0 + ahead_s, ZERO, COVARIANCE)) is outcome, ahead_s
     pose_filter = start_filter()
     for stamp_s in (1.1, 1.2):
-        assert pose_filter.add_measurement(Measurement(stamp_s, ZERO, COVARIANCE)) is Outcome.WAITING
+        assert pose_filter.add_measurement(StampedPose(stamp_s, ZERO, COVARIANCE)) is Outcome.WAITING
     (first,) = pose_filter.add_odometry(1.1, ZERO)
     assert (first.measurement.stamp_s, first.outcome, first.before) == (1.1, Outcome.USED, ZERO)
     assert pose_filter.used_s == 1.1
@@ -462,8 +462,8 @@ def test_poses_come_late_by_a_second_at_most():
         pose_filter = start_filter()
         for index in range(1, 31):
             pose_filter.add_odometry(1.0 + 0.1 * index, ZERO)
-            assert pose_filter.add_measurement(Measurement(1.0 + 0.1 * index, ZERO, COVARIANCE)) is Outcome.USED
-        assert pose_filter.add_measurement(Measurement(4.0 - late_s - 0.001, ZERO, COVARIANCE)) is outcome, late_s
+            assert pose_filter.add_measurement(StampedPose(1.0 + 0.1 * index, ZERO, COVARIANCE)) is Outcome.USED
+        assert pose_filter.add_measurement(StampedPose(4.0 - late_s - 0.001, ZERO, COVARIANCE)) is outcome, late_s
 
 
 def test_the_map_frame_of_odometry_turns_by_less_than_half_a_circle():

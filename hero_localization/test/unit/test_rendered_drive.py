@@ -13,7 +13,7 @@ from std_msgs.msg import Header
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.camera.frame_source import Frame
-from hero_localization.filter.pose_filter import Measurement
+from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_localization.nodes import calibrate_camera
 from hero_localization.simulated_camera.renderer import CameraRenderer
@@ -121,7 +121,7 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
         sightings = [camera.look(scene) for camera in cameras]
         for seen in sightings:
             if seen is not None:
-                lines += localizer.add_measurement(0, Measurement(scene.taken_s, seen.pose, seen.covariance))
+                lines += localizer.add_measurement(0, StampedPose(scene.taken_s, seen.pose, seen.covariance))
         lines += localizer.find_lost(scene.taken_s)
         seen_by.append(tuple(seen is not None for seen in sightings))
         (robot,) = localizer.list_robots(scene.taken_s)

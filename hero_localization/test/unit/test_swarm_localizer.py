@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hero_localization.filter.loss_lines import LossLines
-from hero_localization.filter.pose_filter import Measurement
+from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_msgs.msg import RobotPose
 from hero_node.geometry import Pose
@@ -30,7 +30,7 @@ class Swarm:
             for robot_id in robots:
                 self.lines += self.localizer.add_odometry(robot_id, self.now_s, pose)
             for robot_id, place in (measured or {}).items():
-                measurement = Measurement(self.now_s, Pose(*place), COVARIANCE)
+                measurement = StampedPose(self.now_s, Pose(*place), COVARIANCE)
                 self.lines += self.localizer.add_measurement(robot_id, measurement)
             self.lines += self.localizer.find_lost(self.now_s)
         return self
@@ -44,7 +44,7 @@ def test_a_lost_robot_is_not_found_by_poses_that_come_a_second_late():
     for late_s, state, count in ((1.1, RobotState.LOST, 2), (0.9, RobotState.TRACKED, 3)):
         for _ in range(10):
             swarm.run(0.1)
-            measurement = Measurement(swarm.now_s - late_s, Pose(1.0, 2.0, 0.0), COVARIANCE)
+            measurement = StampedPose(swarm.now_s - late_s, Pose(1.0, 2.0, 0.0), COVARIANCE)
             swarm.lines += swarm.localizer.add_measurement(0, measurement)
         assert swarm[0].state is state and len(swarm.lines) == count, swarm.lines
 
@@ -108,7 +108,7 @@ def test_robots_of_a_moved_camera_are_lost_without_a_line():
 
 def test_poses_that_wait_for_odometry_are_told_of_when_it_comes():
     swarm = Swarm(0).run(0.1)
-    measurement = Measurement(swarm.now_s + 0.02, Pose(1.0, 2.0, 0.0), COVARIANCE)
+    measurement = StampedPose(swarm.now_s + 0.02, Pose(1.0, 2.0, 0.0), COVARIANCE)
     assert swarm.localizer.add_measurement(0, measurement) == []
     assert swarm.run(PERIOD_S).lines == ["hero_0 found at (1.000, 2.000) m, 0 degrees"]
 
@@ -168,7 +168,7 @@ def test_a_robot_that_is_off_or_falls_silent_is_named():
 
 def test_stamps_of_another_clock_are_named():
     swarm = Swarm(0).run(2.0)
-    old = Measurement(swarm.now_s - 30.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
+    old = StampedPose(swarm.now_s - 30.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
     assert swarm.localizer.add_measurement(0, old) == []
     assert swarm[0].problem == "measured poses come with stamps 30.0 s old: do the clocks agree?"
     ahead = old._replace(stamp_s=swarm.now_s + 5.0)
@@ -190,7 +190,7 @@ def test_robots_are_localized_again_after_a_jump_back_in_time():
 
 def test_a_pose_of_a_robot_that_is_not_expected_is_refused():
     with pytest.raises(KeyError):
-        Swarm(0).localizer.add_measurement(7, Measurement(0.0, Pose(0.0, 0.0, 0.0), COVARIANCE))
+        Swarm(0).localizer.add_measurement(7, StampedPose(0.0, Pose(0.0, 0.0, 0.0), COVARIANCE))
 
 
 def test_many_robots_lost_and_found_make_one_line_in_ten_seconds():
@@ -233,7 +233,7 @@ LOOSE = np.diag((4e-2, 4e-2, 4.0))
 @pytest.mark.parametrize(("x_m", "lines"), [(0.019, 1), (0.022, 2)])
 def test_corrections_of_more_than_two_centimeters_are_said(x_m, lines):
     swarm = Swarm(0).run(PERIOD_S)
-    swarm.lines += swarm.localizer.add_measurement(0, Measurement(swarm.now_s, Pose(0.0, 0.0, 0.0), LOOSE))
+    swarm.lines += swarm.localizer.add_measurement(0, StampedPose(swarm.now_s, Pose(0.0, 0.0, 0.0), LOOSE))
     swarm.run(PERIOD_S, {0: (x_m, 0.0, 0.5)})
     assert len(swarm.lines) == lines and swarm[0].estimate.pose.x_m == pytest.approx(x_m, abs=1e-4)
     assert lines == 1 or swarm.lines[1] == "hero_0 corrected by 22 mm and 29 degrees"
@@ -246,7 +246,7 @@ def test_two_outliers_in_a_row_over_a_tenth_of_a_second_lose_a_robot(times_s, st
     swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})
     for time_s in times_s:
         swarm.localizer.add_odometry(0, swarm.now_s + time_s, Pose(0.0, 0.0, 0.0))
-        far = Measurement(swarm.now_s + time_s, Pose(1.5, 2.0, 0.0), COVARIANCE)
+        far = StampedPose(swarm.now_s + time_s, Pose(1.5, 2.0, 0.0), COVARIANCE)
         assert swarm.localizer.add_measurement(0, far) == []
     assert swarm[0].state is state
 
@@ -259,7 +259,7 @@ def test_problems_of_time_begin_at_their_limits():
         assert swarm[0].problem == text
     for ahead_s, named in ((0.19, False), (0.21, True)):
         swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})
-        swarm.localizer.add_measurement(0, Measurement(swarm.now_s + ahead_s, Pose(1.0, 2.0, 0.0), COVARIANCE))
+        swarm.localizer.add_measurement(0, StampedPose(swarm.now_s + ahead_s, Pose(1.0, 2.0, 0.0), COVARIANCE))
         swarm.localizer.add_odometry(0, swarm.now_s + ahead_s, Pose(0.0, 0.0, 0.0))
         assert ("0.2 s ahead: do the clocks agree?" in swarm[0].problem) == named
     swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})

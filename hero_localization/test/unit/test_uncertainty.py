@@ -7,7 +7,7 @@ import pytest
 from test_pose_filter import COVARIANCE as SEEN_COVARIANCE
 from test_pose_filter import start_filter
 
-from hero_localization.filter.pose_filter import Measurement, Outcome, PoseFilter, make_covariance
+from hero_localization.filter.pose_filter import Outcome, PoseFilter, StampedPose, make_covariance
 from hero_localization.nodes.outputs import make_robot_pose
 from hero_node.geometry import Pose, transform_pose, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
@@ -64,7 +64,7 @@ class CoveredSwarm:
             if self.is_seen:
                 noise = self.random.normal(0.0, (NOISE_M, NOISE_M, NOISE_RAD))
                 pose = Pose(*map(float, self.true[row] + self.biases[row] + noise))
-                self.outcomes[row].append(pose_filter.add_measurement(Measurement(now_s, pose, COVARIANCE)))
+                self.outcomes[row].append(pose_filter.add_measurement(StampedPose(now_s, pose, COVARIANCE)))
 
     def normalize_errors(self):
         """Return errors of place and yaw, rms over the robots, by what is reported of them."""
@@ -145,18 +145,18 @@ def test_without_odometry_a_robot_may_have_driven_anywhere_at_its_speed():
     for stamp_s in (1.3, 1.4):  # further ahead of odometry than poses wait
         expected = pose_filter.estimate()
         beyond_m = 0.2 * (stamp_s - expected.stamp_s)
-        near = Measurement(stamp_s, expected.pose._replace(x_m=expected.pose.x_m + 3.9 * beyond_m), SEEN_COVARIANCE)
+        near = StampedPose(stamp_s, expected.pose._replace(x_m=expected.pose.x_m + 3.9 * beyond_m), SEEN_COVARIANCE)
         far = near._replace(pose=expected.pose._replace(x_m=expected.pose.x_m + 4.2 * beyond_m))
         assert pose_filter.add_measurement(far) is Outcome.OUTLIER
         assert pose_filter.add_measurement(near) is Outcome.USED
-    turned = Measurement(1.8, pose_filter.pose()._replace(yaw_rad=3.0), SEEN_COVARIANCE)
+    turned = StampedPose(1.8, pose_filter.pose()._replace(yaw_rad=3.0), SEEN_COVARIANCE)
     assert pose_filter.add_measurement(turned) is Outcome.USED, "2 rad/s for 0.4 s: four deviations are 3.2 rad"
 
 
 def test_a_measured_pose_is_weighed_by_its_uncertainty():
     pose_filter = start_filter(covariance=np.diag((4e-6, 1e-6, 9e-4)))
     pose_filter.add_odometry(1.05, Pose(0.0, 0.0, 0.0))
-    measured = Measurement(1.05, Pose(0.002, -0.002, 0.03), np.diag((1e-6, 4e-6, 1e-4)))
+    measured = StampedPose(1.05, Pose(0.002, -0.002, 0.03), np.diag((1e-6, 4e-6, 1e-4)))
     assert pose_filter.add_measurement(measured) is Outcome.USED
     pose, covariance = pose_filter.estimate()[1:]
     assert pose == pytest.approx((0.8 * 0.002, -0.2 * 0.002, 0.9 * 0.03), rel=1e-2)
@@ -185,7 +185,7 @@ def test_correlated_poses_are_joined_as_the_kalman_filter_has_it():
     second = 1e-6 * np.array(((1.0, -0.3, 0.4), (-0.3, 2.0, -0.5), (0.4, -0.5, 1.5)))
     pose_filter, seen = start_filter(covariance=first), np.array((1e-3, -5e-4, 8e-4))
     pose_filter.add_odometry(1.001, Pose(0.0, 0.0, 0.0))
-    assert pose_filter.add_measurement(Measurement(1.001, Pose(*seen), second)) is Outcome.USED
+    assert pose_filter.add_measurement(StampedPose(1.001, Pose(*seen), second)) is Outcome.USED
     pose, covariance = pose_filter.estimate()[1:]
     joined = np.linalg.inv(np.linalg.inv(first) + np.linalg.inv(second))
     assert pose == pytest.approx(joined @ np.linalg.inv(second) @ seen, rel=1e-3)

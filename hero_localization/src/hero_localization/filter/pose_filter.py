@@ -72,17 +72,8 @@ REPLAYED_S = 1.0
 """Poses that arrive later than this after a newer one are left out."""
 
 
-class Measurement(NamedTuple):
-    """A pose of the robot in `map` that was measured from outside, and its covariance."""
-
-    stamp_s: float
-    pose: Pose
-    covariance: np.ndarray
-    """Of x, y and yaw, (3, 3), m and rad."""
-
-
-class Estimate(NamedTuple):
-    """The robot's pose in `map`."""
+class StampedPose(NamedTuple):
+    """A pose of the robot in `map` at a time, and its covariance: measured from outside, or estimated."""
 
     stamp_s: float
     pose: Pose
@@ -107,7 +98,7 @@ class Outcome(enum.Enum):
 class Correction(NamedTuple):
     """Outcome of a measured pose that had waited, and the pose estimated before it."""
 
-    measurement: Measurement
+    measurement: StampedPose
     outcome: Outcome
     before: Optional[Pose]
 
@@ -115,10 +106,10 @@ class Correction(NamedTuple):
 class _Step(NamedTuple):
     """An estimate, and the measured pose that led to it from the one before; None for a start."""
 
-    estimate: Estimate
+    estimate: StampedPose
     odometry: Odometry
     """At that time."""
-    measurement: Optional[Measurement]
+    measurement: Optional[StampedPose]
     is_blocked: bool = False
     """Whether the wheels slip in place, as at a wall: odometry then does not predict the motion."""
 
@@ -135,8 +126,8 @@ class PoseFilter:
         self.odometry = OdometryHistory()
         self.used_s = -math.inf
         self._steps: List[_Step] = []
-        self._rejected: List[Measurement] = []
-        self._waiting: List[Measurement] = []
+        self._rejected: List[StampedPose] = []
+        self._waiting: List[StampedPose] = []
         self._systematic = SYSTEMATIC
 
     def add_odometry(self, stamp_s: float, pose: Pose) -> List[Correction]:
@@ -154,7 +145,7 @@ class PoseFilter:
         # The pose before each, then what became of it.
         return [Correction(pose, before=self.pose(), outcome=self._use(pose)) for pose in due]
 
-    def add_measurement(self, measurement: Measurement) -> Outcome:
+    def add_measurement(self, measurement: StampedPose) -> Outcome:
         """Correct the estimate by a measured pose, which may be older than others that were used.
 
         Raises: ValueError for numbers that are not finite, or a covariance that is none.
@@ -170,7 +161,7 @@ class PoseFilter:
                 self._use(earlier)
         return self._use(measurement)
 
-    def _use(self, measurement: Measurement) -> Outcome:
+    def _use(self, measurement: StampedPose) -> Outcome:
         stamp_s = measurement.stamp_s
         if self.odometry.find(stamp_s) is None:
             return Outcome.NO_ODOMETRY
@@ -201,7 +192,7 @@ class PoseFilter:
         self._note_systematic(measurement)
         return Outcome.USED
 
-    def _correct(self, steps: Sequence[_Step], measurement: Measurement) -> Optional[_Step]:
+    def _correct(self, steps: Sequence[_Step], measurement: StampedPose) -> Optional[_Step]:
         """Return the step from the last of steps to a measured pose; None for an outlier."""
         start = steps[-1].estimate
         predicted = self._predict(steps[-1], measurement.stamp_s)
@@ -216,7 +207,7 @@ class PoseFilter:
             return None
         return self._make_step(estimate, measurement)._replace(is_blocked=self._is_blocked(steps, measurement))
 
-    def _make_step(self, estimate: Estimate, measurement: Optional[Measurement] = None) -> _Step:
+    def _make_step(self, estimate: StampedPose, measurement: Optional[StampedPose] = None) -> _Step:
         return _Step(estimate, self._get_odometry(estimate.stamp_s), measurement)
 
     def _get_odometry(self, stamp_s: float) -> Odometry:
@@ -231,7 +222,7 @@ class PoseFilter:
             odometry = newest._replace(untold_s=untold_s)
         return step._replace(odometry=odometry)
 
-    def _is_blocked(self, steps: Sequence[_Step], measurement: Measurement) -> bool:
+    def _is_blocked(self, steps: Sequence[_Step], measurement: StampedPose) -> bool:
         """Return whether the robot came nowhere since a pose measured a moment ago, though its wheels turned."""
         for step in reversed(steps):
             since_s = measurement.stamp_s - step.estimate.stamp_s
@@ -243,12 +234,12 @@ class PoseFilter:
                 return counted_m > MIN_SLIP_M and came_m < BLOCKED_SHARE * counted_m
         return False
 
-    def _start(self, measurement: Measurement) -> None:
+    def _start(self, measurement: StampedPose) -> None:
         self._rejected.clear()
-        self._keep([self._make_step(_take_as_estimate(measurement))])
+        self._keep([self._make_step(measurement)])
         self._note_systematic(measurement)
 
-    def _note_systematic(self, measurement: Measurement) -> None:
+    def _note_systematic(self, measurement: StampedPose) -> None:
         # Of a motion capture system that claims less, no more than it claims.
         self._systematic = np.minimum(SYSTEMATIC, np.diagonal(measurement.covariance))
 
@@ -261,7 +252,7 @@ class PoseFilter:
         last = [measurement for measurement in self._rejected if self.odometry.find(measurement.stamp_s) is not None]
         if len(last) < MOVED_POSES or last[-1].stamp_s - last[0].stamp_s < MOVED_S:
             return False
-        step = self._make_step(_take_as_estimate(last[0]))
+        step = self._make_step(last[0])
         for measurement in last[1:]:
             if measurement.stamp_s < step.estimate.stamp_s:
                 return False
@@ -271,7 +262,7 @@ class PoseFilter:
             step = self._make_step(updated)
         return True
 
-    def _predict(self, step: _Step, stamp_s: float) -> Estimate:
+    def _predict(self, step: _Step, stamp_s: float) -> StampedPose:
         """Return the estimate of a step moved on to stamp_s by the odometry since."""
         start, end = step.estimate, self._get_odometry(stamp_s)
         pose = _follow(step, end)
@@ -291,10 +282,10 @@ class PoseFilter:
         drift_rad2 += (TURN_SCALE_SD * (end.heading_rad - step.odometry.heading_rad)) ** 2
         astray = np.array((-moved_y_m / 2.0, moved_x_m / 2.0, 1.0))
         growth = np.diag((place_m2, place_m2, yaw_rad2)) + drift_rad2 * np.outer(astray, astray)
-        return Estimate(stamp_s, pose, jacobian @ start.covariance @ jacobian.T + growth)
+        return StampedPose(stamp_s, pose, jacobian @ start.covariance @ jacobian.T + growth)
 
     @staticmethod
-    def _update(predicted: Estimate, measurement: Measurement) -> Optional[Estimate]:
+    def _update(predicted: StampedPose, measurement: StampedPose) -> Optional[StampedPose]:
         """Return the estimate corrected by a measured pose of the same time; None for an outlier."""
         seen, expected = measurement.pose, predicted.pose
         innovation = np.array(
@@ -312,7 +303,7 @@ class PoseFilter:
         )
         # The same as (1 - gain) @ predicted.covariance, but exact however large that is.
         covariance = gain @ measurement.covariance
-        return Estimate(predicted.stamp_s, pose, (covariance + covariance.T) / 2.0)
+        return StampedPose(predicted.stamp_s, pose, (covariance + covariance.T) / 2.0)
 
     def pose(self) -> Optional[Pose]:
         """Return where the robot is at its newest odometry; None before the first measured pose."""
@@ -323,14 +314,14 @@ class PoseFilter:
         is_blocked = step.is_blocked and self.odometry.newest_s - step.estimate.stamp_s <= MAX_BLOCKED_S
         return step.estimate.pose._replace(yaw_rad=pose.yaw_rad) if is_blocked else pose
 
-    def estimate(self) -> Optional[Estimate]:
+    def estimate(self) -> Optional[StampedPose]:
         """Return pose() with its covariance; None before the first measured pose."""
         pose = self.pose()
         if pose is None:
             return None
         stamp_s = max(self._steps[-1].estimate.stamp_s, self.odometry.newest_s)
         covariance = self._predict(self._steps[-1], stamp_s).covariance
-        return Estimate(stamp_s, pose, covariance + np.diag(self._systematic))
+        return StampedPose(stamp_s, pose, covariance + np.diag(self._systematic))
 
     def find_odom_origin(self, pose: Pose) -> Pose:
         """Return where the frame hero_N/odom is in `map` if the robot is at pose, that of estimate()."""
@@ -353,10 +344,6 @@ def _is_near(one: Pose, other: Pose) -> bool:
     return measure_distance(one, other) < MIN_MOVED_M and turned_rad < MIN_MOVED_RAD
 
 
-def _take_as_estimate(measurement: Measurement) -> Estimate:
-    return Estimate(measurement.stamp_s, measurement.pose, np.array(measurement.covariance, dtype=float))
-
-
 def _invert(matrix: np.ndarray) -> np.ndarray:
     """Return the inverse of a symmetric matrix (3, 3); LAPACK takes five times as long for one so small."""
     (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
@@ -366,7 +353,7 @@ def _invert(matrix: np.ndarray) -> np.ndarray:
     return np.array(adjugate) / (a * first + b * second + c * third)
 
 
-def _check(measurement: Measurement) -> None:
+def _check(measurement: StampedPose) -> None:
     covariance = np.asarray(measurement.covariance, dtype=float)
     if not all(map(math.isfinite, (measurement.stamp_s, *measurement.pose))):
         raise ValueError("a measured pose must be finite, not %r" % (measurement.pose,))

@@ -11,7 +11,7 @@ from hero_node.geometry import Pose, measure_distance, wrap_angle
 
 from .heading_check import HeadingCheck, is_upside_down
 from .loss_lines import LossLines
-from .pose_filter import Estimate, Measurement, Outcome, PoseFilter
+from .pose_filter import Outcome, PoseFilter, StampedPose
 
 LOST_S = 1.0
 """A robot whose pose was not measured for so long is lost: its pose follows its odometry alone."""
@@ -50,7 +50,7 @@ class LocalizedRobot(NamedTuple):
 
     robot_id: int
     state: RobotState
-    estimate: Optional[Estimate]
+    estimate: Optional[StampedPose]
     odom_origin: Optional[Pose]
     """Of the frame hero_N/odom in map."""
     problem: str
@@ -103,7 +103,7 @@ class SwarmLocalizer:
             lines.append("hero_%d: its odometry was set or it restarted; its place in the map stays" % robot_id)
         return lines
 
-    def add_measurement(self, robot_id: int, measurement: Measurement) -> List[str]:
+    def add_measurement(self, robot_id: int, measurement: StampedPose) -> List[str]:
         """Correct a robot by a measured pose; return lines for users.
 
         Raises: KeyError for a robot that is not expected. ValueError as PoseFilter.add_measurement().
@@ -115,7 +115,7 @@ class SwarmLocalizer:
         return [] if outcome is Outcome.WAITING else self._note(robot_id, measurement, outcome, before, used_s)
 
     def _note(
-        self, robot_id: int, measurement: Measurement, outcome: Outcome, before: Optional[Pose], used_s: float
+        self, robot_id: int, measurement: StampedPose, outcome: Outcome, before: Optional[Pose], used_s: float
     ) -> List[str]:
         """Note what became of a measured pose; return lines for users.
 

@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 from hero_client.values.readings import is_plausible, read_pose
 from hero_node.geometry import Pose
 
-from ..filter.pose_filter import Measurement
+from ..filter.pose_filter import StampedPose
 from .outputs import IN_PLANE
 
 _HEADER = struct.Struct("<3I")
@@ -82,7 +82,7 @@ class PoseInput:
         topic: str,
         frame: str,
         default_covariance: np.ndarray,
-        receive: Callable[[Measurement], None],
+        receive: Callable[[StampedPose], None],
         warn: Callable[[str], None],
     ) -> None:
         """receive: is given each pose; warn: a line on what cannot be used. Both on a thread of rospy.
@@ -149,6 +149,6 @@ class PoseInput:
         # A stamp of zero says that the sender does not know the time: that of arrival is the best there is.
         stamp = content.header.stamp if content.header.stamp else rospy.get_rostime()
         try:
-            self._receive(Measurement(stamp.to_sec(), pose, covariance))
+            self._receive(StampedPose(stamp.to_sec(), pose, covariance))
         except ValueError as error:
             self._warn("%s: %s" % (self._topic, error))

@@ -17,7 +17,7 @@ from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
 from hero_node.parameters import number, robot_ids, words
 
-from ..filter.pose_filter import Measurement, make_covariance
+from ..filter.pose_filter import StampedPose, make_covariance
 from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
 from .inputs import OdometryInput, PoseInput
 from .outputs import Outputs
@@ -70,7 +70,7 @@ class LocalizationNode:
             lines = self._localizer.add_odometry(robot_id, stamp_s, pose)
         _log(lines)
 
-    def _receive_pose(self, robot_id: int, measurement: Measurement) -> None:
+    def _receive_pose(self, robot_id: int, measurement: StampedPose) -> None:
         with self._lock:
             lines = self._localizer.add_measurement(robot_id, measurement)
         _log(lines)
@@ -89,7 +89,7 @@ class LocalizationNode:
             if robot.id in self._inputs and robot.state == RobotPose.TRACKED and is_plausible(pose):
                 is_told = 0.0 < robot.position_sd < MAX_SD and 0.0 < robot.yaw_sd < MAX_SD
                 covariance = make_covariance(robot.position_sd, robot.yaw_sd) if is_told else self._covariance
-                measurement = Measurement(robot.stamp.to_sec(), pose, covariance)
+                measurement = StampedPose(robot.stamp.to_sec(), pose, covariance)
                 with self._lock:
                     lines += self._localizer.add_measurement(robot.id, measurement)
         with self._lock:

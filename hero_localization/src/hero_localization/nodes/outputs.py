@@ -12,7 +12,7 @@ from tf2_msgs.msg import TFMessage
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
 
-from ..filter.pose_filter import Estimate
+from ..filter.pose_filter import StampedPose
 from ..filter.swarm_localizer import LocalizedRobot
 
 IN_PLANE = (0, 1, 5)
@@ -64,7 +64,7 @@ class Outputs:
         transform.transform.rotation = _make_quaternion(origin.yaw_rad)
         return transform
 
-    def _make_message(self, estimate: Estimate) -> PoseWithCovarianceStamped:
+    def _make_message(self, estimate: StampedPose) -> PoseWithCovarianceStamped:
         stamp_s, pose, covariance = estimate
         message = PoseWithCovarianceStamped()
         message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp_s), self._frame
