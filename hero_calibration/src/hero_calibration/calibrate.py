@@ -23,8 +23,7 @@ from .calibration import DEFAULT_PARTS, INFRARED, PARTS, WHEELS, Calibration
 from .errors import CalibrationError
 from .procedures.restore import load_calibrations, restore
 from .questions import ask
-from .robots.discovery import find_robots
-from .robots.ros_session import RosSession
+from .robots.ros_session import RosSession, find_robots
 from .store import make_folder
 
 RESTORE = "restore"

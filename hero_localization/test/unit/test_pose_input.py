@@ -125,20 +125,22 @@ def test_what_is_no_pose_in_the_frame_is_named_and_not_used(pose_input):
 
 
 def test_odometry_is_read_from_its_bytes(monkeypatch):
-    monkeypatch.setattr(inputs.rospy, "Subscriber", lambda *_, **__: None)
-    used = []
-    odometry_input = inputs.OdometryInput("/hero_0", lambda *given: used.append(given))
+    subscribed, used = [], []
+    monkeypatch.setattr(inputs.rospy, "Subscriber", lambda *given, **_: subscribed.append(given))
+    inputs.subscribe_odometry("/hero_0", lambda *given: used.append(given))
+    ((topic, _, receive_message, receive),) = subscribed
+    assert topic == "/hero_0/odom"
     message = Odometry(child_frame_id="hero_0/base_link")
     message.header.stamp, message.header.frame_id = rospy.Time(5, 250000000), "hero_0/odom"
     message.pose.pose = Pose(Point(0.4, -0.2, 0.1), Quaternion(0.1, 0.2, 0.3, 0.9))
-    odometry_input._receive_message(make_raw(message))
+    receive_message(make_raw(message), receive)
     yaw_rad = math.atan2(2.0 * (0.9 * 0.3 + 0.1 * 0.2), 1.0 - 2.0 * (0.2 * 0.2 + 0.3 * 0.3))
     ((stamp_s, pose),) = used
     assert stamp_s == pytest.approx(5.25) and pose == pytest.approx((0.4, -0.2, yaw_rad))
     message.pose.pose.position.x = math.nan
     for raw in (make_raw(message), make_raw(PoseStamped())):
-        odometry_input._receive_message(raw)
+        receive_message(raw, receive)
     cut = make_raw(message)
     cut._buff = cut._buff[:30]
-    odometry_input._receive_message(cut)
+    receive_message(cut, receive)
     assert len(used) == 1

@@ -1,17 +1,20 @@
-"""The session over ROS: its time, which may be simulated, and the end of the program."""
+"""The session over ROS: its robots, as the drivers report them, its time, which may be simulated, and its end."""
 
 import time
-from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, Sequence
+from typing import Dict, List, Optional, Sequence, Set
 
 import rospy
 
+from hero_client.ros.drivers import Drivers
+from hero_msgs.msg import Robot
 from hero_node.ros.program import Program
 
+from ..errors import CalibrationError
 from .probe import Probe
+from .ros_probe import RosProbe
 from .session import Session
 
-CALLS_AT_ONCE = 32
+TIMEOUT_S = 10.0
 
 
 class RosSession(Session):
@@ -34,7 +37,49 @@ class RosSession(Session):
     def is_ending(self) -> bool:
         return not self._program.running
 
-    def map(self, work: Callable[[Probe], None], probes: Sequence[Probe]) -> None:
-        """Do work in threads: a service call waits for its robot."""
-        with ThreadPoolExecutor(CALLS_AT_ONCE) as pool:
-            list(pool.map(work, probes))
+
+def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[RosProbe]:
+    """Return the robots with these ids, None: all that are ready; those that are not connected have failed.
+
+    Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
+    """
+    drivers = Drivers()
+    try:
+        robots = _wait_for_robots(program, drivers, robot_ids)
+    finally:
+        drivers.close()
+    ready = _list_ready(robots)
+    wanted = sorted(ready if robot_ids is None else robot_ids)
+    for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
+        if drivers.is_stopped(driver):
+            raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
+    if not ready.intersection(wanted):
+        raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
+    probes = [RosProbe(robot_id, robots[robot_id].model if robot_id in robots else "") for robot_id in wanted]
+    for probe in probes:
+        probe.failure = None if probe.robot_id in ready else "is not connected to the driver: is it on?"
+    return probes
+
+
+def _list_ready(robots: Dict[int, Robot]) -> Set[int]:
+    return {robot_id for robot_id, robot in robots.items() if robot.state == Robot.READY}
+
+
+def _wait_for_robots(program: Program, drivers: Drivers, robot_ids: Optional[Sequence[int]]) -> Dict[int, Robot]:
+    """Return the report of all robots by id, as soon as those wanted are ready, or after TIMEOUT_S."""
+    report = None
+    robots: Dict[int, Robot] = {}
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < deadline_s:
+        if not program.sleep(0.05):
+            raise CalibrationError("ended before a robot was found")
+        report = drivers.read()
+        robots = {robot.id: robot for robot in report.robots if robot.id >= 0} if report else {}
+        ready = _list_ready(robots)
+        if ready and (drivers.is_settled if robot_ids is None else ready.issuperset(robot_ids)):
+            break
+    if report is None:
+        raise CalibrationError(
+            "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
+        )
+    return robots

@@ -5,6 +5,7 @@ clock of this computer: a subclass has the time (ros_session).
 """
 
 from abc import ABC, abstractmethod
+from concurrent.futures import ThreadPoolExecutor
 from typing import Callable, List, Optional, Sequence, TypeVar
 
 from hero_client.values.background_motion import SEND_TIME_S
@@ -18,6 +19,7 @@ T = TypeVar("T")
 POLL_S = 0.02
 SETTLE_S = 0.6
 COMMAND_PERIOD_S = 0.1
+CALLS_AT_ONCE = 32
 
 
 class Session(ABC):
@@ -46,9 +48,10 @@ class Session(ABC):
     def is_ending(self) -> bool:
         """Whether the program is to end."""
 
-    @abstractmethod
     def map(self, work: Callable[[Probe], None], probes: Sequence[Probe]) -> None:
-        """Do work for probes, side by side where it waits for them."""
+        """Do work for probes side by side: a service call waits for its robot."""
+        with ThreadPoolExecutor(CALLS_AT_ONCE) as pool:
+            list(pool.map(work, probes))
 
     # -- time ----------------------------------------------------------------------------------------------
 

@@ -70,8 +70,8 @@ class FrameSource:
         self.problem = self.warning = ""
         self.arrived_s = rospy.get_time()
 
-    def poll(self, timeout_s: float) -> Any:
-        """Return the next image, a Frame; None if none comes in time or is usable."""
+    def poll(self, timeout_s: float) -> Optional[Frame]:
+        """Return the next image; None if none comes in time or is usable."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -93,7 +93,7 @@ class LiveSource(FrameSource):
             self._newest = received
             self._arrival.notify()
 
-    def poll(self, timeout_s: float) -> Any:
+    def poll(self, timeout_s: float) -> Optional[Frame]:
         """Return the newest image, unless an earlier call did; None if none comes in time or is usable."""
         with self._arrival:
             if self._newest is None:
@@ -101,7 +101,7 @@ class LiveSource(FrameSource):
             received, self._newest = self._newest, None
         return None if received is None else self._decode(received)
 
-    def _decode(self, received: Any) -> Any:
+    def _decode(self, received: Any) -> Optional[Frame]:
         raise NotImplementedError
 
 

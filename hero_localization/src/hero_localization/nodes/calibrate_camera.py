@@ -85,8 +85,7 @@ class Images:
     def poll(self) -> Optional[Frame]:
         """Return the next image; None if none comes in a moment. Raises: ProgramError if the program is to end."""
         self._check_running()
-        frame: Optional[Frame] = self.source.poll(WAIT_S)
-        return frame
+        return self.source.poll(WAIT_S)
 
     def _check_running(self) -> None:
         if not self._program.running:
@@ -282,7 +281,7 @@ def _watch_robot(
                 reason = "appears more than once" if count else "is not in the image, or too dark"
                 raise CalibrationError("tag %d %s; the robot was not moved" % (tag_id, reason))
         say("hero_%d turns left and right, and drives forward and back" % robot_id)
-        # Not an OdometryInput: rospy would give its raw messages to Robot as well.
+        # Not subscribe_odometry(): rospy would give its raw messages to Robot as well.
         keep = partial(_keep_odometry, odometry)
         subscriber = rospy.Subscriber("/hero_%d/odom" % robot_id, Odometry, keep, queue_size=30, tcp_nodelay=True)
         try:

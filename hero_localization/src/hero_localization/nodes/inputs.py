@@ -2,6 +2,7 @@
 
 import math
 import struct
+from contextlib import suppress
 from typing import Callable, Optional, Tuple
 
 import genpy
@@ -32,23 +33,22 @@ POSE_TYPES = {kind._md5sum: kind for kind in (PoseStamped, PoseWithCovarianceSta
 """Types of measured poses, by md5; of an Odometry the pose counts."""
 
 
-class OdometryInput:
-    """Subscription to /hero_N/odom, of which only stamp, position and heading are decoded: 29 messages per robot."""
+def subscribe_odometry(namespace: str, receive: Callable[[float, Pose], None]) -> None:
+    """Call receive with stamp (s) and pose of each message on /hero_N/odom, on a thread of rospy.
 
-    def __init__(self, namespace: str, receive: Callable[[float, Pose], None]) -> None:
-        """receive: is given stamp (s) and pose of each message, on a thread of rospy."""
-        self._receive = receive
-        rospy.Subscriber(namespace + "/odom", rospy.AnyMsg, self._receive_message, queue_size=30, tcp_nodelay=True)
+    Nothing else is decoded: 29 messages come a second from each robot.
+    """
+    topic = namespace + "/odom"
+    rospy.Subscriber(topic, rospy.AnyMsg, _receive_odometry, receive, queue_size=30, tcp_nodelay=True)
 
-    def _receive_message(self, message: rospy.AnyMsg) -> None:
-        if message._connection_header["md5sum"] != Odometry._md5sum:
-            return
-        try:
-            stamp_s, pose = _read_odometry(message._buff)
-        except struct.error:
-            return
+
+def _receive_odometry(message: rospy.AnyMsg, receive: Callable[[float, Pose], None]) -> None:
+    if message._connection_header["md5sum"] != Odometry._md5sum:
+        return
+    with suppress(struct.error):
+        stamp_s, pose = _read_odometry(message._buff)
         if is_plausible(pose) and math.isfinite(stamp_s):
-            self._receive(stamp_s, pose)
+            receive(stamp_s, pose)
 
 
 def _read_odometry(data: bytes) -> Tuple[float, Pose]:
@@ -105,50 +105,45 @@ class PoseInput:
         return abs(place.z - self._start.z) > RISE_M
 
     def _receive_message(self, message: rospy.AnyMsg) -> None:
-        kind = POSE_TYPES.get(message._connection_header["md5sum"])
-        if kind is None:
-            self._warn(
-                "%s has the type %s, but must have one of: %s"
-                % (
-                    self._topic,
-                    message._connection_header.get("type", "?"),
-                    ", ".join(kind._type for kind in POSE_TYPES.values()),
-                )
-            )
-            return
         try:
-            content = kind().deserialize(message._buff)
+            measurement = self._read(message)
         except genpy.DeserializationError:
             return
+        except ValueError as error:
+            self._warn("%s %s" % (self._topic, error))
+            return
+        try:
+            self._receive(measurement)
+        except ValueError as error:
+            self._warn("%s: %s" % (self._topic, error))
+
+    def _read(self, message: rospy.AnyMsg) -> StampedPose:
+        """Return the pose in a message. Raises: ValueError with what is wrong with it; genpy.DeserializationError."""
+        kind = POSE_TYPES.get(message._connection_header["md5sum"])
+        if kind is None:
+            known = ", ".join(kind._type for kind in POSE_TYPES.values())
+            found = message._connection_header.get("type", "?")
+            raise ValueError("has the type %s, but must have one of: %s" % (found, known))
+        content = kind().deserialize(message._buff)
         frame = content.header.frame_id.lstrip("/")
         if frame not in ("", self._frame):
-            self._warn(
-                "%s is in the frame %r, but must be in %r: set ~pose_frame to it, or publish it there"
-                % (self._topic, frame, self._frame)
-            )
-            return
+            text = "is in the frame %r, but must be in %r: set ~pose_frame to it, or publish it there"
+            raise ValueError(text % (frame, self._frame))
         has_covariance = kind is not PoseStamped
         message_pose = content.pose.pose if has_covariance else content.pose
         if self._rises(message_pose.position):
-            text = "%s rises by more than %g m, but stays at one y: is the up axis of the motion capture system z?"
-            self._warn(text % (self._topic, RISE_M))
-            return
+            text = "rises by more than %g m, but stays at one y: is the up axis of the motion capture system z?"
+            raise ValueError(text % RISE_M)
         mistake = find_pose_mistake(message_pose)
         if mistake:
-            self._warn("%s %s" % (self._topic, mistake))
-            return
+            raise ValueError(mistake)
         pose = read_pose(message_pose)
         if pose is None:
-            self._warn("%s holds a pose that no robot can have: not finite, or beyond 1000 m" % self._topic)
-            return
+            raise ValueError("holds a pose that no robot can have: not finite, or beyond 1000 m")
         covariance = self._default_covariance
         if has_covariance:
-            covariance = np.array(content.pose.covariance).reshape(6, 6)[np.ix_(IN_PLANE, IN_PLANE)]
-            if not covariance.any():  # not filled in
-                covariance = self._default_covariance
+            told = np.array(content.pose.covariance).reshape(6, 6)[np.ix_(IN_PLANE, IN_PLANE)]
+            covariance = told if told.any() else covariance  # may not be filled in
         # A stamp of zero says that the sender does not know the time: that of arrival is the best there is.
         stamp = content.header.stamp if content.header.stamp else rospy.get_rostime()
-        try:
-            self._receive(StampedPose(stamp.to_sec(), pose, covariance))
-        except ValueError as error:
-            self._warn("%s: %s" % (self._topic, error))
+        return StampedPose(stamp.to_sec(), pose, covariance)

@@ -19,7 +19,7 @@ from hero_node.parameters import number, robot_ids, words
 
 from ..filter.pose_filter import StampedPose, make_covariance
 from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
-from .inputs import OdometryInput, PoseInput
+from .inputs import PoseInput, subscribe_odometry
 from .outputs import Outputs
 
 DIAGNOSTICS_PERIOD_S = 1.0
@@ -43,7 +43,7 @@ class LocalizationNode:
         self._lock = threading.Lock()  # inputs come on threads of rospy
         self._localizer = SwarmLocalizer()
         self._outputs = Outputs(self._frame)
-        self._inputs: Dict[int, List[Any]] = {}
+        self._inputs: Dict[int, PoseInput] = {}
         self._next_diagnostics_s = 0.0
         self._unknown_s: Dict[int, float] = {}
         self._image_used = threading.Event()
@@ -60,10 +60,9 @@ class LocalizationNode:
             self._outputs.add_robot(robot_id)
             topic = self._pose_topic.replace("{id}", str(robot_id))
             warn = partial(rospy.logwarn_throttle, 10.0)
-            self._inputs[robot_id] = [
-                OdometryInput("/hero_%d" % robot_id, partial(self._receive_odometry, robot_id)),
-                PoseInput(topic, self._pose_frame, self._covariance, partial(self._receive_pose, robot_id), warn),
-            ]
+            subscribe_odometry("/hero_%d" % robot_id, partial(self._receive_odometry, robot_id))
+            receive = partial(self._receive_pose, robot_id)
+            self._inputs[robot_id] = PoseInput(topic, self._pose_frame, self._covariance, receive, warn)
 
     def _receive_odometry(self, robot_id: int, stamp_s: float, pose: Pose) -> None:
         with self._lock:
