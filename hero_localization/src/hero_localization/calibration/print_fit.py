@@ -3,8 +3,6 @@
 Where a camera brightens dark shades (gamma), white grows by half a pixel or more, and black squares measure up to 2 %
 less. How much follows from the shades of the edges: the print is rendered with the blur and gamma that explain the
 image best.
-
-Source: D. W. Marquardt, An Algorithm for Least-Squares Estimation of Nonlinear Parameters, 1963.
 """
 
 import math
@@ -12,6 +10,7 @@ from typing import List, Sequence
 
 import cv2
 import numpy as np
+from scipy.optimize import least_squares
 
 from ..prints.tag_images import draw_tag
 from ..tracking.tag_corners import TagCorners
@@ -23,7 +22,7 @@ MARGIN_CELLS = 2
 """Of white around the print, of which SEEN_CELLS are compared."""
 SEEN_CELLS = 0.7
 
-ROUNDS, MIN_GAIN = 8, 1e-4
+ROUNDS, MIN_GAIN = 20, 1e-4
 FIRST_BLUR_PX = 0.8
 STEPS = np.array((0.002, 0.02, 0.5, 0.5, 0.02))
 LOW, HIGH = np.array((0.9, 0.3, 1.0, 30.0, 0.4)), np.array((1.1, 4.0, 200.0, 255.0, 4.0))
@@ -75,21 +74,14 @@ def _refine(gray: np.ndarray, tag: TagCorners, cells: np.ndarray) -> TagCorners:
     image = gray[corner_px[1] : corner_px[1] + size_px, corner_px[0] : corner_px[0] + size_px].astype(float)
     model = _Print(cells, tag, corner_px, size_px)
     seen = image[model.seen]
-    fit = np.clip((1.0, FIRST_BLUR_PX, *np.percentile(seen, (5, 95)), 1.0), LOW, HIGH)
-    residuals = seen - model.render(fit)
-    damping = 0.01
-    for _ in range(ROUNDS):
-        slopes = [model.render(fit + step) - model.render(fit - step) for step in np.diag(STEPS)]
-        jacobian = np.column_stack(slopes) / (2.0 * STEPS)
-        normal = jacobian.T @ jacobian
-        damped = normal + np.diag(damping * np.diagonal(normal) + 1e-9)
-        tried = np.clip(fit + np.linalg.solve(damped, jacobian.T @ residuals), LOW, HIGH)
-        new_residuals = seen - model.render(tried)
-        gain = 1.0 - (new_residuals @ new_residuals) / max(residuals @ residuals, 1e-9)
-        if gain > 0.0:
-            fit, residuals, damping = tried, new_residuals, damping / 5.0
-        else:
-            damping *= 10.0
-        if 0.0 <= gain < MIN_GAIN:
-            break
+    start = np.clip((1.0, FIRST_BLUR_PX, *np.percentile(seen, (5, 95)), 1.0), LOW, HIGH)
+    fit = least_squares(
+        lambda values: model.render(values) - seen,
+        start,
+        bounds=(LOW, HIGH),
+        diff_step=STEPS / start,
+        x_scale=STEPS,
+        ftol=MIN_GAIN,
+        max_nfev=ROUNDS,
+    ).x
     return tag._replace(corners=tag.center + fit[0] * (tag.corners - tag.center))
