@@ -45,7 +45,9 @@ class StepLocalization:
         self._camera = camera
         self._random = np.random.RandomState(seed)
         count = len(swarm.robots)
-        self._biases = self._random.normal(0.0, _list_sds(camera.bias_sd_m, camera.bias_sd_rad), (count, 3))
+        biases_sd = (camera.bias_sd_m, camera.bias_sd_m, camera.bias_sd_rad)
+        self._biases = self._random.normal(0.0, biases_sd, (count, 3))
+        self._noise_sd = (camera.noise_sd_m, camera.noise_sd_m, camera.noise_sd_rad)
         self._covariance = make_covariance(camera.noise_sd_m, camera.noise_sd_rad)
         self._filters = [PoseFilter() for _ in swarm.robots]
         self._images: List[Deque[Tuple[float, Pose]]] = [deque() for _ in swarm.robots]
@@ -81,9 +83,7 @@ class StepLocalization:
 
     def _receive(self, rows: np.ndarray) -> None:
         now_s = self._rows.now_ms / 1e3
-        noise = self._random.normal(
-            0.0, _list_sds(self._camera.noise_sd_m, self._camera.noise_sd_rad), (len(rows), 3)
-        )
+        noise = self._random.normal(0.0, self._noise_sd, (len(rows), 3))
         seen = self._rows.world.poses[rows] + self._biases[rows] + noise
         for row, pose in zip(rows.tolist(), seen.tolist()):
             images, pose_filter = self._images[row], self._filters[row]
@@ -94,7 +94,3 @@ class StepLocalization:
                 pose_filter.add_measurement(StampedPose(taken_s, measured, self._covariance))
             if now_s >= self._published_s[row] + 1.0 / PUBLISH_RATE_HZ:
                 self._published_s[row], self._published[row] = now_s, pose_filter.estimate()
-
-
-def _list_sds(position_sd_m: float, yaw_sd_rad: float) -> Tuple[float, float, float]:
-    return position_sd_m, position_sd_m, yaw_sd_rad

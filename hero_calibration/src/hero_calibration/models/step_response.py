@@ -153,7 +153,6 @@ class GainSearch:
         self._scale = float(np.clip(NOMINAL_GAIN_M_S_US / servo_gain_m_s_us, 0.5, 2.0))
         self._waiting: List[Gains] = [DEFAULT_GAINS]
         self._waiting += [self._make(FIRST_PROPORTIONAL, integral) for integral in INTEGRALS]
-        self._has_second_round = True
         self.tried: Dict[Gains, Response] = {}
 
     def _make(self, proportional: float, integral: float) -> Gains:
@@ -170,8 +169,7 @@ class GainSearch:
 
     def next_gains(self) -> Gains:
         """Return the gains to try next. Raises: IndexError after count_rounds()."""
-        if not self._waiting and self._has_second_round:
-            self._has_second_round = False
+        if len(self.tried) == 1 + len(INTEGRALS) and not self._waiting:
             integral = self.best()[0][1] / self._scale
             self._waiting = [self._make(proportional, integral) for proportional in PROPORTIONALS]
         return self._waiting[0]

@@ -3,7 +3,7 @@
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import rospy
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
@@ -77,10 +77,10 @@ class RosProbe(Probe):
         return silence
 
     def drive(self, angular_rad_s: float, linear_m_s: float = 0.0) -> None:
-        self._velocity.publish(_make_twist(angular_rad_s, linear_m_s))
+        self._velocity.publish(Twist(Vector3(x=linear_m_s), Vector3(z=angular_rad_s)))
 
     def turn(self, angle_rad: float) -> None:
-        self._position.publish(_make_twist(angle_rad))
+        self._position.publish(Twist(angular=Vector3(z=angle_rad)))
 
     def set_pulses(self, pulse_us: int) -> None:
         self._motors.publish(Motor(pulse_us, pulse_us))
@@ -99,10 +99,3 @@ class RosProbe(Probe):
             raise CalibrationError("%s: %s" % (name, one_line(error))) from error
         if not answer.success:
             raise CalibrationError("%s: the robot answers: %s" % (name, answer.message))
-
-
-def _make_twist(angular: float, linear: float = 0.0) -> Twist:
-    twist = Twist()
-    twist.linear.x = linear
-    twist.angular.z = angular
-    return twist

@@ -179,25 +179,17 @@ def _draw_tag(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float) ->
     from matplotlib.patches import Rectangle
 
     cells = draw_tag(family, sheet.tag_id)
-    cell_mm, left_mm, top_mm = (
-        sheet.size_mm / len(cells),
-        x_mm - sheet.size_mm / 2.0,
-        y_mm + sheet.size_mm / 2.0,
-    )
-    black = Rectangle((left_mm, y_mm - sheet.size_mm / 2.0), sheet.size_mm, sheet.size_mm)
+    cell_mm, half_mm = sheet.size_mm / len(cells), sheet.size_mm / 2.0
+    left_mm, top_mm = x_mm - half_mm, y_mm + half_mm
+    black = Rectangle((left_mm, y_mm - half_mm), sheet.size_mm, sheet.size_mm)
     axes.add_collection(PatchCollection([black], facecolor="black", edgecolor="none"))
     # White runs over black: between black neighbors no viewer draws a line.
     white = []
     for row, values in enumerate(cells):
-        column = 0
-        while column < len(cells):
-            end = column
-            while end < len(cells) and values[end]:
-                end += 1
-            if end > column:
-                corner = (left_mm + column * cell_mm, top_mm - (row + 1) * cell_mm)
-                white.append(Rectangle(corner, (end - column) * cell_mm, cell_mm))
-            column = end + 1
+        edges = np.flatnonzero(np.diff(np.pad(values > 0, 1, mode="constant").astype(int)))
+        for start, end in edges.reshape(-1, 2).tolist():
+            corner = (left_mm + start * cell_mm, top_mm - (row + 1) * cell_mm)
+            white.append(Rectangle(corner, (end - start) * cell_mm, cell_mm))
     axes.add_collection(PatchCollection(white, facecolor="white", edgecolor="none", zorder=2))
 
 
