@@ -88,7 +88,6 @@ PURE_ROOMS = (
     "hero_calibration.robots.session",
     "hero_localization.calibration",
     "hero_localization.camera.camera_model",
-    "hero_localization.camera.lens_file",
     "hero_localization.filter",
     "hero_localization.mapping",
     "hero_localization.prints",

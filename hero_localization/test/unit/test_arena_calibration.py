@@ -9,7 +9,7 @@ import pytest
 cv2 = pytest.importorskip("cv2")
 
 from hero_localization.calibration.arena_calibration import (  # noqa: E402
-    _fit,
+    _Image,
     _judge,
     average_tags,
     calibrate_arena,
@@ -338,7 +338,7 @@ def test_a_camera_hangs_between_20_cm_and_20_m(height_m):
     }
     seen = [see(tag_id, pose, 0.1 * size, camera) for tag_id, pose in known.items()]
     if height_m < 1.0:  # closer than tags may lie
-        assert (_fit(LENS, seen, known, 0.1 * size) is not None) == (height_m > 0.2)
+        assert (_Image(LENS, seen, known, 0.1 * size).fit() is not None) == (height_m > 0.2)
     elif height_m < 20.0:
         assert calibrate_arena(LENS, seen, known, 0.1 * size).camera.position_m[2] == pytest.approx(height_m, rel=1e-3)
     else:

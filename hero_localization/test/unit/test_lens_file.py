@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_localization.camera.lens_file import load_lens
+from hero_localization.calibration.lens_calibration import load_lens
 from hero_localization.errors import CalibrationError
 from hero_test.bad_yaml import make_bad_yaml
 

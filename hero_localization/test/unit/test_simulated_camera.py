@@ -11,7 +11,6 @@ cv2 = pytest.importorskip("cv2")
 from hero_localization.errors import SettingsError  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.simulated_camera.board_renderer import list_board_places  # noqa: E402
-from hero_localization.simulated_camera.frame_times import list_frames  # noqa: E402
 from hero_localization.simulated_camera.lab_setup import (  # noqa: E402
     describe_references,
     hang_above,
@@ -24,6 +23,7 @@ from hero_localization.simulated_camera.view import (  # noqa: E402
     PrintedTag,
     View,
     hand_outlines,
+    list_frames,
     tag_corners,
 )
 from hero_localization.tracking import settings as camera_file  # noqa: E402

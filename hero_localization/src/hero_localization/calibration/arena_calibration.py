@@ -89,7 +89,8 @@ def calibrate_arena(
     Raises: CalibrationError if fewer than four reference tags are seen, all lie in a row, or the places cannot be
         right; if one mistake explains them (y the wrong way, swapped tags, scale, units), it is named.
     """
-    seen = [tag for tag in tags if tag.tag_id in references]
+    image = _Image(lens, [tag for tag in tags if tag.tag_id in references], references, size_m)
+    seen = image.tags
     missing = sorted(set(references) - {tag.tag_id for tag in seen})
     if len(seen) < MIN_TAGS:
         raise CalibrationError(
@@ -97,22 +98,21 @@ def calibrate_arena(
             % (len(seen), len(references), ", ".join(map(str, missing)) or "more", MIN_TAGS)
         )
     _check_extent(seen, references)
-    camera = _fit(lens, seen, references, size_m)
-    if camera is None or _compute_rms(measure_residuals(camera, seen, references), ()) > SUSPICIOUS_RMS_M:
-        _refuse_mistakes(lens, seen, references, size_m)
-    if camera is None:
+    fit = image.fit()
+    if fit is None or fit.rms_m > SUSPICIOUS_RMS_M:
+        _refuse_mistakes(image)
+    if fit is None:
         raise CalibrationError(
             "no camera above the floor sees the reference tags like this: check the ids and places in the camera file"
         )
-    residuals_m = measure_residuals(camera, seen, references)
-    left_out: List[int] = []
-    wrong = _find_wrong_tag(lens, seen, references, size_m)
+    camera, left_out = fit.camera, []  # type: Camera, List[int]
+    wrong = _find_wrong_tag(image)
     suspects = wrong.tag_ids if wrong is not None else []
     if wrong is not None and len(suspects) == 1:
         left_out, camera = suspects, wrong.camera_without
-        residuals_m = measure_residuals(camera, seen, references)
+    residuals_m = measure_residuals(camera, seen, references)
     if _compute_rms(residuals_m, left_out) < WORST_RESIDUAL_M:  # or it is no matter of scale
-        _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], references, size_m)
+        _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], size_m)
     problems = _judge(residuals_m, left_out, missing)
     if wrong is not None and len(suspects) > 1:
         text = "tag %s is about %.0f mm from its place: measure them again"
@@ -120,19 +120,57 @@ def calibrate_arena(
     return ArenaCalibration(camera, residuals_m, left_out, problems)
 
 
-def _refuse_mistakes(
-    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
-) -> None:
+class _Fit(NamedTuple):
+    """The camera that sees the reference tags of an image best, and the root mean square of their residuals."""
+
+    camera: Camera
+    rms_m: float
+
+
+class _Image(NamedTuple):
+    """The reference tags in an image, and what is known of them and of the lens."""
+
+    lens: Intrinsics
+    tags: Sequence[TagCorners]
+    references: Mapping[int, Pose]
+    size_m: float
+
+    def fit(self) -> Optional[_Fit]:
+        """Return the camera above the floor that sees the tags like this best; None if there is none."""
+        known = [self.references[tag.tag_id] for tag in self.tags]
+        # The yaws are not known: centers first.
+        points_m = np.array([(*pose[:2], 0.0) for pose in known])
+        pixels = np.array([tag.center for tag in self.tags])
+        for _ in range(_YAW_ROUNDS):
+            try:
+                is_found, turn, shift = cv2.solvePnP(points_m, pixels, self.lens.matrix, self.lens.distortion)
+            except cv2.error:
+                return None
+            if not is_found or not np.isfinite(turn).all() or not np.isfinite(shift).all():
+                return None
+            rotation = cv2.Rodrigues(turn)[0]
+            camera = Camera(self.lens, rotation, (-rotation.T @ shift).ravel())
+            yaws_rad = [fit.pose.yaw_rad for fit in fit_squares(camera, self.tags, 0.0)]
+            turned = [pose._replace(yaw_rad=yaw_rad) for pose, yaw_rad in zip(known, yaws_rad)]
+            points_m = np.vstack([list_corners(pose, self.size_m, 0.0) for pose in turned])
+            pixels = np.vstack([tag.corners for tag in self.tags])
+        if not HEIGHTS_M[0] <= camera.position_m[2] <= HEIGHTS_M[1]:
+            return None
+        return _Fit(camera, _compute_rms(measure_residuals(camera, self.tags, self.references), ()))
+
+
+def _refuse_mistakes(image: _Image) -> None:
     """Try mistakes that users make with places. Raises: CalibrationError that names those that explain all."""
+    references = image.references
     mirrored = {tag_id: Pose(pose.x_m, -pose.y_m, 0.0) for tag_id, pose in references.items()}
     tried = [("y the wrong way (seen from above, y points left of x)", mirrored)]
-    for one, other in itertools.combinations(sorted(tag.tag_id for tag in seen), 2):
+    for one, other in itertools.combinations(sorted(tag.tag_id for tag in image.tags), 2):
         swapped = {**references, one: references[other], other: references[one]}
         tried.append(("tags %d and %d swapped" % (one, other), swapped))
     causes = []
     for cause, places in tried:
-        camera = _fit(lens, seen, places, size_m)
-        if camera is not None and _compute_rms(measure_residuals(camera, seen, places), ()) < WORST_RESIDUAL_M:
+        fit = image._replace(references=places).fit()
+        if fit is not None and fit.rms_m < WORST_RESIDUAL_M:
             causes.append(cause)
     if causes:
         raise CalibrationError("the places of the reference tags have %s: correct them" % ", or ".join(causes))
@@ -146,25 +184,22 @@ class _WrongTag(NamedTuple):
     camera_without: Camera
 
 
-def _find_wrong_tag(
-    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
-) -> Optional[_WrongTag]:
+def _find_wrong_tag(image: _Image) -> Optional[_WrongTag]:
     """Return the tags without one of which the others agree by far better; None if there is none, or none to spare."""
-    if len(seen) <= MIN_TAGS:
+    if len(image.tags) <= MIN_TAGS:
         return None
     found: Optional[_WrongTag] = None
     squares_m2: Dict[int, float] = {}
-    for tag in seen:
-        others = [other for other in seen if other is not tag]
-        camera = _fit(lens, others, references, size_m)
-        if camera is None:
+    for tag in image.tags:
+        others = [other for other in image.tags if other is not tag]
+        fit = image._replace(tags=others).fit()
+        if fit is None:
             continue
-        rest_m = _compute_rms(measure_residuals(camera, others, references), ())
-        alone_m = measure_residuals(camera, [tag], references)[tag.tag_id]
-        squares_m2[tag.tag_id] = len(others) * rest_m**2
+        alone_m = measure_residuals(fit.camera, [tag], image.references)[tag.tag_id]
+        squares_m2[tag.tag_id] = len(others) * fit.rms_m**2
         if squares_m2[tag.tag_id] == min(squares_m2.values()):
-            is_wrong = alone_m > WRONG_PLACE_M and alone_m > WRONG_SHARE * rest_m
-            found = _WrongTag([tag.tag_id], alone_m, camera) if is_wrong else None
+            is_wrong = alone_m > WRONG_PLACE_M and alone_m > WRONG_SHARE * fit.rms_m
+            found = _WrongTag([tag.tag_id], alone_m, fit.camera) if is_wrong else None
     if found is None:
         return None
     limit_m2 = min(squares_m2.values()) + AMBIGUOUS_M2
@@ -172,11 +207,9 @@ def _find_wrong_tag(
     return found._replace(tag_ids=sorted(suspects, key=squares_m2.__getitem__))
 
 
-def _check_sizes(
-    camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
-) -> None:
+def _check_sizes(camera: Camera, tags: Sequence[TagCorners], size_m: float) -> None:
     """Compare the tags' measured size with the printed one. Raises: CalibrationError if places are out of scale."""
-    share = float(np.median([fit.size_m / size_m for fit in fit_references(camera, seen, references)]))
+    share = float(np.median([fit.size_m / size_m for fit in fit_squares(camera, tags, 0.0)]))
     if not abs(share - 1.0) <= MAX_SCALE_ERROR:
         raise CalibrationError(
             "reference tags measure %.1f %% of their size: measure the places again, is the tape right? and the side of"
@@ -221,30 +254,6 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Pose]) ->
         raise CalibrationError(
             "all reference tags lie in a row: spread them over the field, best into its corners"
         )
-
-
-def _fit(
-    lens: Intrinsics, seen: Sequence[TagCorners], references: Mapping[int, Pose], size_m: float
-) -> Optional[Camera]:
-    """Return the camera above the floor that sees the tags like this best; None if there is none."""
-    known = [references[tag.tag_id] for tag in seen]
-    # The yaws are not known: centers first.
-    points_m = np.array([(*pose[:2], 0.0) for pose in known])
-    pixels = np.array([tag.center for tag in seen])
-    for _ in range(_YAW_ROUNDS):
-        try:
-            is_found, turn, shift = cv2.solvePnP(points_m, pixels, lens.matrix, lens.distortion)
-        except cv2.error:
-            return None
-        if not is_found or not np.isfinite(turn).all() or not np.isfinite(shift).all():
-            return None
-        rotation = cv2.Rodrigues(turn)[0]
-        camera = Camera(lens, rotation, (-rotation.T @ shift).ravel())
-        yaws_rad = [fit.pose.yaw_rad for fit in fit_references(camera, seen, references)]
-        turned = [pose._replace(yaw_rad=yaw_rad) for pose, yaw_rad in zip(known, yaws_rad)]
-        points_m = np.vstack([list_corners(pose, size_m, 0.0) for pose in turned])
-        pixels = np.vstack([tag.corners for tag in seen])
-    return camera if HEIGHTS_M[0] <= camera.position_m[2] <= HEIGHTS_M[1] else None
 
 
 def fit_references(camera: Camera, tags: Sequence[TagCorners], references: Mapping[int, Pose]) -> List[TagPose]:

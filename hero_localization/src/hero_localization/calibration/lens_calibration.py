@@ -1,10 +1,13 @@
-"""Intrinsics of a camera, from images of a ChArUco board. Pure but for OpenCV."""
+"""Intrinsics of a camera, from images of a ChArUco board, or a file of camera_calibration. Pure but for OpenCV."""
 
 import math
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
+
+from hero_node.texts import one_line
+from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from ..camera.camera_model import Intrinsics
 from ..errors import CalibrationError
@@ -197,3 +200,26 @@ def _list_empty_regions(views: Sequence[BoardView], width_px: int, height_px: in
         for column, name in enumerate(names)
         if ((rows == row) & (columns == column)).sum() < MIN_IN_REGION
     ]
+
+
+def load_lens(path: str) -> Intrinsics:
+    """Return the intrinsics in a file of camera_calibration. Raises: CalibrationError."""
+    try:
+        content = parse_yaml(read_text(path))
+        return Intrinsics.from_camera_info(
+            int(content["image_width"]),
+            int(content["image_height"]),
+            content["camera_matrix"]["data"],
+            str(content.get("distortion_model", "plumb_bob")),
+            content["distortion_coefficients"]["data"],
+        )
+    except OSError as error:
+        raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from None
+    except YamlError as error:
+        raise CalibrationError("%s is no YAML file: %s" % (path, error)) from None
+    except KeyError as error:
+        raise CalibrationError(
+            "%s: %s is missing; is it a file of camera_calibration?" % (path, error)
+        ) from None
+    except (AttributeError, OverflowError, TypeError, ValueError) as error:
+        raise CalibrationError("%s is no file of camera_calibration: %s" % (path, one_line(error))) from None

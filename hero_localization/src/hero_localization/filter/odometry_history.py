@@ -74,7 +74,7 @@ class OdometryHistory:
         pose, distance_m, turned_rad, heading_rad, untold_s = transform_pose(self._offset, raw), 0.0, 0.0, 0.0, 0.0
         if self._readings.newest is not None:
             last, distance_m, turned_rad, heading_rad, untold_s = self._readings.newest
-            step_m, step_rad = measure_distance(last, pose), _turn_between(last, pose)
+            step_m, step_rad = measure_distance(last, pose), wrap_angle(pose.yaw_rad - last.yaw_rad)
             elapsed_s = stamp_s - self.newest_s
             if _is_jump(step_m, step_rad, 0.0 if elapsed_s > RESTART_S and _is_origin(raw) else elapsed_s):
                 self.jumps += 1
@@ -102,10 +102,6 @@ class OdometryHistory:
 def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:
     sums = (before + share * (after - before) for before, after in zip(start[1:], end[1:]))
     return Odometry(interpolate_pose(start.pose, end.pose, share), *sums)
-
-
-def _turn_between(start: Pose, end: Pose) -> float:
-    return wrap_angle(end.yaw_rad - start.yaw_rad)
 
 
 def _is_origin(pose: Pose) -> bool:

@@ -37,13 +37,13 @@ from ..calibration.lens_calibration import (
     calibrate_lens,
     find_board,
     is_mirrored,
+    load_lens,
 )
 from ..calibration.print_fit import refine_corners
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
 from ..camera.camera_model import Intrinsics
 from ..camera.device_controls import DeviceControls
 from ..camera.frame_source import Frame, open_source
-from ..camera.lens_file import load_lens
 from ..errors import CalibrationError, DetectorError, LocalizationError
 from ..prints.boards import Board
 from ..tracking import settings as camera_file

@@ -27,7 +27,6 @@ from ..errors import LocalizationError, SettingsError
 from ..prints.boards import Board
 from ..prints.tag_images import FAMILIES
 from .board_renderer import BoardRenderer, list_board_places
-from .frame_times import list_frames
 from .lab_setup import (
     describe_references,
     find_first_reference,
@@ -36,7 +35,7 @@ from .lab_setup import (
     write_camera_file,
 )
 from .renderer import CameraRenderer
-from .view import CameraOptions, PrintedTag, View
+from .view import CameraOptions, PrintedTag, View, list_frames
 
 PROGRAM = "simulated_camera"
 NODE = "camera"

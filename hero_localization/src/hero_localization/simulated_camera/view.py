@@ -1,9 +1,9 @@
-"""Extrinsics and intrinsics of the simulated camera, and what degrades its images. Pure.
+"""Extrinsics and intrinsics of the simulated camera, when its images come, and what degrades them. Pure.
 
 Frame `world` as in the arena. Pixels as in OpenCV: the center of the first one is (0, 0).
 """
 
-from typing import List, NamedTuple, Tuple
+from typing import Iterator, List, NamedTuple, Tuple
 
 import cv2
 import numpy as np
@@ -42,6 +42,23 @@ class CameraOptions(NamedTuple):
     delay_jitter_s: float = 0.01
     """Images are late by up to this much more."""
     dropped_share: float = 0.02
+
+
+def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> Iterator[Tuple[float, float]]:
+    """Yield the middle of the exposure and the arrival of images from start_s on, without end.
+
+    Dropped ones are left out. None overtakes another.
+    """
+    random = np.random.RandomState(seed)
+    index, arrival_s = 0, -np.inf
+    while True:
+        stamp_s = start_s + index / options.rate_hz
+        late_s = random.random_sample() * options.delay_jitter_s
+        is_dropped = random.random_sample() < options.dropped_share
+        index += 1
+        if not is_dropped:
+            arrival_s = max(arrival_s, stamp_s + options.delay_s + late_s)
+            yield stamp_s, float(arrival_s)
 
 
 class PrintedTag(NamedTuple):

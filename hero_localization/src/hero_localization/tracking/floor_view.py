@@ -82,13 +82,9 @@ class FloorView:
             if not np.isfinite(corners).all():
                 continue
             color = _UNUSABLE_BGR if tag.tag_id in unusable else _FOUND_BGR
-            center, front = (_round(corners[:count].mean(axis=0)) for count in (4, 2))
+            center, front = (tuple(np.rint(part.mean(axis=0)).astype(int).tolist()) for part in (corners, corners[:2]))
             cv2.polylines(drawn, [np.rint(corners).astype(np.int32)], True, color, 2)
             cv2.line(drawn, center, front, color, 2)
             place = (center[0] + 12, center[1] - 12)
             cv2.putText(drawn, str(tag.tag_id), place, cv2.FONT_HERSHEY_SIMPLEX, 0.7, color, 2)
         return drawn
-
-
-def _round(pixel: np.ndarray) -> Tuple[int, int]:
-    return int(round(float(pixel[0]))), int(round(float(pixel[1])))
