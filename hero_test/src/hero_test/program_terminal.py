@@ -11,9 +11,7 @@ import termios
 import threading
 
 from hero_test.processes import find_program
-from hero_test.waiting import wait_for
-
-TIMEOUT_S = 60.0
+from hero_test.waiting import TIMEOUT_S, wait_for
 
 
 def run_fleet(*arguments, **options):
