@@ -11,7 +11,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 import cv2
 import numpy as np
 
-from hero_localization.prints.boards import Board, draw_board
+from hero_localization.prints.boards import SQUARE_M, draw_board
 from hero_localization.prints.tag_images import draw_tag
 
 SAMPLES = 4
@@ -117,9 +117,8 @@ class LabCamera(NamedTuple):
 
         turn_rad: rotation vector, position_m: of its center, both in the optical frame.
         """
-        board = Board()
-        printed = np.pad(draw_board(board, BOARD_CELLS_PX), BOARD_MARGIN * BOARD_CELLS_PX, constant_values=255)
-        cells_m = BOARD_CELLS_PX / board.square_m
+        printed = np.pad(draw_board(BOARD_CELLS_PX), BOARD_MARGIN * BOARD_CELLS_PX, constant_values=255)
+        cells_m = BOARD_CELLS_PX / SQUARE_M
         rotation = cv2.Rodrigues(np.array(turn_rad, dtype=float))[0]
         # A ray meets the board at x, y of the board, and at the depth that this matrix brings to 1.
         to_ray = np.column_stack((rotation[:, :2], np.array(position_m, dtype=float)))

@@ -22,7 +22,6 @@ from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import CalibrationError
 from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
-from hero_localization.prints.boards import Board
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors
 from hero_localization.tracking.settings import Settings
@@ -332,7 +331,7 @@ def collect_views(lab: LabCamera, random: np.random.RandomState, count: int) -> 
         tilt_rad = random.choice((-1.0, 1.0), 2) * random.uniform(0.1, 0.6, 2)
         ray = (at - lab.center_px) / lab.lens.focal_px
         position_m = (*(ray * distance_m), distance_m)
-        view = find_board(lab.render_board((*tilt_rad, random.uniform(-0.4, 0.4)), position_m, random), Board())
+        view = find_board(lab.render_board((*tilt_rad, random.uniform(-0.4, 0.4)), position_m, random))
         if view is not None:
             views.append(view)
     return views
@@ -344,7 +343,7 @@ def measure_lenses(seeds: int) -> None:
         true, told = [], []
         for seed in range(seeds):
             random = np.random.RandomState(seed)
-            result = calibrate_lens(collect_views(LabCamera(lens), random, 20), *lens.size_px, Board())
+            result = calibrate_lens(collect_views(LabCamera(lens), random, 20), *lens.size_px)
             true += (np.diagonal(result.lens.matrix)[:2] / lens.focal_px - 1.0).tolist()
             told.append(result.focal_error)
         rms_true, rms_told = (100.0 * math.sqrt(np.mean(np.square(values))) for values in (true, told))

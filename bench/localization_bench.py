@@ -24,7 +24,6 @@ from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, c
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
-from hero_localization.prints.boards import Board
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.simulated_camera.board_renderer import BoardRenderer, list_board_places
 from hero_localization.simulated_camera.renderer import CameraRenderer
@@ -147,13 +146,13 @@ class Scene:
 
 def find_lens(random: np.random.RandomState) -> Intrinsics:
     """Calibrate the lens by images of the board at places all over them."""
-    board, views = Board(), []
-    renderer = BoardRenderer(OPTIONS, board)
+    views = []
+    renderer = BoardRenderer(OPTIONS)
     for turn_rad, place_m in itertools.islice(list_board_places(OPTIONS, random), BOARD_IMAGES):
-        view = find_board(renderer.render(turn_rad, place_m, random), board)
+        view = find_board(renderer.render(turn_rad, place_m, random))
         if view is not None:
             views.append(view)
-    result = calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px, board)
+    result = calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px)
     verdict = "; ".join(result.problems) or "good"
     found_px, true_px = result.lens.matrix[0, 0], OPTIONS.focal_px[0]
     text = "lens: %d images, %.2f px rms, focal length %.1f px (true %.1f); %s"

@@ -88,10 +88,10 @@ class Board:
         self.pictures += 1
         return Frame(0.0, np.zeros((2, 2), np.uint8), 0)
 
-    def find(self, gray, board):
+    def find(self, gray):
         return BoardView(np.arange(4), np.full((4, 2), 100.0 * (self.pictures // 2)))
 
-    def calibrate(self, views, width_px, height_px, board):
+    def calibrate(self, views, width_px, height_px):
         self.calibrated.append(len(views))
         problems = [] if len(views) >= self.enough else ["the board is hardly tilted"]
         return LensCalibration(Intrinsics(width_px, height_px, np.eye(3), np.zeros(5)), 0.1, 0.001, [], problems)
@@ -126,7 +126,7 @@ def test_views_are_still_and_away_from_others(tmp_path, monkeypatch):
     places_px = np.cumsum([0.0, 2.9, 39.0, 2.9, 0.2, 40.0, 3.1, 2.9, 50.0, 2.9])
     taken = []
     monkeypatch.setattr(
-        board, "find", lambda gray, _: BoardView(np.arange(4), np.full((4, 2), (places_px[board.pictures - 1], 0.0)))
+        board, "find", lambda gray: BoardView(np.arange(4), np.full((4, 2), (places_px[board.pictures - 1], 0.0)))
     )
     monkeypatch.setattr(calibrate_camera, "find_board", board.find)
     monkeypatch.setattr(calibrate_camera, "say", taken.append)
@@ -152,9 +152,9 @@ def test_without_a_board_for_ten_seconds_a_hint_is_given(tmp_path, monkeypatch, 
         return Frame(0.0, np.full((2, 2), 77, np.uint8), 0)
 
     board.take = take
-    monkeypatch.setattr(calibrate_camera, "find_board", lambda gray, _: None)
+    monkeypatch.setattr(calibrate_camera, "find_board", lambda gray: None)
     mirrored = []
-    monkeypatch.setattr(calibrate_camera, "is_mirrored", lambda gray, _: mirrored.append(program.now_s))
+    monkeypatch.setattr(calibrate_camera, "is_mirrored", lambda gray: mirrored.append(program.now_s))
     parsed = calibrate_camera.parse_options(["lens", "--file", str(tmp_path / "camera.yaml")])
     with pytest.raises(StopIteration):
         calibrate_camera.calibrate_lens_by_board(parsed, board, program)
@@ -162,7 +162,7 @@ def test_without_a_board_for_ten_seconds_a_hint_is_given(tmp_path, monkeypatch, 
     assert capsys.readouterr().out.count("no board in the images (mean shade 77 of 255)") == 2
     times_s = iter((120.0,))
     program.now_s = 100.0
-    monkeypatch.setattr(calibrate_camera, "is_mirrored", lambda gray, _: True)
+    monkeypatch.setattr(calibrate_camera, "is_mirrored", lambda gray: True)
     with pytest.raises(CalibrationError, match="mirrored"):
         calibrate_camera.calibrate_lens_by_board(parsed, board, program)
 

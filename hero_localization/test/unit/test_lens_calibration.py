@@ -18,7 +18,8 @@ from hero_localization.calibration.lens_calibration import (
 )
 from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.errors import CalibrationError
-from hero_localization.prints.boards import Board, draw_board, list_board_corners
+from hero_localization.prints import boards
+from hero_localization.prints.boards import COLUMNS, ROWS, SQUARE_M, draw_board, list_board_corners
 from hero_localization.simulated_camera.board_renderer import BoardRenderer
 from hero_localization.simulated_camera.view import CameraOptions, View
 
@@ -29,7 +30,6 @@ OPTIONS = CameraOptions(
     center_px=(474.0, 276.0),
     distortion=(-0.1, 0.03, 0.001, -0.0005, 0),
 )
-BOARD = Board()
 
 
 def list_holds(count, tilt_rad, seed=0):
@@ -51,9 +51,9 @@ def list_holds(count, tilt_rad, seed=0):
 @pytest.fixture(scope="module")
 def views():
     random = np.random.RandomState(5)
-    renderer = BoardRenderer(OPTIONS, BOARD)
+    renderer = BoardRenderer(OPTIONS)
     pictures = [renderer.render(*hold, random) for hold in list_holds(18, 0.55)]
-    found = [find_board(picture, BOARD) for picture in pictures]
+    found = [find_board(picture) for picture in pictures]
     assert sum(view is not None for view in found) >= 16
     return [view for view in found if view is not None]
 
@@ -63,8 +63,8 @@ def project(holds, noise_px=0.1, seed=0):
     import cv2
 
     random, view = np.random.RandomState(seed), View(OPTIONS)
-    corners_m = list_board_corners(BOARD)
-    center_m = np.array((BOARD.columns * BOARD.square_m / 2.0, BOARD.rows * BOARD.square_m / 2.0, 0.0))
+    corners_m = list_board_corners()
+    center_m = np.array((COLUMNS * SQUARE_M / 2.0, ROWS * SQUARE_M / 2.0, 0.0))
     result = []
     for turn, position_m in holds:
         shift = np.array(position_m) - cv2.Rodrigues(np.array(turn))[0] @ center_m
@@ -79,22 +79,22 @@ def test_corners_of_a_tilted_board_are_right_near_and_far():
     import cv2
 
     fine, cell_px = 4, 120
-    printed = np.pad(draw_board(BOARD, cell_px), cell_px, constant_values=255)
+    printed = np.pad(draw_board(cell_px), cell_px, constant_values=255)
     rows, columns = printed.shape
     rim = np.array(((0, 0), (columns, 0), (columns, rows), (0, rows)), np.float32)
     seen = fine * np.array(((280, 60), (660, 130), (840, 500), (90, 430)), np.float32)
     homography = cv2.getPerspectiveTransform(rim, seen)
     light = cv2.warpPerspective(printed, homography, (fine * 960, fine * 540), borderValue=120)
     gray = cv2.GaussianBlur(cv2.resize(light, (960, 540), interpolation=cv2.INTER_AREA), (0, 0), 0.7)
-    view = find_board(gray, BOARD)
-    corners = (list_board_corners(BOARD)[:, :2] / BOARD.square_m + 1.0) * cell_px - 0.5
+    view = find_board(gray)
+    corners = (list_board_corners()[:, :2] / SQUARE_M + 1.0) * cell_px - 0.5
     expected = (cv2.perspectiveTransform(corners[None], homography)[0] + 0.5) / fine - 0.5
     assert len(view.ids) == len(corners)
     assert np.abs(view.pixels - expected[view.ids]).max() < 0.15
 
 
 def calibrate(views):
-    return calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px, BOARD)
+    return calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px)
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_boards_corners_are_found_where_they_are(views):
 
 
 def test_picture_without_a_board_gives_none():
-    assert find_board(np.full((540, 960), 120, np.uint8), BOARD) is None
+    assert find_board(np.full((540, 960), 120, np.uint8)) is None
 
 
 def test_too_few_pictures_are_refused():
@@ -186,9 +186,9 @@ def test_the_focal_length_is_no_worse_than_reported():
 
 def test_a_mirrored_board_is_recognized():
     random = np.random.RandomState(5)
-    picture = BoardRenderer(OPTIONS, BOARD).render(*list_holds(1, 0.3)[0], random)
-    assert not is_mirrored(picture, BOARD)
-    assert is_mirrored(np.ascontiguousarray(picture[:, ::-1]), BOARD)
+    picture = BoardRenderer(OPTIONS).render(*list_holds(1, 0.3)[0], random)
+    assert not is_mirrored(picture)
+    assert is_mirrored(np.ascontiguousarray(picture[:, ::-1]))
 
 
 def put_corners(places):
@@ -226,7 +226,7 @@ def judge(monkeypatch):
     def run(errors_px, rms_px=0.1, tilts_rad=(0.3,) * 9, focal_error=0.001):
         used = []
 
-        def fit(views, width_px, height_px, board, guess=None):
+        def fit(views, width_px, height_px, guess=None):
             used.append([int(view.ids[0]) for view in views])
             chosen = np.array([errors_px[index] for index in used[-1]])
             return lens_calibration._Fit(None, rms_px, chosen, np.array(tilts_rad))
@@ -235,7 +235,7 @@ def judge(monkeypatch):
         monkeypatch.setattr(lens_calibration, "_measure_focal_error", lambda *_: focal_error)
         everywhere = {(u, v): 25 for u in (0.1, 0.5, 0.9) for v in (0.1, 0.5, 0.9)}
         views = [put_corners(everywhere)._replace(ids=np.array([index])) for index in range(len(errors_px))]
-        return calibrate_lens(views, 960, 540, BOARD), used
+        return calibrate_lens(views, 960, 540), used
 
     return run
 
@@ -275,14 +275,14 @@ def test_the_focal_error_is_that_of_the_jackknife(monkeypatch):
     values = random.normal(700.0, 5.0, (6, 2))
     views = [BoardView(np.array([index]), value) for index, value in enumerate(values)]
 
-    def fit(others, width_px, height_px, board, guess):
+    def fit(others, width_px, height_px, guess):
         matrix = np.diag((*np.mean([view.pixels for view in others], axis=0), 1.0))
         return lens_calibration._Fit(Intrinsics(960, 540, matrix, np.zeros(5)), 0.1, np.ones(1), np.ones(1))
 
     monkeypatch.setattr(lens_calibration, "_fit", fit)
-    whole = fit(views, 960, 540, BOARD, None)
+    whole = fit(views, 960, 540, None)
     errors = values.std(axis=0, ddof=1) / np.sqrt(6.0) / values.mean(axis=0)
-    found = lens_calibration._measure_focal_error(views, whole, 960, 540, BOARD)
+    found = lens_calibration._measure_focal_error(views, whole)
     assert found == pytest.approx(errors.max(), rel=1e-6)
 
 
@@ -292,26 +292,27 @@ def test_images_that_no_lens_explains_are_refused():
         calibrate(views)
 
 
-def test_twelve_corners_make_a_view():
-    small = Board(columns=4, rows=5)
-    printed = np.pad(draw_board(small, 60), 60, constant_values=255)
-    view = find_board(printed, small)
+def test_twelve_corners_make_a_view(monkeypatch):
+    monkeypatch.setattr(boards, "COLUMNS", 4)
+    monkeypatch.setattr(boards, "ROWS", 5)
+    printed = np.pad(draw_board(60), 60, constant_values=255)
+    view = find_board(printed)
     assert sorted(view.ids) == list(range(12))
     # Pixels have their centers at whole numbers, corners lie between.
-    expected = (list_board_corners(small)[:, :2] / small.square_m + 1.0) * 60.0 - 0.5
+    expected = (list_board_corners()[:, :2] / SQUARE_M + 1.0) * 60.0 - 0.5
     np.testing.assert_allclose(view.pixels, expected[view.ids], atol=0.1)
     printed[:180, :180] = 255
-    assert find_board(printed, small) is None, "eleven or fewer"
+    assert find_board(printed) is None, "eleven or fewer"
 
 
 def test_a_board_is_that_of_the_print():
-    assert Board() == (9, 7, 0.025, 0.0185, "DICT_4X4_50")
-    corners_m = list_board_corners(BOARD)
+    assert (COLUMNS, ROWS, SQUARE_M, boards.MARKER_M) == (9, 7, 0.025, 0.0185)
+    corners_m = list_board_corners()
     x_m, y_m = np.meshgrid(np.arange(1, 9) * 0.025, np.arange(1, 7) * 0.025)
     # Versions of OpenCV begin at the upper or at the lower left.
     ordered_m = corners_m[np.lexsort((corners_m[:, 0].round(4), corners_m[:, 1].round(4)))]
     np.testing.assert_allclose(ordered_m, np.column_stack((x_m.ravel(), y_m.ravel(), np.zeros(48))), atol=1e-7)
-    drawn = draw_board(BOARD, 40)
+    drawn = draw_board(40)
     assert drawn.shape == (280, 360) and drawn[2, 2] == 0 and drawn[2, 42] == 255 == drawn[42, 2]
 
 
@@ -322,16 +323,16 @@ def test_a_board_is_seen_where_it_is_held(turn):
     options = CameraOptions(
         width_px=480, height_px=360, focal_px=(500.0, 490.0), center_px=(250.0, 170.0), noise=0.0, blur_px=0.0
     )
-    board, place_m = BOARD, np.array((-0.02, 0.01, 0.4))
-    image = BoardRenderer(options, board).render(turn, place_m, np.random.RandomState(0))
+    place_m = np.array((-0.02, 0.01, 0.4))
+    image = BoardRenderer(options).render(turn, place_m, np.random.RandomState(0))
     cell = 40
-    printed = np.pad(draw_board(board, cell), 2 * cell, constant_values=255)
+    printed = np.pad(draw_board(cell), 2 * cell, constant_values=255)
     around = np.pad(printed, 3 * cell, constant_values=110).astype(float)
     low, high = (change(around.astype(np.uint8), np.ones((9, 9))) for change in (cv2.erode, cv2.dilate))
     rotation = cv2.Rodrigues(np.array(turn))[0]
     seen = {}
     for row, column in np.random.RandomState(2).randint(8, np.array(around.shape) - 8, (900, 2)):
-        x_m, y_m = (np.array((column + 0.5, row + 0.5)) - np.array(around.shape[::-1]) / 2.0) * board.square_m / cell
+        x_m, y_m = (np.array((column + 0.5, row + 0.5)) - np.array(around.shape[::-1]) / 2.0) * SQUARE_M / cell
         point_m = (rotation @ (x_m, y_m, 0.0) + place_m)[None]
         ((u, v),) = cv2.projectPoints(point_m, np.zeros(3), np.zeros(3), View(options).matrix, options.distortion)[0][0]
         if low[row, column] == high[row, column] and 1 <= u < 479 and 1 <= v < 359:
@@ -340,7 +341,7 @@ def test_a_board_is_seen_where_it_is_held(turn):
             seen[shade] = seen.get(shade, 0) + 1
     assert set(seen) == {0, 110, 255} and min(seen.values()) > 15
     noisy = [
-        BoardRenderer(options._replace(noise=4.0), board).render(turn, place_m, np.random.RandomState(seed)).astype(int)
+        BoardRenderer(options._replace(noise=4.0)).render(turn, place_m, np.random.RandomState(seed)).astype(int)
         for seed in (1, 2)
     ]
     plain = np.abs(image.astype(int) - 108) < 2
@@ -353,7 +354,7 @@ def test_a_board_is_blurred_by_pixel_and_lens():
         options = CameraOptions(
             width_px=320, height_px=240, focal_px=(600.0, 600.0), center_px=(160.0, 120.0), noise=0.0, blur_px=blur_px
         )
-        image = BoardRenderer(options, Board()).render((0.0, 0.0, 0.0), (0.0, 0.0, 0.4), np.random.RandomState(0))
+        image = BoardRenderer(options).render((0.0, 0.0, 0.0), (0.0, 0.0, 0.4), np.random.RandomState(0))
         steepest.append(np.abs(np.diff(image.astype(int), axis=1)).max() / (0.8 * 255.0))
     # Of an edge that lies on a pixel's middle or border, as wide as a Gaussian of lens and pixel.
     for blur_px, share in zip((1.0, 2.0), steepest[1:]):

@@ -12,7 +12,7 @@ cv2 = pytest.importorskip("cv2")
 from hero_localization.calibration.lens_calibration import find_board  # noqa: E402
 from hero_localization.errors import LocalizationError  # noqa: E402
 from hero_localization.prints import print_tags  # noqa: E402 - there is nothing to print without these
-from hero_localization.prints.boards import Board  # noqa: E402
+from hero_localization.prints.boards import COLUMNS, ROWS, SQUARE_M  # noqa: E402
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
 
@@ -85,13 +85,12 @@ def test_ruler_is_100_mm_long():
 
 @pytest.mark.slow
 def test_board_on_paper_is_that_of_the_lens_calibration():
-    board = Board()
     for paper_mm in print_tags.PAPERS_MM.values():
-        view = find_board(scan(print_tags.draw_board_page(paper_mm)), board)
-        assert len(view.ids) == (board.columns - 1) * (board.rows - 1)
-        places = view.pixels[np.argsort(view.ids)].reshape(board.rows - 1, board.columns - 1, 2)
+        view = find_board(scan(print_tags.draw_board_page(paper_mm)))
+        assert len(view.ids) == (COLUMNS - 1) * (ROWS - 1)
+        places = view.pixels[np.argsort(view.ids)].reshape(ROWS - 1, COLUMNS - 1, 2)
         along_mm = np.linalg.norm(places[:, -1] - places[:, 0], axis=1) / DOTS_PER_MM
-        assert along_mm == pytest.approx(1e3 * board.square_m * (board.columns - 2), abs=0.2)
+        assert along_mm == pytest.approx(1e3 * SQUARE_M * (COLUMNS - 2), abs=0.2)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from hero_node.yaml_text import YamlError, parse_yaml, read_text
 
 from ..camera.camera_model import Intrinsics
 from ..errors import CalibrationError
-from ..prints.boards import Board, create_board, list_board_corners
+from ..prints.boards import DICTIONARY, create_board, list_board_corners
 
 MIN_VIEWS = 8
 JACKKNIFE_GROUPS = 6
@@ -65,14 +65,13 @@ class LensCalibration(NamedTuple):
     problems: List[str]
 
 
-def find_board(gray: np.ndarray, board: Board) -> Optional[BoardView]:
+def find_board(gray: np.ndarray) -> Optional[BoardView]:
     """Return the board in an image (H, W), 8 bit; None if too little of it is seen."""
-    made = create_board(board)
+    made = create_board()
     if hasattr(cv2.aruco, "CharucoDetector"):  # since OpenCV 4.7
         pixels, ids, _, _ = cv2.aruco.CharucoDetector(made).detectBoard(gray)
     else:
-        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
-        corners, markers, _ = cv2.aruco.detectMarkers(gray, dictionary)
+        corners, markers, _ = cv2.aruco.detectMarkers(gray, DICTIONARY)
         if markers is None:
             return None
         _, pixels, ids = cv2.aruco.interpolateCornersCharuco(corners, markers, gray, made)
@@ -83,9 +82,9 @@ def find_board(gray: np.ndarray, board: Board) -> Optional[BoardView]:
     )
 
 
-def is_mirrored(gray: np.ndarray, board: Board) -> bool:
+def is_mirrored(gray: np.ndarray) -> bool:
     """Return whether the board shows only in the mirror image of an image (H, W)."""
-    return find_board(gray, board) is None and find_board(np.ascontiguousarray(gray[:, ::-1]), board) is not None
+    return find_board(gray) is None and find_board(np.ascontiguousarray(gray[:, ::-1])) is not None
 
 
 def _refine(gray: np.ndarray, pixels: np.ndarray) -> np.ndarray:
@@ -101,9 +100,7 @@ def _refine(gray: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     return refined[:, 0]
 
 
-def calibrate_lens(
-    views: Sequence[BoardView], width_px: int, height_px: int, board: Board
-) -> LensCalibration:
+def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) -> LensCalibration:
     """Return the intrinsics of the camera that saw the board.
 
     Raises: CalibrationError for fewer than eight images, or images that no lens explains.
@@ -114,14 +111,14 @@ def calibrate_lens(
             % (len(views), MIN_VIEWS)
         )
     used = views
-    fit = _fit(used, width_px, height_px, board)
+    fit = _fit(used, width_px, height_px)
     left_out = np.flatnonzero(fit.errors_px > OUTLIER * np.median(fit.errors_px)).tolist()
     if left_out and len(views) - len(left_out) >= MIN_VIEWS:
         used = [view for index, view in enumerate(views) if index not in left_out]
-        fit = _fit(used, width_px, height_px, board)
+        fit = _fit(used, width_px, height_px)
     else:
         left_out = []
-    focal_error = _measure_focal_error(used, fit, width_px, height_px, board)
+    focal_error = _measure_focal_error(used, fit)
     problems = []
     if fit.rms_px > GOOD_RMS_PX:
         problems.append(
@@ -149,10 +146,10 @@ class _Fit(NamedTuple):
 
 
 def _fit(
-    views: Sequence[BoardView], width_px: int, height_px: int, board: Board, guess: Optional[Intrinsics] = None
+    views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics] = None
 ) -> _Fit:
     """Return the intrinsics that explain the views best, sought from a guess; None: from OpenCV's own."""
-    corners_m = list_board_corners(board).astype(np.float32)
+    corners_m = list_board_corners().astype(np.float32)
     # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
     flags = cv2.CALIB_FIX_K3 | (0 if guess is None else cv2.CALIB_USE_INTRINSIC_GUESS)
     try:
@@ -175,7 +172,7 @@ def _fit(
     return _Fit(lens, float(rms_px), np.asarray(errors_px).ravel(), tilts_rad)
 
 
-def _measure_focal_error(views: Sequence[BoardView], fit: _Fit, width_px: int, height_px: int, board: Board) -> float:
+def _measure_focal_error(views: Sequence[BoardView], fit: _Fit) -> float:
     """Return the standard deviation of the focal length, as a share, by the jackknife.
 
     What the corners' residuals tell is too little: a view's errors are alike (a bent board, blur, its place).
@@ -184,7 +181,8 @@ def _measure_focal_error(views: Sequence[BoardView], fit: _Fit, width_px: int, h
     groups, focals_px = np.random.RandomState(0).permutation(len(views)) % JACKKNIFE_GROUPS, []
     for left_out in range(JACKKNIFE_GROUPS):
         others = [view for view, group in zip(views, groups) if group != left_out]
-        focals_px.append(np.diagonal(_fit(others, width_px, height_px, board, fit.lens).lens.matrix)[:2])
+        without = _fit(others, fit.lens.width_px, fit.lens.height_px, fit.lens)
+        focals_px.append(np.diagonal(without.lens.matrix)[:2])
     deviations = np.array(focals_px) / np.diagonal(fit.lens.matrix)[:2] - 1.0
     share = (JACKKNIFE_GROUPS - 1.0) / JACKKNIFE_GROUPS
     return float(np.sqrt(share * ((deviations - deviations.mean(axis=0)) ** 2).sum(axis=0)).max())

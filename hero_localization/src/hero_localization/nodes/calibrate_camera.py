@@ -45,7 +45,6 @@ from ..camera.camera_model import Intrinsics
 from ..camera.device_controls import DeviceControls
 from ..camera.frame_source import Frame, open_source
 from ..errors import CalibrationError, DetectorError, LocalizationError
-from ..prints.boards import Board
 from ..tracking import settings as camera_file
 from ..tracking.detector_process import DetectorProcess
 from ..tracking.detectors import find_print_mistake
@@ -133,7 +132,6 @@ class Images:
 
 def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program: Program) -> int:
     """Collect views of the board, and calibrate. Return the exit code."""
-    board = Board()
     say("move the board slowly through the whole image, near and far, tilted by 30 to 45 degrees; hold still between")
     views: List[BoardView] = []
     wanted = options.views or MAX_VIEWS
@@ -144,12 +142,12 @@ def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program
     while len(views) < wanted and (result is None or result.problems):
         frame = images.take()
         size = (frame.gray.shape[1], frame.gray.shape[0])
-        view = find_board(frame.gray, board)
+        view = find_board(frame.gray)
         if view is not None:
             found_s = program.now_s
         elif program.now_s > found_s + HINT_S:
             found_s = program.now_s
-            if is_mirrored(frame.gray, board):
+            if is_mirrored(frame.gray):
                 raise CalibrationError("images are mirrored: switch that off in the camera or its driver")
             text = "no board in the images (mean shade %.0f of 255): hold it near, flat, in good light"
             say(text % frame.gray.mean())
@@ -163,9 +161,9 @@ def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program
         if len(views) < ENOUGH_VIEWS:
             say("%d of at least %d images" % (len(views), min(ENOUGH_VIEWS, wanted)))
             continue
-        result = calibrate_lens(views, *size, board)
+        result = calibrate_lens(views, *size)
         say("%d images: %s" % (len(views), result.problems[0] if result.problems else "enough"))
-    result = result or calibrate_lens(views, *size, board)
+    result = result or calibrate_lens(views, *size)
     say("error %.2f px rms, focal length known to %.2f %%" % (result.rms_px, 100.0 * result.focal_error))
     return _finish(options.file, camera_file.describe_lens(result.lens), result.problems)
 

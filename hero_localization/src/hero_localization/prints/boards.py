@@ -1,49 +1,41 @@
-"""ChArUco boards, to calibrate lenses with. Pure but for OpenCV."""
+"""The ChArUco board to calibrate lenses with. Pure but for OpenCV.
 
-from typing import Any, NamedTuple
+A chessboard with markers in its white squares, which fits A4 and letter paper. The rows are odd: boards with even rows
+differ between versions of OpenCV.
+"""
+
+from typing import Any
 
 import cv2
 import numpy as np
 
-
-class Board(NamedTuple):
-    """A chessboard with markers in its white squares; by default it fits A4 and letter paper.
-
-    The rows are odd: boards with even rows differ between versions of OpenCV.
-    """
-
-    columns: int = 9
-    rows: int = 7
-    square_m: float = 0.025
-    marker_m: float = 0.0185
-    dictionary: str = "DICT_4X4_50"
+COLUMNS, ROWS = 9, 7
+SQUARE_M, MARKER_M = 0.025, 0.0185
+DICTIONARY = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
 
 
-def create_board(board: Board) -> Any:
+def create_board() -> Any:
     """Return OpenCV's board."""
-    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, board.dictionary))
     if hasattr(cv2.aruco, "CharucoBoard_create"):  # until OpenCV 4.6
-        return cv2.aruco.CharucoBoard_create(
-            board.columns, board.rows, board.square_m, board.marker_m, dictionary
-        )
-    return cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_m, board.marker_m, dictionary)
+        return cv2.aruco.CharucoBoard_create(COLUMNS, ROWS, SQUARE_M, MARKER_M, DICTIONARY)
+    return cv2.aruco.CharucoBoard((COLUMNS, ROWS), SQUARE_M, MARKER_M, DICTIONARY)
 
 
-def draw_board(board: Board, square_px: int) -> np.ndarray:
+def draw_board(square_px: int) -> np.ndarray:
     """Return the board's image without a margin, gray, 8 bit."""
-    made = create_board(board)
+    made = create_board()
     draw = getattr(made, "generateImage", None) or made.draw
-    return draw((board.columns * square_px, board.rows * square_px))
+    return draw((COLUMNS * square_px, ROWS * square_px))
 
 
-def list_board_corners(board: Board) -> np.ndarray:
+def list_board_corners() -> np.ndarray:
     """Return the inner corners (K, 3) on the board, m, x to the right and y down, in the order of their ids."""
-    made = create_board(board)
+    made = create_board()
     if hasattr(made, "getChessboardCorners"):
         corners, markers = made.getChessboardCorners(), made.getObjPoints()
     else:
         corners, markers = made.chessboardCorners, made.objPoints
-    corners_m, height_m = np.array(corners, dtype=float), board.rows * board.square_m
+    corners_m, height_m = np.array(corners, dtype=float), ROWS * SQUARE_M
     if markers[0][0][1] > height_m / 2.0:  # before OpenCV 4.6, y is up: the first marker is in the upper row
         corners_m[:, 1] = height_m - corners_m[:, 1]
     return corners_m

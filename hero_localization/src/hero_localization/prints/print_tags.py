@@ -133,14 +133,13 @@ def draw_page(page: Sequence[Tuple[Sheet, float, float]], family: str, paper_mm:
 
 def draw_board_page(paper_mm: Tuple[float, float]) -> Any:
     """Return a matplotlib figure with the board that calibrates lenses, in its true size, lengthwise."""
-    from .boards import Board, draw_board
+    from .boards import COLUMNS, ROWS, SQUARE_M, draw_board
 
-    board = Board()
-    height_mm, width_mm = 1e3 * board.square_m * board.columns, 1e3 * board.square_m * board.rows
+    height_mm, width_mm = 1e3 * SQUARE_M * COLUMNS, 1e3 * SQUARE_M * ROWS
     figure, axes = _open_page(paper_mm)
     left_mm, bottom_mm = (paper_mm[0] - width_mm) / 2.0, EDGE_MM + FOOTER_MM
     axes.imshow(
-        np.rot90(draw_board(board, 120)),
+        np.rot90(draw_board(120)),
         cmap="gray",
         aspect="auto",
         extent=(left_mm, left_mm + width_mm, bottom_mm, bottom_mm + height_mm),

@@ -1,11 +1,11 @@
-"""ChArUco boards as the simulated camera sees them. Pure but for OpenCV."""
+"""The ChArUco board as the simulated camera sees it. Pure but for OpenCV."""
 
 from typing import Iterator, Sequence, Tuple
 
 import cv2
 import numpy as np
 
-from ..prints.boards import Board, draw_board
+from ..prints.boards import SQUARE_M, draw_board
 from .view import CameraOptions, View
 
 TEXEL_M = 0.00025
@@ -28,15 +28,15 @@ def list_board_places(options: CameraOptions, random: np.random.RandomState) -> 
 
 
 class BoardRenderer:
-    """Images of a board that is held before the camera."""
+    """Images of the board that is held before the camera."""
 
-    def __init__(self, options: CameraOptions, board: Board) -> None:
+    def __init__(self, options: CameraOptions) -> None:
         """options: lens, blur and noise of the camera."""
         self._options = options
         self._rays = View(options).list_rays(options.width_px, options.height_px)
-        per_square = round(board.square_m / TEXEL_M)
+        per_square = round(SQUARE_M / TEXEL_M)
         margin = [2 * per_square] * 4
-        printed = cv2.copyMakeBorder(draw_board(board, per_square), *margin, cv2.BORDER_CONSTANT, value=255)
+        printed = cv2.copyMakeBorder(draw_board(per_square), *margin, cv2.BORDER_CONSTANT, value=255)
         self._texture = printed.astype(np.float32)
 
     def render(

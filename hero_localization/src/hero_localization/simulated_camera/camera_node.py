@@ -24,7 +24,6 @@ from hero_sim.world.arena import Arena, build_default
 from hero_sim.world.arena_file import load_arena
 
 from ..errors import LocalizationError, SettingsError
-from ..prints.boards import Board
 from ..prints.tag_images import FAMILIES
 from .board_renderer import BoardRenderer, list_board_places
 from .lab_setup import (
@@ -140,7 +139,7 @@ class BoardScene:
 
     def __init__(self, options: argparse.Namespace, camera: CameraOptions) -> None:
         self._random = np.random.RandomState(options.seed)
-        self._renderer = BoardRenderer(camera, Board())
+        self._renderer = BoardRenderer(camera)
         self._places = list_board_places(camera, self._random)
         self._place = next(self._places)
         self._shown = 0
