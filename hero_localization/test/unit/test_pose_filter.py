@@ -120,8 +120,8 @@ def test_poses_of_any_age_are_used_and_right_to_a_millimeter(age_s):
             used = (Outcome.FIRST, Outcome.USED, Outcome.WAITING)
             assert event < 0.1 or pose_filter.add_measurement(measured) in used
             continue
-        for correction in pose_filter.add_odometry(event.stamp_s, event.odometry):
-            assert correction.outcome in (Outcome.FIRST, Outcome.USED)
+        for _, _, outcome in pose_filter.add_odometry(event.stamp_s, event.odometry):
+            assert outcome in (Outcome.FIRST, Outcome.USED)
         found = pose_filter.estimate()
         if found is not None and found.stamp_s > 1.0:
             true = drive.true_pose(found.stamp_s)
@@ -452,9 +452,9 @@ def test_a_pose_waits_a_quarter_of_a_second_for_odometry():
     for stamp_s in (1.1, 1.2):
         assert pose_filter.add_measurement(StampedPose(stamp_s, ZERO, COVARIANCE)) is Outcome.WAITING
     (first,) = pose_filter.add_odometry(1.1, ZERO)
-    assert (first.measurement.stamp_s, first.outcome, first.before) == (1.1, Outcome.USED, ZERO)
+    assert (first[0].stamp_s, *first[1:]) == (1.1, ZERO, Outcome.USED)
     assert pose_filter.used_s == 1.1
-    assert [correction.measurement.stamp_s for correction in pose_filter.add_odometry(1.3, ZERO)] == [1.2]
+    assert [measured.stamp_s for measured, _, _ in pose_filter.add_odometry(1.3, ZERO)] == [1.2]
 
 
 def test_poses_come_late_by_a_second_at_most():

@@ -7,7 +7,7 @@ from typing import Dict, List, NamedTuple, Sequence
 import numpy as np
 
 from hero_node.command_line import say
-from hero_node.geometry import Pose
+from hero_node.geometry import Pose, invert_pose, transform_pose
 
 from ..errors import CalibrationError
 from ..models import infrared_model as model
@@ -52,22 +52,10 @@ def format_largest(errors_m: np.ndarray) -> str:
     return "%.0f mm" % (1e3 * largest_m) if np.isfinite(largest_m) else "unknown (no calibration)"
 
 
-class _Wall(NamedTuple):
-    """The wall as a robot saw it first, in its odom frame: the robot's pose, and the direction of the wall's normal."""
-
-    start: Pose
-    direction_rad: float
-
-    def distance_m(self, pose: Pose) -> float:
-        """Return how much closer to the wall a pose is than the first one."""
-        x_m, y_m = pose.x_m - self.start.x_m, pose.y_m - self.start.y_m
-        return x_m * math.cos(self.direction_rad) + y_m * math.sin(self.direction_rad)
-
-
 def calibrate_infrared(session: Session) -> Dict[int, InfraredResult]:
     """Calibrate all active robots, which face a wall; return the results by robot."""
     say("infrared: about %.0f s" % (model.BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0)))
-    walls: Dict[int, _Wall] = {}
+    walls: Dict[int, Pose] = {}
     counts_m2: Dict[int, List[float]] = {}
     first = _face_wall_with_each_sensor(session, "infrared", model.SAMPLES, walls)
 
@@ -88,9 +76,12 @@ def calibrate_infrared(session: Session) -> Dict[int, InfraredResult]:
 
 
 def _face_wall_with_each_sensor(
-    session: Session, title: str, samples: int, walls: Dict[int, _Wall]
+    session: Session, title: str, samples: int, walls: Dict[int, Pose]
 ) -> Dict[int, List[model.Facing]]:
-    """Turn each sensor to the wall and collect its readings; walls are stored at the first one."""
+    """Turn each sensor to the wall and collect its readings.
+
+    walls: places of the robots, in their odom frames, and headings straight to the wall, stored at the first sensor.
+    """
     facings: Dict[int, List[model.Facing]] = {probe.robot_id: [] for probe in session.active}
     for step in range(model.BEAMS):
         sensor = (model.FRONT - step) % model.BEAMS
@@ -109,8 +100,9 @@ def _face_wall_with_each_sensor(
             pose = probe.pose
             facing = model.Facing(sensor, counts.tolist(), ranges_m.tolist(), 0.0)
             misalignment_rad = model.estimate_misalignment_rad(facing)
-            wall = walls.setdefault(probe.robot_id, _Wall(pose, pose.yaw_rad - misalignment_rad))
-            facings[probe.robot_id].append(facing._replace(moved_m=wall.distance_m(pose)))
+            wall = walls.setdefault(probe.robot_id, pose._replace(yaw_rad=pose.yaw_rad - misalignment_rad))
+            moved_m = transform_pose(invert_pose(wall), pose).x_m
+            facings[probe.robot_id].append(facing._replace(moved_m=moved_m))
             targets_rad[probe.robot_id] = pose.yaw_rad - misalignment_rad + model.BEAM_STEP_RAD
 
         session.for_each(title, evaluate)

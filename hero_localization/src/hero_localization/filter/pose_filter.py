@@ -14,7 +14,7 @@ Source: S. Thrun, W. Burgard, D. Fox, Probabilistic Robotics, chapters 3.3 and 5
 
 import enum
 import math
-from typing import List, NamedTuple, Optional, Sequence
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -95,14 +95,6 @@ class Outcome(enum.Enum):
     NO_ODOMETRY = "no odometry"
 
 
-class Correction(NamedTuple):
-    """Outcome of a measured pose that had waited, and the pose estimated before it."""
-
-    measurement: StampedPose
-    outcome: Outcome
-    before: Optional[Pose]
-
-
 class _Step(NamedTuple):
     """An estimate, and the measured pose that led to it from the one before; None for a start."""
 
@@ -130,8 +122,11 @@ class PoseFilter:
         self._waiting: List[StampedPose] = []
         self._systematic = SYSTEMATIC
 
-    def add_odometry(self, stamp_s: float, pose: Pose) -> List[Correction]:
-        """Follow a reading of /hero_N/odom; return what became of measured poses that waited for it."""
+    def add_odometry(self, stamp_s: float, pose: Pose) -> List[Tuple[StampedPose, Optional[Pose], Outcome]]:
+        """Follow a reading of /hero_N/odom.
+
+        Return measured poses that waited for it, each with the pose estimated before it, and what became of it.
+        """
         newest_s = self.odometry.newest_s
         self.odometry.add(stamp_s, pose)
         if self.used_s > newest_s:  # measured while odometry was missing
@@ -142,8 +137,7 @@ class PoseFilter:
             self._waiting.clear()
         due = [measurement for measurement in self._waiting if measurement.stamp_s <= stamp_s]
         self._waiting = [measurement for measurement in self._waiting if measurement.stamp_s > stamp_s]
-        # The pose before each, then what became of it.
-        return [Correction(pose, before=self.pose(), outcome=self._use(pose)) for pose in due]
+        return [(measurement, self.pose(), self._use(measurement)) for measurement in due]
 
     def add_measurement(self, measurement: StampedPose) -> Outcome:
         """Correct the estimate by a measured pose, which may be older than others that were used.

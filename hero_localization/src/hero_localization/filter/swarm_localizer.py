@@ -95,7 +95,7 @@ class SwarmLocalizer:
         """Follow a reading of /hero_N/odom; return lines for users."""
         robot = self._robots[robot_id]
         used_s, lines = robot.filter.used_s, []
-        for measurement, outcome, before in robot.filter.add_odometry(stamp_s, pose):
+        for measurement, before, outcome in robot.filter.add_odometry(stamp_s, pose):
             lines += self._note(robot_id, measurement, outcome, before, used_s)
             used_s = robot.filter.used_s
         if robot.jumps != robot.filter.odometry.jumps:
