@@ -147,11 +147,8 @@ def test_a_robot_that_fails_is_stopped_and_the_others_go_on(capsys):
     session.repeat("motors", 3, move, evaluate)
     assert moved == [[0, 1, 2], [1, 2], [1]] and tried[-1] == (1, True)
     assert [probe.robot_id for probe in session.active] == [0, 2]
-    assert (
-        session.probes[1].failure == "motors: bad data"
-        and session.probes[1].sent == ["stop"]
-        and not session.probes[0].sent
-    )
+    assert session.probes[1].failure == "motors: bad data"
+    assert session.probes[1].sent == ["stop"] and not session.probes[0].sent
     assert "hero_1 once more: motors: bad data" in capsys.readouterr().out
     silent = FakeSession(1)
     silent.repeat("motors", 3, move, evaluate)

@@ -36,7 +36,7 @@ class TagLayout(NamedTuple):
             each tag without another meaning is a robot's.
         mounts: poses of tags in base_link of their robot or object, by the tag's id; all others are centered.
         objects: names, by the tag's id.
-        references: poses in `map` of tags on the floor, by id. As everywhere, the yaw is that of the print's upper edge.
+        references: poses in `map` of tags on the floor, by id. Yaws are those of the print's upper edge.
         size_m, height_m: side of the black square of robots' and objects' tags, and their height above the floor.
         reference_size_m: side of the black square of reference tags.
     """
