@@ -165,7 +165,7 @@ def find_camera(scene: Scene, lens: Intrinsics) -> Camera:
     detector = create_detector(decimate=1.0)
     frames = [detector.detect(scene.renderer.render(scene.true)) for _ in range(5)]
     result = calibrate_arena(lens, average_tags(frames), scene.references)
-    off_mm = 1e3 * np.linalg.norm(result.camera.position_m - scene.renderer.view.position_m)
+    off_mm = 1e3 * np.linalg.norm(result.camera.position_m - scene.renderer.camera.position_m)
     verdict = "; ".join(result.problems) or "good"
     print("arena: %.2f mm rms, camera %.1f mm off; %s" % (1e3 * result.rms_m, off_mm, verdict))
     return result.camera

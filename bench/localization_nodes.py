@@ -19,9 +19,8 @@ from measuring import read_cpu_s, start, start_master, stop
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 
-from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.simulated_camera.renderer import CameraRenderer
-from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, View
+from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 from hero_localization.tracking.settings import describe_camera, update
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_sim.world.arena import build_rectangle
@@ -54,9 +53,7 @@ def render_turn(poses):
 
 def write_camera_file(path):
     """Write the pose of the rendered camera."""
-    view = View(OPTIONS)
-    lens = Intrinsics(OPTIONS.width_px, OPTIONS.height_px, view.matrix, view.distortion)
-    update(path, describe_camera(Camera(lens, view.rotation, view.position_m), {}))
+    update(path, describe_camera(OPTIONS.geometry, {}))
 
 
 class CameraAndDriver:

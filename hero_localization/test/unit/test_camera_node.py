@@ -10,7 +10,7 @@ pytest.importorskip("cv2")
 
 from hero_localization.errors import SettingsError
 from hero_localization.simulated_camera import camera_node
-from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, View
+from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 
 
 def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):
@@ -24,7 +24,7 @@ def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):
 def test_a_camera_with_fewer_pixels_sees_the_same():
     small = camera_node._scale(CameraOptions(), 960, 540)
     points_m = np.array([(0.7, -0.3, 0.076), (-1.0, 0.5, 0.0)])
-    large_px, small_px = (View(options).project(points_m) for options in (CameraOptions(), small))
+    large_px, small_px = (options.geometry.project(points_m) for options in (CameraOptions(), small))
     assert small_px + 0.5 == pytest.approx((large_px + 0.5) / 2.0)
     assert (small.width_px, small.height_px, small.blur_px) == (960, 540, 0.35)
 

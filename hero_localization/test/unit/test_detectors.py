@@ -33,7 +33,7 @@ def backend(request):
 def render(family, options=OPTIONS):
     tags = [PrintedTag(index, family=family) for index in range(len(POSES))]
     renderer = CameraRenderer(options, ARENA, tags, seed=4)
-    true = [renderer.view.project(tag_corners(tag, POSES[[tag.tag_id]]))[0] for tag in tags]
+    true = [renderer.camera.project(tag_corners(tag, POSES[[tag.tag_id]]))[0] for tag in tags]
     return renderer.render(POSES), true
 
 

@@ -21,7 +21,7 @@ from hero_localization.errors import CalibrationError
 from hero_localization.prints import boards
 from hero_localization.prints.boards import COLUMNS, ROWS, SQUARE_M, draw_board, list_board_corners
 from hero_localization.simulated_camera.board_renderer import BoardRenderer
-from hero_localization.simulated_camera.view import CameraOptions, View
+from hero_localization.simulated_camera.view import CameraOptions
 
 OPTIONS = CameraOptions(
     width_px=960,
@@ -62,13 +62,13 @@ def project(holds, noise_px=0.1, seed=0):
     """Return views as exact as a good image's, without rendering."""
     import cv2
 
-    random, view = np.random.RandomState(seed), View(OPTIONS)
+    random, view = np.random.RandomState(seed), OPTIONS.geometry
     corners_m = list_board_corners()
     center_m = np.array((COLUMNS * SQUARE_M / 2.0, ROWS * SQUARE_M / 2.0, 0.0))
     result = []
     for turn, position_m in holds:
         shift = np.array(position_m) - cv2.Rodrigues(np.array(turn))[0] @ center_m
-        pixels = cv2.projectPoints(corners_m, np.array(turn), shift, view.matrix, view.distortion)[0][:, 0]
+        pixels = cv2.projectPoints(corners_m, np.array(turn), shift, view.lens.matrix, view.lens.distortion)[0][:, 0]
         inside = ((pixels > 0) & (pixels < (OPTIONS.width_px, OPTIONS.height_px))).all(axis=1)
         noisy = pixels + random.normal(0.0, noise_px, pixels.shape)
         result.append(BoardView(np.nonzero(inside)[0], noisy[inside].astype(np.float32)))
@@ -105,7 +105,7 @@ def test_lens_is_found_from_rendered_pictures(views):
     assert (found.lens.matrix[0, 0], found.lens.matrix[1, 1]) == pytest.approx(OPTIONS.focal_px, rel=0.003)
     axes = np.meshgrid(np.linspace(-0.6, 0.6, 9), np.linspace(-0.35, 0.35, 5))
     rays = np.column_stack([axis.ravel() for axis in axes])
-    view = View(OPTIONS)
+    view = OPTIONS.geometry
     true = view.project(np.column_stack((rays, np.ones(len(rays)))) @ view.rotation + view.position_m)
     shift = found.lens.distort(rays) - true
     # A shift of the whole image and a turn of the camera are one.
@@ -323,7 +323,7 @@ def test_a_board_is_seen_where_it_is_held(turn):
     options = CameraOptions(
         width_px=480, height_px=360, focal_px=(500.0, 490.0), center_px=(250.0, 170.0), noise=0.0, blur_px=0.0
     )
-    place_m = np.array((-0.02, 0.01, 0.4))
+    place_m, matrix = np.array((-0.02, 0.01, 0.4)), options.geometry.lens.matrix
     image = BoardRenderer(options).render(turn, place_m, np.random.RandomState(0))
     cell = 40
     printed = np.pad(draw_board(cell), 2 * cell, constant_values=255)
@@ -334,7 +334,7 @@ def test_a_board_is_seen_where_it_is_held(turn):
     for row, column in np.random.RandomState(2).randint(8, np.array(around.shape) - 8, (900, 2)):
         x_m, y_m = (np.array((column + 0.5, row + 0.5)) - np.array(around.shape[::-1]) / 2.0) * SQUARE_M / cell
         point_m = (rotation @ (x_m, y_m, 0.0) + place_m)[None]
-        ((u, v),) = cv2.projectPoints(point_m, np.zeros(3), np.zeros(3), View(options).matrix, options.distortion)[0][0]
+        ((u, v),) = cv2.projectPoints(point_m, np.zeros(3), np.zeros(3), matrix, options.distortion)[0][0]
         if low[row, column] == high[row, column] and 1 <= u < 479 and 1 <= v < 359:
             shade = int(low[row, column])
             assert image[int(round(v)), int(round(u))] == pytest.approx(20.0 + 0.8 * shade, abs=2.0), (u, v)

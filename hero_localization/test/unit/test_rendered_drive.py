@@ -11,7 +11,6 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
-from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.camera.frame_source import Frame
 from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
@@ -92,10 +91,9 @@ class TrackedCamera:
         ]
         references = {tag.tag_id: geometry.Pose(tag.x_m, tag.y_m, 0.0) for tag in floor}
         self.renderer = CameraRenderer(options, load_arena(scene.path), [PrintedTag(0)], floor, first_reference)
-        lens = Intrinsics(options.width_px, options.height_px, self.renderer.view.matrix, self.renderer.view.distortion)
         detector = create_detector(decimate=1.0)
         frames = [detector.detect(scene.render(self.renderer)) for _ in range(5)]
-        camera = calibrate_arena(lens, average_tags(frames), references).camera
+        camera = calibrate_arena(options.geometry.lens, average_tags(frames), references).camera
         self.tracker = Tracker(Settings(layout=TagLayout(references=references)), camera)
         self.search = TagSearch(detector, options.width_px, options.height_px)
 
@@ -168,9 +166,7 @@ def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeyp
     place_m = (scene.true.x_m, scene.true.y_m, HEIGHT_M)
     options = OPTIONS._replace(width_px=240, center_px=(121.0, 118.0), position_m=place_m)
     renderer = CameraRenderer(options, load_arena(scene.path), [PrintedTag(0, yaw_rad=yaw_rad)])
-    view = renderer.view
-    lens = Intrinsics(options.width_px, options.height_px, view.matrix, view.distortion)
-    settings.update(path, settings.describe_camera(Camera(lens, view.rotation, view.position_m), {}))
+    settings.update(path, settings.describe_camera(renderer.camera, {}))
 
     def subscribe(topic, kind, receive, **others):
         scene.on_odometry.append(lambda *reading: receive(make_odometry(*reading)))

@@ -21,9 +21,10 @@ from hero_localization.simulated_camera.renderer import CameraRenderer  # noqa: 
 from hero_localization.simulated_camera.view import (  # noqa: E402
     CameraOptions,
     PrintedTag,
-    View,
     hand_outlines,
     list_frames,
+    list_rays,
+    plane_homography,
     tag_corners,
 )
 from hero_localization.tracking import settings as camera_file  # noqa: E402
@@ -93,11 +94,11 @@ def test_picture_shows_every_cell_of_robots_tags_at_their_places():
     image = render(poses, tags, sharp)
     for tag, pose in zip(tags, poses):
         cells = draw_tag(tag.family, tag.tag_id) > 0
-        assert ((read_cells(image, View(sharp), tag, pose) > 120) == cells).all(), (tag, pose)
+        assert ((read_cells(image, sharp.geometry, tag, pose) > 120) == cells).all(), (tag, pose)
 
 
 def test_tags_height_moves_it_away_from_the_axis_of_the_camera():
-    view = View(SMALL._replace(tilt_rad=(0.0, 0.0, 0.0), position_m=(0.0, 0.0, 2.2), distortion=(0.0,) * 5))
+    view = SMALL._replace(tilt_rad=(0.0, 0.0, 0.0), position_m=(0.0, 0.0, 2.2), distortion=(0.0,) * 5).geometry
     high, low = (
         view.project(tag_corners(TAG._replace(height_m=z), np.array([(1.0, 0.0, 0.0)])))[0]
         for z in (0.076, 0)
@@ -108,9 +109,9 @@ def test_tags_height_moves_it_away_from_the_axis_of_the_camera():
 
 
 def test_distortion_bends_lines_at_the_rim_as_opencvs_model_does():
-    view = View(SMALL)
-    rays = view.list_rays(SMALL.width_px, SMALL.height_px)
-    plane = np.dstack((rays, np.ones(rays.shape[:2]))) @ view.plane_homography(0.05).T
+    view = SMALL.geometry
+    rays = list_rays(view.lens)
+    plane = np.dstack((rays, np.ones(rays.shape[:2]))) @ plane_homography(view, 0.05).T
     points_m = np.dstack((plane[..., :2] / plane[..., 2:], np.full(rays.shape[:2], 0.05)))
     pixels = view.project(points_m[::40, ::40])
     u, v = np.meshgrid(np.arange(0, 640, 40), np.arange(0, 360, 40))
@@ -124,17 +125,17 @@ def test_floor_tags_lie_on_the_floor_and_robots_hide_them():
         render([(0.5, 0.2, 0.0)], floor_tags=[floor_tag]),
     )
     cells = draw_tag("36h11", 7) > 0
-    assert ((read_cells(away, View(SMALL), floor_tag, (0.0, 0.0, 0.0)) > 120) == cells).all()
-    assert ((read_cells(above, View(SMALL), floor_tag, (0.0, 0.0, 0.0)) > 120) != cells).any()
+    assert ((read_cells(away, SMALL.geometry, floor_tag, (0.0, 0.0, 0.0)) > 120) == cells).all()
+    assert ((read_cells(above, SMALL.geometry, floor_tag, (0.0, 0.0, 0.0)) > 120) != cells).any()
 
 
 def test_robot_without_a_tag_shows_only_its_body():
-    assert shade_at(render([(0.2, 0.1, 0.0)], (None,)), View(SMALL), (0.2, 0.1, 0.076)) < 60
+    assert shade_at(render([(0.2, 0.1, 0.0)], (None,)), SMALL.geometry, (0.2, 0.1, 0.076)) < 60
 
 
 def test_walls_are_darker_than_the_floor():
     image = render(np.empty((0, 3)), ())
-    assert shade_at(image, View(SMALL), (1.2, 0.0, 0.0)) < 90 < shade_at(image, View(SMALL), (1.0, 0.0, 0.0))
+    assert shade_at(image, SMALL.geometry, (1.2, 0.0, 0.0)) < 90 < shade_at(image, SMALL.geometry, (1.0, 0.0, 0.0))
 
 
 def test_moving_robot_smears_along_its_motion_only():
@@ -178,7 +179,7 @@ def test_noise_has_the_deviation_given_and_differs_between_frames():
 def test_hand_covers_what_lies_below_it():
     pose = np.array([(0.1, 0.1, 0.0)])
     center = (0.1, 0.1, 0.076)
-    assert shade_at(render(pose, hand_m=(0.1, 0.1)), View(SMALL), center) == pytest.approx(185, abs=2)
+    assert shade_at(render(pose, hand_m=(0.1, 0.1)), SMALL.geometry, center) == pytest.approx(185, abs=2)
     assert (render(pose, hand_m=(-0.6, 0.1)) != render(pose)).any()
 
 
@@ -212,7 +213,7 @@ def test_frames_arrive_late_in_order_and_some_never():
 def test_camera_hangs_so_high_that_no_reference_tag_is_cut_off(arena):
     references = list_references(arena, "36h11")
     camera = hang_above(CameraOptions(), arena, references, 0.04)
-    corners = View(camera).project(np.vstack([tag_corners(tag, np.zeros((1, 3)))[0] for tag in references]))
+    corners = camera.geometry.project(np.vstack([tag_corners(tag, np.zeros((1, 3)))[0] for tag in references]))
     assert (corners > 10.0).all() and (corners < np.array((1910.0, 1070.0))).all()
     assert camera.position_m[2] < 5.0
 
@@ -232,10 +233,10 @@ def test_arena_that_is_too_large_for_the_camera_is_refused():
 def test_written_camera_file_holds_the_view_and_the_tags(tmp_path):
     references = list_references(ARENA, "36h11")
     path = str(tmp_path / "camera.yaml")
-    write_camera_file(path, View(SMALL), SMALL, [TAG._replace(x_m=np.float64(0.002))], references)
+    write_camera_file(path, SMALL.geometry, [TAG._replace(x_m=np.float64(0.002))], references)
     settings = camera_file.load(path)
     points_m = np.array([(0.3, 0.2, 0.076), (-1.0, 0.5, 0.0)])
-    assert np.abs(settings.camera.project(points_m) - View(SMALL).project(points_m)).max() < 1e-6
+    assert np.abs(settings.camera.project(points_m) - SMALL.geometry.project(points_m)).max() < 1e-6
     assert settings.layout.mounts[3].x_m == 0.002 and settings.layout.size_m == 0.048
     assert sorted(settings.seen_references) == sorted(settings.layout.references) == [100, 101, 102, 103]
 
@@ -255,7 +256,7 @@ def find_spot(spots):
 def test_everything_has_its_own_shade_and_solids_their_height():
     circle, post = (-0.6, 0.3, 0.15), np.array([(0.5, -0.5), (0.8, -0.5), (0.8, -0.2), (0.5, -0.2)])
     arena = ARENA._replace(circles_m=np.array([circle]), polygons_m=(post,))
-    renderer, view = CameraRenderer(STRAIGHT, arena, (None,), [PrintedTag(7, 0.12, 0.0, 0.1, 0.4)]), View(STRAIGHT)
+    renderer, view = CameraRenderer(STRAIGHT, arena, (None,), [PrintedTag(7, 0.12, 0.0, 0.1, 0.4)]), STRAIGHT.geometry
     image = renderer.render(np.array([(-0.3, -0.3, 0.0)]))
 
     def shade(*point_m):
@@ -287,7 +288,7 @@ def test_a_robots_top_is_a_disc_round_its_center_wherever_its_tag_sits():
         points = np.argwhere(np.abs(with_top - body) > 60.0)[:, ::-1].astype(np.int32)
         cv2.fillConvexPoly(top, cv2.convexHull(points), 1)
         center_px, area_px = find_spot(top)
-        expected_px = View(sharp).project(np.array((pose[0], pose[1], tag.height_m)))
+        expected_px = sharp.geometry.project(np.array((pose[0], pose[1], tag.height_m)))
         assert center_px == pytest.approx(expected_px, abs=0.6)
         radius_px = 0.036835 * 694.5 / (2.2 - tag.height_m)
         assert area_px == pytest.approx(math.pi * radius_px**2, rel=0.12)
@@ -379,10 +380,10 @@ def test_camera_hangs_over_the_middle_of_the_arena_as_high_as_it_must():
     references = list_references(arena, "36h11")
     camera = hang_above(CameraOptions(), arena, references, 0.04)
     assert camera.position_m[:2] == pytest.approx((0.03 + 3.0, -0.02 + 3.0))
-    lower = View(camera._replace(position_m=(*camera.position_m[:2], camera.position_m[2] - 0.05)))
+    lower = camera._replace(position_m=(*camera.position_m[:2], camera.position_m[2] - 0.05)).geometry
     sheets = [tag._replace(size_m=0.13) for tag in references]
     corners = np.vstack([tag_corners(tag, np.zeros((1, 3)))[0] for tag in sheets])
-    for view, is_seen in ((View(camera), True), (lower, False)):
+    for view, is_seen in ((camera.geometry, True), (lower, False)):
         pixels = view.project(corners)
         assert ((pixels >= 0.0) & (pixels <= (1919.0, 1079.0))).all() == is_seen
 
@@ -443,7 +444,7 @@ def test_a_camera_hangs_as_low_as_the_last_pixel_allows(axis):
     x_m, y_m = arena.bounds_m.reshape(2, 2).T
     tops_m = [(x, y, 0.076) for x in x_m for y in y_m]
     corners_m = np.vstack([tops_m, *(tag_corners(tag, np.zeros((1, 3)))[0] for tag in sheets)])
-    last_px = float(View(camera).project(corners_m)[:, axis].max())
+    last_px = float(camera.geometry.project(corners_m)[:, axis].max())
     name = ("width_px", "height_px")[axis]
     for size_px, is_enough in ((math.ceil(last_px) + 1, True), (math.ceil(last_px), False)):
         other = hang_above(CameraOptions()._replace(**{name: size_px}), arena, references, 0.04)
@@ -453,15 +454,15 @@ def test_a_camera_hangs_as_low_as_the_last_pixel_allows(axis):
 def test_a_camera_file_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingsError, match="camera.yaml cannot be written: "):
-        write_camera_file(str(tmp_path / "file" / "camera.yaml"), View(SMALL), SMALL, [TAG], [])
+        write_camera_file(str(tmp_path / "file" / "camera.yaml"), SMALL.geometry, [TAG], [])
 
 
 def test_light_falls_on_walls_and_hands_too():
     image = render(np.empty((0, 3)), (), STRAIGHT._replace(light_gradient=0.8), hand_m=(0.9, 0.0))
     for x_m, height_m, shade in ((-1.2, 0.025, 70.0), (1.2, 0.025, 70.0), (0.9, 0.25, 185.0)):
-        u, v = View(STRAIGHT).project(np.array((x_m, 0.0, height_m)))  # of the middle
+        u, v = STRAIGHT.geometry.project(np.array((x_m, 0.0, height_m)))  # of the middle
         light = 1.0 - 0.8 * (0.7 * u / 639.0 + 0.3 * v / 359.0)
-        assert shade_at(image, View(STRAIGHT), (x_m, 0.02, height_m)) == pytest.approx(shade * light, abs=4.0), x_m
+        assert shade_at(image, STRAIGHT.geometry, (x_m, 0.02, height_m)) == pytest.approx(shade * light, abs=4.0), x_m
 
 
 def test_plates_are_blurred_by_the_lens_however_little():

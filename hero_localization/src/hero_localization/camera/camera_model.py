@@ -56,7 +56,7 @@ class Intrinsics(NamedTuple):
             )
 
     def distort(self, rays: np.ndarray) -> np.ndarray:
-        """Return the pixels (N, 2) of rays (N, 2): x / z and y / z in the optical frame."""
+        """Return the pixels (..., 2) of rays (..., 2): x / z and y / z in the optical frame."""
         bent = _bend(np.asarray(rays, dtype=float), self.distortion)
         return bent @ self.matrix[:2, :2].T + self.matrix[:2, 2]
 
@@ -84,12 +84,12 @@ class Intrinsics(NamedTuple):
 
 def _bend(rays: np.ndarray, distortion: np.ndarray) -> np.ndarray:
     k1, k2, p1, p2, k3 = distortion
-    x, y = rays[:, 0], rays[:, 1]
+    x, y = rays[..., 0], rays[..., 1]
     r2 = x * x + y * y
     radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
     bent_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
     bent_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-    return np.column_stack((bent_x, bent_y))
+    return np.stack((bent_x, bent_y), axis=-1)
 
 
 class Camera(NamedTuple):
@@ -102,10 +102,10 @@ class Camera(NamedTuple):
     """(3,), in `map`."""
 
     def project(self, points_m: np.ndarray) -> np.ndarray:
-        """Return the pixels (N, 2) of points (N, 3) in `map`; nan behind the camera."""
+        """Return the pixels (..., 2) of points (..., 3) in `map`; nan behind the camera."""
         seen_m = (np.asarray(points_m, dtype=float) - self.position_m) @ self.rotation.T
-        depth_m = np.where(seen_m[:, 2] > 1e-6, seen_m[:, 2], np.nan)
-        return self.lens.distort(seen_m[:, :2] / depth_m[:, None])
+        depth_m = np.where(seen_m[..., 2:] > 1e-6, seen_m[..., 2:], np.nan)
+        return self.lens.distort(seen_m[..., :2] / depth_m)
 
     def intersect(self, pixels: np.ndarray, height_m: Union[float, np.ndarray]) -> np.ndarray:
         """Return the points x, y (N, 2) in `map` that pixels (N, 2) show of the plane z = height_m; nan for none.

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from ..prints.boards import SQUARE_M, draw_board
-from .view import CameraOptions, View
+from .view import CameraOptions, list_rays
 
 TEXEL_M = 0.00025
 
@@ -33,7 +33,7 @@ class BoardRenderer:
     def __init__(self, options: CameraOptions) -> None:
         """options: lens, blur and noise of the camera."""
         self._options = options
-        self._rays = View(options).list_rays(options.width_px, options.height_px)
+        self._rays = list_rays(options.geometry.lens)
         per_square = round(SQUARE_M / TEXEL_M)
         margin = [2 * per_square] * 4
         printed = cv2.copyMakeBorder(draw_board(per_square), *margin, cv2.BORDER_CONSTANT, value=255)

@@ -34,7 +34,7 @@ from .lab_setup import (
     write_camera_file,
 )
 from .renderer import CameraRenderer
-from .view import CameraOptions, PrintedTag, View, list_frames
+from .view import CameraOptions, PrintedTag, list_frames
 
 PROGRAM = "simulated_camera"
 NODE = "camera"
@@ -110,7 +110,7 @@ class RobotScene:
         self._true = TrueRobots(self._ids)
         rospy.Subscriber("~hand", Point, self._receive_hand)
         if options.write_file:
-            write_camera_file(options.write_file, self._renderer.view, camera, tags, references)
+            write_camera_file(options.write_file, camera.geometry, tags, references)
         # The reference tags lie at places of the simulator's world: for RViz, which shows its walls.
         transform = TransformStamped(child_frame_id="world")
         transform.header.stamp, transform.header.frame_id = rospy.get_rostime(), "map"
@@ -164,7 +164,7 @@ class CameraNode:
         )
         arena = _load_arena(options)
         self._options = hang_above(camera, arena, list_references(arena, options.family), options.tag_size)
-        self._matrix = View(self._options).matrix
+        self._matrix = self._options.geometry.lens.matrix
         self._scene = (
             BoardScene(options, self._options) if options.board else RobotScene(options, self._options, arena)
         )

@@ -7,11 +7,11 @@ import numpy as np
 from hero_node.geometry import Pose
 from hero_sim.world.arena import Arena
 
-from ..camera.camera_model import Camera, Intrinsics
+from ..camera.camera_model import Camera
 from ..errors import SettingsError
 from ..prints.tag_images import FAMILIES, REFERENCE_SIZE_M
 from ..tracking import settings as camera_file
-from .view import CameraOptions, PrintedTag, View, tag_corners
+from .view import CameraOptions, PrintedTag, tag_corners
 
 REFERENCES = 4
 FIRST_REFERENCE_ID = 100
@@ -73,7 +73,7 @@ def hang_above(
     limits_px = np.array((camera.width_px - 1.0, camera.height_px - 1.0))
     while tag_size_m * camera.focal_px[0] > MIN_SIDE_PX * height_m:
         camera = camera._replace(position_m=(*middle_m, height_m))
-        pixels = View(camera).project(seen_m)
+        pixels = camera.geometry.project(seen_m)
         if ((pixels >= 0.0) & (pixels <= limits_px)).all():
             return camera
         height_m = round(height_m + HEIGHT_STEP_M, 3)
@@ -83,17 +83,16 @@ def hang_above(
 
 
 def write_camera_file(
-    path: str, view: View, options: CameraOptions, tags: Sequence[PrintedTag], references: Sequence[PrintedTag]
+    path: str, camera: Camera, tags: Sequence[PrintedTag], references: Sequence[PrintedTag]
 ) -> None:
     """Write a camera file as calibrations without any error would. Raises: SettingsError."""
     mounts, places = ({tag.tag_id: Pose(tag.x_m, tag.y_m, tag.yaw_rad) for tag in part} for part in (tags, references))
-    lens = Intrinsics(options.width_px, options.height_px, view.matrix, view.distortion)
     parts = {
         "family": tags[0].family,
         "tag_size_m": tags[0].size_m,
         "references": {tag_id: camera_file.describe_pose(pose) for tag_id, pose in places.items()},
         "mounts": {tag_id: camera_file.describe_pose(pose) for tag_id, pose in mounts.items()},
         "delay_s": 0.0,
-        **camera_file.describe_camera(Camera(lens, view.rotation, view.position_m), places),
+        **camera_file.describe_camera(camera, places),
     }
     camera_file.update(path, parts)

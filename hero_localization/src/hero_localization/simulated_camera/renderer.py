@@ -15,7 +15,7 @@ from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world.arena import Arena
 
 from ..prints.tag_images import draw_tag
-from .view import CIRCLE, CameraOptions, PrintedTag, View, hand_outlines, tag_corners
+from .view import CIRCLE, CameraOptions, PrintedTag, hand_outlines, list_rays, plane_homography, tag_corners
 
 FLOOR, WALL, OBSTACLE, BODY, TOP, PAPER, SKIN = 150.0, 70.0, 60.0, 45.0, 205.0, 225.0, 185.0
 """Shades, of 255."""
@@ -50,7 +50,7 @@ class CameraRenderer:
     """Renders frames of one arena.
 
     Attributes:
-        view: the camera's geometry.
+        camera: its geometry.
         options: as given.
     """
 
@@ -64,9 +64,9 @@ class CameraRenderer:
     ) -> None:
         """Prepare images of robots with robot_tags (None: without a tag), and of tags in the arena."""
         self.options = options
-        self.view = View(options)
+        self.camera = options.geometry
         self._random = np.random.RandomState(seed)
-        self._rays = self.view.list_rays(options.width_px, options.height_px)
+        self._rays = list_rays(self.camera.lens)
         self._light = self._spread_light()
         self._body_height_m = max((tag.height_m for tag in robot_tags if tag), default=0.076)
         self._plates = {index: self._print_plate(tag) for index, tag in enumerate(robot_tags) if tag}
@@ -112,7 +112,7 @@ class CameraRenderer:
         points_m = np.vstack(
             [np.column_stack((outline_m, np.full(len(outline_m), z_m))) for z_m in (0.0, height_m)]
         )
-        self._fill(image, self.view.project(points_m), shade)
+        self._fill(image, self.camera.project(points_m), shade)
 
     def _fill(self, image: np.ndarray, pixels: np.ndarray, shade: float) -> None:
         far = 4 * max(image.shape)
@@ -150,7 +150,7 @@ class CameraRenderer:
         inside = (np.minimum(column, row) >= 0) & (np.maximum(column, row) < len(cells))
         shade[inside] = np.where(cells[row[inside], column[inside]] > 0, WHITE, BLACK)
         texture = np.dstack((shade * cover, cover)).astype(np.float32)
-        pixel_m = (self.view.position_m[2] - tag.height_m) / self.options.focal_px[0]
+        pixel_m = (self.camera.position_m[2] - tag.height_m) / self.options.focal_px[0]
         width = int(np.rint(pixel_m / fine_m)) | 1
         texture = cv2.blur(texture, (width, width))
         if self.options.blur_px > 0.0:
@@ -169,14 +169,14 @@ class CameraRenderer:
         """Draw a plate at its robot's poses (M, 3) during one exposure."""
         tag = plate.tag
         around = PrintedTag(tag.tag_id, 2.0 * plate.reach_m, tag.height_m, tag.x_m, tag.y_m, tag.yaw_rad)
-        corners = self.view.project(tag_corners(around, poses[[0, -1]])).reshape(-1, 2)
+        corners = self.camera.project(tag_corners(around, poses[[0, -1]])).reshape(-1, 2)
         height, width = image.shape
         left, top = np.clip(np.floor(corners.min(axis=0)).astype(int), 0, (width, height))
         right, bottom = np.clip(np.ceil(corners.max(axis=0)).astype(int) + 1, 0, (width, height))
         if right <= left or bottom <= top:
             return
         rays = self._rays[top:bottom, left:right]
-        plane = self.view.plane_homography(tag.height_m)
+        plane = plane_homography(self.camera, tag.height_m)
         samples = []
         for x_m, y_m, yaw_rad in poses:
             cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
@@ -212,7 +212,7 @@ class CameraRenderer:
                 self._draw_plate(image, plate, self._list_moments(poses[index], *moving[index]))
         if hand_m is not None:
             for outline_m in hand_outlines(hand_m):
-                self._fill(image, self.view.project(outline_m), SKIN)
+                self._fill(image, self.camera.project(outline_m), SKIN)
         if self._noise:
             down, right = self._random.randint(0, 64, 2)
             field = self._noise[self._random.randint(NOISE_FIELDS)]
@@ -224,7 +224,7 @@ class CameraRenderer:
         """Return the poses (M, 3) over the exposure: one for each half pixel of motion, at most eight."""
         exposure_s = self.options.exposure_s
         moved_m = (abs(linear_m_s) + 0.03 * abs(angular_rad_s)) * exposure_s
-        pixel_m = self.view.position_m[2] / self.options.focal_px[0]
+        pixel_m = self.camera.position_m[2] / self.options.focal_px[0]
         count = min(8, 1 + math.ceil(2.0 * moved_m / pixel_m - 0.1)) if moved_m > 0.0 else 1
         times_s = ((np.arange(count) + 0.5) / count - 0.5) * exposure_s
         heading = pose[2] + angular_rad_s * times_s / 2.0

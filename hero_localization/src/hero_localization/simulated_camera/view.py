@@ -8,6 +8,8 @@ from typing import Iterator, List, NamedTuple, Tuple
 import cv2
 import numpy as np
 
+from ..camera.camera_model import Camera, Intrinsics
+
 _ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 CIRCLE = np.column_stack((np.cos(_ANGLES_RAD), np.sin(_ANGLES_RAD)))
 """Points of the unit circle, (24, 2)."""
@@ -43,6 +45,15 @@ class CameraOptions(NamedTuple):
     """Images are late by up to this much more."""
     dropped_share: float = 0.02
 
+    @property
+    def geometry(self) -> Camera:
+        """Intrinsics and extrinsics, in `world`."""
+        (fx, fy), (cx, cy) = self.focal_px, self.center_px
+        matrix = np.array(((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0)))
+        rotation = cv2.Rodrigues(np.array(self.tilt_rad))[0] @ np.diag((1.0, -1.0, -1.0))
+        lens = Intrinsics(self.width_px, self.height_px, matrix, np.array(self.distortion))
+        return Camera(lens, rotation, np.array(self.position_m))
+
 
 def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> Iterator[Tuple[float, float]]:
     """Yield the middle of the exposure and the arrival of images from start_s on, without end.
@@ -75,51 +86,21 @@ class PrintedTag(NamedTuple):
     family: str = "36h11"
 
 
-class View:
-    """The geometry of the camera.
+def list_rays(lens: Intrinsics) -> np.ndarray:
+    """Return the direction x / z, y / z of each pixel, (H, W, 2), single precision."""
+    u, v = np.meshgrid(np.arange(lens.width_px, dtype=np.float32), np.arange(lens.height_px, dtype=np.float32))
+    pixels = np.dstack((u, v)).reshape(-1, 1, 2)
+    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 1e-7)
+    undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made them one
+    rays = undistort(pixels, lens.matrix, lens.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria)
+    return rays.reshape(lens.height_px, lens.width_px, 2).astype(np.float32)
 
-    Attributes:
-        matrix: focal lengths and principal point, (3, 3), px.
-        distortion: (5,).
-        rotation: (3, 3): turns a vector of world into the optical frame.
-        position_m: (3,).
-    """
 
-    def __init__(self, options: CameraOptions) -> None:
-        (fx, fy), (cx, cy) = options.focal_px, options.center_px
-        self.matrix = np.array(((fx, 0.0, cx), (0.0, fy, cy), (0.0, 0.0, 1.0)))
-        self.distortion = np.array(options.distortion)
-        self.rotation = cv2.Rodrigues(np.array(options.tilt_rad))[0] @ np.diag((1.0, -1.0, -1.0))
-        self.position_m = np.array(options.position_m)
-        self._turn = cv2.Rodrigues(self.rotation)[0]
-        self._shift = -self.rotation @ self.position_m
-
-    def project(self, points_m: np.ndarray) -> np.ndarray:
-        """Return the pixels (..., 2) of points (..., 3)."""
-        flat = np.ascontiguousarray(points_m, dtype=float).reshape(-1, 1, 3)
-        pixels, _ = cv2.projectPoints(flat, self._turn, self._shift, self.matrix, self.distortion)
-        return pixels.reshape(np.shape(points_m)[:-1] + (2,))
-
-    def list_rays(self, width_px: int, height_px: int) -> np.ndarray:
-        """Return the direction x / z, y / z of each pixel, (H, W, 2), single precision."""
-        u, v = np.meshgrid(np.arange(width_px, dtype=np.float32), np.arange(height_px, dtype=np.float32))
-        pixels = np.dstack((u, v)).reshape(-1, 1, 2)
-        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 1e-7)
-        undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made them one
-        rays = undistort(pixels, self.matrix, self.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria)
-        return rays.reshape(height_px, width_px, 2).astype(np.float32)
-
-    def plane_homography(self, height_m: float) -> np.ndarray:
-        """Return what turns directions (x / z, y / z, 1) into points of the plane z = height_m, (3, 3)."""
-        x_axis, y_axis, z_axis = self.rotation.T
-        depth_m = height_m - self.position_m[2]
-        return np.vstack(
-            (
-                self.position_m[0] * z_axis + depth_m * x_axis,
-                self.position_m[1] * z_axis + depth_m * y_axis,
-                z_axis,
-            )
-        )
+def plane_homography(camera: Camera, height_m: float) -> np.ndarray:
+    """Return what turns directions (x / z, y / z, 1) into points of the plane z = height_m, (3, 3)."""
+    x_axis, y_axis, z_axis = camera.rotation.T
+    x_m, y_m, z_m = camera.position_m
+    return np.vstack((x_m * z_axis + (height_m - z_m) * x_axis, y_m * z_axis + (height_m - z_m) * y_axis, z_axis))
 
 
 def tag_corners(tag: PrintedTag, poses: np.ndarray) -> np.ndarray:
