@@ -158,7 +158,7 @@ function receive(updates) {
   if ("log" in updates) log.append(updates.log);
   if (SHOWN_BY_ALL.some((name) => name in updates)) showAll();
   else if ("poses" in updates) panel.show(state, listPresent().filter((robot) => state.chosen.has(robot.name)));
-  map.update(updates);
+  if (RECEIVED.some((name) => name in updates)) map.update(updates); // most carry the clock alone
 }
 
 document.addEventListener("visibilitychange", () => map.requestShown());

@@ -98,7 +98,7 @@ export class StopPanel {
     setText(banner, text);
     const atRest = this.stopped && this.connection.isFresh && level !== "error" && level !== "warn";
     element("stop").classList.toggle("done", atRest);
-    element("stop").textContent = atRest ? "STOPPED" : "STOP ALL";
+    setText(element("stop"), atRest ? "STOPPED" : "STOP ALL");
     element("release_bar").hidden = !this.stopped;
     element("release").classList.toggle("inert", Date.now() < this.inertMs);
   }
