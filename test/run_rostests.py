@@ -19,6 +19,11 @@ TIMEOUT_S = 3600.0  # of one .test file; each <test> in it has its own, shorter 
 LOAD = 1 / 3  # most of a rostest is waiting
 # roslaunch imports distutils, which setuptools replaces by its own and itself: half of roslaunch's start.
 DISTUTILS = {"SETUPTOOLS_USE_DISTUTILS": "stdlib"} if sys.version_info < (3, 12) else {}
+KEEP_FOUND = """\
+kept={programs}/found_$(echo "$CMAKE_PREFIX_PATH $*" | cksum | cut -d " " -f 1)
+if [ ! -s "$kept" ]; then {catkin_find} "$@" >"$kept.$$" || exit; mv "$kept.$$" "$kept"; fi
+cat "$kept"
+"""
 TIME_LIMIT = re.compile(r'time-limit="([0-9.]+)"')
 
 
@@ -43,9 +48,9 @@ def write_program(path, script):
 def make_program_path(results_dir):
     """Return a PATH on which python is this interpreter: test scripts start with "env python".
 
-    Every roslaunch asks rosversion twice, which takes two Pythons: its answers are kept.
+    Every roslaunch asks rosversion twice, and rosrun catkin_find up to four times, each a Python: answers are kept.
     """
-    programs = Path(results_dir) / "bin"
+    programs = Path(results_dir).resolve() / "bin"
     programs.mkdir(parents=True)
     for name in ("python", "python3"):
         # Not a link: from a link, Python does not find the libraries of a virtual environment.
@@ -55,7 +60,9 @@ def make_program_path(results_dir):
         answer = subprocess.check_output(["rosversion", what], text=True).strip()
         cases += f"{what}) echo {shlex.quote(answer)} ;;\n"
     write_program(programs / "rosversion", f"case $1 in\n{cases}*) exit 1 ;;\nesac\n")
-    return f"{programs.resolve()}:{os.environ['PATH']}"
+    keep = KEEP_FOUND.format(programs=programs, catkin_find=shutil.which("catkin_find"))
+    write_program(programs / "catkin_find", keep)
+    return f"{programs}:{os.environ['PATH']}"
 
 
 def make_jobs(results_dir, pattern="", paths=()):
