@@ -1,17 +1,19 @@
 #!/usr/bin/env python3
 """The launch file as users start and end it: without robots, with a port in use, and again while robots wait."""
 
+import signal
 import socket
 import sys
 import unittest
 
+import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 
 from hero_msgs.msg import Robot, RobotArray
-from hero_test.processes import Program, find_free_port, has_traceback
+from hero_test.processes import Program, find_free_port, find_program, has_traceback
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
@@ -63,11 +65,7 @@ class DriverRestartTest(unittest.TestCase):
         self.assertEqual(len(program.find_lines("~port %d is in use" % self.port)), 1, program.lines)
         self.assertFalse(has_traceback(program.text()), program.lines)
 
-    def test_simulated_robots_come_with_it(self):
-        self.launch("count:=2")
-        self.wait_ready([0, 1])
-
-    def test_ctrl_c_ends_moving_simulated_robots_without_a_warning(self):
+    def test_simulated_robots_come_with_it_and_end_without_a_warning(self):
         program = self.launch("count:=2")
         self.wait_ready([0, 1])
         publisher = rospy.Publisher("/hero_0/cmd_vel", Twist, queue_size=1)
@@ -103,6 +101,16 @@ class DriverRestartTest(unittest.TestCase):
             self.fleet = None
         stamps = [message.header.stamp for message in odoms]
         self.assertEqual(stamps, sorted(stamps))
+
+    def test_the_registration_of_a_dead_driver_hinders_no_start(self):
+        command = (find_program("hero_driver", "hero_driver"), "_port:=%d" % self.port, "_host:=127.0.0.1")
+        dead = Program(*command)
+        dead.wait_for_text("listening on")
+        dead.end(signal.SIGKILL)
+        self.assertTrue(rosgraph.Master("/test").lookupNode("/hero_driver"))
+        driver = Program(*command)
+        self.addCleanup(driver.end)
+        driver.wait_for_text("listening on")
 
 
 if __name__ == "__main__":

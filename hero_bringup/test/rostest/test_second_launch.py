@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Launch files that are started twice: the second one ends with a clear line, and the first one's robots drive on."""
 
-import signal
 import unittest
 
 import rosgraph
@@ -10,7 +9,7 @@ import rostest
 from geometry_msgs.msg import Twist
 
 from hero_msgs.msg import Robot, RobotArray
-from hero_test.processes import Program, find_free_port, find_pid, find_program, has_traceback
+from hero_test.processes import Program, find_free_port, find_pid, has_traceback
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
@@ -19,10 +18,33 @@ DRIVER_REFUSED = "a driver already runs as /hero_driver: end it, or start this o
 SIMULATOR_REFUSED = "simulated robots already run as /hero_sim: end them"
 
 
+def make_launch(port, *arguments):
+    """Return a command that starts a fleet."""
+    return ("roslaunch", "hero_bringup", "hero_bringup.launch", "port:=%d" % port, *arguments)
+
+
 class SecondLaunchTest(unittest.TestCase):
+    """A first fleet of two robots, which goes on through all tests."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.port = find_free_port()
+        cls.first = Program(*make_launch(cls.port, "count:=2"))
+        cls.addClassCleanup(cls.first.end)
+        for number in IDS:
+            cls.first.wait_for_text("hero_%d arrived" % number)
+        cls.pids = find_pid("/hero_driver"), find_pid("/hero_sim")
+
     def setUp(self):
         self.reports = {}
-        self.port = find_free_port()
+        self.watch_driver("/hero_driver")
+
+    def tearDown(self):
+        """The first fleet has lost nothing."""
+        self.reports.clear()
+        self.wait_ready("/hero_driver", *IDS)
+        self.assertEqual((find_pid("/hero_driver"), find_pid("/hero_sim")), self.pids)
+        self.assertIsNone(self.first.process.poll())
 
     def start(self, *command, environment=None):
         """Start a program, which ends after the test."""
@@ -30,10 +52,8 @@ class SecondLaunchTest(unittest.TestCase):
         self.addCleanup(program.end)
         return program
 
-    def launch_fleet(self, *arguments, **options):
-        return self.start(
-            "roslaunch", "hero_bringup", "hero_bringup.launch", "port:=%d" % self.port, *arguments, **options
-        )
+    def launch_fleet(self, *arguments, port=None, **options):
+        return self.start(*make_launch(port or self.port, *arguments), **options)
 
     def watch_driver(self, name):
         """Keep the newest report of a driver."""
@@ -64,15 +84,11 @@ class SecondLaunchTest(unittest.TestCase):
         self.assertFalse(has_traceback(program.text()), program.lines)
 
     def test_a_fleet_drives_on_when_its_launch_file_is_started_again(self):
-        self.watch_driver("/hero_driver")
-        first = self.launch_fleet("count:=2")
-        self.wait_ready("/hero_driver", *IDS)
-        pids = find_pid("/hero_driver"), find_pid("/hero_sim")
         publishers = [rospy.Publisher("/hero_%d/cmd_vel" % number, Twist, queue_size=1) for number in IDS]
         command = Twist()
         command.linear.x = 0.05
-        for arguments in (), ("port:=%d" % find_free_port(),):
-            self.assert_fleet_refused(self.launch_fleet("count:=2", *arguments))
+        for port in self.port, find_free_port():
+            self.assert_fleet_refused(self.launch_fleet("count:=2", port=port))
             self.reports.clear()
             self.wait_ready("/hero_driver", *IDS)
             watch = SwarmWatch(IDS)
@@ -84,48 +100,33 @@ class SecondLaunchTest(unittest.TestCase):
 
             wait_for(all_drive, "motion of both robots")
             watch.close()
-        self.assertEqual((find_pid("/hero_driver"), find_pid("/hero_sim")), pids)
-        self.assertIsNone(first.process.poll())
 
     def test_the_master_that_the_first_launch_started_goes_on(self):
         uri = "http://localhost:%d" % find_free_port()
         master = rosgraph.Master("/test", master_uri=uri)
-        environment = {"ROS_MASTER_URI": uri}
-        first = self.launch_fleet("count:=1", environment=environment)
+        port, environment = find_free_port(), {"ROS_MASTER_URI": uri}
+        first = self.launch_fleet("count:=1", port=port, environment=environment)
         first.wait_for_text("hero_0 arrived")
         pid = master.getPid()
-        self.assert_fleet_refused(self.launch_fleet("count:=1", environment=environment))
+        self.assert_fleet_refused(self.launch_fleet("count:=1", port=port, environment=environment))
         self.assertEqual(master.getPid(), pid)
         self.assertEqual(first.find_lines("hero_0 left|killing on exit|has died"), [])
 
     def test_robots_of_a_launch_whose_port_is_taken_join_no_other_swarm(self):
-        first = self.launch_fleet("count:=1")
-        first.wait_for_text("hero_0 arrived")
         environment = {"ROS_MASTER_URI": "http://localhost:%d" % find_free_port()}
         second = self.launch_fleet("count:=1", "first_id:=10", environment=environment)
         second.wait_for_text("is in use: end the other program")
         second.wait_end()
-        self.assertEqual(first.find_lines("hero_10"), [])
+        self.assertEqual(self.first.find_lines("hero_10"), [])
 
     def test_a_fleet_of_another_name_and_port_runs_beside_the_first(self):
-        for name in "/hero_driver", "/hero_driver_b":
-            self.watch_driver(name)
-        self.launch_fleet("count:=1")
-        self.wait_ready("/hero_driver", 0)
-        self.launch_fleet("name:=hero_driver_b", "port:=%d" % find_free_port(), "count:=2", "first_id:=10")
+        self.watch_driver("/hero_driver_b")
+        self.launch_fleet("name:=hero_driver_b", "count:=2", "first_id:=10", port=find_free_port())
         self.wait_ready("/hero_driver_b", 10, 11)
-        self.wait_ready("/hero_driver", 0)
 
     def test_a_tutorial_with_its_own_robots_leaves_a_fleet_alone(self):
-        self.watch_driver("/hero_driver")
-        self.launch_fleet("count:=2")
-        self.wait_ready("/hero_driver", *IDS)
-        pids = find_pid("/hero_driver"), find_pid("/hero_sim")
         tutorial = ("roslaunch", "hero_tutorial", "random_walk.launch", "sim:=true", "port:=%d" % find_free_port())
         self.assert_fleet_refused(self.start(*tutorial))
-        self.assertEqual((find_pid("/hero_driver"), find_pid("/hero_sim")), pids)
-        self.reports.clear()
-        self.wait_ready("/hero_driver", *IDS)
 
     def test_a_second_monitor_ends_and_the_first_one_goes_on(self):
         monitor = ("roslaunch", "hero_bringup", "monitor.launch", "port:=0")
@@ -137,14 +138,6 @@ class SecondLaunchTest(unittest.TestCase):
         self.assertEqual(len(second.find_lines("/hero_monitor already runs: end it")), 1, second.lines)
         self.assertEqual(find_pid("/hero_monitor"), pid)
         self.assertIsNone(first.process.poll())
-
-    def test_the_registration_of_a_dead_driver_hinders_no_start(self):
-        driver = (find_program("hero_driver", "hero_driver"), "_port:=%d" % self.port, "_host:=127.0.0.1")
-        dead = self.start(*driver)
-        dead.wait_for_text("listening on")
-        dead.end(signal.SIGKILL)
-        self.assertTrue(rosgraph.Master("/test").lookupNode("/hero_driver"))
-        self.start(*driver).wait_for_text("listening on")
 
 
 if __name__ == "__main__":

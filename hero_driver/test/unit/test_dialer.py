@@ -1,4 +1,4 @@
-"""How long the driver waits before it dials a robot again; the sockets themselves are tested by driver_dial.test."""
+"""How long the driver waits before it dials a robot again; the sockets themselves are tested by test_driver_dial.py."""
 
 import threading
 import types

@@ -34,7 +34,7 @@ class MonitorPage:
         self.run(KEEP_NOTICES)
 
     def leave(self):
-        """Show nothing until open(): a page that is open costs a tenth of a core."""
+        """Show nothing until open(): an open page costs CPU time."""
         self.browser.get("about:blank")
 
     def resize(self, width, height):

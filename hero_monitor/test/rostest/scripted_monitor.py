@@ -109,8 +109,7 @@ class ScriptedMonitor:
             stopped = request["do"] == "stop"
             status = {"level": "info", "text": "stopped, all wheels at rest", "is_final": True, "reads": 0}
             page.send(encode({"received": request["do"]}))
-            self.state["fleet"]["stopped"] = stopped
-            self.show(fleet=self.state["fleet"], stop=status if stopped else None)
+            self.show(fleet={**self.state["fleet"], "stopped": stopped}, stop=status if stopped else None)
 
     def _send_clock(self):
         if not self.is_silent:

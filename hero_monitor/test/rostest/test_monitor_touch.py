@@ -187,7 +187,11 @@ class TouchTest(unittest.TestCase):
     def test_three_quick_taps_on_stop_all_or_release_never_release(self):
         for size in SIZES:
             self.page.resize(*size)
-            self.setUp()
+            for state, ready in ("empty", "0 of 0 ready"), ("live", "3 of 3 ready"):
+                self.show(state)
+                self.page.wait_for_text("#ready", ready)
+            self.page.wait_for_text("#stop", "STOP ALL")
+            self.monitor.requests.clear()
             for _ in range(3):
                 self.tap(self.find("stop"))
             self.page.wait_for_text("#stop", "STOPPED")

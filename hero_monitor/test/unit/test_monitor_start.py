@@ -39,7 +39,7 @@ def test_a_token_is_needed_where_others_can_reach_the_page(tmp_path):
     with pytest.raises(ProgramError, match="holds less than 16 characters"):
         read_token("0.0.0.0", str(file))
     file.write_bytes(b"\xff" * 20)
-    for wrong in (str(file), str(tmp_path / "none")):
+    for wrong in (str(file), str(tmp_path / "none"), str(tmp_path)):
         with pytest.raises(ProgramError, match="cannot be read"):
             read_token("0.0.0.0", wrong)
 

@@ -9,7 +9,10 @@ import pytest
 from hero_node.errors import NodeError
 from hero_node.ros.master import LimitedTransport, ask_master
 
-BAD_URIS = ("", "localhost", "http://", "http://[::1", "http://localhost:port", "http://a..b:11311", "ftp://localhost")
+BAD_URIS = (
+    *("", "localhost", "http://", "http://[::1", "http://localhost:port", "http://localhost:99999"),
+    *("http://a..b:11311", "ftp://localhost"),
+)
 
 
 @pytest.mark.parametrize("uri", BAD_URIS)
