@@ -180,11 +180,15 @@ class DoorsTest(unittest.TestCase):
 
     def test_wrong_tokens_of_one_address_keep_no_other_from_logging_in(self):
         peer, owner = PEER_ADDRESSES[:2]
-        answers = []
-        while not answers or answers[-1] == 403:
-            answers.append(log_in(OTHER_HOST, "wrong", peer)[0])
-        self.assertEqual((answers[0], answers[-1]), (403, 429))
-        self.assertEqual(log_in(OTHER_HOST, TOKEN, peer)[0], 429)
+        self.assertEqual(log_in(OTHER_HOST, "wrong", peer)[0], 403)
+
+        def is_refused():
+            while log_in(OTHER_HOST, "wrong", peer)[0] != 429:
+                continue
+            # A busy PC may take so long that it has one more try by then.
+            return log_in(OTHER_HOST, TOKEN, peer)[0] == 429
+
+        wait_for(is_refused, "the end of its tries")
         status, cookie = log_in(OTHER_HOST, TOKEN, owner)
         self.assertEqual(status, 204)
         # Who is logged in gets in from anywhere.
