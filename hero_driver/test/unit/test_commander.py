@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from hero_driver.commands.commander import Commander, Commanders
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
-from hero_driver.transport.event_loop import POLL_INTERVAL_S
 from hero_driver.robot_constants import MAX_WATCHDOG_S
+from hero_driver.transport.event_loop import POLL_INTERVAL_S
 
 NAN_TWIST = bytes(6) + b"\xf8\x7f" + bytes(40)
 STOP_S = 0.5
