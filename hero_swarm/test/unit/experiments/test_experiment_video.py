@@ -70,7 +70,7 @@ def test_obstacles_and_objects_are_shown_where_they_are(name, written):
     places_m += [((x1_m + x2_m) / 2.0, (y1_m + y2_m) / 2.0) for x1_m, y1_m, x2_m, y2_m in edges_m]
     video.write_video(trial, 0.05, 1.0, "run.gif")
     ((_, _, (frame,)),) = written
-    scale, middle = len(frame) / (trial.rows.world.arena.bounds_m[2] + 0.2) / 2.0, len(frame) // 2
+    scale, middle = len(frame) / (float(trial.rows.world.arena.bounds_m[2]) + 0.2) / 2.0, len(frame) // 2
     pixels = [(middle - round(scale * y_m), middle + round(scale * x_m)) for x_m, y_m in places_m]
     around = [frame[row - 2 : row + 3, column - 2 : column + 3] for row, column in pixels]
     assert around and all((patch == (0xC0, 0x7A, 0x2E)).all(axis=2).any() for patch in around)
