@@ -13,8 +13,8 @@ from library_tests import sources, uses_library
 
 LEFT_OUT = Path(__file__).with_name("left_out.txt")
 HEADER = """\
-# Unit tests that the stage noetic leaves out: of modules that use libraries they reach no line that others do not reach in
-# less time. Written by test/noetic/choose. A new test runs until it is left out here.
+# Unit tests that the stage noetic leaves out: of modules that use libraries they reach no line that others do not
+# reach in less time. Written by test/noetic/choose. A new test runs until it is left out here.
 """
 MIN_S = 0.001  # of a test that takes no time
 
