@@ -14,7 +14,7 @@ from visualization_msgs.msg import MarkerArray
 
 from hero_node.geometry import Pose
 
-from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robot
+from .scene import FRAME, START_S, draw_arena, draw_objects, draw_robots
 from .scene_markers import make_markers
 from .simulator import Simulator
 from .stepped.ros_messages import encode_odometry, encode_transforms
@@ -58,12 +58,9 @@ class GroundTruth:
                 self._publish_odom_frames(self._static, stamp)
             self._publish_objects(stamp)
         if time_ms % MARKER_PERIOD_MS == 0 and self._markers.get_num_connections():
-            shapes: List[Shape] = []
-            for robot in self._swarm.robots:
-                light = robot.sensing.show_light(robot.to_millis(time_ms))
-                pose, radius_m = robot.body.true_pose, robot.model.radius_m
-                shapes += draw_robot(robot.body.index, robot.name, pose, light, radius_m)
-            self._markers.publish(make_markers(shapes, stamp.to_nsec()))
+            names = [robot.name for robot in self._swarm.robots]
+            lights = [robot.sensing.show_light(robot.to_millis(time_ms)) for robot in self._swarm.robots]
+            self._markers.publish(make_markers(draw_robots(self._swarm.world, names, lights), stamp.to_nsec()))
 
     def _publish_poses(self, stamp: rospy.Time) -> None:
         watched = [index for index, publisher in enumerate(self._poses) if publisher.get_num_connections()]

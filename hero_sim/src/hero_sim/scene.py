@@ -8,6 +8,7 @@ from hero_node.geometry import Pose
 from .robot_constants import BODY_RADIUS_M
 from .world.arena import Arena
 from .world.pushing.shapes import Body, list_outlines
+from .world.world import World
 
 FRAME = "world"
 
@@ -43,19 +44,21 @@ class Shape(NamedTuple):
     text: str = ""
 
 
-def draw_robot(
-    index: int, name: str, pose: Pose, light: Sequence[float], radius_m: float = BODY_RADIUS_M
-) -> List[Shape]:
-    """Return a robot with its heading and name; light: red green blue alpha, dark if it is off."""
-    red, green, blue, alpha = light
-    color = (red, green, blue, 1.0) if alpha > 0.0 and max(red, green, blue) > 0.0 else _DARK_COLOR
-    body_m = (2.0 * radius_m, 2.0 * radius_m, BODY_HEIGHT_M)
+def draw_robots(world: World, names: Sequence[str], lights: Sequence[Sequence[float]]) -> List[Shape]:
+    """Return the first robots of a world with headings and names; lights: red green blue alpha, dark if they are off."""
+    shapes: List[Shape] = []
+    poses, radii_m = world.poses.tolist(), world.errors.radius_m[:, 0].tolist()
     nose_m = (BODY_RADIUS_M, 0.008, 0.004)
-    return [
-        Shape("robots", index, CYLINDER, color, pose, BODY_HEIGHT_M / 2.0, body_m),
-        Shape("headings", index, ARROW, _NOSE_COLOR, pose, BODY_HEIGHT_M + 0.002, nose_m),
-        Shape("names", index, TEXT, _NOSE_COLOR, pose, BODY_HEIGHT_M + 0.04, (0.0, 0.0, 0.03), name),
-    ]
+    for index, (name, light) in enumerate(zip(names, lights)):
+        red, green, blue, alpha = light
+        color = (red, green, blue, 1.0) if alpha > 0.0 and max(red, green, blue) > 0.0 else _DARK_COLOR
+        pose, body_m = Pose(*poses[index]), (2.0 * radii_m[index], 2.0 * radii_m[index], BODY_HEIGHT_M)
+        shapes += [
+            Shape("robots", index, CYLINDER, color, pose, BODY_HEIGHT_M / 2.0, body_m),
+            Shape("headings", index, ARROW, _NOSE_COLOR, pose, BODY_HEIGHT_M + 0.002, nose_m),
+            Shape("names", index, TEXT, _NOSE_COLOR, pose, BODY_HEIGHT_M + 0.04, (0.0, 0.0, 0.03), name),
+        ]
+    return shapes
 
 
 def draw_objects(bodies: Sequence[Body]) -> List[Shape]:

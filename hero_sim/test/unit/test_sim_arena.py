@@ -9,6 +9,8 @@ from hero_sim.errors import OptionError
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import arena as arenas
 from hero_sim.world.arena_file import SHIPPED, load_arena
+from hero_sim.world.robot_errors import draw_errors
+from hero_sim.world.world import World
 
 
 def write(tmp_path, text):
@@ -158,7 +160,7 @@ def test_robots_are_placed_at_random_with_room_between_them():
     assert (np.ptp(poses[2:, :2], axis=0) > (0.6, 0.4)).all(), "all over the field"
 
 
-def test_viewers_draw_walls_and_robots_with_their_middle_and_size():
+def test_viewers_draw_walls_and_obstacles_with_their_middle_and_size():
     arena = arenas.build_rectangle(2.0, 1.0, 1)._replace(circles_m=np.array([(0.5, 0.2, 0.1)]))
     shapes = scene.draw_arena(arena)
     right = shapes[1]
@@ -169,13 +171,22 @@ def test_viewers_draw_walls_and_robots_with_their_middle_and_size():
     post = shapes[-1]
     assert (post.namespace, post.kind, post.pose) == ("obstacles", scene.CYLINDER, (0.5, 0.2, 0.0))
     assert post.size_m == pytest.approx((0.2, 0.2, 0.05)) and post.z_m == pytest.approx(0.025)
-    robot, heading, name = scene.draw_robot(3, "hero_7", Pose(0.1, 0.2, 0.3), (0.0, 1.0, 0.0, 0.5), 0.06)
-    assert {shape.number for shape in (robot, heading, name)} == {3} and robot.pose == heading.pose == (0.1, 0.2, 0.3)
+
+
+def test_viewers_draw_robots_as_they_are_with_heading_name_and_light():
+    errors = draw_errors([np.random.RandomState(0) for _ in range(4)], 0.0)
+    errors.radius_m[1] = 0.06
+    poses = np.array([(0.5, 0.5, 0.0), (0.1, 0.2, 0.3), (-0.5, 0.5, 0.0), (-0.5, -0.5, 0.0)])
+    world = World(arenas.build_default(4), poses, [np.random.RandomState(0)], errors)
+    lights = [(0.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.5), (1.0, 1.0, 1.0, 0.0)]
+    dark, _, _, robot, heading, name, off, *others = scene.draw_robots(world, ["hero_6", "hero_7", "hero_8"], lights)
+    assert len(others) == 2, "a robot without a name is of another world"
+    assert {shape.number for shape in (robot, heading, name)} == {1} and robot.pose == heading.pose == (0.1, 0.2, 0.3)
     assert robot.size_m == pytest.approx((0.12, 0.12, 0.045)) and robot.z_m == pytest.approx(0.0225)
+    assert dark.size_m[0] == pytest.approx(2.0 * BODY_RADIUS_M)
     assert robot.color == (0.0, 1.0, 0.0, 1.0) and name.text == "hero_7"
     assert robot.z_m * 2.0 < heading.z_m < name.z_m, "above each other"
-    for light in ((0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 0.0)):
-        assert max(scene.draw_robot(0, "", Pose(0.0, 0.0, 0.0), light)[0].color[:3]) < 0.2
+    assert max(dark.color[:3]) < 0.2 and max(off.color[:3]) < 0.2
 
 
 def test_viewers_draw_objects_by_their_edges_and_rims():

@@ -12,7 +12,7 @@ import numpy as np
 from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, SCAN_TIME_S
 from hero_node.geometry import Pose, find_frame
 
-from ..scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robot
+from ..scene import FRAME, START_S, draw_arena, draw_objects, draw_robots
 from .robot_rows import RobotRows
 from .ros_messages import (
     FLOAT,
@@ -117,17 +117,10 @@ class StepTopics:
             send("/tf", encode_transforms(time_ns, transforms))
         if robots.now_ms >= self._next_markers_ms:
             self._next_markers_ms = robots.now_ms + MARKER_PERIOD_MS
-            self._draw(true_poses, time_ns)
-
-    def _draw(self, true_poses: List[Pose], time_ns: int) -> None:
-        lights, radii_m = self._rows.lights.tolist(), self._rows.world.errors.radius_m
-        shapes: List[Shape] = []
-        for row, (name, pose) in enumerate(zip(self._names, true_poses)):
-            shapes += draw_robot(row, name, pose, lights[row], radii_m.item(row))
-        self._send(MARKERS, encode_markers(time_ns, FRAME, shapes))
-        if self._has_objects:
-            objects = draw_objects(self._rows.world.list_objects())
-            self._send(OBJECTS, encode_markers(time_ns, FRAME, objects))
+            shapes = draw_robots(robots.world, self._names, robots.lights.tolist())
+            send(MARKERS, encode_markers(time_ns, FRAME, shapes))
+            if self._has_objects:
+                send(OBJECTS, encode_markers(time_ns, FRAME, draw_objects(robots.world.list_objects())))
 
     def _take_scan(self, rows: np.ndarray) -> None:
         ranges_m = self._rows.proximity_m[: len(self._names), _REAR_FIRST]

@@ -6,7 +6,7 @@ that IEEE 754 defines to the last bit are used.
 
 import importlib
 from functools import lru_cache
-from typing import Any, Callable
+from typing import Any, Callable, Optional
 
 import numpy as np
 
@@ -17,22 +17,13 @@ COMPILED_ROWS = 50
 
 
 @lru_cache(maxsize=None)
-def _find_compiler() -> Any:
+def _compile(loop: Loop) -> Optional[Loop]:
+    """Return loop compiled, or None without numba."""
     try:
         numba = importlib.import_module("numba")
     except ImportError:
         return None
-    return numba.njit(cache=True)
-
-
-def is_compiled(rows: int) -> bool:
-    """Return whether loops for so many robots are compiled."""
-    return rows >= COMPILED_ROWS and _find_compiler() is not None
-
-
-@lru_cache(maxsize=None)
-def _compile(loop: Loop) -> Loop:
-    compiled: Loop = _find_compiler()(loop)
+    compiled: Loop = numba.njit(cache=True)(loop)
     return compiled
 
 
@@ -41,8 +32,9 @@ def compile_loop(loop: Loop, rows: int) -> Loop:
 
     loop changes its arrays in place and returns nothing.
     """
-    if is_compiled(rows):
-        return _compile(loop)
+    compiled = _compile(loop) if rows >= COMPILED_ROWS else None
+    if compiled is not None:
+        return compiled
 
     def run(*arguments: Any) -> None:
         # Single reads from lists are several times faster than from arrays.

@@ -4,8 +4,7 @@ import rospy
 from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program
-from hero_node.geometry import Pose
-from hero_sim.scene import draw_arena, draw_objects, draw_robot
+from hero_sim.scene import draw_arena, draw_objects, draw_robots
 from hero_sim.scene_markers import make_markers
 
 from ..trial import Trial
@@ -22,8 +21,7 @@ def replay(trial: Trial, time_s: float, speed: float) -> None:
         )
         world = trial.rows.world
         arena.publish(make_markers(draw_arena(world.arena)))
-        for (_, poses), _ in zip(trial.run(time_s, PERIOD_S * speed), program.rate(1.0 / PERIOD_S)):
-            lights = trial.rows.lights.tolist()
-            drawn = [draw_robot(n, "hero_%d" % n, Pose(*pose), lights[n]) for n, pose in enumerate(poses[0].tolist())]
-            robots.publish(make_markers(shape for shapes in drawn for shape in shapes))
+        names = ["hero_%d" % number for number in range(len(world.poses))]
+        for _ in zip(trial.run(time_s, PERIOD_S * speed), program.rate(1.0 / PERIOD_S)):
+            robots.publish(make_markers(draw_robots(world, names, trial.rows.lights.tolist())))
             objects.publish(make_markers(draw_objects(world.list_objects())))
