@@ -33,6 +33,9 @@ SIMULATED = "simulated"
 REAL = "real"
 """Kind of a run on robots."""
 
+OTHER_CELL = -1
+"""Cell of a run of another experiment."""
+
 RunKey = Tuple[int, int]
 """Index of the cell, and seed."""
 
@@ -89,8 +92,8 @@ class ResultsFolder:
     def _delete(self, kind: str) -> None:
         """Delete the runs of a kind, and all of other experiments: trials on robots outlive changes of the code."""
         for name in os.listdir(self._batches):
-            read = self._read_lines(name)
-            if read is None or read[0]["kind"] == kind or read[0]["cell"] not in self._cells:
+            _, runs = self._read_batch(name)
+            if not runs or runs[0].kind == kind or runs[0].cell == OTHER_CELL:
                 os.remove(os.path.join(self._batches, name))
         if kind == SIMULATED:
             shutil.rmtree(os.path.join(self.path, "series"), ignore_errors=True)
@@ -105,56 +108,44 @@ class ResultsFolder:
         """
         found: Dict[Tuple[int, int, str], Run] = {}
         for name in sorted(os.listdir(self._batches)):
-            if name.endswith(".jsonl"):
-                for run in self._read_batch(name):
-                    key = (run.cell, run.seed, run.kind)
-                    if key not in found or not run.remark:  # a trial on robots that counts replaces one that does not
-                        found[key] = run
+            for _, run in self._list_runs(name) if name.endswith(".jsonl") else ():
+                key = (run.cell, run.seed, run.kind)
+                if key not in found or not run.remark:  # a trial on robots that counts replaces one that does not
+                    found[key] = run
         return [found[key] for key in sorted(found)]
 
-    def _read_lines(self, name: str) -> Optional[Tuple[Dict[str, Any], Dict[int, Dict[str, Any]]]]:
-        """Return cell, code, kind and seeds of a batch, and its runs by seed; None if the file is damaged."""
+    def _read_batch(self, name: str) -> Tuple[str, List[Run]]:
+        """Return the code of a batch, and its runs; none if the file is damaged, so that they are computed again."""
         try:
             with open(os.path.join(self._batches, name), encoding="utf-8") as file:
-                first, *lines = map(json.loads, file)
-            header = {key: first[key] for key in ("cell", "code", "kind")}
-            header["seeds"] = [int(seed) for seed in first["seeds"]]
-            return header, {int(line["seed"]): line for line in lines}
+                header, *lines = map(json.loads, file)
+            digest, code, kind = header["cell"], header["code"], header["kind"]
+            cell = self._cells.index(digest) if digest in self._cells else OTHER_CELL
+            runs = [
+                Run(cell, int(line["seed"]), tuple(map(float, line["values"])), kind, line["remark"]) for line in lines
+            ]
         except (ValueError, KeyError, TypeError):
-            return None
+            return "", []
+        return code, runs if name == self._name_batch(digest, [run.seed for run in runs], code, kind) else []
 
-    def _read_batch(self, name: str) -> List[Run]:
-        """Return the runs of a batch; none if the file is damaged, so that they are computed again."""
-        read = self._read_lines(name)
-        if read is None:
-            return []
-        header, by_seed = read
-        digest, code, kind, seeds = header["cell"], header["code"], header["kind"], header["seeds"]
+    def _list_runs(self, name: str) -> List[Tuple[int, Run]]:
+        """Return the runs of a batch that belong to this experiment, with their places in it. Raises: ExperimentError."""
+        code, runs = self._read_batch(name)
         path, remedy = os.path.join(self._batches, name), "start over with --fresh, or choose another --out"
-        if self._code not in (None, code) and kind == SIMULATED:
-            raise ExperimentError(
-                "%s: computed by other code (%s, now %s); %s" % (path, code, self._code, remedy)
-            )
-        if digest not in self._cells:
+        if any(run.kind == SIMULATED for run in runs) and self._code not in (None, code):
+            raise ExperimentError("%s: computed by other code (%s, now %s); %s" % (path, code, self._code, remedy))
+        if any(run.cell == OTHER_CELL for run in runs):
             raise ExperimentError("%s: of an experiment with other parameters; %s" % (path, remedy))
-        if sorted(by_seed) != sorted(seeds) or name != self._name_batch(digest, seeds, code, kind):
-            return []
-        cell, count = self._cells.index(digest), len(self._experiment.metrics)
-        runs = [
-            Run(cell, seed, tuple(map(float, by_seed[seed]["values"])), kind, by_seed[seed]["remark"])
-            for seed in seeds
-        ]
-        return [run for run in runs if len(run.values) == count and run.seed in self._experiment.seeds]
+        count, seeds = len(self._experiment.metrics), self._experiment.seeds
+        return [(place, run) for place, run in enumerate(runs) if len(run.values) == count and run.seed in seeds]
 
     def write_batch(self, runs: Sequence[Run]) -> None:
         """Keep the runs of one cell: once this returns they survive any end of the program."""
         assert self._code is not None
         digest, kind = self._cells[runs[0].cell], runs[0].kind
         seeds = [run.seed for run in runs]
-        header = {"cell": digest, "code": self._code, "kind": kind, "seeds": seeds}
-        lines = [header] + [
-            {"seed": run.seed, "values": list(map(_encode, run.values)), "remark": run.remark} for run in runs
-        ]
+        lines: List[Dict[str, Any]] = [{"cell": digest, "code": self._code, "kind": kind}]
+        lines += [{"seed": run.seed, "values": list(map(_encode, run.values)), "remark": run.remark} for run in runs]
         name = self._name_batch(digest, seeds, self._code, kind)
         content = "".join(json.dumps(line) + "\n" for line in lines)
         write_file(os.path.join(self._batches, name), content.encode())
@@ -178,11 +169,8 @@ class ResultsFolder:
         for name in sorted(os.listdir(self._batches)):
             path = os.path.join(self.path, "series", name[: -len(".jsonl")] + ending)
             if name.endswith(".jsonl") and os.path.isfile(path):
-                runs = [run for run in self._read_batch(name) if run.cell == cell]
                 recorded = np.load(path, mmap_mode="r")
-                read = self._read_lines(name)
-                seeds = read[0]["seeds"] if read else []
-                series.update({run.seed: recorded[:, seeds.index(run.seed)] for run in runs})
+                series.update({run.seed: recorded[:, place] for place, run in self._list_runs(name) if run.cell == cell})
         return series
 
     def note_time(self, cell: int, seeds: Sequence[int], wall_s: float) -> None:
