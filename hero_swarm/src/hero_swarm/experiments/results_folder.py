@@ -129,7 +129,7 @@ class ResultsFolder:
         return code, runs if name == self._name_batch(digest, [run.seed for run in runs], code, kind) else []
 
     def _list_runs(self, name: str) -> List[Tuple[int, Run]]:
-        """Return the runs of a batch that belong to this experiment, with their places in it. Raises: ExperimentError."""
+        """Return the runs of a batch that the experiment has, with their places in it. Raises: ExperimentError."""
         code, runs = self._read_batch(name)
         path, remedy = os.path.join(self._batches, name), "start over with --fresh, or choose another --out"
         if any(run.kind == SIMULATED for run in runs) and self._code not in (None, code):
@@ -170,7 +170,8 @@ class ResultsFolder:
             path = os.path.join(self.path, "series", name[: -len(".jsonl")] + ending)
             if name.endswith(".jsonl") and os.path.isfile(path):
                 recorded = np.load(path, mmap_mode="r")
-                series.update({run.seed: recorded[:, place] for place, run in self._list_runs(name) if run.cell == cell})
+                own = [(place, run.seed) for place, run in self._list_runs(name) if run.cell == cell]
+                series.update({seed: recorded[:, place] for place, seed in own})
         return series
 
     def note_time(self, cell: int, seeds: Sequence[int], wall_s: float) -> None:
