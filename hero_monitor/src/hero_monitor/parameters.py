@@ -4,10 +4,11 @@ import os
 import platform
 import re
 import stat
-from typing import List, NamedTuple, Optional
+from dataclasses import dataclass
+from typing import Any, List, Optional, Sequence
 
 from hero_node.errors import ProgramError
-from hero_node.parameters import flag, number, whole_number
+from hero_node.parameters import Parameter, declare, find_declared, flag, make_error, number, whole_number
 from hero_node.ros.private_parameters import read_parameters
 
 from .serving.access import TOKEN_LENGTH_MIN, is_loopback
@@ -18,19 +19,46 @@ TOKEN_REMEDY = (
 )
 
 
-class Parameters(NamedTuple):
+def _read_text(name: str, value: Any) -> str:
+    return str(value)
+
+
+def _read_host(name: str, value: Any) -> str:
+    if value == "":
+        raise make_error(name, value, "an address of this PC, such as 127.0.0.1")
+    return str(value)
+
+
+def _read_words(name: str, value: Any) -> List[str]:
+    return re.findall(r"[^\s,]+", str(value))
+
+
+@dataclass(frozen=True)
+class Parameters:
     """The checked parameters of the node."""
 
-    host: str
-    port: int
-    token: Optional[str]
-    host_names: List[str]
-    control: bool
-    rate_hz: float
-    map_frame: str
-    record_folder: str
-    foxglove_origins: List[str]
-    foxglove_publish: bool
+    host: str = declare(Parameter("127.0.0.1", _read_host))
+    port: int = declare(whole_number(8088, 0, 65535))
+    token_file: str = declare(Parameter("", _read_text))
+    host_names: Sequence[str] = declare(Parameter("", _read_words))
+    control: bool = declare(flag(False))
+    rate_hz: float = declare(number(10.0, 1.0, 30.0, "Hz"))
+    map_frame: str = declare(Parameter("world", _read_text))
+    record_folder: str = declare(Parameter("~/hero_recordings", _read_text))
+    foxglove_origins: Sequence[str] = declare(Parameter("", _read_words))
+    foxglove_publish: bool = declare(flag(False))
+
+
+def load_parameters() -> Parameters:
+    """Return the node's private parameters. Raises: ProgramError."""
+    return Parameters(**read_parameters(find_declared(Parameters)))
+
+
+def list_host_names(parameters: Parameters) -> List[str]:
+    """Return names of this PC: its own, and those that are given."""
+    own_name = platform.node()
+    own_names = [name for name in (own_name, own_name.partition(".")[0] + ".local", parameters.host) if name]
+    return [*parameters.host_names, *own_names]
 
 
 def read_token(host: str, file: str) -> Optional[str]:
@@ -55,36 +83,3 @@ def read_token(host: str, file: str) -> Optional[str]:
             "~token_file %s holds less than %d characters: %s" % (path, TOKEN_LENGTH_MIN, TOKEN_REMEDY)
         )
     return token
-
-
-def load_parameters() -> Parameters:
-    """Return the node's private parameters. Raises: ProgramError."""
-    given = read_parameters(
-        {
-            "host": "127.0.0.1",
-            "port": whole_number(8088, 0, 65535),
-            "token_file": "",
-            "host_names": "",
-            "control": flag(False),
-            "rate_hz": number(10.0, 1.0, 30.0, "Hz"),
-            "map_frame": "world",
-            "record_folder": "~/hero_recordings",
-            "foxglove_origins": "",
-            "foxglove_publish": flag(False),
-        }
-    )
-    host, token_file = str(given["host"]), str(given.pop("token_file"))
-    if not host:
-        raise ProgramError("~host is empty, but must be an address of this PC, such as 127.0.0.1")
-    names, origins = (re.findall(r"[^\s,]+", str(given[name])) for name in ("host_names", "foxglove_origins"))
-    own_name = platform.node()
-    own_names = [name for name in (own_name, own_name.partition(".")[0] + ".local", host) if name]
-    given.update(
-        host=host,
-        token=read_token(host, token_file),
-        host_names=names + own_names,
-        map_frame=str(given["map_frame"]).lstrip("/"),
-        record_folder=str(given["record_folder"]),
-        foxglove_origins=origins,
-    )
-    return Parameters(**given)

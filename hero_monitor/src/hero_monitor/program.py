@@ -6,7 +6,7 @@ Everything runs on tornado's thread, except what may block (background).
 """
 
 import platform
-from typing import TYPE_CHECKING, Any, Dict, Set
+from typing import Any, Dict, Set
 
 import rospy
 
@@ -23,12 +23,9 @@ from .control.requests import CLOCK_PERIOD_S, read_clock_ms
 from .fleet_feed.feed import FleetFeed
 from .fleet_feed.page_state import encode
 from .page_requests import PageRequests
-from .parameters import Parameters, load_parameters
+from .parameters import Parameters, list_host_names, load_parameters, read_token
 from .serving.access import Access
 from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits
-
-if TYPE_CHECKING:
-    from .serving.server import PageSocket
 
 LINGER_S = 10.0
 """Time that subscriptions outlive the last page, which may only reload."""
@@ -65,7 +62,13 @@ class Monitor:
             self._broadcast_updates,
         )
         self._programs = self._requests.programs
-        actions = Actions(self._open_page, self._requests.receive, self._leave, self._feed.picture.find_jpeg)
+        self._feed.page_state.put("hello", {"control": parameters.control})
+        actions = Actions(
+            lambda page: self._enter(page.number),
+            self._requests.receive,
+            self._leave,
+            self._feed.picture.find_jpeg,
+        )
         # The other half of the files is for ROS: some per robot.
         limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         topics = RosTopics(self._background)
@@ -74,7 +77,8 @@ class Monitor:
         self._foxglove = FoxgloveEndpoint(
             source, parameters.foxglove_origins, publisher if parameters.foxglove_publish else None
         )
-        access = Access(parameters.token, parameters.host_names)
+        token = read_token(parameters.host, parameters.token_file)
+        access = Access(token, list_host_names(parameters))
         self._server = Server(access, limits, actions, self._foxglove.route)
         self._repeated = [
             tornado.ioloop.PeriodicCallback(call, 1000.0 * period_s)
@@ -127,10 +131,6 @@ class Monitor:
             self._loop.stop()
 
     # ---------------------------------------------------------------- pages come and go
-
-    def _open_page(self, page: "PageSocket") -> None:
-        page.send(encode({"hello": {"control": self._parameters.control}}))
-        self._enter(page.number)
 
     def _enter(self, number: int) -> None:
         """A page is there, or a client that may publish: robots are watched, and stopped when it falls silent."""

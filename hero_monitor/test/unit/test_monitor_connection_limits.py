@@ -1,13 +1,10 @@
-"""Connections and wrong tokens of the monitor's clients: untrusted ones cannot lock out those who are logged in."""
+"""Connections of the monitor's clients: untrusted ones cannot lock out those who are logged in."""
 
 import pytest
 
 from hero_monitor.serving.connection_limits import (
-    TOKEN_BURST,
-    TOKEN_PERIOD_S,
     UNTRUSTED_S,
     ConnectionLimits,
-    TokenAttempts,
     group_address,
 )
 
@@ -108,29 +105,3 @@ def test_a_connection_without_a_login_is_closed_after_a_while():
 )
 def test_an_ipv6_network_counts_as_one_address(address, group):
     assert group_address(address) == group
-
-
-def use_up(attempts, address, now_s=0.0):
-    for _ in range(TOKEN_BURST):
-        assert attempts.admits(address, now_s)
-        attempts.count_wrong(address, now_s)
-    assert not attempts.admits(address, now_s)
-
-
-def test_after_too_many_wrong_tokens_an_address_has_to_wait():
-    attempts = TokenAttempts()
-    use_up(attempts, UNTRUSTED, 100.0)
-    assert not attempts.admits(UNTRUSTED, 99.9 + TOKEN_PERIOD_S)
-    assert attempts.admits(UNTRUSTED, 100.1 + TOKEN_PERIOD_S)
-
-
-def test_an_address_that_waited_long_has_no_more_tries_than_a_new_one():
-    attempts = TokenAttempts()
-    attempts.count_wrong(UNTRUSTED, 0.0)
-    use_up(attempts, UNTRUSTED, 1000.0)
-
-
-def test_wrong_tokens_of_one_address_keep_no_other_from_trying():
-    attempts = TokenAttempts()
-    use_up(attempts, UNTRUSTED)
-    assert attempts.admits(OWNER, 0.0)

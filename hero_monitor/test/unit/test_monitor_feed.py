@@ -11,6 +11,7 @@ import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, TransformStamped
+from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
@@ -23,6 +24,7 @@ from hero_monitor.fleet_feed import robot_feed as robot_feed_module
 from hero_monitor.fleet_feed.feed import (
     LOG_LINES_PER_READ,
     MARKERS_MAX,
+    REPLAY_KEPT_S,
     ROBOTS_MAX,
     ROW_PERIOD_S,
     FleetFeed,
@@ -326,6 +328,41 @@ def test_lines_of_the_log_are_counted_and_known_by_their_robot(fleet):
     assert fleet.feed.page_state.log.count == 6 + LOG_LINES_PER_READ + 10 and fleet.feed._log_bytes == deque()
     say("/other", "more", LOG_LINES_KEPT + 10)
     assert len(fleet.feed._log_bytes) == LOG_LINES_KEPT
+
+
+def test_a_grid_is_drawn_in_its_frame_and_a_replay_while_it_runs(fleet):
+    fleet.receive(make_row(0), make_row(1))
+    fleet.subscribe()
+    for number, feed in enumerate(fleet.feed._feeds.values()):
+        feed.listener.track.receive_pose(Pose(0.1 * number, 0.0, 0.0))
+    grid = OccupancyGrid(data=[0, 100])
+    grid.header.frame_id, grid.info.resolution, grid.info.width, grid.info.height = "world", 0.1, 2, 1
+    grid.info.origin.orientation.w = 1.0
+    fleet.put("/map", grid)
+    heading = make_marker(Marker.ARROW, 1, 1, 1, ns="headings")
+    fleet.put("/hero_sim/replay", MarkerArray([heading, make_marker(9, 1, 1, 1, ns="names", text="hero_7")]))
+    state = fleet.read()
+    assert state["poses"] == {"hero_0": [-500, 0, 0], "hero_1": [600, 0, 0]}, "side by side"
+    assert state["grid"]["runs"] == [1, 1, 2, 1] and state["replay"] == {"hero_7": [1000, 0, 0]}
+    report = RobotPoses(robots=[RobotPose(id=0, state=RobotPose.TRACKED)])
+    report.header.frame_id = "map"
+    fleet.put("/localization/poses", report)
+    assert fleet.read()["grid"] is None
+    fleet.now_s += max(FORGOTTEN_S, REPLAY_KEPT_S) + 0.1
+    state = fleet.read()
+    assert state["grid"]["runs"] == [1, 1, 2, 1] and state["replay"] == {}, "a map_server publishes once"
+
+
+def test_localization_that_no_page_listened_to_is_not_lost(fleet):
+    fleet.receive(make_row(0))
+    fleet.subscribe()
+    fleet.put("/localization/poses", RobotPoses())
+    fleet.read()
+    fleet.feed.update_subscriptions(False, False, False)
+    fleet.now_s += SILENT_S + 0.1
+    fleet.read()
+    fleet.feed.update_subscriptions(True, False, False)
+    assert fleet.read()["losses"] == []
 
 
 def make_marker(kind, *scale, **fields):

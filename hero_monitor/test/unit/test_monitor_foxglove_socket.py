@@ -18,7 +18,9 @@ from hero_monitor.foxglove.endpoint import (
 )
 from hero_monitor.foxglove.hub import Client, TopicMessage, TopicType
 from hero_monitor.serving.access import Access
-from hero_monitor.serving.connection_limits import TOKEN_BURST, ConnectionLimits, TokenAttempts
+from hero_monitor.serving.connection_limits import ConnectionLimits
+from hero_monitor.serving.server import TOKEN_BURST
+from hero_node.token_bucket import TokenBuckets
 
 TOKEN = "a secret of more than sixteen letters"
 LET_IN = 426
@@ -50,7 +52,13 @@ def make_topics(monkeypatch):
     return made
 
 
-def connect(endpoint, attempts, token=TOKEN, uri="/foxglove", protocol="foxglove.websocket.v1", origin=None, **headers):
+def make_buckets():
+    return TokenBuckets(TOKEN_BURST, 0.01)
+
+
+def connect(
+    endpoint, wrong_tokens, token=TOKEN, uri="/foxglove", protocol="foxglove.websocket.v1", origin=None, **headers
+):
     """Return the status of the answer to a client that wants to connect."""
     connection = mock.Mock()
     all_headers = tornado.httputil.HTTPHeaders({"Host": "localhost", "Upgrade": "websocket", "Connection": "Upgrade"})
@@ -61,7 +69,7 @@ def connect(endpoint, attempts, token=TOKEN, uri="/foxglove", protocol="foxglove
         method="GET", uri=uri, host="localhost", headers=all_headers, connection=connection
     )
     request.remote_ip = "192.168.1.7"
-    values = {**endpoint.route[2], "attempts": attempts}
+    values = {**endpoint.route[2], "wrong_tokens": wrong_tokens}
     handler = FoxgloveSocket(
         tornado.web.Application(cookie_secret="secret"),
         request,
@@ -78,7 +86,7 @@ def connect(endpoint, attempts, token=TOKEN, uri="/foxglove", protocol="foxglove
 
 
 def test_clients_need_the_token_the_protocol_and_an_admitted_origin(topics):
-    endpoint, attempts = FoxgloveEndpoint(topics.source, ["https://Studio.example"]), TokenAttempts()
+    endpoint, tokens = FoxgloveEndpoint(topics.source, ["https://Studio.example"]), make_buckets()
     right = "/foxglove?token=" + TOKEN.replace(" ", "%20")
     for changes, status in (
         ({"uri": right}, LET_IN),
@@ -92,13 +100,13 @@ def test_clients_need_the_token_the_protocol_and_an_admitted_origin(topics):
         ({"uri": right, "protocol": None}, 400),
         ({"uri": right, "protocol": "chat, foxglove.sdk.v1"}, LET_IN),
     ):
-        assert connect(endpoint, attempts, **changes) == status, changes
-    assert [connect(endpoint, attempts) for _ in range(TOKEN_BURST - 1)] == [403] * (TOKEN_BURST - 2) + [429]
-    assert connect(endpoint, attempts, uri=right) == 429, "also with the right token"
+        assert connect(endpoint, tokens, **changes) == status, changes
+    assert [connect(endpoint, tokens) for _ in range(TOKEN_BURST - 1)] == [403] * (TOKEN_BURST - 2) + [429]
+    assert connect(endpoint, tokens, uri=right) == 429, "also with the right token"
     endpoint.hub.clients = {Client(lambda text: None) for _ in range(CLIENTS_MAX)}
-    assert CLIENTS_MAX == 10 and connect(endpoint, TokenAttempts(), uri=right) == 503
+    assert CLIENTS_MAX == 10 and connect(endpoint, make_buckets(), uri=right) == 503
     endpoint.hub.clients.pop()
-    assert connect(endpoint, TokenAttempts(), uri=right) == LET_IN
+    assert connect(endpoint, make_buckets(), uri=right) == LET_IN
 
 
 def test_the_newest_protocol_that_a_client_offers_is_taken():

@@ -5,6 +5,7 @@ import struct
 from types import SimpleNamespace
 
 import pytest
+from rosgraph.network import encode_ros_handshake_header
 from std_msgs.msg import Bool
 
 from hero_monitor.foxglove import ros_topics as module
@@ -184,20 +185,43 @@ def test_nodes_that_fail_leave_workers_to_others_and_are_tried_later(ros, topics
     assert len(ros.publishers) == 4
 
 
+class Node:
+    """Stands for the XML-RPC interface of a node."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def __call__(self, *arguments, **options):
+        return self
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        pass
+
+    def requestTopic(self, *arguments):  # noqa: N802
+        return self.answer
+
+
 def test_a_refusal_of_a_publisher_is_an_error(monkeypatch):
-    class Refusing:
-        def __init__(self, *arguments, **options):
-            pass
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *error):
-            pass
-
-        def requestTopic(self, *arguments):  # noqa: N802
-            return 0, "not a publisher of [/flag]", 0
-
-    monkeypatch.setattr(topic_streams.xmlrpc.client, "ServerProxy", Refusing)
+    monkeypatch.setattr(topic_streams.xmlrpc.client, "ServerProxy", Node((0, "not a publisher of [/flag]", 0)))
     with pytest.raises(OSError, match="not a publisher"):
         topic_streams.open_stream("/flag", "http://localhost:1", "/monitor")
+
+
+def test_a_connection_stays_open_unless_its_header_is_an_error(monkeypatch):
+    monkeypatch.setattr(topic_streams.xmlrpc.client, "ServerProxy", Node((1, "", ["TCPROS", "localhost", 1])))
+    for header in (LATCHED, {"error": "another md5sum"}):
+        ours, theirs = socket.socketpair()
+        monkeypatch.setattr(topic_streams.socket, "create_connection", lambda *arguments, ours=ours: ours)
+        theirs.sendall(encode_ros_handshake_header(header) + frame(b"latched"))
+        if "error" in header:
+            with pytest.raises(OSError, match="another md5sum"):
+                topic_streams.open_stream("/flag", "http://localhost:1", "/monitor")
+            assert ours.fileno() == -1
+        else:
+            stream = topic_streams.open_stream("/flag", "http://localhost:1", "/monitor")
+            assert stream.header == header and stream.read() == [b"latched"]
+            stream.close()
+        theirs.close()

@@ -136,7 +136,12 @@ def test_the_master_is_asked_in_turn_and_missed_after_a_while(monkeypatch):
     clock, jobs = SimpleNamespace(now_s=100.0), []
     monkeypatch.setattr(master_link_module, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
     monkeypatch.setattr(master_link_module, "MasterWatch", lambda: SimpleNamespace(is_lost=False, look=lambda: ""))
-    link = MasterLink(SimpleNamespace(submit=jobs.append))
+
+    def submit(function):
+        jobs.append(function)
+        return SimpleNamespace(done=lambda: function not in jobs)
+
+    link = MasterLink(SimpleNamespace(submit=submit))
     for after_s, asked, is_lost in ((0.0, 1, False), (0.7, 1, False), (0.55, 1, False), (0.1, 1, True)):
         clock.now_s += after_s
         assert bool(link.check()) == is_lost and len(jobs) == asked

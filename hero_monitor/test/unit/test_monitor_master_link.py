@@ -1,5 +1,6 @@
 """What pages are told of a ROS master that ends, hangs and comes back."""
 
+from concurrent.futures import Future
 from contextlib import suppress
 
 import pytest
@@ -28,9 +29,12 @@ class Watch:
         return ""
 
     def submit(self, function):
+        future = Future()
         if not self.hangs:
-            with suppress(OSError):  # kept in the future, which nothing reads
+            with suppress(NodeError, OSError):  # kept in the future, which nothing reads
                 function()
+            future.set_result(None)
+        return future
 
 
 @pytest.fixture

@@ -213,7 +213,7 @@ def test_the_length_of_a_recording_counts_from_its_file_on(started, monkeypatch,
     starts_s = []
 
     def measure(folder):
-        starts_s.append(recording.start_s)
+        starts_s.append(started.programs.find_recording().start_s)
         return 7 if len(starts_s) >= 3 else 0
 
     monkeypatch.setattr(programs_module, "measure", measure)

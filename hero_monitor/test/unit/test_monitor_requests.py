@@ -4,9 +4,11 @@ import json
 import math
 import struct
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 
+from hero_client.apps.formations import FormationError
 from hero_client.ros.stop_status import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import commander as commander_module
@@ -207,7 +209,7 @@ def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
     assert desk.ask("goal", **GOAL) == [] and len(desk.submitted) == GOALS_AT_ONCE + 1
 
 
-def test_a_program_is_started_with_its_robots_and_their_topics_open(desk):
+def test_a_program_is_started_with_its_robots_and_their_topics_open(desk, monkeypatch):
     assert desk.ask("start", **WALK) == []
     ((child, arguments),) = desk.started
     assert (child.program, child.robots, child.places) == ("random_walk", ["hero_0", "hero_1"], [])
@@ -232,6 +234,14 @@ def test_a_program_is_started_with_its_robots_and_their_topics_open(desk):
     desk.programs.count = PROGRAMS_MAX - 1
     assert desk.ask("start", **wide) == [] and '_frame:="map"' in desk.started[2][1]
     desk.started[2][0].end()
+    segregation = {"groups": 3.0, "own_m": 0.2, "others_m": 1.0, "max_linear_m_s": 0.1, "safety": "off"}
+    desk.programs.paths["behavior_segregation"] = "/behavior"
+    assert desk.ask("start", program="behavior_segregation", robots=["hero_0"], values=segregation) == []
+    child, arguments = desk.started.pop()
+    child.end()
+    assert any('"groups": 3,' in argument for argument in arguments), "a whole number, however a page writes it"
+    monkeypatch.setattr(page_requests, "place_robots", Mock(side_effect=FormationError("robots would touch")))
+    assert desk.ask("start", **wide) == ["robots would touch"]
     desk.programs.count = PROGRAMS_MAX
     assert desk.ask("start", **wide) == ["20 programs run: end one first"] and len(desk.started) == 3
 

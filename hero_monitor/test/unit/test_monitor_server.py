@@ -8,16 +8,20 @@ import pytest
 import tornado.httputil
 import tornado.web
 
+from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import Access
-from hero_monitor.serving.connection_limits import TOKEN_BURST, ConnectionLimits, TokenAttempts
+from hero_monitor.serving.connection_limits import ConnectionLimits
 from hero_monitor.serving.server import (
     SOCKETS_MAX,
+    TOKEN_BURST,
+    TOKEN_PERIOD_S,
     FileHandler,
     LoginHandler,
     PageSocket,
     PictureHandler,
     choose_served,
 )
+from hero_node.token_bucket import TokenBuckets
 
 TOKEN = "a secret of more than sixteen letters"
 OURS = {"Origin": "http://localhost"}
@@ -25,14 +29,16 @@ ASKS_TO_UPGRADE = 426
 """The answer to one that is let in, because it names no version of the protocol."""
 
 
-def ask(handler_class, *arguments, headers=(), host="localhost", token=None, method="GET", body=b"", **values):
+def ask(
+    handler_class, *arguments, headers=(), host="localhost", token=None, method="GET", body=b"", address="::1", **values
+):
     """Return status, headers and text of the answer to a request."""
     connection = mock.Mock()
     all_headers = tornado.httputil.HTTPHeaders({"Host": host, **dict(headers)})
     request = tornado.httputil.HTTPServerRequest(
         method=method, uri="/", host=host, headers=all_headers, body=body, connection=connection
     )
-    request.remote_ip = "192.168.1.7"
+    request.remote_ip = address
     application = tornado.web.Application(cookie_secret="secret")
     handler = handler_class(application, request, access=Access(token, []), limits=ConnectionLimits(400), **values)
 
@@ -96,20 +102,35 @@ def test_the_picture_is_for_those_who_are_logged_in():
     assert ask(PictureHandler, "8", actions=actions)[0] == 404
 
 
+RIGHT = json.dumps({"token": TOKEN})
+
+
+def make_login(headers=OURS):
+    """Return a function that sends a login with this body from an address."""
+    tokens = TokenBuckets(TOKEN_BURST, 1.0 / TOKEN_PERIOD_S)
+    fixed = {"headers": headers, "method": "POST", "token": TOKEN, "wrong_tokens": tokens}
+    return lambda body, address="10.0.0.2": ask(LoginHandler, body=body.encode(), address=address, **fixed)
+
+
+@pytest.fixture(name="clock")
+def make_clock(monkeypatch):
+    clock = mock.Mock()
+    monkeypatch.setattr(server_module, "time", clock)
+    clock.monotonic.return_value = 1000.0
+    return clock.monotonic
+
+
+@pytest.mark.usefixtures("clock")
 @pytest.mark.parametrize("body", ["{", "[]", "{}", '{"token": 1}', '{"token": "wrong"}', "[" * 100000])
 def test_wrong_tokens_are_refused_and_counted(body):
-    attempts = TokenAttempts()
-
-    def log_in(body):
-        return ask(LoginHandler, headers=OURS, method="POST", body=body.encode(), token=TOKEN, attempts=attempts)
-
-    right = json.dumps({"token": TOKEN})
-    status, headers, _ = log_in(right)
+    assert make_login({"Origin": "http://evil.example"})(RIGHT)[0] == make_login({})(RIGHT)[0] == 403
+    log_in = make_login()
+    status, headers, _ = log_in(RIGHT)
     assert status == 204
     assert "HttpOnly" in headers["Set-Cookie"]
     assert "SameSite=Strict" in headers["Set-Cookie"]
     assert [log_in(body)[0] for _ in range(TOKEN_BURST)] == [403] * TOKEN_BURST
-    status, headers, text = log_in(right)
+    status, headers, text = log_in(RIGHT)
     assert status == 429
     assert "Set-Cookie" not in headers
     assert "wait 5 s" in text
@@ -119,3 +140,19 @@ def test_pages_that_can_be_seen_are_served_first():
     pages = [mock.Mock(is_idle=number < 3) for number in range(40)]
     assert choose_served(pages) == pages[3:33]
     assert choose_served(pages[:10]) == [*pages[3:10], *pages[:3]]
+
+
+def test_too_many_wrong_tokens_make_their_address_wait_and_no_other(clock):
+    log_in = make_login()
+    assert [log_in("wrong")[0] for _ in range(TOKEN_BURST + 1)] == [403] * TOKEN_BURST + [429]
+    assert log_in("wrong", "10.0.0.1")[0] == 403 and log_in("wrong", "::ffff:10.0.0.2")[0] == 429
+    for waited_s, status in ((TOKEN_PERIOD_S - 0.1, 429), (TOKEN_PERIOD_S + 0.1, 204)):
+        clock.return_value = 1000.0 + waited_s
+        assert log_in(RIGHT)[0] == status
+
+
+def test_an_address_that_waited_long_has_no_more_tries_than_a_new_one(clock):
+    log_in = make_login()
+    assert log_in("wrong")[0] == 403
+    clock.return_value = 2000.0
+    assert [log_in("wrong")[0] for _ in range(TOKEN_BURST + 1)] == [403] * TOKEN_BURST + [429]

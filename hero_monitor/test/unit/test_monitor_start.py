@@ -11,7 +11,7 @@ from hero_monitor.background import Background
 from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.foxglove import hub as hub_module
 from hero_monitor.foxglove.hub import Client, Hub, TopicType
-from hero_monitor.parameters import load_parameters, read_token
+from hero_monitor.parameters import list_host_names, load_parameters, read_token
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
 from hero_monitor.serving.server import STUCK_S, WAITING_MAX, PageSocket
@@ -49,14 +49,15 @@ def test_parameters_are_checked_and_name_this_pc(monkeypatch):
     monkeypatch.setattr(parameters_module, "read_parameters", lambda declared: check_parameters(declared, given))
     monkeypatch.setattr(parameters_module.platform, "node", lambda: "pc.lab")
     defaults = load_parameters()
-    assert (defaults.host, defaults.port, defaults.token, defaults.control) == ("127.0.0.1", 8088, None, False)
-    assert defaults.host_names == ["pc.lab", "pc.local", "127.0.0.1"]
+    assert (defaults.host, defaults.port, defaults.token_file, defaults.control) == ("127.0.0.1", 8088, "", False)
+    assert list_host_names(defaults) == ["pc.lab", "pc.local", "127.0.0.1"]
     assert (defaults.map_frame, defaults.foxglove_origins, defaults.foxglove_publish) == ("world", [], False)
     given.update(
         host_names=" a, b c", map_frame="/map", foxglove_origins="https://a.example, https://b.example", control=True
     )
     loaded = load_parameters()
-    assert loaded.host_names[:3] == ["a", "b", "c"] and loaded.map_frame == "map" and loaded.control
+    assert list_host_names(loaded)[:4] == ["a", "b", "c", "pc.lab"]
+    assert loaded.map_frame == "/map" and loaded.control and loaded.record_folder == "~/hero_recordings"
     assert loaded.foxglove_origins == ["https://a.example", "https://b.example"]
     for wrong in ({"port": 65536}, {"rate_hz": 0.5}, {"rate_hz": 31.0}, {"host": ""}):
         given.clear()
@@ -163,6 +164,8 @@ def test_limits_of_what_pages_may_set_are_the_ends_of_their_fields():
             for outside in (low - 1e-6 * max(1.0, high), high + 1e-6 * max(1.0, high)):
                 with pytest.raises(ProgramError, match=name):
                     field.check(name, outside)
+    (formation,) = describe_offers(["swarm_go_to"])
+    assert [field["name"] for field in formation["fields"] if field["on_map"]] == ["turn_deg", "x_m", "y_m"]
     follow, led_show = describe_offers(["follow", "led_show"])
     assert [offer["program"] for offer in (follow, led_show)] == ["follow", "led_show"]
     assert led_show["fields"][0]["choices"] == ("rainbow", "chase", "blink") and not led_show["fields"][0]["limits"]

@@ -4,12 +4,12 @@ Pages show if it is lost, and work without it.
 """
 
 import time
-from contextlib import suppress
+from concurrent.futures import Future
+from typing import Optional
 
 import rosgraph
 import rospy
 
-from hero_node.errors import NodeError
 from hero_node.ros.master_watch import MasterWatch
 
 from ..background import Background
@@ -23,22 +23,18 @@ class MasterLink:
         self._background = background
         self._watch = MasterWatch()
         self._asked_s = -MASTER_PERIOD_S
-        self._is_pending = False
+        self._look: Optional[Future[None]] = None
 
     def check(self, period_s: float = MASTER_PERIOD_S) -> str:
         """Ask if it is time to; return why the master is lost, empty if it answers. Returns at once."""
         now_s = time.monotonic()
-        if not self._is_pending and now_s - self._asked_s >= period_s:
-            self._asked_s, self._is_pending = now_s, True
-            self._background.submit(self._ask)
-        is_late = self._is_pending and now_s - self._asked_s > MASTER_SILENT_S
+        is_pending = self._look is not None and not self._look.done()
+        if not is_pending and now_s - self._asked_s >= period_s:
+            self._asked_s, self._look = now_s, self._background.submit(self._ask)
+        is_late = is_pending and now_s - self._asked_s > MASTER_SILENT_S
         return "%s does not answer" % rosgraph.get_master_uri() if self._watch.is_lost or is_late else ""
 
     def _ask(self) -> None:
-        try:
-            with suppress(NodeError):
-                news = self._watch.look()
-                if news:
-                    rospy.logwarn(news)
-        finally:
-            self._is_pending = False
+        news = self._watch.look()  # its errors stay in the future: is_lost tells
+        if news:
+            rospy.logwarn(news)

@@ -1,4 +1,4 @@
-"""Limits for connections and token attempts, so that untrusted clients cannot lock out those who are logged in. Pure.
+"""Limits for connections: untrusted clients cannot lock out those who are logged in. Pure.
 
 A connection is trusted once a request with a login has arrived on it. A new connection always gets in while
 an untrusted one can be evicted for it: one of its own address when that address has too many, else one of the address
@@ -9,18 +9,12 @@ import ipaddress
 from collections import Counter
 from typing import Dict, NamedTuple, Protocol, Set
 
-from hero_node.token_bucket import TokenBuckets
-
 CONNECTIONS_MAX = 400
 UNTRUSTED_PER_ADDRESS_MAX = 50
 """Untrusted connections of one address. Each is served one request per turn of the loop, however many it sends."""
 
 UNTRUSTED_S = 10.0
 """An untrusted connection is closed after this time: a login takes one request, and the request one second."""
-
-TOKEN_BURST = 5
-TOKEN_PERIOD_S = 5.0
-"""An address may try TOKEN_BURST wrong tokens at once, then one in TOKEN_PERIOD_S."""
 
 
 class Connection(Protocol):
@@ -93,18 +87,3 @@ class ConnectionLimits:
         for connection, arrival in self._untrusted.items():
             if now_s - arrival.time_s > UNTRUSTED_S:
                 connection.close()
-
-
-class TokenAttempts:
-    """Wrong tokens, limited by a token bucket per address."""
-
-    def __init__(self) -> None:
-        self._buckets = TokenBuckets(TOKEN_BURST, 1.0 / TOKEN_PERIOD_S)
-
-    def admits(self, address: str, now_s: float) -> bool:
-        """Return whether this address may try a token."""
-        return self._buckets.count(group_address(address), now_s) >= 1.0
-
-    def count_wrong(self, address: str, now_s: float) -> None:
-        """Count a wrong token."""
-        self._buckets.take(group_address(address), 1.0, now_s)

@@ -7,7 +7,6 @@ itself), and what cannot be sent at once takes 64 kB at most.
 import itertools
 import json
 import logging
-import mimetypes
 import secrets
 import socket
 import time
@@ -22,13 +21,17 @@ import tornado.netutil
 import tornado.web
 import tornado.websocket
 
+from hero_node.token_bucket import TokenBuckets
+
 from ..fleet_feed.page_state import encode
 from .access import Access
-from .connection_limits import TOKEN_PERIOD_S, ConnectionLimits, TokenAttempts
+from .connection_limits import ConnectionLimits, group_address
 
 WEB = Path(__file__).resolve().parents[1] / "web"
 FILES = {path.relative_to(WEB).as_posix(): path for path in WEB.glob("**/*") if path.is_file()}
 """The page's files; no other is served."""
+
+TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 
 COOKIE = "hero_monitor"
 SESSION_DAYS = 0.5
@@ -38,6 +41,10 @@ CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+
+TOKEN_BURST = 5
+TOKEN_PERIOD_S = 5.0
+"""An address may try TOKEN_BURST wrong tokens at once, then one in TOKEN_PERIOD_S."""
 
 PAGES_MAX = 30
 """Pages that are served: those that can be seen come first. Others get STOP ALL alone."""
@@ -82,7 +89,7 @@ class BaseHandler(tornado.web.RequestHandler):
 
     access: Access
     limits: ConnectionLimits
-    attempts: TokenAttempts
+    wrong_tokens: TokenBuckets
     actions: Actions
     pages: List["PageSocket"]
 
@@ -121,11 +128,11 @@ class BaseHandler(tornado.web.RequestHandler):
 
     def check_token(self, token: Any) -> None:
         """Refuse a request whose token is wrong, rate-limited per address. Raises: HTTPError."""
-        address, now_s = self.request.remote_ip or "", time.monotonic()
-        if not self.attempts.admits(address, now_s):
+        address, now_s = group_address(self.request.remote_ip or ""), time.monotonic()
+        if self.wrong_tokens.count(address, now_s) < 1.0:
             raise tornado.web.HTTPError(429)
         if not (isinstance(token, str) and self.access.admits_token(token)):
-            self.attempts.count_wrong(address, now_s)
+            self.wrong_tokens.take(address, 1.0, now_s)
             raise tornado.web.HTTPError(403)
 
     def write_error(self, status_code: int, **others: Any) -> None:
@@ -151,9 +158,7 @@ class FileHandler(BaseHandler):
         path = FILES.get(name)
         if path is None:
             raise tornado.web.HTTPError(404)
-        kind = {".js": "text/javascript", ".svg": "image/svg+xml"}.get(path.suffix)
-        kind = kind or mimetypes.guess_type(name)[0] or "application/octet-stream"
-        self.set_header("Content-Type", kind + "; charset=utf-8")
+        self.set_header("Content-Type", TYPES.get(path.suffix, "text/plain") + "; charset=utf-8")
         self.finish(path.read_bytes())
 
 
@@ -215,10 +220,9 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         self._sending: Optional[Awaitable[None]] = None
         self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
         self.set_nodelay(True)
-        if self.ws_connection is not None:
-            stream = getattr(self.ws_connection, "stream", None)
-            if stream is not None and stream.socket is not None:
-                stream.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+        stream = getattr(self.ws_connection, "stream", None)
+        if stream is not None and stream.socket is not None:
+            stream.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         self.pages.append(self)
         self.actions.open_page(self)
 
@@ -300,7 +304,7 @@ class Server:
         shared = {
             "access": access,
             "limits": limits,
-            "attempts": TokenAttempts(),
+            "wrong_tokens": TokenBuckets(TOKEN_BURST, 1.0 / TOKEN_PERIOD_S),
             "actions": actions,
             "pages": self.pages,
         }

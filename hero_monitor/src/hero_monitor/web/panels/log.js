@@ -17,7 +17,7 @@ export class LogView {
   constructor() {
     [this.list, this.level, this.mine, this.words] = ["lines", "level", "mine", "words"].map(element);
     this.chosen = new Set();
-    this.groups = new Map(); // by message without its numbers: the line that shows it, how often it came, and of whom
+    this.groups = new Map(); // the line that shows a message, by its text without numbers
     for (const input of [this.level, this.mine, this.words]) {
       input.addEventListener("input", () => this.filter());
     }
@@ -48,20 +48,20 @@ export class LogView {
   add({ seconds, level, node, robot, text }) {
     const key = `${level} ${node} ${text.replace(NUMBER, "#")}`;
     const former = this.groups.get(key);
-    former?.line.remove();
-    if (former && isLate(seconds, former.line.entry)) seconds = former.line.entry.seconds;
-    const robots = new Set(former?.robots).add(robot);
-    const count = (former?.count ?? 0) + 1;
+    former?.remove();
+    if (isLate(seconds, former?.entry)) seconds = former.entry.seconds;
+    const robots = new Set(former?.entry.robots).add(robot);
+    const count = (former?.entry.count ?? 0) + 1;
     const time = new Date(seconds * 1000).toTimeString().slice(0, 8);
     const source = cell("node", robots.size > 1 ? `${robots.size} robots` : robot || node);
     source.title = node;
     if (robot && robots.size === 1) source.style.color = colorOf(Number(robot.slice(robot.indexOf("_") + 1)));
     const said = cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text);
     if (count > 1) said.append(cell("count", `${count} times`));
-    const entry = { key, seconds, level, robots, words: `${node} ${text}`.toLowerCase() };
+    const entry = { key, seconds, level, robots, count, words: `${node} ${text}`.toLowerCase() };
     const line = make("li", { className: LEVELS[level] || "info", entry }, cell("time", time), source, said);
-    line.hidden = !this.admits(line.entry);
-    this.groups.set(key, { line, count, robots });
+    line.hidden = !this.admits(entry);
+    this.groups.set(key, line);
     this.list.insertBefore(line, this.findNext(seconds));
   }
 
