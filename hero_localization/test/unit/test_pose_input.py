@@ -124,6 +124,15 @@ def test_what_is_no_pose_in_the_frame_is_named_and_not_used(pose_input):
     assert pose_input.lines == [] == pose_input.used
 
 
+def test_a_pose_that_the_filter_refuses_is_named(pose_input):
+    def refuse(measurement):
+        raise ValueError("a covariance must be positive definite")
+
+    pose_input._receive = refuse
+    pose_input._receive_message(make_raw(PoseStamped(pose=Pose(Point(0.0, 0.0, 0.0), UPRIGHT))))
+    assert pose_input.lines == ["/hero_0/pose: a covariance must be positive definite"]
+
+
 def test_odometry_is_read_from_its_bytes(monkeypatch):
     subscribed, used = [], []
     monkeypatch.setattr(inputs.rospy, "Subscriber", lambda *given, **_: subscribed.append(given))

@@ -7,7 +7,7 @@ is continuous.
 import math
 from typing import NamedTuple, Optional
 
-from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node.geometry import Pose, find_frame, measure_distance, transform_pose, wrap_angle
 
 from .stamped_history import StampedHistory, interpolate_pose
 
@@ -79,7 +79,7 @@ class OdometryHistory:
             if _is_jump(step_m, step_rad, 0.0 if elapsed_s > RESTART_S and _is_origin(raw) else elapsed_s):
                 self.jumps += 1
                 untold_s += elapsed_s
-                self._offset = transform_pose(last, invert_pose(raw))
+                self._offset = find_frame(last, raw)
                 pose, step_rad = last, 0.0
             counted_m = measure_distance(self._counted, pose)
             if counted_m >= JITTER_M:

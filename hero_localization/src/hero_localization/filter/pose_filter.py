@@ -18,7 +18,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node.geometry import Pose, find_frame, invert_pose, measure_distance, transform_pose, wrap_angle
 
 from .odometry_history import KEPT_S, Odometry, OdometryHistory
 
@@ -320,8 +320,7 @@ class PoseFilter:
     def find_odom_origin(self, pose: Pose) -> Pose:
         """Return where the frame hero_N/odom is in `map` if the robot is at pose, that of estimate()."""
         assert self.odometry.raw_pose is not None, "no pose is measured before the first reading"
-        origin = transform_pose(pose, invert_pose(self.odometry.raw_pose))
-        return origin._replace(yaw_rad=wrap_angle(origin.yaw_rad))
+        return find_frame(pose, self.odometry.raw_pose)
 
 
 def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:

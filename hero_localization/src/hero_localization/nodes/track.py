@@ -21,7 +21,7 @@ from ..camera.frame_source import Frame, open_source
 from ..errors import DetectorError, LocalizationError
 from ..tracking import settings as camera_file
 from ..tracking.detector_process import DetectorProcess
-from ..tracking.tag_pose import Sightings, find_smallest_side
+from ..tracking.tag_pose import Sightings
 from ..tracking.tracker import Tracker
 from .outputs import make_robot_pose, make_status, publish_statuses
 from .picture_output import PictureOutput
@@ -95,9 +95,8 @@ class TrackNode:
         tracker.camera.lens.check_size(height_px, width_px)
         if self._process is None:
             settings = self._settings
-            smallest_px = find_smallest_side(tracker.camera, settings.layout.size_m, settings.layout.height_m)
             self._process = DetectorProcess(
-                settings.detector, settings.family, settings.decimate, width_px, height_px, smallest_px
+                settings.detector, settings.family, settings.decimate, width_px, height_px, tracker.smallest_px
             )
             return  # by now the image is a second old
         expected = tracker.project(self._expected)

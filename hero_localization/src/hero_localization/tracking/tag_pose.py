@@ -10,7 +10,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node.geometry import Pose, find_frame
 
 from ..camera.camera_model import Camera
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
@@ -166,9 +166,8 @@ def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout) -> Sig
 
 
 def _find_base(tag: TagPose, mount: Pose) -> TagPose:
-    pose = transform_pose(tag.pose, invert_pose(mount))
+    pose = find_frame(tag.pose, mount)
     # A wrong heading moves the robot's center round the tag's.
     jacobian = np.eye(3)
     jacobian[0, 2], jacobian[1, 2] = tag.pose.y_m - pose.y_m, pose.x_m - tag.pose.x_m
-    pose = pose._replace(yaw_rad=wrap_angle(pose.yaw_rad))
     return tag._replace(pose=pose, covariance=jacobian @ tag.covariance @ jacobian.T)

@@ -63,6 +63,7 @@ class Tracker:
         camera: lens and place.
         found: the tags in the last image.
         sightings: what they stand for.
+        smallest_px: side of the smallest robot's tag that lies wholly in the image.
         is_moved: whether most reference tags were not at their places when they were seen last: no pose is right.
     """
 
@@ -72,7 +73,7 @@ class Tracker:
         self.sightings: Optional[Sightings] = None
         self._settings = settings
         self.camera = camera
-        self._smallest_px = find_smallest_side(camera, settings.layout.size_m, settings.layout.height_m)
+        self.smallest_px = find_smallest_side(camera, settings.layout.size_m, settings.layout.height_m)
         self._images: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
         self._shade = math.nan
         self._tag_problems: Dict[int, Tuple[float, str]] = {}
@@ -180,7 +181,7 @@ class Tracker:
             text = "images are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
             problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
-        smallest_px = min(sides_px, default=self._smallest_px)
+        smallest_px = min(sides_px, default=self.smallest_px)
         if smallest_px < MIN_SIDE_PX:
             text = "tags measure only %.0f px, less than %.0f: mount the camera lower, or print larger tags"
             problems.append(Problem("camera", text % (smallest_px, MIN_SIDE_PX), False))
