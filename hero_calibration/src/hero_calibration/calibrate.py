@@ -15,12 +15,10 @@ from typing import Sequence
 import rospy
 
 from hero_node import command_line
-from hero_node.errors import ProgramError
 from hero_node.parameters import robot_ids_option
 from hero_node.ros.program import Program
 
 from .calibration import DEFAULT_PARTS, INFRARED, PARTS, WHEELS, Calibration
-from .errors import CalibrationError
 from .procedures.restore import load_calibrations, restore
 from .questions import ask
 from .robots.ros_session import RosSession, find_robots
@@ -77,4 +75,4 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Run the program calibrate."""
-    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]), CalibrationError, ProgramError)
+    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]))

@@ -1,7 +1,9 @@
 """Errors of a camera, its detector and its calibration."""
 
+from hero_node.errors import HeroError
 
-class LocalizationError(Exception):
+
+class LocalizationError(HeroError):
     """One line: the thing, its value, the remedy."""
 
 

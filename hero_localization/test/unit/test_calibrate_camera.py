@@ -11,7 +11,7 @@ from hero_localization.calibration.lens_calibration import BoardView, LensCalibr
 from hero_localization.calibration.robot_calibration import RobotCalibration
 from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.camera.frame_source import Frame
-from hero_localization.errors import CalibrationError
+from hero_localization.errors import CalibrationError, DetectorError
 from hero_localization.nodes import calibrate_camera
 from hero_localization.tracking import settings
 from hero_node.geometry import Pose
@@ -69,6 +69,15 @@ def test_a_robot_whose_tag_is_another_ones_is_not_driven(calibrate, capsys):
     status, found = calibrate("0 12")
     assert status == 1 and 12 not in found.layout.mounts
     assert "hero_12: tag 12 is assigned to something else: name the robot's in tag_robots" in capsys.readouterr().out
+
+
+def test_a_detector_that_ends_ends_the_calibration_of_all_robots(calibrate, monkeypatch):
+    def end(*_):
+        raise DetectorError("the detector's process has ended")
+
+    monkeypatch.setattr(calibrate_camera, "_watch_robot", end)
+    with pytest.raises(DetectorError):
+        calibrate("0-2")
 
 
 def test_without_any_robot_seen_the_file_stays_as_it_was(calibrate):

@@ -44,7 +44,7 @@ from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration,
 from ..camera.camera_model import Intrinsics
 from ..camera.device_controls import DeviceControls
 from ..camera.frame_source import Frame, open_source
-from ..errors import CalibrationError, DetectorError, LocalizationError
+from ..errors import CalibrationError, DetectorError
 from ..tracking import settings as camera_file
 from ..tracking.detector_process import DetectorProcess
 from ..tracking.detectors import find_print_mistake
@@ -225,9 +225,9 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
             continue
         try:
             result = results[tag_id] = _watch_robot(settings, images, program, robot_id, tag_id)
-        except ProgramError:
+        except (ProgramError, DetectorError):
             raise
-        except (CalibrationError, HeroError) as error:
+        except HeroError as error:
             problems.append("hero_%d: %s" % (robot_id, error))
             say(problems[-1])
             continue
@@ -363,4 +363,4 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Run the program calibrate_camera."""
-    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]), LocalizationError, ProgramError)
+    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]))

@@ -190,4 +190,4 @@ def track() -> None:
 
 def main() -> None:
     """Run the program track."""
-    run(track, LocalizationError)
+    run(track)

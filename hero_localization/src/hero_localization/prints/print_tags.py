@@ -268,4 +268,4 @@ def _count(count: int, thing: str) -> str:
 
 def main() -> None:
     """Run the program print_tags."""
-    command_line.run(lambda: run(parse_options(sys.argv[1:])), LocalizationError)
+    command_line.run(lambda: run(parse_options(sys.argv[1:])))

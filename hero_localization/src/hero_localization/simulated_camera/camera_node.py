@@ -19,11 +19,10 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
 from hero_node import command_line
-from hero_sim.errors import SimulatorError
 from hero_sim.world.arena import Arena, build_default
 from hero_sim.world.arena_file import load_arena
 
-from ..errors import LocalizationError, SettingsError
+from ..errors import SettingsError
 from ..prints.tag_images import FAMILIES
 from .board_renderer import BoardRenderer, list_board_places
 from .lab_setup import (
@@ -281,4 +280,4 @@ def _run() -> None:
 
 def main() -> None:
     """Run the camera until ROS ends."""
-    command_line.run(_run, LocalizationError, SimulatorError)
+    command_line.run(_run)
