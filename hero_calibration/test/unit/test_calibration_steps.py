@@ -12,7 +12,7 @@ from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models.encoder_readings import TICK_M, Readings
 from hero_calibration.procedures import infrared, motors, velocity, wheels
 from hero_calibration.robots.session import SETTLE_S
-from hero_node.geometry import Pose
+from hero_node.geometry import Pose, transform_pose
 
 STEP_S = 0.034
 STARTS_S = [2.0, 2.45, 2.9, 3.35]
@@ -144,6 +144,23 @@ def test_a_turn_ends_when_it_is_reached_and_is_tried_three_times():
     wrapped = TurningSession(math.inf)
     wrapped.turn(2.0 * math.pi - 0.1)
     assert wrapped.probe.sent[0][1] == pytest.approx(-0.1)
+
+
+def test_readings_tell_how_far_a_robot_came_to_the_wall(monkeypatch):
+    session, moved_m, sides_m = FakeSession(1), [0.0, 0.01, -0.02, 0.0, 0.03, 0.0, 0.0, 0.0], [0.0, 0.0, 0.01, 0.05] * 2
+    (probe,) = session.probes
+    start = Pose(0.3, 0.2, 1.0)
+    left = [transform_pose(start, Pose(ahead_m, side_m, 0.0)) for ahead_m, side_m in zip(moved_m, sides_m)]
+
+    def receive(now_s):
+        session.hear((12.0,) * 8)
+        probe.receive_pose(now_s, left[0])
+
+    session.on_sleep = receive
+    monkeypatch.setattr(infrared, "_turn", lambda *_: left.pop(0))
+    facings = infrared._face_wall_with_each_sensor(session, "infrared", 2, {})
+    assert [facing.moved_m for facing in facings[0]] == pytest.approx(moved_m)
+    assert [facing.sensor for facing in facings[0]] == [4, 3, 2, 1, 0, 7, 6, 5]
 
 
 def test_infrared_says_how_long_it_takes(monkeypatch, capsys):
