@@ -226,6 +226,7 @@ TWIST = "geometry_msgs/Twist"
         ("/hero_3/velocity_controller/cmd_vel", TWIST, (9.0, 0, 0, 0, 0, 99.0), DriveCommand("/hero_3", 0.2, 8.0)),
         ("/hero_3/cmd_vel", "geometry_msgs/msg/Twist", (0.0,) * 6, DriveCommand("/hero_3", 0.0, 0.0)),
         ("/hero_3/cmd_vel", TWIST, (math.nan, 0, 0, 0, 0, 0), None),
+        ("/hero_3/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, math.inf), None),
         ("/hero_3/cmd_vel", TWIST, (0.1,), None),
         ("/hero_3/position_controller/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, 0), None),
         ("/turtle/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, 0), None),

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import pytest
 
 from hero_monitor.control.requests import AGE_MAX_S, is_fresh
-from hero_monitor.fleet_feed.losses import FORGOTTEN_S, LocalizationWatch, list_losses
+from hero_monitor.fleet_feed.losses import FORGOTTEN_S, NO_DRIVER, LocalizationWatch, list_losses
 from hero_monitor.serving.server import PAGES_MAX, choose_served
 
 
-def list_sources(drivers, localization=None, now_s=0.0, master=""):
-    return [loss.source for loss in list_losses(drivers, master, localization or LocalizationWatch(), now_s)]
+def list_sources(drivers, localization=None, now_s=0.0):
+    return [loss.source for loss in list_losses(drivers, "", localization or LocalizationWatch(), now_s)]
 
 
 def test_nothing_is_lost_while_all_that_was_ever_heard_answers():
@@ -25,7 +25,9 @@ def test_a_driver_that_does_not_answer_is_named_and_a_missing_one_too():
 
 
 def test_what_is_worst_comes_first():
-    assert list_sources({"/hero_driver": False}, master="http://pc:11311 does not answer") == ["driver", "master"]
+    losses = list_losses({"/hero_driver": False}, "http://pc:11311 does not answer", LocalizationWatch(), 0.0)
+    assert [loss.source for loss in losses] == ["driver", "master"]
+    assert all(loss.remedy.endswith("again: " + NO_DRIVER) for loss in losses)
 
 
 def test_localization_is_lost_within_two_seconds_and_later_not_missed():

@@ -181,12 +181,12 @@ def test_robots_on_a_picture_are_where_they_were_when_it_was_taken():
     picture = CameraPicture()
     picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
     for stamp_s in (100.0, 100.1, 100.2, 100.3):
-        picture.follow("hero_0", stamp_s, Pose(stamp_s - 100.0, 0.5, math.pi if stamp_s < 100.15 else -math.pi + 0.2))
+        picture.follow("hero_0", stamp_s, Pose(stamp_s - 100.0, 0.5, 3.0 if stamp_s < 100.15 else 3.2 - math.tau))
         picture.follow("hero_1", stamp_s - 50.0, Pose(1.0, 1.0, 0.0))  # it is silent, or was switched off
     image = CompressedImage(data=JPEG)
     image.header.stamp = rospy.Time.from_sec(100.15)
     picture.receive(image, 10.0)
-    assert picture.describe("map", 10.1)["poses"] == {"hero_0": [150, 500, round(1000 * (-math.pi + 0.1))]}
+    assert picture.describe("map", 10.1)["poses"] == {"hero_0": [150, 500, 3100]}
     image.header.stamp = rospy.Time.from_sec(100.35)  # newer than the poses: the newest counts
     picture.receive(image, 10.3)
     assert picture.describe("map", 10.3)["poses"]["hero_0"][0] == 300

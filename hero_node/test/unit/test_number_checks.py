@@ -20,6 +20,7 @@ def test_what_is_no_finite_number(value):
 def test_limits_belong_to_the_range():
     assert is_number(0.5) and is_number(1, 1, 2) and is_number(2, 1, 2) and not is_number(2.1, 1, 2)
     assert is_whole_number(1, 1, 2) and not is_whole_number(1.0) and not is_whole_number(3, 1, 2)
+    assert is_whole_number(-3) and is_number(-3) and is_whole_number(10**300) and not is_whole_number(0, 1)
 
 
 def test_goals_and_speeds_are_finite_numbers_also_of_numpy():
