@@ -67,6 +67,7 @@ def test_of_places_that_were_not_reached_the_newest_are_not_tried_again(swarm):
     places = [(5.0 + number, 0.0) for number in range(6)]
     for tried in range(1, 7):
         explorer.choose(pose, places[:tried], [], 0.0)
+        assert explorer.goal == places[tried - 1], "all nearer ones have failed"
         explorer.controller.state = State.FAILED
     explorer.choose(pose, places, [], 0.0)
     assert explorer.goal == places[0]  # failed longest ago
