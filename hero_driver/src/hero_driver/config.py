@@ -39,16 +39,12 @@ def _read_robots(name: str, value: Any) -> Tuple[Address, ...]:
         raise make_error(name, value, allowed)
     addresses = []
     for entry in value:
-        if (
-            not isinstance(entry, dict)
-            or not set(entry) <= {"host", "port"}
-            or not isinstance(entry.get("host"), str)
-        ):
+        if not isinstance(entry, dict) or not set(entry) <= {"host", "port"}:
             raise make_error(name, entry, allowed)
-        port = entry.get("port", DEFAULT_PORT)
-        if not is_whole_number(port, 1, 65535) or not entry["host"]:
+        host, port = entry.get("host"), entry.get("port", DEFAULT_PORT)
+        if not isinstance(host, str) or not host or not is_whole_number(port, 1, 65535):
             raise make_error(name, entry, allowed)
-        addresses.append(Address(entry["host"], port))
+        addresses.append(Address(host, port))
     if len(set(addresses)) != len(addresses):
         raise make_error(name, value, "a list that names no robot twice")
     return tuple(addresses)

@@ -12,11 +12,8 @@ from .tick_odometry import WheelGeometry
 
 
 def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
-    allowed = "a list of 6 numbers that are not negative"
-    if not isinstance(value, (list, tuple)) or len(value) != 6:
-        raise make_error(name, value, allowed)
-    if not all(is_number(entry, low=0.0) for entry in value):
-        raise make_error(name, value, allowed)
+    if not isinstance(value, (list, tuple)) or len(value) != 6 or not all(is_number(entry, low=0.0) for entry in value):
+        raise make_error(name, value, "a list of 6 numbers that are not negative")
     return tuple(float(entry) for entry in value)
 
 

@@ -34,8 +34,7 @@ class Endpoints:
         """label is the robot's name in log lines; log(level, throttle key, text)."""
         self._label = label
         self._log = log
-        self._subscribers: Dict[str, Tuple[Layout, RawSubscriber]] = {}
-        self._servers: Dict[str, Tuple[Layout, Any]] = {}
+        self._open: Dict[Tuple[str, str], Tuple[Layout, Callable[[], None]]] = {}  # what closes each kind and name
         self._errors: Dict[str, str] = {}
         self._closed = False
 
@@ -79,48 +78,45 @@ class Endpoints:
 
     def subscribe(self, name: str, layout: Layout, make_subscriber: Callable[[str], RawSubscriber]) -> bool:
         """Subscribe to a topic with the subscriber that make_subscriber(type) gives; return whether it can be used."""
-        known = self._subscribers.get(name)
-        if known is not None and known[0] != layout:
-            self.unsubscribe(name)
-        message_class = self._find_class("topic", name, layout)
-        if message_class is None:
-            return False
-        if name not in self._subscribers:
+
+        def open_subscriber(message_class: Any) -> Callable[[], None]:
             subscriber = make_subscriber(message_class._type)
-            self._subscribers[name] = layout, subscriber
             subscriber.open(name, message_types.make_raw_class(message_class), QUEUE_LENGTH)
-        return True
+            return subscriber.close
+
+        return self._register("topic", name, layout, open_subscriber)
 
     def unsubscribe(self, name: str) -> None:
         """Undo subscribe(); does nothing where there was none."""
-        if name in self._subscribers:
-            self._subscribers.pop(name)[1].close()
+        if ("topic", name) in self._open:
+            self._open.pop(("topic", name))[1]()
 
     def serve(self, name: str, layout: Layout, call: Callable[[bytes], bytes]) -> bool:
         """Offer a service, whose answers call(request) gives; return whether it can be used."""
-        known = self._servers.get(name)
-        if known is not None and known[0] != layout:
-            del self._servers[name]
-            known[1].shutdown("the robot declared it with another type")
-        service_class = self._find_class("service", name, layout)
-        if service_class is None:
-            return False
-        if name not in self._servers:
+
+        def open_service(service_class: Any) -> Callable[[], None]:
             raw_class = message_types.make_raw_service(service_class)
+            server = rospy.Service(name, raw_class, lambda request: raw_class._response_class(call(request.data)))
+            return functools.partial(server.shutdown, "the robot left, or declared it with another type")
 
-            def handle(request: Any) -> Any:
-                return raw_class._response_class(call(request.data))
+        return self._register("service", name, layout, open_service)
 
-            self._servers[name] = layout, rospy.Service(name, raw_class, handle)
-        return True
+    def _register(self, kind: str, name: str, layout: Layout, open_it: Callable[[Any], Callable[[], None]]) -> bool:
+        """Open what takes a topic or service, unless it is open; open_it(its class) returns what closes it again."""
+        known = self._open.get((kind, name))
+        if known is not None and known[0] != layout:
+            del self._open[kind, name]
+            known[1]()
+        found = self._find_class(kind, name, layout)
+        if found is not None and (kind, name) not in self._open:
+            self._open[kind, name] = layout, open_it(found)
+        return found is not None
 
     def close(self, released: Sequence[Callable[[], None]], publishers: Sequence[RawPublisher]) -> None:
         """Take everything down: what was released, and what a job before this one has opened of publishers."""
         calls = [*released, *(call for publisher in publishers for call in publisher.release())]
-        calls += [subscriber.close for _, subscriber in self._subscribers.values()]
-        calls += [functools.partial(server.shutdown, "the robot left") for _, server in self._servers.values()]
-        self._subscribers.clear()
-        self._servers.clear()
+        calls += [close for _, close in self._open.values()]
+        self._open.clear()
         for call in calls:
             try:
                 call()
