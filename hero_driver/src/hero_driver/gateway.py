@@ -14,7 +14,7 @@ from .command_sender import CommandSender
 from .commands.stop_progress import StopState
 from .config import DriverConfig
 from .fleet import namespaces
-from .fleet.admission import Admission
+from .fleet.admission import Admission, RateLimit
 from .fleet.namespaces import Identity
 from .fleet.registry import Decision, FleetRegistry, RobotRecord, RobotState, Verdict
 from .peer import Peer
@@ -98,7 +98,7 @@ class Gateway(LinkHandler):
             return refusal
         now_s = time.monotonic()
         session = Session(self._config, now_s)
-        peer = Peer(link, session, self._admission.limit_rate(now_s))
+        peer = Peer(link, session, RateLimit(self._config.max_packets_per_s, self._config.max_bytes_per_s, now_s))
         self.peers[link] = peer
         self.poll_link(link, now_s)
         return None
@@ -161,7 +161,7 @@ class Gateway(LinkHandler):
     def resume(self, now_s: float) -> None:
         """Keep robots that could not be read meanwhile, drop commands that waited, and continue stops at once."""
         for bridge in self.bridges.values():
-            bridge.commands.resume(now_s)
+            bridge.commands.queue.discard_motion(now_s)
         for peer in self.peers.values():
             peer.session.forgive_silence(now_s)
             if peer.stop is not None:
@@ -201,10 +201,9 @@ class Gateway(LinkHandler):
         record.packets += peer.session.reader.packets
         record.bad_packets += peer.session.reader.bad_packets
         record.received_length += link.received_length
-        now_s = time.monotonic()
         if record.link is link:
             record.last_heard_s = peer.session.last_receive_s
-        if self.fleet.leave(link, reason, now_s) is not None:
+        if self.fleet.leave(link, reason, time.monotonic()) is not None:
             self._log.log_throttled(
                 "debug" if reason == THE_DRIVER_ENDS else "warn",
                 "left " + record.identity.namespace,

@@ -10,7 +10,6 @@ from .fleet import log_lines
 from .fleet.admission import RateLimit
 from .fleet.registry import RobotRecord
 from .ros.robot_bridge import RobotBridge
-from .ros.robot_commands import NO_LIGHT
 from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
 from .transport.link import Link
@@ -44,11 +43,6 @@ class Peer:
         if self.record is not None:
             return "%s at %s (refused)" % (self.record.identity.namespace.lstrip("/"), self.link.address)
         return str(self.link.address)
-
-    @property
-    def light(self) -> bytes:
-        """The color (std_msgs/ColorRGBA) that the robot's light was given last; dark if none is known."""
-        return NO_LIGHT if self.bridge is None else self.bridge.commands.light
 
     def watch_wheels(self, topic: Topic) -> None:
         """Read the wheels of a robot without a bridge from its encoder."""

@@ -85,7 +85,7 @@ def describe_robot(
         received_length,
         bridge is not None and bridge.commands.tunes(now_s),
         problem,
-        0 if corrections is None else corrections.corrected_stamps,
+        0 if corrections is None else corrections.stamps.corrected,
         0 if corrections is None else corrections.odometry.resets,
         [] if corrections is None else sorted(corrections.transforms.foreign_frames),
         [

@@ -24,6 +24,7 @@ from .commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
 from .corrections.message_layouts import MD5SUMS
 from .peer import Peer, PeerOwner
 from .ros.message_types import apply_aliases
+from .ros.robot_commands import NO_LIGHT
 from .rosserial.errors import RosserialError
 from .rosserial.session import Topic
 from .transport.event_loop import CallLater
@@ -72,7 +73,8 @@ def encode_stop(peer: Peer, with_burst: bool) -> bytes:
             elif payload is not None:
                 motors += peer.session.encode_message(topic_id, payload)
             elif with_burst and is_light(topic):
-                light = peer.session.encode_message(topic_id, peer.light)
+                color = NO_LIGHT if peer.bridge is None else peer.bridge.commands.light
+                light = peer.session.encode_message(topic_id, color)
         except RosserialError:
             continue  # its buffer is too small for such a message, so nothing can drive the robot by it
     return BURST_LIGHTS * light + (twists or motors)

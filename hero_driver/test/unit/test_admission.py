@@ -10,6 +10,7 @@ from hero_driver.fleet.admission import (
     NEW_ROBOTS_PER_S,
     Admission,
     AdmissionLimits,
+    RateLimit,
 )
 
 ROBOT = "10.42.0.17"
@@ -129,8 +130,7 @@ def test_addresses_that_left_are_forgotten():
 
 
 def make_rate_limit(max_packets_per_s, max_bytes_per_s):
-    limits = AdmissionLimits(max_packets_per_s=max_packets_per_s, max_bytes_per_s=max_bytes_per_s)
-    return Admission(limits).limit_rate(0.0)
+    return RateLimit(max_packets_per_s, max_bytes_per_s, 0.0)
 
 
 def test_a_stock_robot_stays_far_below_the_rate_limits():

@@ -150,13 +150,11 @@ def test_a_program_that_goes_leaves_no_robot_driving(bench):
     assert bench.later == []
 
 
-def test_a_stop_and_a_pause_drop_what_waits(bench):
+def test_a_stop_drops_what_waits(bench):
     bench.command(twist(0.1))
     assert bench.commands.is_commanded
     bench.commands.stop()
     assert not bench.commands.is_commanded and bench.commands.queue.discarded == [100.0]
-    bench.commands.resume(105.0)
-    assert bench.commands.queue.discarded == [100.0, 105.0]
 
 
 def test_self_tuning_is_known_by_calls_and_for_a_while_by_its_log(monkeypatch):

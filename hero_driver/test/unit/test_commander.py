@@ -267,7 +267,7 @@ def test_after_a_pause_of_the_driver_a_command_that_waited_is_forgotten():
         robot = CommandedRobot(clock, network_s=0.3, has_readings=True)
         robot.publish_velocity(0.05)
         robot.publish_velocity(0.1)
-        robot.bridge.commands.resume(clock.now_s)
+        robot.bridge.commands.queue.discard_motion(clock.now_s)
         clock.run(2.0)
     assert [speed for _, speed in robot.list_speeds()] == [0.05]
 

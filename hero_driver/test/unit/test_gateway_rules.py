@@ -285,7 +285,7 @@ def test_a_pause_of_the_driver_forgives_silence_and_renews_stops(driver):
     link = driver.join(declarations=STOCK_DECLARATIONS)
     driver.gateway.stop_robot("/hero_0")
     peer, resumed = driver.gateway.peers[link], []
-    peer.bridge.commands.resume = resumed.append
+    peer.bridge.commands.queue.discard_motion = resumed.append
     driver.now_s += 30.0
     driver.gateway.resume(driver.now_s)
     assert resumed == [driver.now_s] and peer.stop._next_s <= driver.now_s == peer.stop._began_s

@@ -34,7 +34,7 @@ def test_messages_with_stamps_since_boot_get_the_time_of_their_arrival():
     for name in ("/hero_0/odom", "/hero_0/encoder"):
         assert read_stamp_ns(list_payloads(outputs, name)[0]) == NOW_NS
     assert {stamp_ns for stamp_ns, *_ in list_transforms(outputs)} == {NOW_NS}
-    assert robot.corrections.corrected_stamps >= 7
+    assert robot.corrections.stamps.corrected >= 7
 
 
 def test_odometry_and_its_transform_share_one_stamp_from_boot_on():

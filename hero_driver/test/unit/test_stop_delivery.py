@@ -281,7 +281,7 @@ def test_a_robot_that_only_motor_commands_reach_is_stopped_by_them():
         ]
         topics = {topic_id: SimpleNamespace(info=info, kind=kind) for (topic_id, _), info in zip(topics, infos)}
         session = SimpleNamespace(topics=topics, encode_message=encode)
-        return encode_stop(SimpleNamespace(session=session, light=b""), with_burst)
+        return encode_stop(SimpleNamespace(session=session, bridge=None), with_burst)
 
     light = (4, LIGHT_TYPE)
     assert stop_by((1, motor), (2, twist), (3, twist), light) == b"2,3,", "the controllers overwrite pulses"

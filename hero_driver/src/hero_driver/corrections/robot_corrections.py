@@ -79,6 +79,7 @@ class RobotCorrections:
     Attributes:
         model: of the robot, one of robot_models.
         odometry: the robot's tick odometry.
+        stamps: the filter of all its stamps.
         transforms: the robot's transforms.
         wheels: whether its wheels turn.
     """
@@ -87,7 +88,7 @@ class RobotCorrections:
         """Correct the messages of the robot in namespace; add_transform takes the transforms of all robots."""
         self._add_transform = add_transform
         self._namespace = namespace
-        self._stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
+        self.stamps = StampFilter(settings.stamps == "arrival", settings.max_future_s, settings.max_age_s)
         self._writer = message_layouts.OdometryWriter(settings.pose_covariance, settings.twist_covariance)
         self._uses_ticks = settings.odometry == "ticks"
         self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
@@ -100,7 +101,7 @@ class RobotCorrections:
         self._declared: Set[str] = set()
         self.odometry = TickOdometry(settings.find_geometry(namespace, self.model))
         self.transforms = TransformCorrector(
-            namespace, self._stamps, add_transform, self._take_odom_transform
+            namespace, self.stamps, add_transform, self._take_odom_transform
         )
         self._refused = 0
         self._packed_pose = self._pack_pose()
@@ -158,11 +159,6 @@ class RobotCorrections:
         """Messages and transforms that could not be used."""
         return self._refused + self.transforms.refused
 
-    @property
-    def corrected_stamps(self) -> int:
-        """Stamps that were replaced so far."""
-        return self._stamps.corrected
-
     def note_encoder(self, md5sum: str) -> None:
         """The robot declares an Encoder message of this md5, which tells its model."""
         model = self._settings.find_model(self._namespace, md5sum)
@@ -212,7 +208,7 @@ class RobotCorrections:
         if stamp_ns is None:
             self._refused += 1
             return
-        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
+        stamp_ns = self.stamps.correct(name, stamp_ns, arrival_ns)
         sink.publish(message_layouts.restamp(payload, next(self._seqs[name]), stamp_ns))
 
     def _correct_laser(self, sink: Sink, proximity_sink: Sink, payload: bytes, arrival_ns: int) -> None:
@@ -224,7 +220,7 @@ class RobotCorrections:
         if not proximity_sink.is_wanted:
             return
         name = self._proximity_name
-        stamp_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
+        stamp_ns = self.stamps.correct(name, stamp_ns, arrival_ns)
         proximity = message_layouts.make_proximity(payload, next(self._seqs[name]), stamp_ns, SCAN_TIME_S)
         if proximity is None:
             self._refused += 1
@@ -258,7 +254,7 @@ class RobotCorrections:
             velocity = message_layouts.read_odometry_velocity(payload)
             if velocity is not None:
                 self.wheels.read_velocity(*velocity)
-        corrected_ns = self._stamps.correct(self._odom_name, stamp_ns, arrival_ns)
+        corrected_ns = self.stamps.correct(self._odom_name, stamp_ns, arrival_ns)
         if self._has_encoder:
             if self._waiting:
                 self._release()

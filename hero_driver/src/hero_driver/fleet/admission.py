@@ -121,10 +121,6 @@ class Admission:
             return None
         return "its address sends too many bytes outside of packets: this does not speak rosserial"
 
-    def limit_rate(self, now_s: float) -> "RateLimit":
-        """Return the limit on what a new connection may send."""
-        return RateLimit(self._limits.max_packets_per_s, self._limits.max_bytes_per_s, now_s)
-
     @property
     def unidentified(self) -> int:
         """Number of unidentified connections."""

@@ -223,10 +223,6 @@ class RobotCommands:
         self._commanders.stop()
         self.queue.discard_motion(time.monotonic())
 
-    def resume(self, now_s: float) -> None:
-        """The driver runs again after a pause: what waits is old."""
-        self.queue.discard_motion(now_s)
-
     @property
     def is_commanded(self) -> bool:
         """Whether a program has asked for motion, and not for a stop, since the last stop()."""
