@@ -36,6 +36,9 @@ class Handler(LinkHandler):
     def report_bug(self, error):
         self.faults.append(error)
 
+    def poll(self, now_s):
+        """Have nothing to do."""
+
     def resume(self, now_s):
         """Have nothing to do."""
 
