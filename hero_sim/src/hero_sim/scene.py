@@ -45,7 +45,7 @@ class Shape(NamedTuple):
 
 
 def draw_robots(world: World, names: Sequence[str], lights: Sequence[Sequence[float]]) -> List[Shape]:
-    """Return the first robots of a world with headings and names; lights: red green blue alpha, dark if they are off."""
+    """Return the first robots of a world with headings and names; lights: red green blue alpha, dark if off."""
     shapes: List[Shape] = []
     poses, radii_m = world.poses.tolist(), world.errors.radius_m[:, 0].tolist()
     nose_m = (BODY_RADIUS_M, 0.008, 0.004)
