@@ -114,8 +114,8 @@ def run_and_judge(job):
     return bool(counts.failures), "\n".join(lines)
 
 
-def run_jobs(jobs: List[Job], cores: float) -> bool:
-    """Run all jobs, in order, as many at once as keep so many cores busy; return whether all passed."""
+def run_jobs(jobs: List[Job], max_load: float) -> bool:
+    """Run all jobs, in order, as many at once as add up to this load; return whether all passed."""
     # A background job of a shell ignores Ctrl-C, and so would all that it starts; the tests send Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     waiting, running = list(jobs), {}
@@ -125,7 +125,7 @@ def run_jobs(jobs: List[Job], cores: float) -> bool:
             while waiting or running:
                 # The next that fits; one alone may be as large as it likes.
                 load = sum(job.load for job in running.values())
-                fitting = [job for job in waiting if not running or load + job.load <= cores]
+                fitting = [job for job in waiting if not running or load + job.load <= max_load]
                 if fitting:
                     waiting.remove(fitting[0])
                     running[pool.submit(run_and_judge, fitting[0])] = fitting[0]
