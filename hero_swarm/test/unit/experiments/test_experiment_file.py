@@ -52,6 +52,12 @@ def test_parameters_of_the_behavior_can_vary():
     assert [cell.parameters for cell in experiment.cells] == [{"v0_m_s": -0.1}, {"v0_m_s": -0.05}] * 2
 
 
+def test_many_mappings_beside_each_other_are_not_deep():
+    means = ", ".join("{mean_of_last_s: {dispersion: %d}}" % last_s for last_s in range(1, 16))
+    text = FILE.replace("[cluster_fraction, {time_until: {dispersion: 1.15}}]", "[cluster_fraction, %s]" % means)
+    assert len(parse(text).metrics) == 16
+
+
 def test_without_anything_that_varies_there_is_one_cell():
     experiment = parse("behavior: a.B\nrobots: 5\ntime_s: 1\nseeds: {count: 2}\nmetrics: [dispersion]\n")
     assert len(experiment.cells) == 1 and experiment.cells[0].label == "all"

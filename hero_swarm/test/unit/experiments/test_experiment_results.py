@@ -13,6 +13,7 @@ from hero_swarm.experiments import code_version, report
 from hero_swarm.experiments.batch import METRICS_ENDING
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_swarm.experiments.reporting.statistics import correct_by_holm
 from hero_swarm.experiments.reporting.summary import build_report
 from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
 from hero_swarm.experiments.streams import Stream
@@ -224,6 +225,18 @@ def test_a_report_compares_runs_of_one_seed_and_says_what_is_missing():
     remarks = "\n".join(found.remarks)
     for words in ("2 of 8 runs are still missing", "4 seeds: ", "1 runs are left out", "not reached in 1 runs"):
         assert words in remarks
+
+
+def test_each_cell_is_compared_with_that_of_the_first_value_and_corrected():
+    text = FILE.replace("[2, 3]", "[2, 3, 4], delay_s: [0, 1]") + "compare: {metric: dispersion, between: robots}\n"
+    experiment = parse(text)
+    runs = [Run(cell, seed, (seed + cell * (seed - 6.3), 1.0)) for cell in range(6) for seed in range(5, 9)]
+    compared = build_report(experiment, runs).compared
+    assert [(first, second) for first, second, _ in compared] == [(0, 2), (0, 4), (1, 3), (1, 5)]
+    alone = [[run for run in runs if run.cell in cells] for *cells, _ in compared]
+    p_values = [build_report(experiment, own).compared[0][2].p_value for own in alone]
+    assert [one.p_value for _, _, one in compared] == list(correct_by_holm(p_values))
+    assert compared[0][2].p_value > p_values[0]
 
 
 def test_what_runs_record_is_found_by_cell_and_seed(tmp_path):
