@@ -161,7 +161,10 @@ def test_messages_of_another_layout_are_found(monkeypatch):
 
 def test_packages_that_are_not_on_the_path_are_named(monkeypatch):
     assert computer.check_packages().state == OK
-    monkeypatch.setattr(computer, "SUITE", ("hero_msgs", "hero_nowhere"))
+    monkeypatch.setattr(computer, "OPTIONS", ("hero_tools", "hero_nowhere"))
+    finding = computer.check_packages()
+    assert finding.state == OK and finding.text.endswith(", without hero_nowhere")
+    monkeypatch.setattr(computer, "CORE", ("hero_msgs", "hero_nowhere"))
     finding = computer.check_packages()
     assert finding.state == FAIL
     assert "hero_nowhere" in finding.text

@@ -221,7 +221,8 @@ def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
         get_path=lambda name: "/ws/" + name, get_manifest=lambda name: SimpleNamespace(version=name.rpartition("_")[2])
     )
     monkeypatch.setattr(computer.rospkg, "RosPack", lambda: finder)
-    monkeypatch.setattr(computer, "SUITE", ("a_1", "b_2"))
+    monkeypatch.setattr(computer, "CORE", ("a_1",))
+    monkeypatch.setattr(computer, "OPTIONS", ("b_2",))
     assert "several versions are mixed: 1, 2" in computer.check_packages().text
 
 

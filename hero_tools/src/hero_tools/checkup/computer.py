@@ -10,20 +10,24 @@ import rospkg
 
 from .points import Finding, ask_system, fail, ok, warn
 
-SUITE = (
+CORE = (
     "hero_bringup",
-    "hero_calibration",
     "hero_client",
-    "hero_description",
     "hero_driver",
     "hero_examples",
+    "hero_msgs",
+    "hero_node",
+    "hero_sim",
+    "hero_tutorial",
+)
+OPTIONS = (
+    "hero_calibration",
+    "hero_description",
     "hero_localization",
     "hero_monitor",
-    "hero_msgs",
     "hero_recording",
-    "hero_sim",
+    "hero_swarm",
     "hero_tools",
-    "hero_tutorial",
 )
 NEEDED_MODULES = ("rospy", "numpy", "yaml", "actionlib", "tf2_ros", "diagnostic_updater")
 FIRMWARE_MD5 = {
@@ -69,23 +73,25 @@ def check_python() -> Finding:
 
 
 def check_packages() -> Finding:
-    """Check that the suite is on ROS_PACKAGE_PATH, in one version."""
+    """Check that the core is on ROS_PACKAGE_PATH, and all that is there of the suite in one version."""
     finder = rospkg.RosPack()
     paths, versions, missing = [], set(), []
-    for name in SUITE:
+    for name in CORE + OPTIONS:
         try:
             paths.append(finder.get_path(name))
             versions.add(finder.get_manifest(name).version)
         except rospkg.ResourceNotFound:
             missing.append(name)
-    if missing:
-        return fail("not on ROS_PACKAGE_PATH: " + ", ".join(missing), SOURCE)
+    missing_core = [name for name in missing if name in CORE]
+    if missing_core:
+        return fail("not on ROS_PACKAGE_PATH: " + ", ".join(missing_core), SOURCE)
     if len(versions) > 1:
         return fail(
             "packages of several versions are mixed: " + ", ".join(sorted(versions)),
             "rebuild all of them from one clone, and source only that workspace",
         )
-    return ok("all of version %s, below %s" % (versions.pop(), os.path.commonpath(paths)))
+    text = "all of version %s, below %s" % (versions.pop(), os.path.commonpath(paths))
+    return ok(text + (", without " + ", ".join(missing) if missing else ""))
 
 
 def check_messages() -> Finding:
