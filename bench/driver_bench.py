@@ -255,13 +255,13 @@ def find_driver_command(workspace):
 
 
 def measure_all(options, commands):
-    """Return the medians for each number of robots and server; the servers take turns in every round."""
+    """Return the medians for each number of robots and server; each other round begins with the other server."""
     results = []
     with use_master(options) as environment:
         for count in options.count:
             runs: Dict[str, List[dict]] = {name: [] for name in commands}
-            for _ in range(options.rounds):
-                for name, command in commands.items():
+            for turn in range(options.rounds):
+                for name, command in sorted(commands.items(), reverse=turn % 2 == 0):
                     runs[name].append(run_once(options, command, count, environment))
                     print_run(name, runs[name])
             results += [{"server": name, **take_medians(runs[name])} for name in commands]
@@ -328,7 +328,11 @@ def main():
         parser.error("--history is for one driver: leave --against out")
     commands = {"": options.server_command}
     if options.against:
-        commands = {"this driver": DRIVER_COMMAND, "the other": find_driver_command(options.against)}
+        # Both are started in the same way.
+        commands = {
+            "this driver": find_driver_command(HERE.parent),
+            "the other": find_driver_command(options.against),
+        }
     machine_us = measure_machine_us()
     print_machine(machine_us)
     results = measure_all(options, commands)
