@@ -303,5 +303,7 @@ def test_outside_of_a_checkout_the_commit_is_unknown(monkeypatch, failure):
     def fail(*arguments, **options):
         raise failure
 
+    # The first call in a process asks a program, too.
+    monkeypatch.setattr(code_version.platform, "platform", lambda: "Linux")
     monkeypatch.setattr(code_version.subprocess, "check_output", fail)
     assert code_version.describe_machine()["commit"] == "unknown"
