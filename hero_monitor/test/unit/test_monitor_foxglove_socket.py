@@ -150,7 +150,7 @@ def test_topics_are_subscribed_to_while_there_is_a_client(topics):
     reading = FoxgloveEndpoint(topics.source, [])
     reading.add(make_socket())
     reading.remove(reading._sockets[0])
-    assert opened == [7] and closed == [7], "one that takes no messages tells nobody"
+    assert opened == [7] and closed == [7], "without a publisher nothing is opened or closed"
 
 
 def test_a_client_that_still_receives_gets_the_rest_in_one_write_later():

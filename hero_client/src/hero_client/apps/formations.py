@@ -34,10 +34,10 @@ class FormationError(ProgramError):
     """A formation that cannot be taken; the text names the key, the value and what it must be."""
 
 
-def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[Point]:
+def place_formation(formation: Any, count: int, min_spacing_m: float) -> List[Point]:
     """Return count places [x, y], m, in the frame in which center is given.
 
-    formation: a table, or its text in YAML. least_spacing_m: closer together robots could not reach their places.
+    formation: a table, or its text in YAML. min_spacing_m: closer together robots could not reach their places.
     Raises: FormationError.
     """
     if isinstance(formation, str):
@@ -64,7 +64,7 @@ def place_formation(formation: Any, count: int, least_spacing_m: float) -> List[
         places = _grid(count, spacing_m, formation)
     else:
         places = _read_points(formation, count)
-    _check_spacing(places, least_spacing_m)
+    _check_spacing(places, min_spacing_m)
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return [(center[0] + x * cos - y * sin, center[1] + x * sin + y * cos) for x, y in places]
 
@@ -99,11 +99,11 @@ def _read_points(formation: Dict[str, Any], count: int) -> List[Point]:
     return [_read_point("points", point) for point in points]
 
 
-def _check_spacing(places: List[Point], least_spacing_m: float) -> None:
+def _check_spacing(places: List[Point], min_spacing_m: float) -> None:
     apart_m = min((math.dist(*pair) for pair in combinations(places, 2)), default=math.inf)
-    if apart_m < least_spacing_m:
+    if apart_m < min_spacing_m:
         text = "formation: two places are %.3f m apart, but robots need %.2f m: make spacing_m larger"
-        raise FormationError(text % (apart_m, least_spacing_m))
+        raise FormationError(text % (apart_m, min_spacing_m))
 
 
 def _read_number(key: str, value: Any) -> float:

@@ -17,7 +17,7 @@ class WifiProfile(NamedTuple):
     base_ms: float  # least delay in one direction
     jitter_ms: float  # mean of the exponential delay on top
     bytes_per_s: float  # 0 for no limit
-    outages_ms: Sequence[Tuple[float, float, float]] = ()  # mean time between two; least, most in which nothing passes
+    outages_ms: Sequence[Tuple[float, float, float]] = ()  # mean time between two; shortest and longest
 
 
 PROFILES: Dict[str, WifiProfile] = {
@@ -39,9 +39,9 @@ class _Outages:
         self._draw(0.0)
 
     def _draw(self, from_ms: float) -> None:
-        every_ms, least_ms, most_ms = self._outages_ms
-        self._start_ms = from_ms + self._rng.exponential(every_ms)
-        self._end_ms = self._start_ms + self._rng.uniform(least_ms, most_ms)
+        interval_ms, min_ms, max_ms = self._outages_ms
+        self._start_ms = from_ms + self._rng.exponential(interval_ms)
+        self._end_ms = self._start_ms + self._rng.uniform(min_ms, max_ms)
 
     def find_end(self, at_ms: float) -> float:
         """Return when bytes sent at at_ms can pass."""
