@@ -97,4 +97,4 @@ def run(options: argparse.Namespace) -> None:
 
 def main() -> None:
     """Run the program export."""
-    command_line.run(lambda: run(parse_options(sys.argv[1:])), RecordingError)
+    command_line.run(lambda: run(parse_options(sys.argv[1:])))

@@ -140,4 +140,4 @@ def run(options: argparse.Namespace) -> None:
 
 def main() -> None:
     """Run the program plot."""
-    command_line.run(lambda: run(parse_options(sys.argv[1:])), RecordingError)
+    command_line.run(lambda: run(parse_options(sys.argv[1:])))

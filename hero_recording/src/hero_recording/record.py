@@ -21,7 +21,6 @@ import rosgraph
 import roslib.packages
 
 from hero_node import command_line
-from hero_node.errors import NodeError
 from hero_node.parameters import robot_ids_option
 from hero_node.processes import end_process
 from hero_node.ros.master import ask_master, check_master
@@ -267,4 +266,4 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Run the program record."""
-    command_line.run(lambda: run(sys.argv[1:]), RecordingError, NodeError)
+    command_line.run(lambda: run(sys.argv[1:]))

@@ -6,7 +6,6 @@ import signal
 from typing import Callable, Iterator, Optional, Sequence, Tuple
 
 from hero_node.command_line import WRONG_ARGUMENTS, call
-from hero_node.errors import HeroError
 
 from .build import build_simulator
 from .errors import OptionError
@@ -137,7 +136,7 @@ def _report(text: str) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Run the simulator; return the exit status."""
-    return call(lambda: _run(parse_options(build_parser(), arguments)), HeroError)
+    return call(lambda: _run(parse_options(build_parser(), arguments)))
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -17,7 +17,7 @@ import rosgraph.network
 import rospy
 
 from hero_node.command_line import call
-from hero_node.errors import HeroError, NodeError
+from hero_node.errors import NodeError
 from hero_node.ros.master import find_running_node
 from hero_node.ros.master_watch import MasterWatch
 from hero_node.ros.ros_node import end_ros_node, init_ros_node
@@ -113,7 +113,7 @@ def watch_master(has_ended: threading.Event) -> None:
 
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
-    status = call(_run, HeroError)
+    status = call(_run)
     end_ros_node("hero_sim ends", MASTER_WAIT_S)
     os._exit(status)
 

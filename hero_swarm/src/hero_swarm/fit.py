@@ -5,7 +5,6 @@ import sys
 from typing import Optional, Sequence
 
 from hero_node import command_line
-from hero_node.errors import HeroError
 from hero_node.safe_file import write_file
 from hero_sim.world.arena_file import load_arena
 
@@ -47,4 +46,4 @@ def fit(options: argparse.Namespace) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    command_line.run(lambda: fit(parse_options(arguments)), HeroError)
+    command_line.run(lambda: fit(parse_options(arguments)))

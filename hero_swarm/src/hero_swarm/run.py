@@ -3,7 +3,6 @@
 from typing import Optional, Sequence
 
 from hero_node import command_line
-from hero_node.errors import HeroError
 
 from .experiments.runner import open_folder, parse_options, run_experiment
 
@@ -21,4 +20,4 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         _, experiment, folder, runs = open_folder(options)
         print(run_on_robots(experiment, folder, runs, options))
 
-    command_line.run(run, HeroError)
+    command_line.run(run)

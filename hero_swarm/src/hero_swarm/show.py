@@ -10,7 +10,6 @@ from importlib import import_module
 from typing import Any, Optional, Sequence
 
 from hero_node import command_line
-from hero_node.errors import HeroError
 
 from .experiments.batch import build_trial
 from .experiments.code_version import hash_code
@@ -88,4 +87,4 @@ def show_run(options: argparse.Namespace) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    command_line.run(lambda: show_run(parse_options(arguments)), HeroError)
+    command_line.run(lambda: show_run(parse_options(arguments)))

@@ -19,6 +19,7 @@ import sys
 from typing import List, Optional, Sequence, Tuple
 
 from hero_node import command_line
+from hero_node.errors import HeroError
 
 CONNECTION = "hero_hotspot"
 ADDRESS = "10.42.0.1"  # robots connect to it by default
@@ -39,7 +40,7 @@ SETTINGS = (
 )  # fmt: skip
 
 
-class HotspotError(Exception):
+class HotspotError(HeroError):
     """The hotspot cannot be created or removed; the text is one line with the remedy."""
 
 
@@ -196,4 +197,4 @@ def run(arguments: Sequence[str]) -> int:
 
 def main() -> None:
     """Run the program hotspot."""
-    command_line.run(lambda: run(sys.argv[1:]), HotspotError)
+    command_line.run(lambda: run(sys.argv[1:]))
