@@ -3,102 +3,69 @@
 Public names are imported on first use (PEP 562), so that pure modules of this package work without ROS.
 """
 
+# ruff: noqa: PLC0414
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, List
 
-if TYPE_CHECKING:  # for editors and mypy
-    from hero_node.clock import Clock
-    from hero_node.command_line import run
-    from hero_node.errors import HeroError, NodeError, ProgramError
-    from hero_node.geometry import Pose, Velocity
-    from hero_node.ros.private_parameters import read_parameters
-    from hero_node.ros.program import Program
-    from hero_node.ros.script import rate, start_node
+if TYPE_CHECKING:  # for editors and mypy, to which a name with `as` is public
+    from hero_node.clock import Clock as Clock
+    from hero_node.command_line import run as run
+    from hero_node.errors import HeroError as HeroError
+    from hero_node.errors import NodeError as NodeError
+    from hero_node.errors import ProgramError as ProgramError
+    from hero_node.geometry import Pose as Pose
+    from hero_node.geometry import Velocity as Velocity
+    from hero_node.ros.private_parameters import read_parameters as read_parameters
+    from hero_node.ros.program import Program as Program
+    from hero_node.ros.script import rate as rate
+    from hero_node.ros.script import start_node as start_node
 
-    from .apps.go_to_goal_server import GoToGoalServer
-    from .robot import Robot
-    from .robots.common_frame import CommonFrame
-    from .robots.robot_base import BaseRobot
-    from .robots.swarm_base import BaseSwarm
-    from .ros.drivers import Drivers
-    from .ros.stop_status import StopStatus
-    from .swarm import Swarm, open_swarm
-    from .values.background_motion import BackgroundMotion
-    from .values.colors import COLORS
-    from .values.errors import (
-        FrameError,
-        GoalError,
-        RobotError,
-        RobotNotReadyError,
-        StaleDataError,
-        StoppedError,
-    )
-    from .values.readings import Obstacle
+    from .apps.go_to_goal_server import GoToGoalServer as GoToGoalServer
+    from .robot import Robot as Robot
+    from .robots.common_frame import CommonFrame as CommonFrame
+    from .robots.robot_base import BaseRobot as BaseRobot
+    from .robots.swarm_base import BaseSwarm as BaseSwarm
+    from .ros.drivers import Drivers as Drivers
+    from .ros.stop_status import StopStatus as StopStatus
+    from .swarm import Swarm as Swarm
+    from .swarm import open_swarm as open_swarm
+    from .values.background_motion import BackgroundMotion as BackgroundMotion
+    from .values.colors import COLORS as COLORS
+    from .values.errors import FrameError as FrameError
+    from .values.errors import GoalError as GoalError
+    from .values.errors import RobotError as RobotError
+    from .values.errors import RobotNotReadyError as RobotNotReadyError
+    from .values.errors import StaleDataError as StaleDataError
+    from .values.errors import StoppedError as StoppedError
+    from .values.readings import Obstacle as Obstacle
 
-__all__ = [
-    "COLORS",
-    "BackgroundMotion",
-    "BaseRobot",
-    "BaseSwarm",
-    "Clock",
-    "CommonFrame",
-    "Drivers",
-    "FrameError",
-    "GoToGoalServer",
-    "GoalError",
-    "HeroError",
-    "NodeError",
-    "Obstacle",
-    "Pose",
-    "Program",
-    "ProgramError",
-    "Robot",
-    "RobotError",
-    "RobotNotReadyError",
-    "StaleDataError",
-    "StopStatus",
-    "StoppedError",
-    "Swarm",
-    "Velocity",
-    "open_swarm",
-    "rate",
-    "read_parameters",
-    "run",
-    "start_node",
-]
-
-_MODULES = {
-    "BackgroundMotion": "hero_client.values.background_motion",
-    "BaseRobot": "hero_client.robots.robot_base",
-    "BaseSwarm": "hero_client.robots.swarm_base",
-    "COLORS": "hero_client.values.colors",
-    "Clock": "hero_node.clock",
-    "CommonFrame": "hero_client.robots.common_frame",
-    "Drivers": "hero_client.ros.drivers",
-    "FrameError": "hero_client.values.errors",
-    "GoToGoalServer": "hero_client.apps.go_to_goal_server",
-    "GoalError": "hero_client.values.errors",
-    "HeroError": "hero_node.errors",
-    "NodeError": "hero_node.errors",
-    "Obstacle": "hero_client.values.readings",
-    "Pose": "hero_node.geometry",
-    "Program": "hero_node.ros.program",
-    "ProgramError": "hero_node.errors",
-    "Robot": "hero_client.robot",
-    "RobotError": "hero_client.values.errors",
-    "RobotNotReadyError": "hero_client.values.errors",
-    "StaleDataError": "hero_client.values.errors",
-    "StopStatus": "hero_client.ros.stop_status",
-    "StoppedError": "hero_client.values.errors",
-    "Swarm": "hero_client.swarm",
-    "Velocity": "hero_node.geometry",
-    "open_swarm": "hero_client.swarm",
-    "rate": "hero_node.ros.script",
-    "read_parameters": "hero_node.ros.private_parameters",
-    "run": "hero_node.command_line",
-    "start_node": "hero_node.ros.script",
+_NAMES = {
+    "hero_client.apps.go_to_goal_server": ["GoToGoalServer"],
+    "hero_client.robot": ["Robot"],
+    "hero_client.robots.common_frame": ["CommonFrame"],
+    "hero_client.robots.robot_base": ["BaseRobot"],
+    "hero_client.robots.swarm_base": ["BaseSwarm"],
+    "hero_client.ros.drivers": ["Drivers"],
+    "hero_client.ros.stop_status": ["StopStatus"],
+    "hero_client.swarm": ["Swarm", "open_swarm"],
+    "hero_client.values.background_motion": ["BackgroundMotion"],
+    "hero_client.values.colors": ["COLORS"],
+    "hero_client.values.errors": [
+        "FrameError", "GoalError", "RobotError", "RobotNotReadyError", "StaleDataError", "StoppedError",
+    ],
+    "hero_client.values.readings": ["Obstacle"],
+    "hero_node.clock": ["Clock"],
+    "hero_node.command_line": ["run"],
+    "hero_node.errors": ["HeroError", "NodeError", "ProgramError"],
+    "hero_node.geometry": ["Pose", "Velocity"],
+    "hero_node.ros.private_parameters": ["read_parameters"],
+    "hero_node.ros.program": ["Program"],
+    "hero_node.ros.script": ["rate", "start_node"],
 }
+_MODULES = {name: module for module, names in _NAMES.items() for name in names}
+
+__all__ = list(_MODULES)
 
 
 def __getattr__(name: str) -> Any:
@@ -115,4 +82,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> List[str]:
-    return __all__
+    return sorted(__all__)
