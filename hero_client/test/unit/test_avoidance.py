@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from hero_client.controllers import avoidance
 from hero_client.controllers.avoidance import (
-    DETOUR,
+    MAX_DETOUR_RAD_S,
     STOP_STEPS,
     WANDER,
     WanderMemory,
@@ -109,10 +110,10 @@ def test_a_detour_is_the_sum_of_goal_push_and_swirl():
     assert bend_around(AHEAD, 0.0, 0.5, look(left=0.115, right=0.1))[1] == 1
 
 
-def test_a_detour_is_limited_and_never_driven_into_what_is_ahead():
+def test_a_detour_is_limited_and_never_driven_into_what_is_ahead(monkeypatch):
     command, _ = bend_around(AHEAD, 0.0, 0.5, look(front=0.0))
-    assert command == (0.0, DETOUR.max_angular_rad_s), "backwards is no way"
-    gentle = DETOUR._replace(push=0.1)
+    assert command == (0.0, MAX_DETOUR_RAD_S), "backwards is no way"
+    monkeypatch.setattr(avoidance, "PUSH", 0.1)
     for range_m, is_driving in ((0.069, False), (0.071, True)):
-        command, _ = bend_around(AHEAD, 0.0, 0.5, look(front=range_m), law=gentle)
+        command, _ = bend_around(AHEAD, 0.0, 0.5, look(front=range_m))
         assert (command.linear_m_s > 0.0) == is_driving

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hero_client.controllers.unicycle import FOLLOW, GO_TO, SMOOTH, follow, go_to_point, go_to_pose
+from hero_client.controllers.unicycle import FOLLOW, GO_TO, TOLERANCE_RAD, follow, go_to_point, go_to_pose
 from hero_node.geometry import STOP, Pose, measure_distance, wrap_angle
 
 STEP_S = 0.02
@@ -27,25 +27,25 @@ def test_a_smooth_curve_ends_at_the_place_with_the_heading(place, yaw_rad):
     pose, goal, fastest_m_s = Pose(0.0, 0.0, 0.0), Pose(*place, yaw_rad), 0.0
     at_goal = False
     for _ in range(3000):
-        at_goal = at_goal or measure_distance(pose, goal) < SMOOTH.tolerance_m
+        at_goal = at_goal or measure_distance(pose, goal) < GO_TO.tolerance_m
         command = go_to_pose(pose, goal, at_goal=at_goal)
-        assert abs(command.linear_m_s) <= SMOOTH.max_linear_m_s + 1e-9
-        assert abs(command.angular_rad_s) <= SMOOTH.max_angular_rad_s + 1e-9
+        assert abs(command.linear_m_s) <= GO_TO.max_linear_m_s + 1e-9
+        assert abs(command.angular_rad_s) <= GO_TO.max_angular_rad_s + 1e-9
         if command == STOP:
             break
         fastest_m_s = max(fastest_m_s, command.linear_m_s)
         pose = advance(pose, command)
-    assert measure_distance(pose, goal) < 1.5 * SMOOTH.tolerance_m
-    assert abs(wrap_angle(pose.yaw_rad - yaw_rad)) < SMOOTH.tolerance_rad
-    assert fastest_m_s > 0.5 * SMOOTH.max_linear_m_s
+    assert measure_distance(pose, goal) < 1.5 * GO_TO.tolerance_m
+    assert abs(wrap_angle(pose.yaw_rad - yaw_rad)) < TOLERANCE_RAD
+    assert fastest_m_s > 0.5 * GO_TO.max_linear_m_s
 
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("yaw_rad", [-2.0, 0.5, 3.0])
 def test_a_turn_that_is_too_fast_slows_the_same_curve_down(place, yaw_rad):
     pose, goal = Pose(0.0, 0.0, 0.3), Pose(*place, yaw_rad)
-    free = go_to_pose(pose, goal, SMOOTH._replace(max_angular_rad_s=1e6))
-    slow = go_to_pose(pose, goal, SMOOTH._replace(max_angular_rad_s=0.01))
+    free = go_to_pose(pose, goal, GO_TO._replace(max_angular_rad_s=1e6))
+    slow = go_to_pose(pose, goal, GO_TO._replace(max_angular_rad_s=0.01))
     assert slow.linear_m_s > 0.0
     assert slow.angular_rad_s == pytest.approx(math.copysign(0.01, free.angular_rad_s))
     assert slow.angular_rad_s / slow.linear_m_s == pytest.approx(free.angular_rad_s / free.linear_m_s)
@@ -53,7 +53,6 @@ def test_a_turn_that_is_too_fast_slows_the_same_curve_down(place, yaw_rad):
 
 def test_robots_are_driven_as_fast_as_the_documents_say():
     assert (GO_TO.max_linear_m_s, GO_TO.max_angular_rad_s, GO_TO.tolerance_m) == (0.12, 1.5, 0.01)
-    assert (SMOOTH.max_linear_m_s, SMOOTH.max_angular_rad_s, SMOOTH.tolerance_m) == (0.12, 1.5, 0.01)
     assert (FOLLOW.gap_m, FOLLOW.max_linear_m_s, FOLLOW.max_angular_rad_s) == (0.15, 0.15, 2.0)
 
 
@@ -76,7 +75,7 @@ def test_near_its_goal_a_robot_slows_down_and_at_last_drives_straight():
         assert docking == pytest.approx(go_to_point(Pose(0.0, 0.0, 0.0), 0.02, side))
     arrived = go_to_pose(Pose(0.0, 0.0, 0.0), Pose(0.009, 0.0, 0.2))
     assert arrived == pytest.approx((0.0, 1.5 * 0.2))
-    assert go_to_pose(Pose(0.0, 0.0, 0.0), Pose(0.009, 0.0, -3.0)) == (0.0, -SMOOTH.max_angular_rad_s)
+    assert go_to_pose(Pose(0.0, 0.0, 0.0), Pose(0.009, 0.0, -3.0)) == (0.0, -GO_TO.max_angular_rad_s)
 
 
 def test_a_point_is_approached_by_the_nearer_end():

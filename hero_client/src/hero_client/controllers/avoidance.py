@@ -126,33 +126,23 @@ def _choose_side(left_m: float, right_m: float, otherwise: int) -> int:
     return otherwise if left_m == right_m else 1 if left_m > right_m else -1
 
 
-class DetourLaw(NamedTuple):
-    """Settings of driving around obstacles."""
+INFLUENCE_M = 0.18
+"""Obstacles nearer than this push."""
 
-    influence_m: float = 0.18
-    """Obstacles nearer than this push."""
-    body_m: float = 0.05
-    """At this range one beam pushes `push` times as hard as the goal pulls."""
-    push: float = 1.5
-    swirl: float = 1.2
-    """Share of the push that acts sideways, so that the robot slides along a wall and does not stop before it."""
-    turn_gain: float = 2.0
-    max_linear_m_s: float = 0.08
-    max_angular_rad_s: float = 2.0
+BODY_M, PUSH = 0.05, 1.5
+"""At this range one beam pushes so many times as hard as the goal pulls."""
 
+SWIRL = 1.2
+"""Share of the push that acts sideways, so that the robot slides along a wall and does not stop before it."""
 
-DETOUR = DetourLaw()
+DETOUR_GAIN = 2.0
+MAX_DETOUR_M_S, MAX_DETOUR_RAD_S = 0.08, 2.0
 
 
 def bend_around(
-    command: Velocity,
-    bearing_rad: float,
-    distance_m: float,
-    ranges: Sequence[float],
-    side: int = 0,
-    law: DetourLaw = DETOUR,
+    command: Velocity, bearing_rad: float, distance_m: float, ranges: Sequence[float], side: int = 0
 ) -> Tuple[Velocity, int]:
-    """Return (command, 0), or what goes around an obstacle nearer than both the goal and law.influence_m, and a side.
+    """Return (command, 0), or what goes around an obstacle nearer than both the goal and INFLUENCE_M, and a side.
 
     bearing_rad, distance_m: of the goal, from the robot. Obstacles push away, and along themselves to one side: +1
     passes them on their left, -1 on their right, 0 chooses the side on which the goal is. The caller gives the side
@@ -162,7 +152,7 @@ def bend_around(
         (index * 2.0 * math.pi / len(ranges), 0.0 if math.isnan(range_m) else range_m)
         for index, range_m in enumerate(ranges)
     ]
-    near = [(angle_rad, range_m) for angle_rad, range_m in seen if range_m < min(law.influence_m, distance_m)]
+    near = [(angle_rad, range_m) for angle_rad, range_m in seen if range_m < min(INFLUENCE_M, distance_m)]
     near = [item for item in near if abs(wrap_angle(item[0] - bearing_rad)) < math.radians(100.0)]
     if not near:
         return command, 0
@@ -170,13 +160,13 @@ def bend_around(
         side = 1 if wrap_angle(bearing_rad - min(near, key=lambda item: item[1])[0]) >= 0.0 else -1
     force_x, force_y = math.cos(bearing_rad), math.sin(bearing_rad)
     for angle_rad, range_m in near:
-        strength = law.push * min(1.0, (law.influence_m - range_m) / (law.influence_m - law.body_m)) ** 2
-        force_x -= strength * (math.cos(angle_rad) + side * law.swirl * math.sin(angle_rad))
-        force_y -= strength * (math.sin(angle_rad) - side * law.swirl * math.cos(angle_rad))
+        strength = PUSH * min(1.0, (INFLUENCE_M - range_m) / (INFLUENCE_M - BODY_M)) ** 2
+        force_x -= strength * (math.cos(angle_rad) + side * SWIRL * math.sin(angle_rad))
+        force_y -= strength * (math.sin(angle_rad) - side * SWIRL * math.cos(angle_rad))
     towards_rad = math.atan2(force_y, force_x)
-    angular_rad_s = clamp(law.turn_gain * towards_rad, law.max_angular_rad_s)
+    angular_rad_s = clamp(DETOUR_GAIN * towards_rad, MAX_DETOUR_RAD_S)
     # A detour is never driven backwards.
-    speed_m_s = law.max_linear_m_s * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
-    if split_sectors(ranges)[1] < law.body_m + 0.02:
+    speed_m_s = MAX_DETOUR_M_S * max(0.0, math.cos(towards_rad)) * min(1.0, math.hypot(force_x, force_y))
+    if split_sectors(ranges)[1] < BODY_M + 0.02:
         speed_m_s = 0.0
     return Velocity(speed_m_s, angular_rad_s), side

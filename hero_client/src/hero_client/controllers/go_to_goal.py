@@ -12,7 +12,7 @@ from hero_node.number_checks import check_finite
 from ..values.readings import find_nearest
 from .avoidance import bend_around
 from .motion import AIM_SHARE, DEFAULT_TIMEOUT_S, MotionController
-from .unicycle import GoToLaw, GoToPoseLaw, go_to_point, go_to_pose
+from .unicycle import GoToLaw, go_to_point, go_to_pose
 
 DEFAULT_TOLERANCE_M = 0.01
 
@@ -78,14 +78,14 @@ class GoToGoalController(MotionController):
         if self.goal.yaw_rad is None:
             return STOP
         target = Pose(self.goal.x_m, self.goal.y_m, self.goal.yaw_rad)
-        return go_to_pose(pose, target, GoToPoseLaw(), at_goal=True)
+        return go_to_pose(pose, target, at_goal=True)
 
     def _approach(self, pose: Pose, ranges: Sequence[float], seen_s: float) -> Velocity:
-        goal, tolerance_m = self.goal, AIM_SHARE * self._tolerance_m
+        goal, law = self.goal, GoToLaw(tolerance_m=AIM_SHARE * self._tolerance_m)
         if goal.yaw_rad is None:
-            command = go_to_point(pose, goal.x_m, goal.y_m, GoToLaw(tolerance_m=tolerance_m))
+            command = go_to_point(pose, goal.x_m, goal.y_m, law)
         else:
-            command = go_to_pose(pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad), GoToPoseLaw(tolerance_m=tolerance_m))
+            command = go_to_pose(pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad), law)
         if not self._avoid or not ranges:
             return command
         bearing_rad = wrap_angle(math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m) - pose.yaw_rad)

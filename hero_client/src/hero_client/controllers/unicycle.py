@@ -10,12 +10,12 @@ from hero_node.geometry import STOP, Pose, Velocity, clamp, measure_distance, wr
 
 
 class GoToLaw(NamedTuple):
-    """Gains and limits of going to a point: as quickly as its motors (0.5 s to a new speed) follow without swinging."""
+    """Gains and limits of going to a place: as quickly as motors (0.5 s to a new speed) follow without swinging."""
 
     linear_gain: float = 0.8
     """Speed in m/s per meter of distance, 1/s."""
     turn_gain: float = 1.5
-    """Turn in rad/s per radian of bearing, 1/s."""
+    """Turn in rad/s per radian of bearing, and of heading at the place, 1/s."""
     max_linear_m_s: float = 0.12
     max_angular_rad_s: float = 1.5
     tolerance_m: float = 0.01
@@ -41,31 +41,22 @@ def go_to_point(pose: Pose, x_m: float, y_m: float, law: GoToLaw = GO_TO) -> Vel
     return Velocity(linear_m_s, clamp(law.turn_gain * off_rad, law.max_angular_rad_s))
 
 
-class GoToPoseLaw(NamedTuple):
-    """Gains and limits of going to a point and ending with a heading."""
+K1 = 1.0
+"""Larger: the robot bends earlier towards the final heading."""
 
-    k1: float = 1.0
-    """Larger: the robot bends earlier towards the final heading."""
-    k2: float = 2.0
-    """Rate of convergence onto that curve, relative to the speed."""
-    slowing_m2: float = 0.003
-    """beta: how much it slows down in curves: to half where the curve has a radius of sqrt(beta)."""
-    linear_gain: float = 0.8
-    """Speed in m/s per meter of distance near the goal, 1/s."""
-    max_linear_m_s: float = 0.12
-    max_angular_rad_s: float = 1.5
-    heading_gain: float = 1.5
-    """Turn at the goal in rad/s per radian, 1/s."""
-    docking_m: float = 0.03
-    """Nearer than this straight to the place: the curve would be too tight for motors that lag 0.5 s."""
-    tolerance_m: float = 0.01
-    tolerance_rad: float = 0.05
+K2 = 2.0
+"""Rate of convergence onto that curve, relative to the speed."""
+
+SLOWING_M2 = 0.003
+"""beta: how much it slows down in curves: to half where the curve has a radius of sqrt(beta)."""
+
+DOCKING_M = 0.03
+"""Nearer than this straight to the place: the curve would be too tight for motors that lag 0.5 s."""
+
+TOLERANCE_RAD = 0.05
 
 
-SMOOTH = GoToPoseLaw()
-
-
-def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool = False) -> Velocity:
+def go_to_pose(pose: Pose, goal: Pose, law: GoToLaw = GO_TO, at_goal: bool = False) -> Velocity:
     """Return the command of a smooth curve to goal that ends in its heading; STOP where it is reached.
 
     at_goal: the place was reached already; only the heading counts, so that a millimeter of drift during the last
@@ -76,22 +67,19 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToPoseLaw = SMOOTH, at_goal: bool 
     distance_m = measure_distance(pose, goal)
     if at_goal or distance_m < law.tolerance_m:
         off_rad = wrap_angle(goal.yaw_rad - pose.yaw_rad)
-        if abs(off_rad) < law.tolerance_rad:
+        if abs(off_rad) < TOLERANCE_RAD:
             return STOP
-        return Velocity(0.0, clamp(law.heading_gain * off_rad, law.max_angular_rad_s))
-    if distance_m < law.docking_m:
-        docking = GoToLaw(
-            law.linear_gain, law.heading_gain, law.max_linear_m_s, law.max_angular_rad_s, law.tolerance_m
-        )
-        return go_to_point(pose, goal.x_m, goal.y_m, docking)
+        return Velocity(0.0, clamp(law.turn_gain * off_rad, law.max_angular_rad_s))
+    if distance_m < DOCKING_M:
+        return go_to_point(pose, goal.x_m, goal.y_m, law)
     sight_rad = math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m)
     goal_off_rad = wrap_angle(goal.yaw_rad - sight_rad)  # theta of the paper
     own_off_rad = wrap_angle(pose.yaw_rad - sight_rad)  # delta of the paper
     curvature_1_m = -(
-        law.k2 * (own_off_rad - math.atan(-law.k1 * goal_off_rad))
-        + (1.0 + law.k1 / (1.0 + (law.k1 * goal_off_rad) ** 2)) * math.sin(own_off_rad)
+        K2 * (own_off_rad - math.atan(-K1 * goal_off_rad))
+        + (1.0 + K1 / (1.0 + (K1 * goal_off_rad) ** 2)) * math.sin(own_off_rad)
     ) / distance_m
-    linear_m_s = law.max_linear_m_s / (1.0 + law.slowing_m2 * curvature_1_m**2)
+    linear_m_s = law.max_linear_m_s / (1.0 + SLOWING_M2 * curvature_1_m**2)
     linear_m_s = min(linear_m_s, law.linear_gain * distance_m)
     angular_rad_s = curvature_1_m * linear_m_s
     if abs(angular_rad_s) > law.max_angular_rad_s:  # the curve stays the same, only slower
