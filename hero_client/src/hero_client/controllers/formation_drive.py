@@ -1,11 +1,11 @@
 """Drives robots as one rigid body, each with two wheels: pure, from poses and one command to a command for each.
 
 A point ahead of each robot's axle follows its place in the body (feedback linearization: d'Andrea-Novel, Campion and
-Bastin, 1995), so robots may begin with any headings.
+Bastin, 1995), so robots may begin with any headings. Places and velocities are complex numbers, x + y i.
 """
 
-import math
-from typing import List, Sequence, Tuple
+import cmath
+from typing import List, Sequence
 
 from hero_node.geometry import Pose, Velocity, clamp
 
@@ -28,49 +28,32 @@ class FormationDrive:
 
     def __init__(self, poses: Sequence[Pose]) -> None:
         """Take the robots' poses in one frame."""
-        sin, cos = (sum(turn(pose.yaw_rad) for pose in poses) for turn in (math.sin, math.cos))
-        heading_rad = math.atan2(sin, cos)
         points = [_find_point_ahead(pose) for pose in poses]
-        x_m, y_m = (sum(values) / len(points) for values in zip(*points))
-        self.pose = Pose(x_m, y_m, heading_rad)
-        self._places_m = [_rotate(x - x_m, y - y_m, -heading_rad) for x, y in points]
+        middle = sum(points) / len(points)
+        yaw_rad = cmath.phase(sum(cmath.rect(1.0, pose.yaw_rad) for pose in poses))
+        self.pose = Pose(middle.real, middle.imag, yaw_rad)
+        self._places = [(point - middle) * cmath.rect(1.0, -yaw_rad) for point in points]
 
     def step(self, poses: Sequence[Pose], command: Velocity, period_s: float) -> List[Velocity]:
         """Move the body by command for period_s, as far as the robots keep up; return a command for each robot."""
-        targets = [self._find_place(index) for index in range(len(poses))]
+        middle, heading = complex(*self.pose[:2]), cmath.rect(1.0, self.pose.yaw_rad)
+        targets = [middle + place * heading for place in self._places]
         points = [_find_point_ahead(pose) for pose in poses]
-        lag_m = max(math.dist(target, point) for target, point in zip(targets, points))
-        radius_m = max(math.hypot(*place) for place in self._places_m)
-        fastest_m_s = abs(command.linear_m_s) + abs(command.angular_rad_s) * radius_m
+        lag_m = max(abs(target - point) for target, point in zip(targets, points))
+        fastest_m_s = abs(command.linear_m_s) + abs(command.angular_rad_s) * max(map(abs, self._places))
         share = min(1.0, max(0.0, (WAIT_FULLY_M - lag_m) / (WAIT_FULLY_M - WAIT_FROM_M)))
         share *= min(1.0, PLACE_SPEED_M_S / fastest_m_s) if fastest_m_s > 0.0 else 0.0
-        linear_m_s, angular_rad_s = command.linear_m_s * share, command.angular_rad_s * share
-        forward_x, forward_y = _rotate(linear_m_s, 0.0, self.pose.yaw_rad)
+        velocity, angular_rad_s = command.linear_m_s * share * heading, command.angular_rad_s * share
         commands = []
-        for pose, (x_m, y_m), (at_x_m, at_y_m) in zip(poses, targets, points):
-            along_m_s, across_m_s = _rotate(
-                forward_x - angular_rad_s * (y_m - self.pose.y_m) + GAIN_1_S * (x_m - at_x_m),
-                forward_y + angular_rad_s * (x_m - self.pose.x_m) + GAIN_1_S * (y_m - at_y_m),
-                -pose.yaw_rad,
-            )
-            robot_angular_rad_s = clamp(across_m_s / AHEAD_M, MAX_ANGULAR_RAD_S)
-            commands.append(Velocity(clamp(along_m_s, MAX_LINEAR_M_S), robot_angular_rad_s))
-        self.pose = Pose(
-            self.pose.x_m + forward_x * period_s,
-            self.pose.y_m + forward_y * period_s,
-            self.pose.yaw_rad + angular_rad_s * period_s,
-        )
+        for pose, target, point in zip(poses, targets, points):
+            wanted = velocity + 1j * angular_rad_s * (target - middle) + GAIN_1_S * (target - point)
+            wanted *= cmath.rect(1.0, -pose.yaw_rad)  # as seen from the robot
+            robot_angular_rad_s = clamp(wanted.imag / AHEAD_M, MAX_ANGULAR_RAD_S)
+            commands.append(Velocity(clamp(wanted.real, MAX_LINEAR_M_S), robot_angular_rad_s))
+        middle += velocity * period_s
+        self.pose = Pose(middle.real, middle.imag, self.pose.yaw_rad + angular_rad_s * period_s)
         return commands
 
-    def _find_place(self, index: int) -> Tuple[float, float]:
-        x_m, y_m = _rotate(*self._places_m[index], self.pose.yaw_rad)
-        return self.pose.x_m + x_m, self.pose.y_m + y_m
 
-
-def _find_point_ahead(pose: Pose) -> Tuple[float, float]:
-    return pose.x_m + AHEAD_M * math.cos(pose.yaw_rad), pose.y_m + AHEAD_M * math.sin(pose.yaw_rad)
-
-
-def _rotate(x: float, y: float, angle_rad: float) -> Tuple[float, float]:
-    sin, cos = math.sin(angle_rad), math.cos(angle_rad)
-    return x * cos - y * sin, x * sin + y * cos
+def _find_point_ahead(pose: Pose) -> complex:
+    return complex(pose.x_m, pose.y_m) + cmath.rect(AHEAD_M, pose.yaw_rad)
