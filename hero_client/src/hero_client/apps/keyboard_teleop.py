@@ -74,12 +74,9 @@ class KeyDrive:
         """Start stopped; linear_m_s, angular_rad_s: the speeds that keys give."""
         self.linear_m_s = linear_m_s
         self.angular_rad_s = angular_rad_s
-        self._forward = 0
-        self._left = 0
         self._last_key = ""
         self._last_press_s = -math.inf
-        self._forward_end_s = -math.inf
-        self._left_end_s = -math.inf
+        self.stop()
 
     def press(self, key: str, now_s: float) -> None:
         """Handle a key; one that has no meaning here changes nothing."""
@@ -99,22 +96,19 @@ class KeyDrive:
         """Set the parts of the motion that the key gives; the other part expires on its own."""
         held = key == self._last_key and now_s - self._last_press_s < REPEAT_TIMEOUT_S
         end_s = now_s + (REPEAT_TIMEOUT_S if held else FIRST_TIMEOUT_S)
-        forward, left = MOTIONS[key]
-        if forward:
-            self._forward, self._forward_end_s = forward, end_s
-        if left:
-            self._left, self._left_end_s = left, end_s
+        for part, sign in enumerate(MOTIONS[key]):
+            if sign:
+                self._parts[part] = sign, end_s
         self._last_key, self._last_press_s = key, now_s
 
     def stop(self) -> None:
         """Forget every motion."""
-        self._forward = self._left = 0
+        self._parts = [(0, -math.inf)] * 2  # forward and left: the sign, and when it expires
         self._last_key = ""
 
     def command(self, now_s: float) -> Velocity:
         """Return the command for now."""
-        forward = self._forward if now_s < self._forward_end_s else 0
-        left = self._left if now_s < self._left_end_s else 0
+        forward, left = (sign if now_s < end_s else 0 for sign, end_s in self._parts)
         return Velocity(forward * self.linear_m_s, left * self.angular_rad_s)
 
 

@@ -66,7 +66,7 @@ class GoToGoalController(MotionController):
     def change_goal(self, goal: Goal, tolerance_m: float, timeout_s: float, now_s: float) -> None:
         """Drive to another goal of the same frame from now on; its time limit begins now."""
         self.goal, self._tolerance_m, self._timeout_s = goal, tolerance_m, timeout_s
-        self._start_s, self._at_goal, self._stopped_since_s = now_s, False, None
+        self._start_s, self._at_goal, self._stopped_since_s = now_s, False, math.inf
         self._min_distance_m, self._progress_s = math.inf, self._seen_s
 
     def _offset(self, pose: Pose) -> float:

@@ -92,8 +92,8 @@ class MotionController:
         self._stepped_s = now_s
         self._seen_s = now_s  # runs only while the robot is seen
         self._silent_steps = 0
-        self._stopped_since_s: Optional[float] = None
-        self._blocked_since_s: Optional[float] = None
+        self._stopped_since_s = math.inf
+        self._blocked_since_s = math.inf
         self._patience_s = BLOCKED_S
         self._obstacle: Optional[Obstacle] = None
         self._moved_pose: Optional[Pose] = None
@@ -132,12 +132,11 @@ class MotionController:
         self._at_goal = self._offset(pose) < (1.0 if self._at_goal else AIM_SHARE)
         command = self._arrive(pose) if self._at_goal else self._approach(pose, ranges, seen_s)
         if self._at_goal and command == STOP:
-            if self._stopped_since_s is None:
-                self._stopped_since_s = seen_s
+            self._stopped_since_s = min(self._stopped_since_s, seen_s)
             if seen_s - self._stopped_since_s >= SETTLE_S:
                 self.state = State.REACHED
             return STOP
-        self._stopped_since_s = None
+        self._stopped_since_s = math.inf
         command = self._slow_for_obstacle(command, ranges, seen_s)
         self._check_wheels(pose, odometry, command, seen_s)
         problem = self._pose_check.add(pose, odometry, seen_s) if odometry is not None else ""
@@ -162,14 +161,13 @@ class MotionController:
         free_m, obstacle = find_in_path(ranges, backward=command.linear_m_s < 0.0)
         limit_m_s = APPROACH_GAIN * max(0.0, free_m - CLEARANCE_M)
         if obstacle is None or free_m >= self.distance_m or abs(command.linear_m_s) <= limit_m_s:
-            self._blocked_since_s = None
+            self._blocked_since_s = math.inf
             return command
         if limit_m_s > BLOCKED_M_S:
-            self._blocked_since_s = None
+            self._blocked_since_s = math.inf
             return Velocity(math.copysign(limit_m_s, command.linear_m_s), command.angular_rad_s)
         self._obstacle = obstacle
-        if self._blocked_since_s is None:
-            self._blocked_since_s = seen_s
+        self._blocked_since_s = min(self._blocked_since_s, seen_s)
         if seen_s - self._blocked_since_s >= self._patience_s:
             self._fail(self._describe_obstacle() + self._describe_distance())
         return Velocity(0.0, command.angular_rad_s)

@@ -50,11 +50,7 @@ class NewestMessage:
 
 
 class RateMeter:
-    """Measures how often something arrived in the last RATE_WINDOW_S.
-
-    Attributes:
-        total: how often it arrived so far.
-    """
+    """Measures how often something arrived in the last RATE_WINDOW_S; total: how often so far."""
 
     def __init__(self) -> None:
         self.total = 0
