@@ -3,7 +3,7 @@
 import time
 from concurrent.futures import Future
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Sequence, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Sequence, Tuple, Union
 
 import rospy
 
@@ -12,7 +12,7 @@ from hero_node.geometry import Pose
 
 from .background import Background
 from .control.client_commands import read_command
-from .control.commander import Commander, Notice
+from .control.commander import Commander
 from .control.dead_man import DriveCommand
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
 from .control.programs import PROGRAMS_MAX, Child, Programs
@@ -180,7 +180,7 @@ class PageRequests:
         sending = self._background.submit(self._commander.send_goal, "/" + robot, frame, goal, yaw_rad is not None)
         sending.add_done_callback(lambda sent: self._hand_over(self._tell_outcome, page, sent))
 
-    def _tell_outcome(self, page: "PageSocket", sent: "Future[Notice]") -> None:
+    def _tell_outcome(self, page: "PageSocket", sent: "Future[Tuple[str, str]]") -> None:
         self._pending_goals -= 1
         page.tell(*sent.result())
 

@@ -118,7 +118,7 @@ class Monitor:
             self._commander.close()
             self._foxglove.close()
             self._server.close()
-            self._background.close()
+            self._background.shutdown(wait=False)
 
     def _offer(self, paths: Dict[str, str]) -> None:
         self._programs.paths = paths

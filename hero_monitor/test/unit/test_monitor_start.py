@@ -121,7 +121,7 @@ def test_warnings_wait_for_no_terminal(monkeypatch):
     said.append("printed")
     background.warn("third")
     assert jobs[1:] == [(0.0, "third")]
-    background.close()
+    background.shutdown()
 
 
 def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):

@@ -6,7 +6,7 @@ for driving are opened, and goals sent, in the background.
 
 import math
 import time
-from typing import Dict, NamedTuple, Optional
+from typing import Dict, Optional, Tuple
 
 import rospy
 from geometry_msgs.msg import PoseStamped, Twist
@@ -25,13 +25,6 @@ LISTENER_TIMEOUT_S = 2.0
 """To connect to a driver or a program that takes goals; about 0.1 s is usual."""
 
 STOP_PERIOD_S = 0.06
-
-
-class Notice(NamedTuple):
-    """A line for the users of a page."""
-
-    level: str  # info, warn, error
-    text: str
 
 
 class Commander:
@@ -87,15 +80,18 @@ class Commander:
         _wait_for_connections(publisher, 1)
         self._velocities[namespace] = publisher
 
-    def send_goal(self, namespace: str, frame: str, goal: Pose, with_heading: bool) -> Notice:
-        """Send a goal in a frame to the program that takes goals for this robot; may take seconds."""
+    def send_goal(self, namespace: str, frame: str, goal: Pose, with_heading: bool) -> Tuple[str, str]:
+        """Send a goal in a frame to the program that takes goals for this robot; may take seconds.
+
+        Return level (info, warn, error) and text for the users of a page.
+        """
         name, topic = namespace.strip("/"), namespace + "/goal"
         try:
             if not self._has_listener(topic):
                 launch = "roslaunch hero_examples go_to_goal.launch robots:=%s" % name.rpartition("_")[2]
-                return Notice("error", "no program takes goals for %s: start one here, or %s" % (name, launch))
+                return "error", "no program takes goals for %s: start one here, or %s" % (name, launch)
         except NodeError as error:
-            return Notice("error", str(error))
+            return "error", str(error)
         message = PoseStamped()
         message.header.stamp = rospy.Time.now()
         message.header.frame_id = frame
@@ -104,7 +100,7 @@ class Commander:
             message.pose.orientation.z = math.sin(goal.yaw_rad / 2.0)
             message.pose.orientation.w = math.cos(goal.yaw_rad / 2.0)
         self._goals[topic].publish(message)
-        return Notice("info", "%s has a new goal" % name)
+        return "info", "%s has a new goal" % name
 
     def _has_listener(self, topic: str) -> bool:
         """Return whether another node subscribes to a topic, as soon as it is connected."""
