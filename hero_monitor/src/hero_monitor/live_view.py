@@ -11,6 +11,7 @@ import threading
 import time
 from collections import deque
 from concurrent.futures import Future
+from contextlib import ExitStack
 from typing import Any, Deque, Dict, List, Sequence, Set
 
 import tornado.ioloop
@@ -32,8 +33,8 @@ WAITING_MAX = 20_000
 _sleep, _monotonic = time.sleep, time.monotonic  # hero_sim.in_process replaces those of scripts
 
 
-class LiveView:
-    """A Foxglove endpoint on this PC that shows robots until it is closed.
+class LiveView(ExitStack):
+    """A Foxglove endpoint on this PC that shows robots until close(); then time passes as fast as it can.
 
     Attributes:
         port: on which it listens.
@@ -52,39 +53,30 @@ class LiveView:
         port: 0 for any that is free. speed: simulated seconds per second. origins: of web pages that may connect.
         Raises: ProgramError if the port is taken.
         """
+        super().__init__()
         self._rows = rows
         self._speed = speed
         self._origins = list(origins)
         self._wanted: Set[str] = set()
         self._waiting: Deque[TopicMessage] = deque(maxlen=WAITING_MAX)
         self._latched: Dict[str, TopicMessage] = {}
-        self._topics = StepTopics(rows, robot_ids, self._receive)
-        self._types = {name: TopicType(kind.name, kind.definition) for name, kind in self._topics.types.items()}
+        topics = StepTopics(rows, robot_ids, self._receive)
+        self._types = {name: TopicType(kind.name, kind.definition) for name, kind in topics.types.items()}
         self._loop: Any = None
         self._start_s = _monotonic() - rows.now_ms / 1000.0 / speed
         listening: Future[int] = Future()
-        self._thread = threading.Thread(target=self._serve, args=(port, listening), name="live view", daemon=True)
-        self._thread.start()
+        thread = threading.Thread(target=self._serve, args=(port, listening), name="live view", daemon=True)
+        thread.start()
         try:
             self.port = listening.result()
         except OSError as error:
-            self._topics.close()
+            topics.close()
             raise ProgramError("cannot listen on port %d: %s; choose another" % (port, error.strerror)) from None
         rows.on_cycle.append(self._pace)
-
-    def __enter__(self) -> "LiveView":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Disconnect viewers, and let simulated time pass as fast as it can; safe twice."""
-        if self._thread.is_alive():
-            self._topics.close()
-            self._rows.on_cycle.remove(self._pace)
-            self._loop.add_callback(self._loop.stop)
-            self._thread.join()
+        self.callback(thread.join)
+        self.callback(lambda: self._loop.add_callback(self._loop.stop))
+        self.callback(rows.on_cycle.remove, self._pace)
+        self.callback(topics.close)
 
     def _pace(self, rows: Any) -> None:
         """Wait until real time has come as far; a program that was slower does not catch up."""

@@ -6,6 +6,7 @@
 Times are simulated; the same run gives the same messages.
 """
 
+from contextlib import ExitStack
 from typing import Any, Dict, Sequence
 
 from hero_sim.stepped.robot_rows import RobotRows
@@ -16,14 +17,15 @@ from .errors import RecordingError, explain_write_errors
 from .optional import import_optional
 
 
-class StepRecorder:
-    """A bag that is open until close()."""
+class StepRecorder(ExitStack):
+    """A bag that is complete after close()."""
 
     def __init__(self, rows: RobotRows, robot_ids: Sequence[int], path: str) -> None:
         """Record the robots of the first world from now on.
 
         Raises: RecordingError if the file exists or cannot be written, or rosbags is not installed.
         """
+        super().__init__()
         rosbag1: Any = import_optional("rosbags.rosbag1", "rosbags")
         self._path = path
         self._connections: Dict[str, Any] = {}
@@ -33,14 +35,8 @@ class StepRecorder:
                 self._writer.open()
         except rosbag1.WriterError as error:
             raise RecordingError("%s: %s; move it away or choose another name" % (path, error)) from None
-        self._topics = StepTopics(rows, robot_ids, self._write)
-        self._is_open = True
-
-    def __enter__(self) -> "StepRecorder":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
+        self.callback(self._complete)
+        self.callback(StepTopics(rows, robot_ids, self._write).close)
 
     def _write(self, topic: str, kind: MessageType, content: bytes, time_ns: int) -> None:
         with explain_write_errors(self._path):
@@ -55,10 +51,6 @@ class StepRecorder:
                 )
             self._writer.write(self._connections[topic], time_ns, content)
 
-    def close(self) -> None:
-        """Complete the bag; safe twice."""
-        if self._is_open:
-            self._is_open = False
-            self._topics.close()
-            with explain_write_errors(self._path):
-                self._writer.close()
+    def _complete(self) -> None:
+        with explain_write_errors(self._path):
+            self._writer.close()

@@ -1,5 +1,6 @@
 """Reads a bag without ROS, with the package rosbags from PyPI."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Sequence, Tuple
 
@@ -7,22 +8,18 @@ from ..optional import import_optional
 from .topics import Message, RawMessage
 
 
-class Reader:
+class Reader(ExitStack):
     """One open bag, with the interface of ros_reader's."""
 
     unindexed = ("ReaderError", "AnyReaderError")
 
     def __init__(self, path: str, skip_index: bool = False) -> None:
         """Open the file, with its index in any case. Raises: RecordingError without rosbags; whatever it raises."""
+        super().__init__()
         del skip_index
         self._bag: Any = import_optional("rosbags.highlevel", "rosbags").AnyReader([Path(path)])
         self._bag.open()
-
-    def __enter__(self) -> "Reader":
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._bag.close()
+        self.callback(self._bag.close)
 
     def list_topics(self) -> Dict[str, Tuple[str, int]]:
         """Return the type of every topic, and the number of its messages."""

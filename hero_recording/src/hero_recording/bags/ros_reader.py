@@ -1,14 +1,15 @@
 """Reads a bag with ROS's rosbag."""
 
-from typing import Any, Dict, Iterator, Sequence, Tuple
+from contextlib import ExitStack
+from typing import Dict, Iterator, Sequence, Tuple
 
 import rosbag
 
 from .topics import Message, RawMessage
 
 
-class Reader:
-    """One open bag; a context manager.
+class Reader(ExitStack):
+    """One open bag.
 
     Attributes:
         unindexed: names of the errors that a bag without index raises.
@@ -18,13 +19,8 @@ class Reader:
 
     def __init__(self, path: str, skip_index: bool = False) -> None:
         """Open the file; skip_index: only to list topics. Raises: whatever rosbag does."""
-        self._bag = rosbag.Bag(path, "r", skip_index=skip_index)
-
-    def __enter__(self) -> "Reader":
-        return self
-
-    def __exit__(self, *error: Any) -> None:
-        self._bag.close()
+        super().__init__()
+        self._bag = self.enter_context(rosbag.Bag(path, "r", skip_index=skip_index))
 
     def list_topics(self) -> Dict[str, Tuple[str, int]]:
         """Return the type of every topic, and the number of its messages."""
