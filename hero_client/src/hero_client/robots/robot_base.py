@@ -78,6 +78,8 @@ class BaseRobot(Group):
                 self._link.wait_for_next(topic, self._first_data_s - self.now_s)
 
     def _check_fresh(self, topic: str) -> None:
+        if self._link.age_s(topic) <= FRESH_S:
+            return
         self.await_first(topic)
         age_s = self._link.age_s(topic)
         if age_s <= FRESH_S:

@@ -7,12 +7,12 @@ solved anew (E. Catto, Iterative Dynamics with Temporal Coherence, 2005).
 """
 
 import math
-from typing import Any, Tuple
+from typing import Any, Sequence, Tuple
 
 import numpy as np
 
 from .arena import Arena, list_obstacles, measure_clearance, square_length
-from .compiled import compile_loop
+from .compiled import compile_loops
 
 _PASSES = 100
 _SETTLED_M = 2e-5
@@ -26,26 +26,83 @@ _SHIFT_M = 0.006
 _MARGIN_M = 0.03
 """Distance that bodies may move until their neighbors are listed again; a larger margin makes each step slower."""
 
-_NONE, _NO_M = np.empty(0, dtype=int), np.empty(0)
+
+def _warm_start(
+    x: Any, y: Any, firsts: Any, seconds: Any, touching: Any, wanted: Any, pushes: Any,
+    rows: Any, start_x: Any, start_y: Any, along_x: Any, along_y: Any, length2: Any,
+    free: Any, wall_wanted: Any, wall_pushes: Any,
+) -> Tuple[bool, bool, float, float]:  # fmt: skip
+    """Find the contacts that matter in this step, and move robots as they were pushed in the last one, in place.
+
+    Arguments are those of _relax(). Returns whether bodies touch, whether a robot is at two obstacles, and how far all
+    may move until two robots, and until a robot and an obstacle could touch. A loop for compile_loops().
+    """
+    touches, has_corner, gap, wall_gap = False, False, math.inf, math.inf
+    first_x, first_y, second_x, second_y = [0.0] * len(x), [0.0] * len(x), [0.0] * len(x), [0.0] * len(x)
+    for k in range(len(firsts)):
+        a, b, push = firsts[k], seconds[k], pushes[k]
+        apart_x, apart_y = x[a] - x[b], y[a] - y[b]
+        distance = math.sqrt(apart_x * apart_x + apart_y * apart_y)
+        between = (distance - touching[k]) / 2.0
+        if between < gap:  # in lists twice as fast as min()
+            gap = between
+        # Robots that were placed into each other come apart step by step, never through a wall.
+        wanted[k] = min(distance + _SHIFT_M, touching[k]) if between < _SHIFT_M or push != 0.0 else 0.0
+        if push != 0.0:
+            touches = True
+            share = push / max(distance, _TOUCH_M)
+            first_x[a] += apart_x * share
+            first_y[a] += apart_y * share
+            second_x[b] -= apart_x * share
+            second_y[b] -= apart_y * share
+    wall_x, wall_y, last = [0.0] * len(x), [0.0] * len(x), -1
+    for k in range(len(rows)):
+        a, push = rows[k], wall_pushes[k]
+        to_x, to_y = x[a] - start_x[k], y[a] - start_y[k]
+        along = min(max((to_x * along_x[k] + to_y * along_y[k]) / length2[k], 0.0), 1.0)
+        away_x, away_y = to_x - along * along_x[k], to_y - along * along_y[k]
+        distance = math.sqrt(away_x * away_x + away_y * away_y)
+        between = distance - free[k]
+        if between < wall_gap:
+            wall_gap = between
+        wall_wanted[k] = 0.0
+        if between < _SHIFT_M or push != 0.0:
+            wall_wanted[k] = free[k]
+            has_corner = has_corner or a == last
+            last = a
+        if push != 0.0:
+            touches = True
+            share = push / max(distance, _TOUCH_M)
+            wall_x[a] += away_x * share
+            wall_y[a] += away_y * share
+    touches = touches or min(gap, wall_gap) < -_TOUCH_M
+    if touches:
+        for a in range(len(x)):
+            x[a] = x[a] + first_x[a] + second_x[a] + wall_x[a]
+            y[a] = y[a] + first_y[a] + second_y[a] + wall_y[a]
+    return touches, has_corner, gap, wall_gap
 
 
 def _relax(
-    settled: float, x: Any, y: Any, firsts: Any, seconds: Any, wanted: Any, pushes: Any, pair_ends: Any,
-    rows: Any, start_x: Any, start_y: Any, along_x: Any, along_y: Any, length2: Any, free: Any,
-    wall_pushes: Any, wall_ends: Any,
+    x: Any, y: Any, settled: float, firsts: Any, seconds: Any, wanted: Any, pushes: Any, pair_ends: Any,
+    rows: Any, start_x: Any, start_y: Any, along_x: Any, along_y: Any, length2: Any,
+    wall_wanted: Any, wall_pushes: Any, wall_ends: Any,
 ) -> None:  # fmt: skip
-    """Solve the contacts of each world, in place, until no push changes by settled (m). A loop for compile_loop().
+    """Solve the contacts of each world, in place, until no push changes by settled (m). A loop for compile_loops().
 
-    x, y: places (m) of all robots. Pair k, of the robots firsts[k] and seconds[k], is pushed by pushes[k] (m) each, to
+    x, y: places (m) of robots. Pair k, of the robots firsts[k] and seconds[k], is pushed by pushes[k] (m) each, to
     be wanted[k] apart; pair_ends: where the pairs of each world end. Robot rows[k] is pushed out of an obstacle by
-    wall_pushes[k]; the obstacle is a segment (see Segments), from which its center has to be free[k] away.
+    wall_pushes[k]; the obstacle is a segment (see Segments), from which its center has to be wall_wanted[k] away.
+    What is wanted to be 0 apart does not matter in this step.
     """
     begin = wall_begin = 0
     for world in range(len(pair_ends)):
         end, wall_end = pair_ends[world], wall_ends[world]
+        pairs = [k for k in range(begin, end) if wanted[k] != 0.0]
+        beside = [k for k in range(wall_begin, wall_end) if wall_wanted[k] != 0.0]
         for _ in range(_PASSES):
             changed = 0.0
-            for k in range(begin, end):
+            for k in pairs:
                 push = pushes[k]
                 a, b = firsts[k], seconds[k]
                 apart_x, apart_y = x[a] - x[b], y[a] - y[b]
@@ -63,16 +120,16 @@ def _relax(
                 y[a] += apart_y * share
                 x[b] -= apart_x * share
                 y[b] -= apart_y * share
-            for k in range(wall_begin, wall_end):
+            for k in beside:
                 push = wall_pushes[k]
                 a = rows[k]
                 to_x, to_y = x[a] - start_x[k], y[a] - start_y[k]
                 along = min(max((to_x * along_x[k] + to_y * along_y[k]) / length2[k], 0.0), 1.0)
                 away_x, away_y = to_x - along * along_x[k], to_y - along * along_y[k]
                 distance = max(math.sqrt(away_x * away_x + away_y * away_y), 1e-9)
-                if push == 0.0 and distance >= free[k]:
+                if push == 0.0 and distance >= wall_wanted[k]:
                     continue
-                change = max(free[k] - distance, -push)
+                change = max(wall_wanted[k] - distance, -push)
                 wall_pushes[k] = push + change
                 changed = max(changed, abs(change))
                 x[a] += away_x * (change / distance)
@@ -80,18 +137,6 @@ def _relax(
             if changed < settled:
                 break
         begin, wall_begin = end, wall_end
-
-
-def _find_touching(gaps_m: np.ndarray, pushes_m: np.ndarray) -> Tuple[bool, np.ndarray, float]:
-    """Return whether bodies touch, which of the entries could do so in this step (K,), and how far all may move.
-
-    gaps_m: between each two bodies, negative if they overlap. pushes_m: of each in the last step.
-    """
-    min_gap_m = float(np.minimum.reduce(gaps_m, initial=np.inf))
-    if min_gap_m >= -_TOUCH_M and not np.count_nonzero(pushes_m):
-        return False, (gaps_m < _SHIFT_M).nonzero()[0], min_gap_m
-    pushed = pushes_m != 0.0
-    return True, ((gaps_m < _SHIFT_M) | pushed).nonzero()[0], min_gap_m
 
 
 class Contacts:
@@ -111,19 +156,18 @@ class Contacts:
         self._ordered = np.triu(np.ones((self._shape[1], self._shape[1]), dtype=bool), k=1)
         self._obstacles, obstacle_radii_m = list_obstacles(arena)
         self._free_m = radii_m[:, None] + obstacle_radii_m
-        self._relax = compile_loop(_relax, rows)
+        self._world_ends = np.arange(1, worlds + 1) * self._shape[1]
+        self._hold, (self._warm_start, self._relax) = compile_loops(rows, _warm_start, _relax)
+        self._no_pair_ends = self._hold(np.zeros(worlds, dtype=int))
+        no_entries, nothing_m = np.empty((2, 0), dtype=int), np.empty(0)
+        self._list_entries(no_entries, nothing_m, no_entries, nothing_m)
+        # Load what is compiled now: at the first contact robots in real time would pause meanwhile.
+        self._reach_m = np.inf
+        self.separate(np.zeros((2, rows)))
+        self._solve(*[self._hold(nothing_m)] * 2, _SETTLED_M, self._no_pair_ends, self._hold(nothing_m))
         # How far all may still move until the lists are incomplete, and until two robots, and until a
         # robot and an obstacle could touch.
         self._reach_m = self._robots_gap_m = self._walls_gap_m = -np.inf
-        # Two robots that are near each other (2, P) and how far each was pushed in the last step; a robot, an obstacle
-        # near it, how far away its center has to be, and how far it was pushed.
-        self._pairs, self._pushes_m = np.empty((2, 0), dtype=int), _NO_M
-        self._touching_m = _NO_M  # distance of each two that touch
-        self._beside, self._wall_pushes_m = np.empty((2, 0), dtype=int), _NO_M
-        self._near, self._near_free_m = self._obstacles.take(_NONE), _NO_M
-        self._world_ends = np.arange(1, worlds + 1) * self._shape[1]
-        # Load what is compiled now: at the first contact robots in real time would pause meanwhile.
-        self._solve(np.zeros((2, rows)), _NONE, _NO_M, _NONE)
 
     def could_touch(self, moved_m: float) -> bool:
         """Note how far the fastest has moved; return whether bodies could have come to touch something."""
@@ -136,69 +180,66 @@ class Contacts:
         """Push bodies out of walls, obstacles and each other, in place."""
         if self._reach_m < 0.0:
             self._list_neighbors(positions_m)
-        touches, pairs, beside, wanted_m = False, _NONE, _NONE, _NO_M
-        if self._robots_gap_m < _SHIFT_M:
-            firsts, seconds = self._pairs
-            pair_m = positions_m.take(self._pairs, axis=1)
-            apart_m = pair_m[:, 0] - pair_m[:, 1]
-            distance_m = np.sqrt(square_length(apart_m))
-            touches, pairs, gap_m = _find_touching((distance_m - self._touching_m) / 2.0, self._pushes_m)
-            self._robots_gap_m = min(gap_m, self._reach_m)
-            # Robots that were placed into each other come apart step by step, never through a wall.
-            wanted_m = np.minimum(distance_m[pairs] + _SHIFT_M, self._touching_m[pairs])
-        if self._walls_gap_m < _SHIFT_M:
-            rows = self._beside[0]
-            away_m = self._near.point_away(positions_m.take(rows, axis=1))
-            free_m = np.sqrt(square_length(away_m))
-            enters, beside, gap_m = _find_touching(free_m - self._near_free_m, self._wall_pushes_m)
-            self._walls_gap_m = min(gap_m, self._reach_m)
-            touches |= enters
+        before_m = positions_m.take(self._rows, axis=1)
+        x, y = map(self._hold, before_m.copy())
+        touches, has_corner, robots_gap_m, walls_gap_m = self._warm_start(
+            x, y, *self._robots, self._touching_m, self._wanted_m, self._pushes_m,
+            *self._walls, self._free_near_m, self._wall_wanted_m, self._wall_pushes_m,
+        )  # fmt: skip
+        self._robots_gap_m = min(robots_gap_m, self._reach_m)
+        self._walls_gap_m = min(walls_gap_m, self._reach_m)
         if not touches:
             return
-        before_m = positions_m.copy()
-        if np.count_nonzero(self._pushes_m):
-            pressed, ways_m = _take_ways(apart_m, distance_m, self._pushes_m)
-            _push(positions_m, firsts[pressed], ways_m)
-            _push(positions_m, seconds[pressed], -ways_m)
-        if np.count_nonzero(self._wall_pushes_m):
-            pressed, ways_m = _take_ways(away_m, free_m, self._wall_pushes_m)
-            _push(positions_m, rows[pressed], ways_m)
-        self._solve(positions_m, pairs, wanted_m, beside)
-        self.could_touch(float(np.abs(positions_m - before_m).max()) * math.sqrt(2.0))
+        self._solve(x, y, _SETTLED_M, self._pair_ends, self._wall_pushes_m)
+        if has_corner:
+            # Whatever presses, walls are never entered; where two of them meet, the last pass may have left one.
+            self._solve(x, y, _TOUCH_M, self._no_pair_ends, self._hold(np.zeros(len(self._free_near_m))))
+        places_m = np.array((x, y))
+        positions_m[:, self._rows] = places_m
+        self.could_touch(float(np.abs(places_m - before_m).max()) * math.sqrt(2.0))
         # Those that press on each other are looked at in each step.
         if np.count_nonzero(self._pushes_m):
             self._robots_gap_m = 0.0
         if np.count_nonzero(self._wall_pushes_m):
             self._walls_gap_m = 0.0
 
-    def _solve(self, positions_m: np.ndarray, pairs: np.ndarray, wanted_m: np.ndarray, beside: np.ndarray) -> None:
-        """Solve the contacts of pairs, to be wanted_m apart, and of robots beside obstacles: entries of the lists."""
-        firsts, seconds = self._pairs.take(pairs, axis=1)
-        rows, near = self._beside[0, beside], self._near.take(beside)
-        obstacles = (rows, *near.start_m, *near.along_m, near.length_m2, self._near_free_m[beside])
-        pushes_m, wall_pushes_m = self._pushes_m[pairs], self._wall_pushes_m[beside]
-        pair_ends, wall_ends = firsts.searchsorted(self._world_ends), rows.searchsorted(self._world_ends)
-        robots = (firsts, seconds, wanted_m, pushes_m, pair_ends)
-        self._relax(_SETTLED_M, *positions_m, *robots, *obstacles, wall_pushes_m, wall_ends)
-        self._pushes_m[pairs], self._wall_pushes_m[beside] = pushes_m, wall_pushes_m
-        if np.count_nonzero(rows[1:] == rows[:-1]):
-            # Whatever presses, walls are never entered; where two of them meet, the last pass may have left one.
-            robots = (_NONE, _NONE, _NO_M, _NO_M, np.zeros_like(pair_ends))
-            self._relax(_TOUCH_M, *positions_m, *robots, *obstacles, 0.0 * wall_pushes_m, wall_ends)
+    def _solve(self, x: Any, y: Any, settled_m: float, pair_ends: Any, wall_pushes_m: Any) -> None:
+        pairs = (*self._robots, self._wanted_m, self._pushes_m, pair_ends)
+        self._relax(x, y, settled_m, *pairs, *self._walls, self._wall_wanted_m, wall_pushes_m, self._wall_ends)
 
     def _list_neighbors(self, positions_m: np.ndarray) -> None:
         """List which robots are near each other, and near what."""
         self._reach_m = _MARGIN_M
         near_m = _SHIFT_M + _MARGIN_M
         pairs = self._find_pairs(positions_m, 2.0 * float(self._radii_m.max()) + 2.0 * near_m)
-        self._pushes_m = _carry_over(self._pairs, self._pushes_m, pairs, positions_m.shape[1])
-        self._pairs, self._touching_m = pairs, self._radii_m.take(pairs).sum(axis=0)
+        pushes_m = _carry_over(self._pairs, self._pushes_m, pairs, positions_m.shape[1])
         away_m = self._obstacles.for_each_place().point_away(positions_m[..., None])
         free_m = self._free_m + near_m
-        entries = np.array((square_length(away_m) < free_m * free_m).nonzero())
-        self._wall_pushes_m = _carry_over(self._beside, self._wall_pushes_m, entries, self._free_m.shape[1])
-        self._beside = entries
-        self._near, self._near_free_m = self._obstacles.take(entries[1]), self._free_m[entries[0], entries[1]]
+        beside = np.array((square_length(away_m) < free_m * free_m).nonzero())
+        wall_pushes_m = _carry_over(self._beside, self._wall_pushes_m, beside, self._free_m.shape[1])
+        self._list_entries(pairs, pushes_m, beside, wall_pushes_m)
+
+    def _list_entries(
+        self, pairs: np.ndarray, pushes_m: np.ndarray, beside: np.ndarray, wall_pushes_m: np.ndarray
+    ) -> None:
+        """Note which robots are near each other, and near what, for loops that number only these robots.
+
+        pairs (2, P) of robots, and how far each of them was pushed in the last step (P,). beside (2, Q): a robot and an
+        obstacle, and how far it was pushed (Q,).
+        """
+        self._pairs, self._beside = pairs, beside
+        (firsts, seconds), (rows, obstacles) = pairs, beside
+        self._rows, numbers = np.unique(np.concatenate((firsts, seconds, rows)), return_inverse=True)
+        self._robots = [self._hold(part) for part in numbers[: pairs.size].reshape(2, -1)]
+        self._touching_m = self._hold(self._radii_m[firsts] + self._radii_m[seconds])
+        self._wanted_m, self._pushes_m = self._hold(np.zeros(len(firsts))), self._hold(pushes_m)
+        self._pair_ends = self._hold(firsts.searchsorted(self._world_ends))
+        near = self._obstacles.take(obstacles)
+        walls = (numbers[pairs.size :], *near.start_m, *near.along_m, near.length_m2)
+        self._walls = [self._hold(part) for part in walls]
+        self._free_near_m = self._hold(self._free_m[rows, obstacles])
+        self._wall_wanted_m, self._wall_pushes_m = self._hold(np.zeros(len(rows))), self._hold(wall_pushes_m)
+        self._wall_ends = self._hold(rows.searchsorted(self._world_ends))
 
     def _find_pairs(self, positions_m: np.ndarray, distance_m: float) -> np.ndarray:
         """Return the rows (2, P) of the first and the second of all two robots less than distance_m apart."""
@@ -219,21 +260,12 @@ class Contacts:
         return robots_m, np.maximum(self._radii_m - measure_clearance(positions_m.T, self._arena), 0.0)
 
 
-def _take_ways(ways_m: np.ndarray, lengths_m: np.ndarray, pushes_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return which entries (K,) are pushed, and how far along ways_m (2, P), of lengths_m (P,), by pushes_m (P,)."""
-    pressed = (pushes_m != 0.0).nonzero()[0]  # of truth values: ten times as fast as of numbers
-    return pressed, ways_m.take(pressed, axis=1) * (pushes_m[pressed] / np.maximum(lengths_m[pressed], _TOUCH_M))
-
-
-def _push(positions_m: np.ndarray, rows: np.ndarray, ways_m: np.ndarray) -> None:
-    """Move the robots at rows (K,), any of them several times, by ways_m (2, K), in place."""
-    for axis_m, axis_ways_m in zip(positions_m, ways_m):
-        axis_m += np.bincount(rows, axis_ways_m, len(axis_m))
-
-
-def _carry_over(entries: np.ndarray, values: np.ndarray, wanted: np.ndarray, columns: int) -> np.ndarray:
+def _carry_over(entries: np.ndarray, values: Sequence[float], wanted: np.ndarray, columns: int) -> np.ndarray:
     """Return the values (W,) of the wanted entries (2, W), zero for new ones; both in ascending order."""
+    values = np.asarray(values)
+    if not np.count_nonzero(values):
+        return np.zeros(wanted.shape[1])
     keys, wanted_keys = entries[0] * columns + entries[1], wanted[0] * columns + wanted[1]
-    carried = np.zeros(len(wanted_keys))
-    carried[np.isin(wanted_keys, keys)] = values[np.isin(keys, wanted_keys)]
-    return carried
+    found = keys.searchsorted(wanted_keys)
+    known = keys.take(found, mode="clip") == wanted_keys
+    return np.where(known, values.take(found, mode="clip"), 0.0)
