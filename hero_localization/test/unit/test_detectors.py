@@ -2,6 +2,7 @@
 
 import math
 import sys
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hero_localization.errors import DetectorError
 from hero_localization.prints.tag_images import draw_tag
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, tag_corners
+from hero_localization.tracking import detectors
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors, find_print_mistake
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_sim.world.arena import build_rectangle
@@ -101,6 +103,39 @@ def test_fine_detectors_find_blurred_tags_of_16_px_and_none_in_noise():
         assert tag.tag_id == 5 and np.abs(tag.center - (113.5, 63.5)).max() < 0.3
     for family in ("36h11", "16h5"):
         assert not any(detector.detect(noise) for detector in create_fine_detectors(family))
+
+
+def draw_on_floor(cell_px, contrast=0.7):
+    """Return an image (H, W) of tag 5 on a floor with noise, and the part of it that the tag takes."""
+    cells = np.pad(draw_tag("36h11", 5), 1, constant_values=255)
+    image, part = np.full((900, 1200), 110.0), slice(60, 60 + cell_px * len(cells))
+    image[part, part] = np.kron(contrast * (cells - 127.0) + 110.0, np.ones((cell_px, cell_px)))
+    noise = np.random.RandomState(1).normal(0.0, 3.0, image.shape)
+    return np.clip(cv2.GaussianBlur(image, (0, 0), 0.8) + noise, 0, 255).astype(np.uint8), part
+
+
+@pytest.mark.parametrize(("cell_px", "contrast"), [(3, 0.7), (15, 0.7), (60, 0.7), (2, 0.15)])
+@pytest.mark.parametrize("decimate", [1.0, 2.0])
+def test_corners_are_the_same_where_noise_of_the_ground_is_removed(cell_px, contrast, decimate, monkeypatch):
+    pytest.importorskip("apriltag")
+    image, _ = draw_on_floor(cell_px, contrast)
+    (tag,) = create_detector("apriltag", decimate=decimate).detect(image)
+    monkeypatch.setattr(detectors, "EVEN_FROM_PX", image.size)
+    (same,) = create_detector("apriltag", decimate=decimate).detect(image)
+    assert tag.tag_id == same.tag_id == 5 and np.array_equal(tag.corners, same.corners)
+
+
+def test_noise_of_even_ground_alone_is_removed(monkeypatch):
+    """apriltag skips what differs by less than 5 within 12 px: most of an image."""
+    pytest.importorskip("apriltag")
+    image, part = draw_on_floor(3)
+    detector, given = create_detector("apriltag"), []
+    monkeypatch.setattr(detector, "_detector", Mock(detect=lambda gray: given.append(gray) or []))
+    for window in (image, image[:200, :200]):
+        detector.detect(window)
+    assert np.array_equal(given[0][part, part], image[part, part]) and np.array_equal(given[1], image[:200, :200])
+    blocks = given[0].reshape(75, 12, 100, 12)
+    assert np.mean(blocks.max(axis=(1, 3)) - blocks.min(axis=(1, 3)) < 5) > 0.95
 
 
 def test_center_is_where_the_diagonals_cross():

@@ -22,6 +22,9 @@ _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 SHARPEN_PX = 1.0
 """Radius of the unsharp mask of fine detectors: cells of 2 px are as wide as the blur of a webcam."""
 
+EVEN_CONTRAST, EVEN_FROM_PX = 8, 200 * 200
+"""Most that means of 4 x 4 px differ by on even ground, of 255; pixels of the smallest image that has much of it."""
+
 MIN_MISTAKEN_TAGS = 3
 """Fewer may be noise."""
 
@@ -62,6 +65,8 @@ class AprilTagDetector(TagDetector):
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
         shift, scale = np.array(origin) - 0.5, max(self._enlarge, 1)
+        if gray.size > EVEN_FROM_PX:
+            gray = _remove_noise(gray)
         if self._enlarge:
             gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
             gray = cv2.addWeighted(gray, 2.0, cv2.GaussianBlur(gray, (0, 0), scale * SHARPEN_PX), -1.0, 0.0)
@@ -70,6 +75,16 @@ class AprilTagDetector(TagDetector):
             for found in self._detector.detect(np.ascontiguousarray(gray))
             if found["margin"] >= self._least_margin
         ]
+
+
+def _remove_noise(gray: np.ndarray) -> np.ndarray:
+    """Return an image without the noise of its even ground, on which apriltag spends most of its time."""
+    around = np.ones((7, 7), np.uint8)
+    means = cv2.resize(gray, None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA)
+    darkest = cv2.erode(means, around)  # which varies less than the mean
+    even = (cv2.dilate(means, around) - darkest <= EVEN_CONTRAST).astype(np.uint8)
+    even, darkest = (cv2.resize(part, gray.shape[::-1], interpolation=cv2.INTER_NEAREST) for part in (even, darkest))
+    return np.where(even, darkest, gray)
 
 
 class ArucoDetector(TagDetector):
