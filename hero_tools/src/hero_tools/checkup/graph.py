@@ -3,6 +3,7 @@
 The return path is tried: the node rosout runs beside the master and must connect to a node here that has /rosout.
 """
 
+import contextlib
 import os
 import urllib.parse
 from typing import Any, Dict, List, Optional, Sequence, Tuple
@@ -27,23 +28,24 @@ CLEAN_UP = "did it end without a word? rosnode cleanup"
 
 
 def read_master_host() -> str:
-    """Return the host of ROS_MASTER_URI. Raises: ValueError with what is wrong."""
-    uri = rosgraph.get_master_uri()
-    try:
-        parts = urllib.parse.urlsplit(uri)
+    """Return the host of ROS_MASTER_URI; empty if that is no address of a master."""
+    with contextlib.suppress(ValueError):  # a port beyond 65535, half an IPv6 address
+        parts = urllib.parse.urlsplit(rosgraph.get_master_uri())
         if parts.scheme == "http" and parts.hostname and parts.port:
             return parts.hostname
-    except ValueError:
-        pass  # a port beyond 65535, half an IPv6 address
-    raise ValueError("ROS_MASTER_URI is %s, but must be like http://ADDRESS:11311" % ascii(uri))
+    return ""
+
+
+def fail_master_uri() -> Finding:
+    """Return the finding of a ROS_MASTER_URI that is no address of a master."""
+    text = "ROS_MASTER_URI is %s, but must be like http://ADDRESS:11311" % ascii(rosgraph.get_master_uri())
+    return fail(text, "export ROS_MASTER_URI=http://localhost:11311")
 
 
 def check_variables(own: Optional[Sequence[Address]]) -> Finding:
     """Check the variables by which nodes find each other."""
-    try:
-        read_master_host()
-    except ValueError as error:
-        return fail(str(error), "export ROS_MASTER_URI=http://localhost:11311")
+    if not read_master_host():
+        return fail_master_uri()
     ip, hostname = os.environ.get("ROS_IP", ""), os.environ.get("ROS_HOSTNAME", "")
     addresses = [found.address for found in own or []]
     if ip and own is not None and ip not in addresses and not ip.startswith("127."):
@@ -61,10 +63,7 @@ def check_own_name(own: Sequence[Address]) -> Finding:
     """Check whether other PCs find the nodes of this PC by the name that they register."""
     name = rosgraph.network.get_host_name()
     found = resolve(name)
-    try:
-        master = resolve(read_master_host())
-    except ValueError:
-        master = resolve("localhost")
+    master = resolve(read_master_host() or "localhost")
     is_remote = bool(master) and not any(is_own(address, own) for address in master)
     address = find_source_address(next(iter(master))) if is_remote else None
     export = "export ROS_IP=%s" % (address or (own[0].address if own else "127.0.0.1"))
@@ -82,10 +81,9 @@ def check_own_name(own: Sequence[Address]) -> Finding:
 
 def check_master(own: Sequence[Address]) -> Finding:
     """Check whether the master answers at ROS_MASTER_URI."""
-    try:
-        host = read_master_host()
-    except ValueError as error:
-        return fail(str(error), "export ROS_MASTER_URI=http://localhost:11311")
+    host = read_master_host()
+    if not host:
+        return fail_master_uri()
     uri = rosgraph.get_master_uri()
     addresses = resolve(host)
     if not addresses:
