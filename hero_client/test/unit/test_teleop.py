@@ -104,7 +104,7 @@ def test_keys_choose_robots_and_those_that_were_driven_stop(shown):
         teleop.press(key, 0.0)
         assert [robot.robot_id for robot in teleop._chosen] == chosen
         assert [robot.robot_id for robot, link in zip(swarm, swarm.links) if velocities(link)] == stopped
-    assert shown == ["hero_7 is not among the robots of this teleop: hero_0, hero_4, hero_2\n"]
+    assert shown == ["hero_7 is not in this swarm: hero_0, hero_4, hero_2\n"]
     teleop.press("g", 0.0)
     teleop.press("w", 0.0)
     teleop.press("2", 0.1)

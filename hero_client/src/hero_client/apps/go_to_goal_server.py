@@ -4,7 +4,8 @@ Callbacks only queue requests, because actionlib holds its lock meanwhile; a thr
 """
 
 import threading
-from typing import Any
+from contextlib import contextmanager
+from typing import Any, Iterator
 
 import actionlib
 import rospy
@@ -55,24 +56,17 @@ class GoToGoalServer(goals.GoalQueue):
     # ---------------------------------------------------------------- callbacks, on ROS's threads
 
     def _receive_goal(self, message: PoseStamped) -> None:
-        try:
-            goal, frame = goals.read_goal(message, use_heading=True)
-        except goals.InvalidGoalError as error:
-            self._reject(str(error), None)
-        else:
-            self.put_goal(goal, frame)
+        with self._rejecting():
+            self.put_goal(*goals.read_goal(message, use_heading=True))
 
     def _receive_action(self, handle: Any) -> None:
         wanted = handle.get_goal()
         tolerance_m = wanted.tolerance or self._tolerance_m
         timeout_s = wanted.timeout or self._timeout_s
-        try:
+        with self._rejecting(handle):
             goal, frame = goals.read_goal(wanted.target, wanted.use_heading)
             goals.check_limits(tolerance_m, timeout_s)
-        except goals.InvalidGoalError as error:
-            self._reject(str(error), handle)
-        else:
-            self._put(goals.GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
+            self.put(goals.GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
 
     def _receive_cancel(self, handle: Any) -> None:
         self.cancel(handle)
@@ -80,19 +74,19 @@ class GoToGoalServer(goals.GoalQueue):
 
     def put_goal(self, goal: Goal, frame: str = "") -> None:
         """Accept a goal with the server's own tolerance and time limit; an empty frame means hero_N/odom."""
-        self._put(goals.GoalRequest(goal, frame, self._tolerance_m, self._timeout_s))
+        with self._rejecting():
+            self.put(goals.GoalRequest(goal, frame, self._tolerance_m, self._timeout_s))
 
-    def _put(self, request: goals.GoalRequest) -> None:
+    @contextmanager
+    def _rejecting(self, handle: Any = None) -> Iterator[None]:
+        """Reject a goal that turns out to be invalid, and wake the server's thread."""
         try:
-            self.put(request)
+            yield
         except goals.InvalidGoalError as error:
-            self._reject(str(error), request.handle)
+            rospy.logerr("%s: goal refused: %s", self.robot.name, error)
+            if handle is not None:
+                handle.set_rejected(GoToResult(reason=str(error)))
         self._news.set()
-
-    def _reject(self, problem: str, handle: Any) -> None:
-        rospy.logerr("%s: goal refused: %s", self.robot.name, problem)
-        if handle is not None:
-            handle.set_rejected(GoToResult(reason=problem))
 
     # ---------------------------------------------------------------- the server's thread
 

@@ -164,12 +164,10 @@ class KeyboardTeleop:
         elif key == "g":
             self._choose(self._swarm.robots)
         elif key.isdecimal():
-            chosen = [robot for robot in self._swarm if str(robot.robot_id) == key]
-            if chosen:
-                self._choose(chosen)
-            else:
-                names = ", ".join(robot.name for robot in self._swarm)
-                show_text("hero_%s is not among the robots of this teleop: %s\n" % (key, names))
+            try:
+                self._choose([self._swarm[int(key)]])
+            except KeyError as error:
+                show_text("%s\n" % error.args[0])
         else:
             self._drive.press(key, now_s)
             if key in STOP_KEYS:
