@@ -72,8 +72,8 @@ class Recording:
                 found.append((status.st_ctime_ns, path, status.st_size))
         return {path: size for _, path, size in sorted(found)}
 
-    def run(self) -> int:
-        """Record until something ends it; return the exit code."""
+    def run(self) -> None:
+        """Record until something ends it. Raises: RecordingError if that was not the user, or files were left open."""
         for path in sorted(self._old_files):
             if path.endswith(ACTIVE_SUFFIX):
                 say("%s was cut off, or is being recorded; to repair it: record --repair %s" % (path, path))
@@ -105,12 +105,9 @@ class Recording:
             repaired = self._repair_leftovers()
         self._summarize(time.monotonic() - start_s)
         if reason is not None:
-            command_line.print_error("stopped: " + reason)
-            return 1
+            raise RecordingError("stopped: " + reason)
         if repaired or code not in (0, -signal.SIGINT, -signal.SIGTERM):
-            command_line.print_error("rosbag's recorder failed (exit code %s); its last lines tell why" % code)
-            return 1
-        return 0
+            raise RecordingError("rosbag's recorder failed (exit code %s); its last lines tell why" % code)
 
     def _watch(self, recorder: "subprocess.Popen[bytes]", start_s: float) -> Optional[str]:
         """Wait for the end; return the reason if the disk forced it."""
@@ -252,16 +249,15 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run with the arguments of the command line; return the exit code. Raises: RecordingError, NodeError."""
+def run(arguments: Sequence[str]) -> None:
+    """Run with the arguments of the command line. Raises: RecordingError, NodeError."""
     options, ros_arguments = split_arguments(arguments)
     parsed = parse_options(read_launch_options(ros_arguments) + options)
-    if parsed.repair:
-        for path in parsed.repair:
-            say(repair_bag(path))
-        return 0
-    check_master()
-    return Recording(parsed, ros_arguments).run()
+    for path in parsed.repair or ():
+        say(repair_bag(path))
+    if not parsed.repair:
+        check_master()
+        Recording(parsed, ros_arguments).run()
 
 
 def main() -> None:

@@ -271,7 +271,7 @@ def make_recording(monkeypatch, tmp_path):
         made.recording = Recording(
             record.parse_options(["--folder", str(tmp_path), "--min-free-mb", "0", *arguments]), []
         )
-        return made.recording.run()
+        return record.command_line.call(made.recording.run)
 
     made.run = run
     return made
