@@ -130,7 +130,7 @@ class TeleopTest(unittest.TestCase):
                 0, lambda keys=keys: terminal.type(keys), condition, "the command of %r" % keys
             )
         terminal.type("7")
-        wait_for(lambda: "hero_7 is not among" in terminal.text, "a word about a robot that is not there")
+        wait_for(lambda: "hero_7 is not in this swarm" in terminal.text, "a word about a robot that is not there")
 
     def test_every_end_stops_the_robot_and_restores_the_terminal(self):
         ends = {
