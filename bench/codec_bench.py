@@ -11,7 +11,7 @@ from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.corrections.robot_corrections import RobotCorrections
 from hero_driver.ros.message_types import apply_aliases
 from hero_driver.rosserial import packets
-from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, TopicDeclared
+from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, Topic
 
 BURSTS = 3000
 REPEATS = 5
@@ -63,10 +63,10 @@ def main():
         sink = NoSink()
         corrections = RobotCorrections("/hero_0", CorrectionSettings(), sink.publish)
         for event in declared:
-            if isinstance(event, TopicDeclared) and event.topic.kind.is_from_robot:
-                info = event.topic.info
+            if isinstance(event, Topic) and event.kind.is_from_robot:
+                info = event.info
                 ros_type = apply_aliases(info.message_type)
-                event.topic.receive = corrections.handler_for(info.name, ros_type, lambda *_: sink)
+                event.receive = corrections.handler_for(info.name, ros_type, lambda *_: sink)
         for index, of_burst in enumerate(messages):
             for topic, payload in of_burst:
                 topic.receive(payload, start_ns + index * BURST_NS)

@@ -13,7 +13,8 @@ with atheris.instrument_imports():
     from hero_driver.corrections.robot_corrections import RobotCorrections
     from hero_driver.fleet import log_lines
     from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH
-    from hero_driver.rosserial.session import LogReceived, MessagesReceived, Session, SessionLimits
+    from hero_driver.rosserial.payloads import Log
+    from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits
 
 MAX_TOPICS = 64
 ARRIVAL_NS = 1795240942 * 10**9
@@ -43,8 +44,8 @@ def try_bytes(data):
                     message_type = TYPES.get(topic.info.message_type, topic.info.message_type)
                     receive = corrections.handler_for(topic.info.name, message_type, lambda *_: sink)
                     receive(payload, ARRIVAL_NS)
-            elif type(event) is LogReceived:
-                log_lines.read_log_line(event.log.text)
+            elif type(event) is Log:
+                log_lines.read_log_line(event.text)
         session.poll(0.01 * index)
     if len(session.topics) > MAX_TOPICS:
         raise AssertionError("more topics than allowed")

@@ -24,16 +24,8 @@ from .ros.log_relay import LogRelay
 from .ros.robot_bridge import BridgeContext, RobotBridge
 from .ros.transform_publisher import TransformPublisher
 from .ros.worker import Worker
-from .rosserial.session import (
-    Event,
-    LogReceived,
-    MessagesReceived,
-    Problem,
-    Session,
-    SessionEnded,
-    Topic,
-    TopicDeclared,
-)
+from .rosserial.payloads import Log
+from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
 from .stop_delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
 from .transport.event_loop import THE_DRIVER_ENDS, EventLoop
 from .transport.link import Link, LinkHandler
@@ -231,10 +223,10 @@ class Gateway(LinkHandler):
     # What a session tells.
 
     def _receive_event(self, peer: Peer, event: Event, now_s: float) -> None:
-        if isinstance(event, TopicDeclared):
-            self._declare(peer, event.topic, now_s)
-        elif isinstance(event, LogReceived):
-            self._robot_log.receive(peer, event.log, now_s)
+        if isinstance(event, Topic):
+            self._declare(peer, event, now_s)
+        elif isinstance(event, Log):
+            self._robot_log.receive(peer, event, now_s)
         elif isinstance(event, Problem):
             self.warn_robot(peer, event.text)
         elif isinstance(event, SessionEnded):

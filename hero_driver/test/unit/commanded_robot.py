@@ -113,8 +113,8 @@ class CommandedRobot:
         self._senders = {}
         subscribed = FakeRobot(1, [entry for entry in STOCK_DECLARATIONS if entry.kind == SUB])
         for event in self.peer.session.receive_bytes(subscribed.encode_declarations(), clock.now_s, 0.0):
-            self.bridge.declare(event.topic, event.topic.info.name)
-            self._names[event.topic.info.topic_id] = event.topic.info.name
+            self.bridge.declare(event, event.info.name)
+            self._names[event.info.topic_id] = event.info.name
         self.sender = command_sender.CommandSender(clock.call_later, self)
         self.stops = stop_delivery.StopDelivery(clock.call_later, self)
         clock.call_later(phase_s, self._read)

@@ -10,7 +10,7 @@ from robot_messages import NOW_NS, read_odometry, read_stamp_ns, read_transform
 
 from hero_driver.corrections.robot_corrections import TRANSFORMS
 from hero_driver.ros.message_types import apply_aliases
-from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, TopicDeclared
+from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, Topic
 from hero_node.geometry import Pose
 
 START_NS = 1795240942 * 10**9 + 831 * 10**6
@@ -25,9 +25,9 @@ def clean(data, namespace, start_ns, **settings):
     for start in range(0, len(data), 1000):
         arrival_ns = start_ns + start * 10**9 // 44051
         for event in session.receive_bytes(data[start : start + 1000], 0.0, 0.0):
-            if type(event) is TopicDeclared:
-                info = event.topic.info
-                event.topic.receive = make_handler(corrections, info.name, apply_aliases(info.message_type), outputs)
+            if type(event) is Topic:
+                info = event.info
+                event.receive = make_handler(corrections, info.name, apply_aliases(info.message_type), outputs)
             elif isinstance(event, MessagesReceived):
                 for topic, payload in event.messages:
                     if topic.info.name.endswith("/set_odom"):

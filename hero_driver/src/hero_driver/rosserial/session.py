@@ -98,18 +98,6 @@ class MessagesReceived(NamedTuple):
     messages: List[Tuple[Topic, bytes]]
 
 
-class TopicDeclared(NamedTuple):
-    """The robot declared a topic that is new, or differs from what it had declared under this id."""
-
-    topic: Topic
-
-
-class LogReceived(NamedTuple):
-    """The robot sent a log line."""
-
-    log: Log
-
-
 class Problem(NamedTuple):
     """The robot sent something that cannot be used; text says what and why. Nothing else is affected."""
 
@@ -122,13 +110,8 @@ class SessionEnded(NamedTuple):
     reason: str
 
 
-Event = Union[
-    MessagesReceived,
-    TopicDeclared,
-    LogReceived,
-    Problem,
-    SessionEnded,
-]
+Event = Union[MessagesReceived, Topic, Log, Problem, SessionEnded]
+"""A Topic is one that the robot declared: new, or another than what it had declared under this id."""
 
 
 @dataclass(frozen=True)
@@ -269,7 +252,7 @@ class Session:
             log = payloads.decode_log(payload)
             if not self.topics or now_s - self._last_configured_s > UNCONFIGURED_S:
                 self._ask_by(self._earliest_repeat_s(now_s))
-            return LogReceived(log)
+            return log
         if topic_id in _NOT_SERVED:
             return Problem(_NOT_SERVED[topic_id])
         return self._receive_undeclared(topic_id, now_s)
@@ -323,7 +306,7 @@ class Session:
             topics.pop(info.topic_id, None)
             if holds:
                 topics[info.topic_id] = topic
-        return TopicDeclared(topic)
+        return topic
 
     def _find_error(self, info: TopicInfo) -> Optional[str]:
         """Return what is wrong with a declaration, or None."""

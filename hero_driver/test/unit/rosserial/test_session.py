@@ -27,14 +27,14 @@ from vectors import (
     build_text,
 )
 
+from hero_driver.rosserial.payloads import Log
 from hero_driver.rosserial.session import (
-    LogReceived,
     MessagesReceived,
     Problem,
     Session,
     SessionEnded,
     SessionLimits,
-    TopicDeclared,
+    Topic,
     TopicKind,
 )
 
@@ -65,8 +65,8 @@ def test_the_request_is_repeated_every_1_5_s_until_a_declaration():
 def test_nothing_is_asked_any_more_once_a_topic_is_declared():
     session = open_session()
     events = receive(session, HANDSHAKE, T0 + 0.06)
-    assert [event.topic.info.topic_id for event in events] == [topic[1] for topic in STOCK_TOPICS]
-    assert all(type(event) is TopicDeclared for event in events)
+    assert [event.info.topic_id for event in events] == [topic[1] for topic in STOCK_TOPICS]
+    assert all(type(event) is Topic for event in events)
     session.take_packets()
     assert poll_until(session, T0 + 0.1, T0 + 5.0) == ([], [])
 
@@ -128,8 +128,8 @@ def test_a_robot_that_streams_on_a_new_connection_is_asked_at_once():
 def test_log_lines_before_any_topic_are_events_and_a_reason_to_ask_again():
     session = open_session()
     (event,) = receive(session, HEARTBEAT, T0 + 0.9)
-    assert type(event) is LogReceived
-    assert event.log == (1, "\x1b[96m[/hero_0] Conected at time 1638\x1b[0m")
+    assert type(event) is Log
+    assert event == (1, "\x1b[96m[/hero_0] Conected at time 1638\x1b[0m")
     session.poll(T0 + 0.9)
     assert session.take_packets() == [REQUEST]
 
@@ -250,7 +250,7 @@ def test_a_declared_session_does_not_end_while_the_robot_speaks():
 def test_a_message_comes_with_its_topic_in_the_order_of_the_wire():
     session = open_declared_session()
     events = receive(session, ODOM_MESSAGE + HEARTBEAT + ENCODER_MESSAGE)
-    assert [type(event) for event in events] == [MessagesReceived, LogReceived, MessagesReceived]
+    assert [type(event) for event in events] == [MessagesReceived, Log, MessagesReceived]
     ((topic, payload),) = events[0].messages
     assert topic.info.name == "/hero_0/odom"
     assert topic.kind is TopicKind.PUBLISHER
@@ -349,4 +349,4 @@ def test_declarations_come_one_by_one_too():
     session = open_session()
     for topic in STOCK_TOPICS:
         (event,) = receive(session, build_declaration(*topic))
-        assert event.topic.info[:4] == topic[1:]
+        assert event.info[:4] == topic[1:]

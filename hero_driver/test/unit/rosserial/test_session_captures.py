@@ -5,7 +5,8 @@ from collections import Counter
 from conversation import T0, list_messages, list_requests, open_session, receive
 from vectors import FROM_ROBOT, HANDSHAKE, STOCK_TOPICS
 
-from hero_driver.rosserial.session import LogReceived, MessagesReceived, TopicDeclared
+from hero_driver.rosserial.payloads import Log
+from hero_driver.rosserial.session import MessagesReceived, Topic
 
 SEGMENT_LENGTH = 1460
 
@@ -26,8 +27,8 @@ def test_a_whole_conversation_has_the_topics_data_and_logs_of_the_robot(read_cap
     events, request_times_s = run(session, read_capture("A.robot_to_server.bin"))
     assert request_times_s == []
     kinds = Counter(type(event) for event in events if type(event) is not MessagesReceived)
-    assert kinds == {LogReceived: 20, TopicDeclared: 24}
-    declared = [event.topic.info[:4] for event in events if type(event) is TopicDeclared]
+    assert kinds == {Log: 20, Topic: 24}
+    declared = [event.info[:4] for event in events if type(event) is Topic]
     assert declared == [topic[1:] for topic in STOCK_TOPICS]
     counts = Counter(topic.info.name for topic, _ in list_messages(events))
     assert counts == {
@@ -50,7 +51,7 @@ def test_a_robot_that_declared_nothing_is_asked_again_and_then_understood(read_c
     capture = read_capture("C_zero_topics.robot_to_server.bin")
     events, request_times_s = run(session, capture)
     assert len(request_times_s) == 1
-    assert {type(event) for event in events} == {LogReceived}
+    assert {type(event) for event in events} == {Log}
     assert session.undeclared_messages == 140
     assert session.topics == {}
 

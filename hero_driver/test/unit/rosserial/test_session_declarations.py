@@ -16,7 +16,7 @@ from vectors import (
 )
 
 from hero_driver.rosserial.errors import RosserialError
-from hero_driver.rosserial.session import MessagesReceived, Problem, TopicDeclared, TopicKind
+from hero_driver.rosserial.session import MessagesReceived, Problem, Topic, TopicKind
 
 ODOM = next(topic for topic in STOCK_TOPICS if topic[1] == 130)
 CMD_VEL = next(topic for topic in STOCK_TOPICS if topic[1] == 109)
@@ -52,7 +52,7 @@ def test_the_stock_robots_topics_are_kept_by_id_with_kind_and_direction():
 def test_the_id_of_the_declaring_packet_says_the_kind_and_the_direction(frame_id, kind, is_from_robot):
     session = open_session()
     (event,) = receive(session, declare_twist(110, "/hero_0/x", frame_id))
-    assert event.topic.kind is kind
+    assert event.kind is kind
     assert kind.is_from_robot is is_from_robot
 
 
@@ -73,7 +73,7 @@ def test_the_same_declaration_again_is_no_event():
 def test_another_declaration_of_an_id_replaces_the_one_before():
     session = open_declared_session()
     (event,) = receive(session, declare_twist(130, "/hero_0/other", frame_id=0))
-    assert type(event) is TopicDeclared
+    assert type(event) is Topic
     ((topic, _),) = list_messages(receive(session, ODOM_MESSAGE))
     assert topic.info.name == "/hero_0/other"
 
@@ -83,7 +83,7 @@ def test_ids_redeclared_too_often_are_refused_and_keep_their_name():
     events = []
     for count in range(10):
         events += receive(session, declare_twist(106, "/hero_0/name_%d/cmd_vel" % count))
-    assert [type(event) for event in events] == [TopicDeclared] * 4 + [Problem] * 6
+    assert [type(event) for event in events] == [Topic] * 4 + [Problem] * 6
     assert "more than 3 times (max_topics)" in events[4].text
     assert session.topics[106].info.name == "/hero_0/name_3/cmd_vel"
 
@@ -153,7 +153,7 @@ def test_a_bad_declaration_is_a_problem_in_one_line_while_the_others_work(name):
     events = receive(
         session, build_declaration(*ODOM) + declaration + build_declaration(*CMD_VEL) + ODOM_MESSAGE
     )
-    assert [type(event) for event in events] == [TopicDeclared, Problem, TopicDeclared, MessagesReceived]
+    assert [type(event) for event in events] == [Topic, Problem, Topic, MessagesReceived]
     assert words in events[1].text
     assert "refused" in events[1].text
     assert events[1].text.isprintable()
@@ -171,7 +171,7 @@ def test_a_bad_declaration_before_all_others_does_not_count_as_an_answer():
 def test_topics_beyond_the_limit_are_refused_while_the_first_ones_work():
     session = open_session(max_topics=3)
     events = [receive(session, declare_twist(100 + index, "/hero_0/x%d" % index))[0] for index in range(5)]
-    assert [type(event) for event in events] == [TopicDeclared] * 3 + [Problem] * 2
+    assert [type(event) for event in events] == [Topic] * 3 + [Problem] * 2
     assert "more than 3 topics (max_topics)" in events[4].text
     assert sorted(session.topics) == [100, 101, 102]
     session.encode_message(102, bytes(48))
@@ -183,7 +183,7 @@ def test_an_id_may_be_declared_again_at_the_limit_of_topics():
     session = open_session(max_topics=1)
     receive(session, declare_twist(100, "/hero_0/a"))
     (event,) = receive(session, declare_twist(100, "/hero_0/b"))
-    assert type(event) is TopicDeclared
+    assert type(event) is Topic
     assert session.topics[100].info.name == "/hero_0/b"
 
 
@@ -261,14 +261,14 @@ def test_arbitrary_declarations_are_taken_or_refused_in_one_line(
         assert event.text.isprintable()
         assert session.topics == {}
     else:
-        assert event.topic == session.topics[topic_id]
+        assert event is session.topics[topic_id]
 
 
 def test_a_name_and_a_type_may_have_128_characters():
     session = open_session()
     name, message_type = "/hero_0/" + "x" * 120, "geometry_msgs/" + "T" * 114
     (event,) = receive(session, build_declaration(1, 120, name, message_type, TWIST_MD5))
-    assert isinstance(event, TopicDeclared) and len(name) == len(message_type) == 128
+    assert isinstance(event, Topic) and len(name) == len(message_type) == 128
 
 
 @pytest.mark.parametrize(("length", "shown"), [(60, "x" * 60), (61, "x" * 57 + "...")])
