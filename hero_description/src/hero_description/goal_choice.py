@@ -17,10 +17,10 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_node.command_line import run
+from hero_node.parameters import Parameter, parse_given_ids
 from hero_node.ros.private_parameters import read_parameters
 from hero_node.ros.program import Program
 
-from .robots_parameter import given_robots
 from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
 
 LISTEN_S = 0.5
@@ -100,7 +100,7 @@ class GoalChoice:
 def choose_robots() -> None:
     """Run until the node is to end."""
     with Program("goal_choice") as program:
-        robots = read_parameters({"robots": given_robots()})["robots"]
+        robots = read_parameters({"robots": Parameter("0", parse_given_ids)})["robots"]
         GoalChoice(["hero_%d" % robot_id for robot_id in robots])
         while program.sleep(10.0):
             pass

@@ -14,10 +14,10 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_node.command_line import run
+from hero_node.parameters import Parameter, parse_given_ids
 from hero_node.ros.private_parameters import read_parameters
 from hero_node.ros.program import Program
 
-from .robots_parameter import given_robots
 from .rviz_config import LIGHTS_TOPIC, color_of
 
 LIGHT_S = 15.0
@@ -71,7 +71,7 @@ def make_identity(robot_id: int) -> List[Marker]:
 def show_lights() -> None:
     """Publish names and rings again and again, and a sphere for each color."""
     with Program("hero_lights") as program:
-        robots = read_parameters({"robots": given_robots()})["robots"]
+        robots = read_parameters({"robots": Parameter("0", parse_given_ids)})["robots"]
         publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(robots) + 10)
 
         def show(color: ColorRGBA, robot_id: int) -> None:

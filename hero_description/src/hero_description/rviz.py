@@ -15,17 +15,16 @@ import rospy
 
 from hero_node.command_line import run
 from hero_node.errors import ProgramError
-from hero_node.parameters import Parameter, choice, flag
+from hero_node.parameters import Parameter, choice, flag, parse_given_ids
 from hero_node.ros.private_parameters import read_parameters
 from hero_node.ros.program import Program
 
 from .hero_plus import make_hero_plus
-from .robots_parameter import check_given, given_robots
 from .rviz_config import FRAMES, PLUS_DESCRIPTION, make_config
 
 
 def _read_ids(name: str, value: Any) -> Sequence[int]:
-    return check_given(name, value) if value not in ("", ()) else ()
+    return parse_given_ids(name, value) if value not in ("", ()) else ()
 
 
 def start_rviz() -> None:
@@ -38,7 +37,7 @@ def start_rviz() -> None:
     with Program("rviz", anonymous=True):
         parameters = read_parameters(
             {
-                "robots": given_robots(),
+                "robots": Parameter("0", parse_given_ids),
                 "fixed_frame": "",
                 "view": choice("orbit", sorted(FRAMES)),
                 "picture": flag(False),

@@ -8,9 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hero_description.robots_parameter import check_given
 from hero_description.rviz_config import GOAL_TOPIC, POINT_TOPIC, color_of, make_config, make_robot_displays
-from hero_node.errors import ProgramError
 
 TOPIC_KEYS = ("TF Prefix", "Topic", "Marker Topic", "Image Topic")
 
@@ -183,9 +181,3 @@ def test_only_errors_of_localized_places_are_drawn_around_robots():
     assert path["Unreliable"] is False and path["Keep"] > 100 > path["Position Tolerance"] > 0
     (click,) = [tool for tool in manager["Tools"] if tool["Class"] == "rviz/PublishPoint"]
     assert click["Single click"] is True
-
-
-@pytest.mark.parametrize("value", ["all", "1 x", "", "3-1"])
-def test_robots_must_be_given_by_their_ids(value):
-    with pytest.raises(ProgramError, match="~robots"):
-        check_given("robots", value)

@@ -134,7 +134,7 @@ def test_wrong_options_are_named(arguments, words):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"), [(["--robots", "all"], "name the ids"), (["--family", "25h9"], "'16h5', '36h11'")]
+    ("arguments", "words"), [(["--robots", "all"], "must be ids such as"), (["--family", "25h9"], "'16h5', '36h11'")]
 )
 def test_ids_and_a_known_family_must_be_named(arguments, words, capsys):
     with pytest.raises(SystemExit):

@@ -7,10 +7,12 @@ import argparse
 import dataclasses
 import difflib
 import math
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type, TypeVar
 
 from .errors import ProgramError
 from .number_checks import is_number
+
+T = TypeVar("T")
 
 ALL_ROBOTS = "all"
 
@@ -151,10 +153,27 @@ def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
     return ids
 
 
+def parse_given_ids(name: str, value: Any) -> List[int]:
+    """As parse_robot_ids(), for what looks for no robots. Raises: ProgramError for "all", too."""
+    ids = parse_robot_ids(name, value)
+    if ids is None:
+        raise make_error(name, value, 'ids such as "0 1 2" or "0-3"')
+    return ids
+
+
 def robot_ids_option(text: str) -> Optional[List[int]]:
     """Return the ids in the value of a command line option, None for "all". Raises: argparse.ArgumentTypeError."""
+    return _read_option(parse_robot_ids, text)
+
+
+def given_ids_option(text: str) -> List[int]:
+    """As robot_ids_option(), but "all" is refused. Raises: argparse.ArgumentTypeError."""
+    return _read_option(parse_given_ids, text)
+
+
+def _read_option(parse: Callable[[str, Any], T], text: str) -> T:
     try:
-        return parse_robot_ids("robots", text)
+        return parse("robots", text)
     except ProgramError as error:
         raise argparse.ArgumentTypeError(str(error).replace("~robots", "it")) from error
 

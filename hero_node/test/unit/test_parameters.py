@@ -13,7 +13,9 @@ from hero_node.parameters import (
     check_parameters,
     choice,
     flag,
+    given_ids_option,
     number,
+    parse_given_ids,
     parse_poses,
     parse_robot_ids,
     robot_ids,
@@ -129,6 +131,15 @@ def test_what_are_no_ids_of_robots_is_named(value, reason):
     assert str(raised.value).startswith("~robots " + reason)
     with pytest.raises(argparse.ArgumentTypeError, match="^it "):
         robot_ids_option(value)
+
+
+@pytest.mark.parametrize("value", ["all", "1 x", "", "3-1"])
+def test_robots_that_nothing_looks_for_must_be_given_by_their_ids(value):
+    with pytest.raises(ProgramError, match="~robots"):
+        parse_given_ids("robots", value)
+    with pytest.raises(argparse.ArgumentTypeError, match="^it "):
+        given_ids_option(value)
+    assert parse_given_ids("robots", "0 2-3") == given_ids_option("0 2-3") == [0, 2, 3]
 
 
 def test_poses_belong_to_robots_in_their_order():

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any, Mapping, NamedTuple, Optional, Tuple
 
 from hero_node.number_checks import is_number
-from hero_node.parameters import Parameter, choice, declare, make_error, number, parse_robot_ids, words
+from hero_node.parameters import Parameter, choice, declare, make_error, number, parse_given_ids, words
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, PLUS_WHEELS, STOCK
@@ -19,9 +19,7 @@ def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
 
 def _read_names(name: str, value: Any) -> Tuple[str, ...]:
     """Return the names of the robots with the ids in value."""
-    ids = [] if value in ("", [], ()) else parse_robot_ids(name, value)
-    if ids is None:
-        raise make_error(name, value, 'ids such as "0 2" or "4-7"')
+    ids = [] if value in ("", [], ()) else parse_given_ids(name, value)
     return tuple("hero_%d" % robot_id for robot_id in ids)
 
 

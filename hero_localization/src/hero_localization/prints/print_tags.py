@@ -13,7 +13,7 @@ from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from hero_node import command_line
-from hero_node.parameters import robot_ids_option
+from hero_node.parameters import given_ids_option
 from hero_node.safe_file import replace_file
 
 from ..errors import LocalizationError
@@ -52,9 +52,9 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="print_tags", description="Make a PDF with tags of true size.")
     text = "discs for robots, e.g. '0 1 2' or 0-9"
-    parser.add_argument("--robots", type=_read_ids, default=(), metavar="IDS", help=text)
+    parser.add_argument("--robots", type=given_ids_option, default=(), metavar="IDS", help=text)
     text = "squares for the floor, e.g. 100-103"
-    parser.add_argument("--references", type=_read_ids, default=(), metavar="IDS", help=text)
+    parser.add_argument("--references", type=given_ids_option, default=(), metavar="IDS", help=text)
     text = "family of the tags: 36h11 (default), or 16h5 as in the stock suite"
     parser.add_argument("--family", choices=sorted(FAMILIES), default="36h11", help=text)
     text = "side of the black square on robots, mm (%(default)g)"
@@ -67,13 +67,6 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--paper", choices=sorted(PAPERS_MM), default="a4", help="(%(default)s)")
     parser.add_argument("--out", default="tags.pdf", metavar="FILE.pdf", help="(%(default)s)")
     return parser.parse_args(arguments)
-
-
-def _read_ids(text: str) -> List[int]:
-    ids = robot_ids_option(text)
-    if ids is None:
-        raise argparse.ArgumentTypeError("name the ids, e.g. 0-9")
-    return ids
 
 
 def list_sheets(options: argparse.Namespace, cells: int) -> List[Sheet]:

@@ -12,7 +12,7 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequ
 
 from tqdm import tqdm
 
-from hero_node.parameters import robot_ids_option
+from hero_node.parameters import given_ids_option
 from hero_node.yaml_text import YamlError, read_text
 
 from ..metrics import METRICS
@@ -50,13 +50,6 @@ def _parse_executor(text: str) -> str:
     return text[len(DASK) :]
 
 
-def _parse_robots(text: str) -> List[int]:
-    ids = robot_ids_option(text)
-    if ids is None:
-        raise argparse.ArgumentTypeError("name the robots, such as 0-9")
-    return ids
-
-
 def _whole(low: int, high: int) -> Callable[[str], int]:
     def parse(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
@@ -87,7 +80,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
         "--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts"
     )
     parser.add_argument(
-        "--robots", type=_parse_robots, metavar="IDS", help="run trials on these robots instead, such as 0-9"
+        "--robots", type=given_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9"
     )
     parser.add_argument("--frame", default="map", help="of robots' poses: of localize (map), or world in the simulator")
     parser.add_argument(
