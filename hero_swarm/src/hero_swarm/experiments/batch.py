@@ -5,9 +5,10 @@ Metrics are taken once per second of simulated time. A run has the same values a
 """
 
 import math
+import os
 import time
 from contextlib import contextmanager
-from typing import Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from .errors import ExperimentError, report_place
 from .experiment_file import ERRORS, Cell, Experiment, Metric, parse_experiment
 from .results_folder import Run
 from .starts import place_all, place_objects
-from .streams import Stream
 
 SAMPLE_S = 1.0
 """Between two samples of the metrics."""
@@ -147,14 +147,16 @@ def _run(experiment: Experiment, trial: Trial, stem: str) -> Tuple[np.ndarray, L
     series = np.full((samples, worlds, len(names)), np.nan)
     ends = np.full(worlds, samples - 1)
     running = np.ones(worlds, dtype=bool)
-    poses_file: Optional[Stream] = None
+    recorded, poses_path = 0, stem + POSES_ENDING
+    poses: Any = None  # on the disk: they may be more than fits into memory
     if experiment.record_hz:
-        count = math.floor(experiment.time_s * experiment.record_hz + 1e-9) + 1
-        poses_file = Stream(stem + POSES_ENDING, (count, worlds, robots, 3))
+        shape = (math.floor(experiment.time_s * experiment.record_hz + 1e-9) + 1, worlds, robots, 3)
+        poses = np.lib.format.open_memmap(poses_path + ".part", "w+", np.float32, shape)  # type: ignore[no-untyped-call]
     now_s = 0.0
     while True:
-        if poses_file is not None and now_s >= poses_file.count / experiment.record_hz - 1e-6:
-            poses_file.append(np.where(running[:, None, None], trial.poses, np.nan))
+        if poses is not None and now_s >= recorded / experiment.record_hz - 1e-6:
+            poses[recorded] = np.where(running[:, None, None], trial.poses, np.nan)
+            recorded += 1
         sample = math.floor(now_s / SAMPLE_S + 1e-6)
         if sample < samples and np.isnan(series[sample]).all():
             state = trial.poses, trial.velocities, trial.things.poses
@@ -165,8 +167,10 @@ def _run(experiment: Experiment, trial: Trial, stem: str) -> Tuple[np.ndarray, L
         if now_s >= experiment.time_s - 1e-6 or not running.any():
             break
         now_s = trial.step()
-    if poses_file is not None:
-        poses_file.close()
+    if poses is not None:
+        poses[recorded:] = np.nan
+        poses.flush()
+        os.replace(poses_path + ".part", poses_path)
     with_ends = np.where(np.arange(samples)[:, None, None] <= ends[:, None], series, np.nan)
     with replace_file(stem + METRICS_ENDING) as file:
         np.save(file, with_ends.astype(np.float32))

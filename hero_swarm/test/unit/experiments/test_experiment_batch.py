@@ -57,6 +57,11 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
         assert runs[world].values[0] == pytest.approx(series[last, world, 0])
     assert np.isnan(ended[-1]).any()
     assert not (tmp_path / ("b" + POSES_ENDING)).exists()
+    first = 11 + int(series[2, :, 0].argmin())
+    compute_batch(text + "record: {hz: 2}\n", 0, [first], str(tmp_path / "d"))
+    recorded = np.load(str(tmp_path / ("d" + POSES_ENDING)))
+    assert recorded.dtype == np.float32 and recorded.shape == (9, 1, 3, 3)
+    assert (recorded[:5, 0] == poses[:5, first - 11]).all() and np.isnan(recorded[5:]).all(), "it ended after 2 s"
     alone = compute_batch(FILE, 0, [12], str(tmp_path / "c"))[0]
     assert alone == whole[1:2], "a run has the same values alone"
 
@@ -73,6 +78,7 @@ def test_what_a_behavior_raises_names_the_cell_and_the_seeds(tmp_path, monkeypat
     monkeypatch.setitem(metrics.METRICS, "dispersion", lambda *arguments: 1 // 0)
     with pytest.raises(ExperimentError, match="with seeds 11 to 13: ZeroDivisionError: .*test_experiment_batch"):
         compute_batch(FILE, 0, [11, 12, 13], str(tmp_path / "a"))
+    assert not (tmp_path / ("a" + POSES_ENDING)).exists(), "a file has its name once it is whole"
 
 
 def make_experiment(robots=20, time_s=300, count=100):

@@ -16,7 +16,6 @@ from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.statistics import correct_by_holm
 from hero_swarm.experiments.reporting.summary import build_report
 from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
-from hero_swarm.experiments.streams import Stream
 
 FILE = """\
 behavior: a.B
@@ -259,19 +258,6 @@ def test_times_of_batches_are_appended_below_one_heading(tmp_path):
     folder.note_time(1, [5, 6], 1.23456)
     folder.note_time(0, [7], 0.5)
     assert (tmp_path / "times.csv").read_text() == "cell,first_seed,runs,wall_s\n1,5,2,1.235\n0,7,1,0.500\n"
-
-
-def test_a_stream_has_its_name_once_it_is_whole(tmp_path):
-    path = tmp_path / "a.npy"
-    stream = Stream(str(path), (3, 2))
-    for values in ((1.0, 2.0), (3.0, 4.0)):
-        stream.append(np.array(values))
-    assert stream.count == 2 and not path.exists()
-    stream.close()
-    written = np.load(str(path))
-    assert written.dtype == np.float32 and written[:2].tolist() == [[1.0, 2.0], [3.0, 4.0]]
-    assert np.isnan(written[2]).all()
-    assert os.listdir(str(tmp_path)) == ["a.npy"]
 
 
 def test_code_is_the_sources_of_all_packages_and_the_users_file(tmp_path, monkeypatch):

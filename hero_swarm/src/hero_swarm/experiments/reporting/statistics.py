@@ -65,22 +65,11 @@ def bootstrap_median(values: Sequence[float]) -> Interval:
     medians: List[np.ndarray] = []
     for start in range(0, RESAMPLES, block):
         chosen = rng.randint(len(sample), size=(min(block, RESAMPLES - start), len(sample)))
-        medians.append(_find_medians(sample, chosen))
+        medians.append(np.median(sample[chosen], axis=1))
     resampled = np.sort(np.concatenate(medians))
     tail = (RESAMPLES + 1) * (1.0 - CONFIDENCE) / 2.0
     low, high = round(tail) - 1, RESAMPLES - round(tail)
-    middle = _find_medians(sample, np.arange(len(sample))[None])[0]
-    return Interval(float(middle), float(resampled[low]), float(resampled[high]))
-
-
-def _find_medians(sample: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Return the median of each row (M,) of indices chosen (M, N) into the ascending sample (N,)."""
-    count = chosen.shape[1]
-    middle = [(count - 1) // 2, count // 2]
-    # The order of indices is that of the values, and whole numbers are sorted faster.
-    low, high = sample[np.partition(chosen, middle, axis=1)[:, middle].T]
-    # Half of the difference is nan between equal infinities.
-    return np.where(low == high, low, low / 2.0 + high / 2.0)
+    return Interval(float(np.median(sample)), float(resampled[low]), float(resampled[high]))
 
 
 def cliffs_delta(first: Sequence[float], second: Sequence[float]) -> float:
