@@ -8,6 +8,7 @@ on any path instead of a square).
 from typing import Iterator, List
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from hero_client.values.robot_constants import WHEEL_SEPARATION_M
 from hero_client.values.wheel_paths import follow_wheels
@@ -21,9 +22,6 @@ HEADING_M = 0.1
 
 MIN_TURN_RAD = 6.0
 """Less turning tells too little of the distance between the wheels."""
-
-_ITERATIONS = 8
-_STEP = 1e-4
 
 
 def follow_body(wheels_m: np.ndarray, body: np.ndarray) -> np.ndarray:
@@ -43,12 +41,7 @@ def fit_body(recordings: List[Recording]) -> np.ndarray:
     turned_rad = sum(float(np.abs(np.diff(np.unwrap(poses[:, 2]))).sum()) for _, poses in stretches)
     if turned_rad < MIN_TURN_RAD:
         raise ValueError("turned by %.1f rad only; %.0f are needed, with poses" % (turned_rad, MIN_TURN_RAD))
-    body = np.ones(3)
-    for _ in range(_ITERATIONS):
-        residual = _compare(stretches, body)
-        slopes = np.column_stack([(_compare(stretches, body + _STEP * unit) - residual) / _STEP for unit in np.eye(3)])
-        body = body - np.linalg.lstsq(slopes, residual, rcond=None)[0]
-    return np.clip(body, 0.5, 2.0)
+    return np.clip(least_squares(lambda body: _compare(stretches, body), np.ones(3)).x, 0.5, 2.0)
 
 
 def _list_stretches(recording: Recording) -> Iterator[List[np.ndarray]]:
