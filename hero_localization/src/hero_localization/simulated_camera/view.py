@@ -8,7 +8,10 @@ from typing import Iterator, List, NamedTuple, Tuple
 import cv2
 import numpy as np
 
+from hero_node.geometry import Pose, transform_pose
+
 from ..camera.camera_model import Camera, Intrinsics
+from ..tracking.tag_pose import list_corners
 
 _ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 CIRCLE = np.column_stack((np.cos(_ANGLES_RAD), np.sin(_ANGLES_RAD)))
@@ -104,19 +107,10 @@ def plane_homography(camera: Camera, height_m: float) -> np.ndarray:
 
 
 def tag_corners(tag: PrintedTag, poses: np.ndarray) -> np.ndarray:
-    """Return the corners (N, 4, 3) in world of one tag mounted at each of poses (N, 3).
-
-    Order: upper left, upper right, lower right, lower left of the upright print, seen from above.
-    """
-    half_m = tag.size_m / 2.0
-    # The print's upper edge looks along x, its left edge along y.
-    square_m = half_m * np.array(((1, 1), (1, -1), (-1, -1), (-1, 1)))
-    cos, sin = np.cos(tag.yaw_rad), np.sin(tag.yaw_rad)
-    on_robot_m = square_m @ np.array(((cos, sin), (-sin, cos))) + (tag.x_m, tag.y_m)
-    cos, sin = np.cos(poses[:, 2])[:, None], np.sin(poses[:, 2])[:, None]
-    x_m = poses[:, 0, None] + cos * on_robot_m[:, 0] - sin * on_robot_m[:, 1]
-    y_m = poses[:, 1, None] + sin * on_robot_m[:, 0] + cos * on_robot_m[:, 1]
-    return np.dstack((x_m, y_m, np.full(x_m.shape, tag.height_m)))
+    """Return the corners (N, 4, 3) in world of one tag mounted at each of poses (N, 3), in the order of TagCorners."""
+    mount = Pose(tag.x_m, tag.y_m, tag.yaw_rad)
+    tags = [transform_pose(Pose(*pose), mount) for pose in poses.tolist()]
+    return np.array([list_corners(pose, tag.size_m, tag.height_m) for pose in tags])
 
 
 def hand_outlines(hand_m: Tuple[float, float]) -> List[np.ndarray]:
