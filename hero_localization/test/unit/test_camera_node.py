@@ -32,13 +32,13 @@ def test_a_camera_with_fewer_pixels_sees_the_same():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--count", "501"], "--count: 501 is not from 1 to 500"),
-        (["--first-id", "-1"], "--first-id: -1 is not"),
-        (["--width", "159"], "--width: 159 is not from 160 to 4096"),
-        (["--rate", "0.4"], "--rate: 0.4 is not from 0.5 to 120"),
-        (["--delay", "5.1"], "--delay: 5.1 is not from 0 to 5"),
-        (["--exposure", "0.11"], "--exposure: 0.11 is not from 0 to 0.1"),
-        (["--tag-size", "nan"], "--tag-size: nan is not from 0.01 to 0.2"),
+        (["--count", "501"], "--count: 501 must be a whole number from 1 to 500"),
+        (["--first-id", "-1"], "--first-id: -1 must be"),
+        (["--width", "159"], "--width: 159 must be a whole number from 160 to 4096"),
+        (["--rate", "0.4"], "--rate: 0.4 must be a number from 0.5 to 120"),
+        (["--delay", "5.1"], "--delay: 5.1 must be a number from 0 to 5"),
+        (["--exposure", "0.11"], "--exposure: 0.11 must be a number from 0 to 0.1"),
+        (["--tag-size", "nan"], "--tag-size: nan must be a number from 0.01 to 0.2"),
     ],
 )
 def test_options_beyond_their_limits_are_named(arguments, words, capsys):

@@ -178,6 +178,22 @@ def _read_option(parse: Callable[[str, Any], T], text: str) -> T:
         raise argparse.ArgumentTypeError(str(error).replace("~robots", "it")) from error
 
 
+def within(low: float, high: float, kind: Type[Any] = float) -> Callable[[str], Any]:
+    """Return the type of a command line option that takes numbers of a kind in low..high."""
+
+    def parse(text: str) -> Any:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            text = "%s must be a %snumber from %g to %g" % (text, "whole " if kind is int else "", low, high)
+            raise argparse.ArgumentTypeError(text)
+        return value
+
+    return parse
+
+
 def _parse_id_range(word: Any) -> Tuple[int, int]:
     """Return the first and last id of a word; (-1, -1) if it holds none."""
     if isinstance(word, int) and not isinstance(word, bool):

@@ -21,6 +21,7 @@ from hero_node.parameters import (
     robot_ids,
     robot_ids_option,
     whole_number,
+    within,
     words,
 )
 
@@ -140,6 +141,17 @@ def test_robots_that_nothing_looks_for_must_be_given_by_their_ids(value):
     with pytest.raises(argparse.ArgumentTypeError, match="^it "):
         given_ids_option(value)
     assert parse_given_ids("robots", "0 2-3") == given_ids_option("0 2-3") == [0, 2, 3]
+
+
+def test_numbers_of_options_lie_within_their_limits():
+    assert [within(1, 5, int)(text) for text in ("1", "5")] == [1, 5]
+    assert [within(0.5, 2.5)(text) for text in ("0.5", "2.5", "1")] == [0.5, 2.5, 1.0]
+    for text in ("0", "6", "2.0", "x", ""):
+        with pytest.raises(argparse.ArgumentTypeError, match="^%s must be a whole number from 1 to 5$" % text):
+            within(1, 5, int)(text)
+    for text in ("0.4", "2.6", "nan", "inf", "x"):
+        with pytest.raises(argparse.ArgumentTypeError, match="^%s must be a number from 0.5 to 2.5$" % text):
+            within(0.5, 2.5)(text)
 
 
 def test_poses_belong_to_robots_in_their_order():

@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import Any, Optional, Sequence
 
 from hero_node import command_line
+from hero_node.parameters import within
 
 from .experiments.batch import build_trial
 from .experiments.code_version import hash_code
@@ -24,7 +25,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     parser.add_argument("folder", metavar="FOLDER", help="the results of run")
     parser.add_argument("--seed", type=int, help="of the run (the first one)")
     parser.add_argument("--cell", type=int, default=1, metavar="K", help="number of the cell, from 1 (1)")
-    parser.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second (1)")
+    parser.add_argument("--speed", type=within(0.01, 100.0), default=1.0, help="simulated seconds per second (1)")
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument("--video", metavar="FILE", help="write an .mp4 or .gif instead, without ROS")
     instead.add_argument("--bag", metavar="FILE", help="write a bag instead, without ROS")
@@ -51,8 +52,6 @@ def _find(module: str) -> Any:
 
 def show_run(options: argparse.Namespace) -> None:
     """Replay the run that options name. Raises: ExperimentError."""
-    if not 0.01 <= options.speed <= 100.0:
-        raise ExperimentError("--speed %g: must be from 0.01 to 100" % options.speed)
     _, experiment, about = read_results(options.folder)
     cell = _choose_cell(experiment, options.cell)
     seed = experiment.seeds[0] if options.seed is None else options.seed

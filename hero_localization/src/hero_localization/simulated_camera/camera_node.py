@@ -19,6 +19,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
 from hero_node import command_line
+from hero_node.parameters import within
 from hero_sim.world.arena import Arena, build_default
 from hero_sim.world.arena_file import load_arena
 
@@ -233,37 +234,24 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog=PROGRAM, description="A simulated camera above the simulated robots.")
     add = parser.add_argument
-    add("--count", type=int, default=1, metavar="N", help="number of robots (%(default)s)")
-    add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (%(default)s)")
+    add("--count", type=within(1, 500, int), default=1, metavar="N", help="number of robots (%(default)s)")
+    add("--first-id", type=within(0, 500, int), default=0, metavar="K", help="id of the first robot (%(default)s)")
     add("--arena", metavar="FILE", help="the simulator's arena")
-    add("--width", type=int, default=1920, metavar="PX", help="width of the images, 16:9 (%(default)s)")
-    add("--rate", type=float, default=30.0, metavar="HZ", help="images per second (%(default)s)")
-    add("--delay", type=float, default=0.07, metavar="S", help="delay from capture to arrival (%(default)s)")
-    add("--exposure", type=float, default=0.008, metavar="S", help="exposure time (%(default)s)")
+    text = "width of the images, 16:9 (%(default)s)"
+    add("--width", type=within(160, 4096, int), default=1920, metavar="PX", help=text)
+    add("--rate", type=within(0.5, 120.0), default=30.0, metavar="HZ", help="images per second (%(default)s)")
+    add("--delay", type=within(0.0, 5.0), default=0.07, metavar="S", help="delay from capture to arrival (%(default)s)")
+    add("--exposure", type=within(0.0, 0.1), default=0.008, metavar="S", help="exposure time (%(default)s)")
     add("--stamps", choices=("capture", "arrival"), default="capture", help="timestamp source (%(default)s)")
     add("--family", choices=sorted(FAMILIES), default="36h11", help="family of the tags (%(default)s)")
-    add("--tag-size", type=float, default=0.04, metavar="M", help="side of the robots' tags (%(default)s)")
+    add("--tag-size", type=within(0.01, 0.2), default=0.04, metavar="M", help="side of the robots' tags (%(default)s)")
     add("--board", action="store_true", help="show the calibration board at changing poses")
     add("--perfect", action="store_true", help="place all tags exactly")
     text = "print the reference tags for the camera file, and exit"
     add("--print-references", action="store_true", help=text)
     add("--write-file", metavar="FILE", help="write a camera file, calibrated without error")
     add("--seed", type=int, default=0, help="seed of noise, dropped images and tag placement (%(default)s)")
-    options = parser.parse_args(arguments)
-    limits = {
-        "count": (1, 500),
-        "first_id": (0, 500),
-        "width": (160, 4096),
-        "rate": (0.5, 120.0),
-        "delay": (0.0, 5.0),
-        "exposure": (0.0, 0.1),
-        "tag_size": (0.01, 0.2),
-    }
-    for name, (low, high) in limits.items():
-        value = getattr(options, name)
-        if not low <= value <= high:
-            parser.error("--%s: %g is not from %g to %g" % (name.replace("_", "-"), value, low, high))
-    return options
+    return parser.parse_args(arguments)
 
 
 def _run() -> None:

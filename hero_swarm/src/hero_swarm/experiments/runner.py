@@ -12,7 +12,7 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequ
 
 from tqdm import tqdm
 
-from hero_node.parameters import given_ids_option
+from hero_node.parameters import given_ids_option, within
 from hero_node.yaml_text import YamlError, read_text
 
 from ..metrics import METRICS
@@ -50,25 +50,16 @@ def _parse_executor(text: str) -> str:
     return text[len(DASK) :]
 
 
-def _whole(low: int, high: int) -> Callable[[str], int]:
-    def parse(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise argparse.ArgumentTypeError("%r must be a whole number from %d to %d" % (text, low, high))
-        return int(text)
-
-    return parse
-
-
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="run", description="Run an experiment: all seeds of all cells.")
     parser.add_argument("file", metavar="EXPERIMENT.yaml", help="experiment file")
     parser.add_argument("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
     parser.add_argument(
-        "--jobs", type=_whole(1, 1024), default=os.cpu_count() or 1, help="worker processes (%(default)s)"
+        "--jobs", type=within(1, 1024, int), default=os.cpu_count() or 1, help="worker processes (%(default)s)"
     )
     parser.add_argument(
-        "--batch", type=_whole(1, MAX_BATCH), help="runs that are computed together (about 10 s of work)"
+        "--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (about 10 s of work)"
     )
     parser.add_argument(
         "--executor",

@@ -286,7 +286,6 @@ def test_a_run_is_replayed_as_a_video_that_ends_as_the_run_did(finished, tmp_pat
     [
         (["--seed", 10], "--seed 10: the experiment has seeds 11 to 15"),
         (["--cell", 5], "--cell 5: must be one of 1: robots 3, errors perfect; 2:"),
-        (["--speed", 0], "--speed 0: must be from"),
         (["--video", "/nowhere/run.gif"], "cannot be written"),
     ],
 )
@@ -294,6 +293,13 @@ def test_what_cannot_be_shown_is_refused_in_one_line(options, words, finished):
     with pytest.raises(ExperimentError) as caught:
         replay(finished, *options)
     assert words in str(caught.value)
+
+
+def test_a_run_is_shown_at_speeds_that_its_options_name(capsys):
+    assert [show.parse_options(["x", "--speed", text]).speed for text in ("0.01", "100")] == [0.01, 100.0]
+    with pytest.raises(SystemExit):
+        show.parse_options(["x", "--speed", "0"])
+    assert "--speed: 0 must be a number from 0.01 to 100" in capsys.readouterr().err
 
 
 def test_a_run_of_other_code_is_shown_with_a_note(finished, tmp_path, monkeypatch, capsys):
