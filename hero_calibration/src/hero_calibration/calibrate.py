@@ -9,7 +9,6 @@ rosrun hero_calibration calibrate restore                write the files into th
 import argparse
 import os
 import sys
-from functools import partial
 from typing import Sequence
 
 import rospy
@@ -19,8 +18,8 @@ from hero_node.parameters import robot_ids_option
 from hero_node.ros.program import Program
 
 from .calibration import DEFAULT_PARTS, INFRARED, PARTS, WHEELS, Calibration
+from .errors import CalibrationError, EndedError
 from .procedures.restore import load_calibrations, restore
-from .questions import ask
 from .robots.ros_session import RosSession, find_robots
 from .store import make_folder
 
@@ -68,9 +67,17 @@ def run(arguments: Sequence[str]) -> int:
         session = RosSession(program, find_robots(program, robot_ids))
         if options.restore:
             return restore(session, calibrations)
-        question = partial(ask, program)
-        tape = question if options.tape else None
-        return Calibration(session, options.parts, options.folder, None if options.yes else question, tape).run()
+
+        def ask(question: str) -> str:
+            answer = program.ask(question)
+            if answer is None and program.running:
+                raise CalibrationError("no terminal to answer questions: start it in a terminal, or with --yes")
+            if answer is None:
+                raise EndedError
+            return answer
+
+        tape = ask if options.tape else None
+        return Calibration(session, options.parts, options.folder, None if options.yes else ask, tape).run()
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ from typing import List, Optional, Sequence
 import rospy
 
 from ..clock import Clock
+from ..command_line import say
 from .private_parameters import delete_own_parameters
 from .ros_node import start_ros_node
 
@@ -90,6 +91,24 @@ class Program(Clock):
             return []
         readable, _, _ = select.select([self._wake_read_fd, *fds], [], [], max(0.0, timeout_s))
         return [] if self._ending else [fd for fd in readable if fd != self._wake_read_fd]
+
+    def ask(self, question: str) -> Optional[str]:
+        """Ask the user in the terminal; return the answer in lower case, None without one or if the program is to end.
+
+        Unlike input(), which would keep waiting after Ctrl-C: signals only set a flag.
+        """
+        if sys.stdin is None:
+            return None
+        say(question, end="")
+        while not self.wait_readable([sys.stdin.fileno()], 1.0):
+            if not self.running:
+                say("")
+                return None
+        try:
+            answer = sys.stdin.readline()
+        except UnicodeDecodeError:
+            return ""  # a key that is no letter, as Enter
+        return answer.strip().lower() if answer else None
 
     def __enter__(self) -> "Program":
         return self

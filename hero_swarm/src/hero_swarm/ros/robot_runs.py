@@ -110,14 +110,10 @@ def _ask(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource,
     """Say how far robots are from their places; return START once the operator says so and all are ready, or
     DRIVE to drive there again, or END."""
     while program.running:
-        print("%s: %s. Enter starts, d drives there again, q ends" % (label, _describe_offsets(swarm, starts, source)))
-        while not program.wait_readable([sys.stdin.fileno()], 1.0):
-            if not program.running:
-                return END
-        line = sys.stdin.readline()
-        answer = line.strip().lower() if line else END
-        if answer in (DRIVE, END):
-            return answer
+        offsets = _describe_offsets(swarm, starts, source)
+        answer = program.ask("%s: %s. Enter starts, d drives there again, q ends: " % (label, offsets))
+        if answer in (DRIVE, END, None):
+            return answer or END
         obstacle = _find_obstacle(swarm, source)
         if not obstacle:
             return START
