@@ -74,28 +74,26 @@ class StepSession(Session):
         robots.on_cycle.append(self.receive_cycles)
         robots.on_scan.append(self.receive_scans)
 
+    @property
     def now_s(self):
         return self.robots.now_ms / 1000.0
 
     def sleep(self, duration_s):
         self.robots.advance(self.robots.now_ms + max(1, round(1000.0 * duration_s)))
-        for time_s in [time_s for time_s in self.events if time_s <= self.now_s()]:
+        for time_s in [time_s for time_s in self.events if time_s <= self.now_s]:
             self.events.pop(time_s)()
-
-    @property
-    def is_ending(self):
-        return self.end_s is not None and self.now_s() >= self.end_s
+        return self.end_s is None or self.now_s < self.end_s
 
     def map(self, work, probes):
         for probe in probes:
             work(probe)
 
     def receive_cycles(self, rows):
-        now_s, ticks, poses = self.now_s(), self.robots.ticks[rows].tolist(), self.robots.odometry[rows].tolist()
+        now_s, ticks, poses = self.now_s, self.robots.ticks[rows].tolist(), self.robots.odometry[rows].tolist()
         for row, *reading in zip(rows.tolist(), ticks, poses):
             self.probes[row].receive_cycle(now_s, *reading)
 
     def receive_scans(self, rows):
-        now_s, counts, ranges_m = self.now_s(), self.robots.counts[rows].tolist(), self.robots.ranges_m[rows].tolist()
+        now_s, counts, ranges_m = self.now_s, self.robots.counts[rows].tolist(), self.robots.ranges_m[rows].tolist()
         for row, *scan in zip(rows.tolist(), counts, ranges_m):
             self.probes[row].receive_ranges(now_s, *scan)

@@ -200,7 +200,7 @@ class TestDisturbances:
         session.stop()
         session.sleep(0.5)
         assert is_moving(session) == [False] * 4
-        assert session.now_s() < session.end_s + 1.0
+        assert session.now_s < session.end_s + 1.0
 
 
 class TestFaults:

@@ -57,16 +57,14 @@ class FakeSession(Session):
         super().__init__([FakeProbe(number) for number in range(count)])
         self.time_s, self.end_s, self.on_sleep = 100.0, math.inf, lambda now_s: None
 
+    @property
     def now_s(self):
         return self.time_s
 
     def sleep(self, duration_s):
         self.time_s += duration_s
         self.on_sleep(self.time_s)
-
-    @property
-    def is_ending(self):
-        return self.time_s >= self.end_s
+        return self.time_s < self.end_s
 
     def map(self, work, probes):
         for probe in probes:
@@ -352,13 +350,12 @@ def test_kept_calibrations_are_restored_robot_by_robot(tmp_path, capsys):
 
 def test_wheels_drive_a_square_to_each_side_and_are_looked_at_at_rest(monkeypatch):
     driven, looked = [], []
-    now_s = [100.0]
     monkeypatch.setattr(wheels, "_drive", lambda session, probes, part: driven.append(part))
     probe = SimpleNamespace(robot_id=3, find_place=looked.append)
     session = SimpleNamespace(
         probes=[probe],
-        now_s=lambda: now_s[0],
-        pause=lambda duration_s: now_s.append(now_s.pop() + duration_s),
+        now_s=100.0,
+        pause=lambda duration_s: setattr(session, "now_s", session.now_s + duration_s),
         repeat=lambda title, tries, drive, evaluate: drive([probe]),
     )
     wheels.calibrate_wheels(session)

@@ -32,7 +32,7 @@ def watch(session):
 
     def measure(rows):
         for row in rows:
-            session.probes[row].receive_place(session.now_s(), see(session, noise, row))
+            session.probes[row].receive_place(session.now_s, see(session, noise, row))
 
     session.robots.on_cycle.append(measure)
 
@@ -42,8 +42,8 @@ def measure_drift(session, wheels_m):
     starts, ticks = session.robots.world.poses.copy(), [[robot.copy()] for robot in session.robots.ticks]
     session.robots.on_cycle.append(lambda rows: [ticks[row].append(session.robots.ticks[row].copy()) for row in rows])
     for linear_m_s, angular_rad_s, duration_s in HELD_OUT:
-        end_s = session.now_s() + duration_s
-        while session.now_s() < end_s:
+        end_s = session.now_s + duration_s
+        while session.now_s < end_s:
             for probe in session.probes:
                 probe.drive(angular_rad_s, linear_m_s)
             session.sleep(0.1)

@@ -95,7 +95,7 @@ def _face_wall_with_each_sensor(
         targets_rad: Dict[int, float] = {}
 
         def evaluate(probe: Probe, sensor: int = sensor, targets_rad: Dict[int, float] = targets_rad) -> None:
-            probe.check_alive(session.now_s())
+            probe.check_alive(session.now_s)
             counts, ranges_m = probe.read_scans()
             pose = probe.pose
             facing = model.Facing(sensor, counts.tolist(), ranges_m.tolist(), 0.0)
@@ -120,7 +120,7 @@ def _turn(session: Session, title: str, targets_rad: Dict[int, float]) -> None:
         return all(abs(remaining_rad(probe)) <= TURN_REACHED_RAD for probe in turning)
 
     def check(probe: Probe) -> None:
-        probe.check_alive(session.now_s())
+        probe.check_alive(session.now_s)
         if abs(remaining_rad(probe)) > TURN_TOLERANCE_RAD:
             raise CalibrationError(
                 "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"

@@ -56,7 +56,7 @@ def calibrate_motors(session: Session) -> Dict[int, MotorResult]:
         for pulse_us in pulses_us:
             for probe in probes:
                 probe.set_pulses(pulse_us)
-            start_times_s.append(session.now_s())
+            start_times_s.append(session.now_s)
             session.pause(dead_zone.PULSE_S)
         session.settle()
         return start_times_s

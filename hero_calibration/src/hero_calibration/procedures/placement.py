@@ -53,13 +53,13 @@ def check_places(session: Session, at_wall: bool) -> Dict[Probe, str]:
         probe.forget_scans()
 
     def is_ready(probe: Probe) -> bool:
-        return probe.count_scans() >= SCANS_TO_CHECK and not probe.find_silence(session.now_s())
+        return probe.count_scans() >= SCANS_TO_CHECK and not probe.find_silence(session.now_s)
 
     session.wait_for(lambda: all(map(is_ready, probes)), READY_TIMEOUT_S)
     problems = {}
     for probe in probes:
         try:
-            probe.check_alive(session.now_s())
+            probe.check_alive(session.now_s)
             obstacle = find_obstacle(probe.read_scans()[0].tolist(), at_wall)
         except CalibrationError as error:
             obstacle = str(error)

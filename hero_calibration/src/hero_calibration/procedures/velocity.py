@@ -112,8 +112,8 @@ def _test(session: Session) -> Dict[int, List[Response]]:
         start_times_s: List[float] = []
         for angular_rad_s in (ANGULAR_RAD_S, -ANGULAR_RAD_S):
             session.settle()
-            start_times_s.append(session.now_s())
-            while session.now_s() < start_times_s[-1] + STEP_S:
+            start_times_s.append(session.now_s)
+            while session.now_s < start_times_s[-1] + STEP_S:
                 for probe in probes:
                     probe.drive(angular_rad_s)
                 session.pause(COMMAND_PERIOD_S)

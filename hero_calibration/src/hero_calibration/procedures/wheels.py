@@ -146,17 +146,17 @@ def _list_square(side: float) -> List[Drive]:
 
 def _drive(session: Session, probes: Sequence[Probe], part: Drive) -> None:
     linear_m_s, angular_rad_s, duration_s = part
-    end_s = session.now_s() + duration_s
-    while session.now_s() < end_s:
+    end_s = session.now_s + duration_s
+    while session.now_s < end_s:
         for probe in probes:
             probe.drive(angular_rad_s, linear_m_s)
-        session.pause(min(COMMAND_PERIOD_S, max(0.0, end_s - session.now_s())))
+        session.pause(min(COMMAND_PERIOD_S, max(0.0, end_s - session.now_s)))
     session.settle()
 
 
 def _stop_and_look(session: Session) -> Stop:
     session.pause(MEASURE_S)
-    now_s = session.now_s()
+    now_s = session.now_s
     return now_s, {probe.robot_id: probe.find_place(now_s - MEASURE_S / 2.0) for probe in session.probes}
 
 
@@ -180,11 +180,11 @@ def _drive_for_tape(session: Session, ask: Ask) -> Dict[int, List[Leg]]:
     ):
         if ask("Mark center and heading of each robot for %s; then Enter, q to end: " % name) == "q":
             raise EndedError
-        start_s = session.now_s()
+        start_s = session.now_s
         for part in parts:
             _drive(session, session.active, part)
         session.pause(MEASURE_S)
-        session.for_each("wheels", partial(_add_leg, legs, ask, start_s, session.now_s(), sd))
+        session.for_each("wheels", partial(_add_leg, legs, ask, start_s, session.now_s, sd))
     return legs
 
 

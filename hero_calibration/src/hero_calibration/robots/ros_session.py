@@ -25,17 +25,15 @@ class RosSession(Session):
         super().__init__(probes)
         self._program = program
 
+    @property
     def now_s(self) -> float:
-        """Return ROS time."""
+        """ROS time."""
         return rospy.get_time()
 
-    def sleep(self, duration_s: float) -> None:
-        """Sleep by the clock of this computer."""
+    def sleep(self, duration_s: float) -> bool:
+        """Sleep by the clock of this computer; return whether the program is to continue."""
         time.sleep(duration_s)
-
-    @property
-    def is_ending(self) -> bool:
-        return not self._program.running
+        return self._program.running
 
 
 def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[RosProbe]:

@@ -1,14 +1,14 @@
 """Takes all robots through a procedure together: each step moves all of them, and the data of each is evaluated alone.
 
 A robot that fails is stopped, keeps its reason, and is excluded; the others continue. Knows neither ROS nor the
-clock of this computer: a subclass has the time (ros_session).
+clock of this computer: a subclass has the time, and waits (ros_session).
 """
 
-from abc import ABC, abstractmethod
 from concurrent.futures import ThreadPoolExecutor
 from typing import Callable, List, Optional, Sequence, TypeVar
 
 from hero_client.values.background_motion import SEND_TIME_S
+from hero_node.clock import Clock
 from hero_node.command_line import say
 
 from ..errors import CalibrationError, EndedError
@@ -22,8 +22,8 @@ COMMAND_PERIOD_S = 0.1
 CALLS_AT_ONCE = 32
 
 
-class Session(ABC):
-    """The robots under calibration, and the clock.
+class Session(Clock):
+    """The robots under calibration, and the clock; its sleep() takes the whole time also while the program ends.
 
     Attributes:
         probes: all robots, including those that failed.
@@ -32,21 +32,6 @@ class Session(ABC):
     def __init__(self, probes: Sequence[Probe]) -> None:
         """Work with probes."""
         self.probes = list(probes)
-
-    # -- what the subclass has -----------------------------------------------------------------------------
-
-    @abstractmethod
-    def now_s(self) -> float:
-        """Return the time."""
-
-    @abstractmethod
-    def sleep(self, duration_s: float) -> None:
-        """Wait about duration_s."""
-
-    @property
-    @abstractmethod
-    def is_ending(self) -> bool:
-        """Whether the program is to end."""
 
     def map(self, work: Callable[[Probe], None], probes: Sequence[Probe]) -> None:
         """Do work for probes side by side: a service call waits for its robot."""
@@ -61,14 +46,13 @@ class Session(ABC):
 
     def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> None:
         """Wait until condition holds, at most timeout_s. Raises: EndedError if the program is to end."""
-        end_s = self.now_s() + timeout_s
+        end_s = self.now_s + timeout_s
         while not condition():
-            left_s = end_s - self.now_s()
+            left_s = end_s - self.now_s
             if left_s <= 0.0:
                 return
-            if self.is_ending:
+            if not self.sleep(min(left_s, POLL_S)):
                 raise EndedError
-            self.sleep(min(left_s, POLL_S))
 
     # -- robots --------------------------------------------------------------------------------------------
 
@@ -118,7 +102,7 @@ class Session(ABC):
                 except CalibrationError as error:
                     if is_last:
                         raise
-                    probe.check_alive(self.now_s())
+                    probe.check_alive(self.now_s)
                     say("%s once more: %s: %s" % (probe.name, step, error))
                     again.append(probe)
 
