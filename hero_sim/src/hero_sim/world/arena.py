@@ -4,7 +4,7 @@ Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m;
 """
 
 import math
-from typing import Any, List, NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
