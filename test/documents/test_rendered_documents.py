@@ -3,6 +3,7 @@
 A broken link, or a page that is missing in the menu, fails the rendering.
 """
 
+import re
 import subprocess
 from pathlib import Path
 
@@ -17,7 +18,7 @@ NEXT_PAGE = "a.md-footer__link--next"
 
 FIND_CUT_LINES = """
 return [...document.querySelectorAll("pre > code")].filter(code => code.scrollWidth > code.clientWidth)
-    .map(code => code.innerText)"""
+    .map(code => code.closest("article").dataset.page + ": " + code.innerText)"""
 
 # Lines may break at spaces, and where CSS allows it anyway: after hyphens and slashes.
 FIND_BROKEN_WORDS = r"""
@@ -30,7 +31,7 @@ for (const cell of document.querySelectorAll("td, th")) {
             range.setStart(text, word.index);
             range.setEnd(text, word.index + word[0].length);
             const lines = [...range.getClientRects()].filter(box => box.width > 0).map(box => Math.round(box.top));
-            if (new Set(lines).size > 1) broken.push(word[0]);
+            if (new Set(lines).size > 1) broken.push(cell.closest("article").dataset.page + ": " + word[0]);
         }
 }
 return broken;"""
@@ -97,12 +98,27 @@ def test_the_copy_button_copies_commands_alone(pages, browser):
     ]
 
 
+def join_pages():
+    """Return a page with the contents of all, which have the same width, and their number: one by one they load for 12 s."""
+    found = {}
+    for path in sorted(RENDERED.rglob("*.html")):
+        (found[path],) = re.findall("<article .*?</article>", path.read_text(encoding="utf-8"), re.DOTALL)
+    contents = ""
+    for path, article in found.items():
+        contents += article.replace("<article", '<article data-page="%s"' % path.relative_to(RENDERED), 1)
+    index = RENDERED / "index.html"
+    return index.read_text(encoding="utf-8").replace(found[index], contents), len(found)
+
+
 def test_no_code_is_cut_and_no_word_in_a_table_is_broken(pages, browser):
-    for page in sorted(RENDERED.rglob("*.html")):
-        browser.get(page.as_uri())
-        name = page.relative_to(RENDERED)
-        assert not browser.execute_script(FIND_CUT_LINES), name
-        assert not browser.execute_script(FIND_BROKEN_WORDS), name
+    text, count = join_pages()
+    joined = RENDERED / "all_pages.html"
+    joined.write_text(text, encoding="utf-8")
+    browser.get(joined.as_uri())
+    joined.unlink()
+    wait_for(lambda: len(browser.find_elements("css selector", "article[data-page]")) == count, "all pages")
+    assert browser.execute_script(FIND_CUT_LINES) == []
+    assert browser.execute_script(FIND_BROKEN_WORDS) == []
 
 
 def test_blocks_name_their_terminal_where_there_are_several(pages, browser):
