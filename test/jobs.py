@@ -30,8 +30,8 @@ class Job(NamedTuple):
     name: str  # as in the printed line
     command: Tuple[str, ...]
     results_dir: Path  # the job's own: its JUnit files, and its output as log.txt
-    load: float  # cores that it keeps busy, on average
     timeout_s: float  # when it hangs; a busy machine needs its time
+    load: float = 1 / 3  # cores that it keeps busy, on average; most of a test is waiting
     environment: Dict[str, str] = {}  # besides ours
     has_own_network: bool = True
 
@@ -115,7 +115,7 @@ def run_and_judge(job):
 
 
 def run_jobs(jobs: List[Job], max_load: float) -> bool:
-    """Run all jobs, in order, as many at once as add up to this load; return whether all passed."""
+    """Run all jobs, in order, the next one while those that run add up to less than this load; return whether all passed."""
     # A background job of a shell ignores Ctrl-C, and so would all that it starts; the tests send Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     waiting, running = list(jobs), {}
@@ -123,12 +123,9 @@ def run_jobs(jobs: List[Job], max_load: float) -> bool:
     with concurrent.futures.ThreadPoolExecutor(max(1, len(waiting))) as pool:
         try:
             while waiting or running:
-                # The next that fits; one alone may be as large as it likes.
-                load = sum(job.load for job in running.values())
-                fitting = [job for job in waiting if not running or load + job.load <= max_load]
-                if fitting:
-                    waiting.remove(fitting[0])
-                    running[pool.submit(run_and_judge, fitting[0])] = fitting[0]
+                if waiting and sum(job.load for job in running.values()) < max_load:
+                    job = waiting.pop(0)
+                    running[pool.submit(run_and_judge, job)] = job
                     continue
                 ended, _ = concurrent.futures.wait(running, return_when=concurrent.futures.FIRST_COMPLETED)
                 for run in ended:

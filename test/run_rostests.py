@@ -5,7 +5,6 @@ The workspace must be sourced.
 """
 
 import os
-import re
 import shlex
 import shutil
 import subprocess
@@ -16,7 +15,6 @@ from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 3600.0  # of one .test file; each <test> in it has its own, shorter time-limit
-LOAD = 1 / 3  # most of a rostest is waiting
 # roslaunch imports distutils, which setuptools replaces by its own and itself: half of roslaunch's start.
 DISTUTILS = {"SETUPTOOLS_USE_DISTUTILS": "stdlib"} if sys.version_info < (3, 12) else {}
 KEEP_FOUND = """\
@@ -24,19 +22,12 @@ kept={programs}/found_$(echo "$CMAKE_PREFIX_PATH $*" | cksum | cut -d " " -f 1)
 if [ ! -s "$kept" ]; then {catkin_find} "$@" >"$kept.$$" || exit; mv "$kept.$$" "$kept"; fi
 cat "$kept"
 """
-TIME_LIMIT = re.compile(r'time-limit="([0-9.]+)"')
-
-
-def read_time_limit_s(path):
-    """Return how long the tests of a .test file may take at most, one after another, by its own word."""
-    return sum(map(float, TIME_LIMIT.findall(path.read_text())))
 
 
 def find_rostests(pattern):
-    """All .test files of the suite whose path contains the pattern, those first that may take longest."""
+    """All .test files of the suite whose path contains the pattern."""
     paths = sorted(ROOT.glob("*/test/rostest/*.test"))
-    chosen = [path for path in paths if pattern in str(path.relative_to(ROOT))]
-    return sorted(chosen, key=read_time_limit_s, reverse=True)
+    return [path for path in paths if pattern in str(path.relative_to(ROOT))]
 
 
 def write_program(path, script):
@@ -85,7 +76,7 @@ def make_jobs(results_dir, pattern="", paths=()):
         ros_home = Path(os.environ["ROS_HOME"]) / package_dir.name / path.stem
         environment = {"PATH": program_path, "ROS_TEST_RESULTS_DIR": str(own_results), "ROS_HOME": str(ros_home)}
         environment.update(DISTUTILS)
-        jobs.append(Job(str(path.relative_to(ROOT)), command, own_results, LOAD, TIMEOUT_S, environment))
+        jobs.append(Job(str(path.relative_to(ROOT)), command, own_results, TIMEOUT_S, environment=environment))
     return jobs
 
 

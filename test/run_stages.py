@@ -16,34 +16,17 @@ from jobs import Job, count_cores, run_jobs
 ROOT = Path(__file__).resolve().parents[1]
 TIMEOUT_S = 3600.0  # of one that hangs
 OPTIONS_PYTHON = (3, 10)  # with an older one the stage options is left out
-COMPUTING_LOAD = 1.0
-WAITING_LOAD = 1 / 3
-LOAD_PER_CORE = 1.2  # two that compute leave room for one that waits; more at once cost each other CPU time
-LONGEST = (
-    "hero_tutorial/test/rostest/hero.test",
-    "unit: hero_sim",
-    "noetic",
-    "unit: hero_localization",
-    "unit: hero_swarm",
-    "workspaces: test_build_modes.py catkin_build",
-    "workspaces: test_build_modes.py install",
-    "lint",
-    "documents",
-    "core",
-    "unit: hero_calibration",
-    "unit: hero_tutorial",
-)
-"""Names of the longest jobs: begun last, one would keep a core busy while the others idle."""
+COSTS = ROOT / "test" / "costs.txt"  # of the jobs, as measured
 
 sys.path.insert(0, str(ROOT / "test" / "faults"))
 import run as faults  # noqa: E402
 
 
-def make_pytest_job(name, arguments, results_dir, load):
+def make_pytest_job(name, arguments, results_dir):
     """Return a job of pytest."""
     command = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *arguments)
     junit = ("--junitxml", str(results_dir / "results.xml"))
-    return Job(name, (*command, *junit), results_dir, load, TIMEOUT_S)
+    return Job(name, (*command, *junit), results_dir, TIMEOUT_S)
 
 
 def make_unit_jobs(results_dir, packages):
@@ -54,8 +37,7 @@ def make_unit_jobs(results_dir, packages):
         parts = min(2 * count_cores() // len(packages) or 1, len(files))
         for part in range(parts):
             name = package + (f"_{part + 1}_of_{parts}" if parts > 1 else "")
-            load = COMPUTING_LOAD if parts == 1 else COMPUTING_LOAD / 2
-            job = make_pytest_job("unit: " + name, files, results_dir / name, load)
+            job = make_pytest_job("unit: " + name, files, results_dir / name)
             jobs.append(job._replace(environment={"HERO_PART": f"{part}/{parts}"}))
     return jobs
 
@@ -76,52 +58,49 @@ def find_unit_tests(paths=()):
 
 def make_workspace_jobs(results_dir):
     """Return one job for each build mode, and one for each other file."""
-    parts = [("test_build_modes.py", mode, COMPUTING_LOAD) for mode in ("catkin_build", "install")]
+    parts = [("test_build_modes.py", mode) for mode in ("catkin_build", "install")]
     others = {path.name for path in (ROOT / "test" / "workspaces").glob("test_*.py")}
-    parts += [(name, "", WAITING_LOAD) for name in sorted(others - {"test_build_modes.py", "test_core.py"})]
+    parts += [(name, "") for name in sorted(others - {"test_build_modes.py", "test_core.py"})]
     jobs = [make_core_job(results_dir / "core", "not unit_tests")]  # they have run, with all packages
     environment = {"PATH": run_rostests.make_program_path(results_dir)}
-    for file, mode, load in parts:
+    for file, mode in parts:
         arguments = (str(ROOT / "test" / "workspaces" / file), *(("-k", f"[{mode}]") if mode else ()))
         name = " ".join(["workspaces:", file, mode]).rstrip()
         own_results = results_dir / (mode or file[:-3])
-        jobs.append(make_pytest_job(name, arguments, own_results, load)._replace(environment=environment))
+        jobs.append(make_pytest_job(name, arguments, own_results)._replace(environment=environment))
     return jobs
 
 
 def make_core_job(results_dir, selection):
     """Return the job that builds and tests the core without the other packages."""
     arguments = (str(ROOT / "test" / "workspaces" / "test_core.py"), "-k", selection)
-    return make_pytest_job("core", arguments, results_dir, COMPUTING_LOAD)
+    return make_pytest_job("core", arguments, results_dir)
 
 
 def make_jobs(stages, results, pattern, paths):
-    """Return all jobs of the stages and paths, in the order in which they begin: what waits, then what computes.
-
-    What computes fills the cores to the end.
-    """
+    """Return all jobs of the stages and paths, in the order in which they begin."""
     jobs = []
     # What these install the first time comes from the network.
     if "noetic" in stages and os.environ.get("HERO_PYTHON38"):
         own_results = results / "noetic"
         command = (str(ROOT / "test" / "noetic" / "run"), os.environ["HERO_PYTHON38"], str(own_results))
-        jobs.append(Job("noetic", command, own_results, COMPUTING_LOAD, TIMEOUT_S, has_own_network=False))
+        jobs.append(Job("noetic", command, own_results, TIMEOUT_S, has_own_network=False))
     if "options" in stages and sys.version_info >= OPTIONS_PYTHON:
         own_results = results / "options"
         command = (str(ROOT / "test" / "options" / "run"), str(own_results))
-        jobs.append(Job("options", command, own_results, COMPUTING_LOAD, TIMEOUT_S, has_own_network=False))
+        jobs.append(Job("options", command, own_results, TIMEOUT_S, has_own_network=False))
     if "noetic_rostest" in stages and os.environ.get("HERO_PYTHON38"):
         own_results = results / "noetic_rostest"
         script = str(ROOT / "test" / "noetic" / "run_rostests")
         command = (script, os.environ["HERO_PYTHON38"], str(own_results), pattern or "hero_driver/")
-        jobs.append(Job("noetic_rostest", command, own_results, count_cores(), TIMEOUT_S, has_own_network=False))
+        jobs.append(Job("noetic_rostest", command, own_results, TIMEOUT_S, count_cores(), has_own_network=False))
     if "lint" in stages:
         own_results = results / "lint"
         environment = {"HERO_RESULTS": str(own_results)}
         command = (str(ROOT / "script" / "lint"),)
-        jobs.append(Job("lint", command, own_results, COMPUTING_LOAD, TIMEOUT_S, environment, has_own_network=False))
+        jobs.append(Job("lint", command, own_results, TIMEOUT_S, environment=environment, has_own_network=False))
         tests = [str(ROOT / "test" / "documents")]
-        documents = make_pytest_job("documents", tests, results / "documents", COMPUTING_LOAD)
+        documents = make_pytest_job("documents", tests, results / "documents")
         jobs.append(documents._replace(has_own_network=False))
     if "workspaces" in stages:
         jobs += make_workspace_jobs(results / "workspaces")
@@ -142,8 +121,19 @@ def make_jobs(stages, results, pattern, paths):
         jobs += make_unit_jobs(results / "unit", unit_tests)
     if paths and not jobs:
         print("-- no unit tests here: the rules of test/lint, which read launch files and documents, too", flush=True)
-        jobs.append(make_pytest_job("rules", [str(ROOT / "test" / "lint")], results / "lint", COMPUTING_LOAD))
-    return sorted(jobs, key=lambda job: (job.load, LONGEST.index(job.name) if job.name in LONGEST else len(LONGEST)))
+        jobs.append(make_pytest_job("rules", [str(ROOT / "test" / "lint")], results / "lint"))
+    return add_costs(jobs)
+
+
+def add_costs(jobs):
+    """Return the jobs with their loads, the longest first: what waits runs beside what computes, and short ones end together."""
+    costs = {}
+    for line in COSTS.read_text().splitlines():
+        if not line.startswith("#"):
+            duration_s, cpu_s, name = line.split(maxsplit=2)
+            costs[name] = (float(duration_s), float(cpu_s))
+    known = [job._replace(load=costs[job.name][1] / costs[job.name][0]) for job in jobs if job.name in costs]
+    return sorted(known, key=lambda job: -costs[job.name][0]) + [job for job in jobs if job.name not in costs]
 
 
 def main():
@@ -155,7 +145,7 @@ def main():
     parser.add_argument("--paths", type=Path, nargs="*", default=(), help="packages, or files of them")
     options = parser.parse_args()
     jobs = make_jobs(options.stages, options.results, options.pattern, options.paths)
-    passed = run_jobs(jobs, LOAD_PER_CORE * count_cores())
+    passed = run_jobs(jobs, count_cores())
     if {"rostest", "faults"} & set(options.stages) or any(path.suffix == ".test" for path in options.paths):
         print("the robots of rostests and faults were drawn with HERO_SEED=%s" % os.environ.get("HERO_SEED", "0"))
     if "faults" in options.stages:
