@@ -115,7 +115,7 @@ def run_and_judge(job):
 
 
 def run_jobs(jobs: List[Job], max_load: float) -> bool:
-    """Run all jobs, in order, the next one while those that run add up to less than this load; return whether all passed."""
+    """Run all jobs in order, another one while those that run have less than this load; return whether all passed."""
     # A background job of a shell ignores Ctrl-C, and so would all that it starts; the tests send Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     waiting, running = list(jobs), {}

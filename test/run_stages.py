@@ -126,7 +126,7 @@ def make_jobs(stages, results, pattern, paths):
 
 
 def add_costs(jobs):
-    """Return the jobs with their loads, the longest first: what waits runs beside what computes, and short ones end together."""
+    """Return the jobs with their loads, the longest first: waiting and computing ones mix, short ones end together."""
     costs = {}
     for line in COSTS.read_text().splitlines():
         if not line.startswith("#"):

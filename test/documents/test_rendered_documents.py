@@ -99,7 +99,7 @@ def test_the_copy_button_copies_commands_alone(pages, browser):
 
 
 def join_pages():
-    """Return a page with the contents of all, which have the same width, and their number: one by one they load for 12 s."""
+    """Return a page with the contents of all, of the same width, and their number: one by one they load for 12 s."""
     found = {}
     for path in sorted(RENDERED.rglob("*.html")):
         (found[path],) = re.findall("<article .*?</article>", path.read_text(encoding="utf-8"), re.DOTALL)
