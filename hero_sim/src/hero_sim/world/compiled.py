@@ -33,7 +33,7 @@ def compile_loops(rows: int, *loops: Loop) -> Tuple[Hold, Sequence[Loop]]:
 
     hold(array) is what the loops read and change: the array, or a list, whose single reads are several times faster.
     """
-    compiled = [_compile(loop) for loop in loops] if rows >= COMPILED_ROWS else [None]
-    if None in compiled:
+    compiled = [loop for loop in map(_compile, loops) if loop is not None] if rows >= COMPILED_ROWS else []
+    if not compiled:
         return np.ndarray.tolist, loops
     return np.ascontiguousarray, compiled
