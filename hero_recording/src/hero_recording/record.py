@@ -21,7 +21,7 @@ import rosgraph
 import roslib.packages
 
 from hero_node import command_line
-from hero_node.parameters import robot_ids_option
+from hero_node.parameters import robot_ids_option, within
 from hero_node.processes import end_process
 from hero_node.ros.master import ask_master, check_master
 
@@ -224,17 +224,14 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     parser.add_argument("--topics", default="", help="more topics: regular expressions separated by spaces")
     parser.add_argument("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
-    parser.add_argument("--split-mb", type=int, default=256, metavar="MB", help="size of a file (256)")
-    parser.add_argument("--max-files", type=int, default=0, metavar="N", help="keep only the newest N (0: all)")
-    parser.add_argument("--min-free-mb", type=float, default=1000.0, metavar="MB", help="stop below this (1000)")
+    add = parser.add_argument
+    add("--split-mb", type=within(1, 100_000, int), default=256, metavar="MB", help="size of a file (256)")
+    add("--max-files", type=within(0, 10_000, int), default=0, metavar="N", help="keep only the newest N (0: all)")
+    add("--min-free-mb", type=within(0.0, 1e9), default=1000.0, metavar="MB", help="stop below this (1000)")
     parser.add_argument("--compression", choices=("lz4", "bz2", "none"), default="lz4", help="bag compression (lz4)")
     parser.add_argument("--seconds", type=float, metavar="S", help="stop after S seconds")
     parser.add_argument("--repair", nargs="+", metavar="FILE", help="repair recordings that were cut off, and exit")
     options = parser.parse_args(arguments)
-    for name, lowest, highest in (("split_mb", 1, 100000), ("max_files", 0, 10000), ("min_free_mb", 0.0, 1e9)):
-        value = getattr(options, name)
-        if not lowest <= value <= highest:
-            parser.error("--%s %s: must be %g..%g" % (name.replace("_", "-"), value, lowest, highest))
     if options.seconds is not None and not 0.0 < options.seconds < math.inf:
         parser.error("--seconds %g: must be more than 0, and finite" % options.seconds)
     if not re.fullmatch(r"[\w][\w.-]*", options.name):

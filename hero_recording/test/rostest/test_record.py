@@ -219,7 +219,7 @@ class RecordTest(unittest.TestCase):
         without_master = dict(os.environ, ROS_MASTER_URI="http://127.0.0.1:9")
         cases = [
             (self.start_recording("disk", "--min-free-mb", "1e9"), 1, "nothing is recorded"),
-            (self.start_recording("split", "--split-mb", "0"), 2, "must be 1.."),
+            (self.start_recording("split", "--split-mb", "0"), 2, "must be a whole number from 1 to"),
             (self.start_recording("master", env=without_master), 1, "no ROS master at"),
         ]
         for process, expected, words in cases:

@@ -11,12 +11,12 @@ from hero_recording import __main__, record
 @pytest.mark.parametrize(
     ("option", "value", "words"),
     [
-        ("--split-mb", "0", "must be 1..100000"),
-        ("--split-mb", "100001", "must be 1..100000"),
-        ("--max-files", "-1", "must be 0..10000"),
-        ("--max-files", "10001", "must be 0..10000"),
-        ("--min-free-mb", "-1", "must be 0..1e+09"),
-        ("--min-free-mb", "1000000001.0", "must be 0..1e+09"),
+        ("--split-mb", "0", "must be a whole number from 1 to 100000"),
+        ("--split-mb", "100001", "must be a whole number from 1 to 100000"),
+        ("--max-files", "-1", "must be a whole number from 0 to 10000"),
+        ("--max-files", "10001", "must be a whole number from 0 to 10000"),
+        ("--min-free-mb", "-1", "must be a number from 0 to 1e+09"),
+        ("--min-free-mb", "1000000001.0", "must be a number from 0 to 1e+09"),
         ("--seconds", "0", "must be more than 0"),
         ("--name", "../x", "must be letters"),
         ("--topics", "(", "not a regular expression"),

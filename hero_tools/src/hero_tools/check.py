@@ -14,6 +14,7 @@ from typing import Dict, List, Optional, Sequence
 import rospy
 
 from hero_node import command_line
+from hero_node.parameters import within
 from hero_node.ros.ros_node import end_ros_node
 from hero_node.texts import make_printable
 
@@ -74,16 +75,12 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         prog="check", description="Checks whether this PC can drive robots."
     )
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
-    parser.add_argument(
-        "--port", type=int, default=11411, metavar="PORT", help="TCP port that robots connect to (11411)"
-    )
+    text = "TCP port that robots connect to (11411)"
+    parser.add_argument("--port", type=within(1, 65535, int), default=11411, metavar="PORT", help=text)
     parser.add_argument(
         "--interface", metavar="NAME", help="interface to the robots' network, such as wlan0 (default: the only one)"
     )
-    options = parser.parse_args(arguments)
-    if not 1 <= options.port <= 65535:
-        parser.error("--port %d: must be 1..65535" % options.port)
-    return options
+    return parser.parse_args(arguments)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -229,7 +229,7 @@ def test_a_command_that_is_missing_fails_or_hangs_is_no_error():
     assert ask_system(["echo", "yes"]) == "yes\n"
 
 
-@pytest.mark.parametrize(("option", "words"), [("--port=0", "1..65535"), ("--color", "--color")])
+@pytest.mark.parametrize(("option", "words"), [("--port=0", "from 1 to 65535"), ("--color", "--color")])
 def test_wrong_options_of_check_are_refused_by_name(option, words, capsys):
     with pytest.raises(SystemExit) as caught:
         check.parse_options([option])
