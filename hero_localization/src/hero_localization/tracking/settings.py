@@ -5,7 +5,7 @@ Pure but for the file. Lengths in m, angles in degrees, pixels as in camera_mode
 
 import math
 import os
-from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional
+from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def load(path: str) -> Settings:
 
     Raises: SettingsError with the file, the key and what it must be.
     """
-    content = _parse(path, _read(path))
+    _, content = _read(path)
     try:
         return _build(content)
     except ValueError as error:
@@ -69,8 +69,8 @@ def update(path: str, parts: Mapping[str, Any]) -> None:
     try:
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
         with lock_file(path):
-            text = _read(path)
-            write_file(path, replace_values(text, {**_parse(path, text), **parts}).encode())
+            text, content = _read(path)
+            write_file(path, replace_values(text, {**content, **parts}).encode())
     except OSError as error:
         raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
 
@@ -101,27 +101,20 @@ def describe_pose(pose: Pose) -> List[float]:
     return [round(float(pose.x_m), 5), round(float(pose.y_m), 5), round(math.degrees(pose.yaw_rad), 3)]
 
 
-def _read(path: str) -> str:
+def _read(path: str) -> Tuple[str, Dict[str, Any]]:
+    """Return the text of a file and what it says, nothing if it does not exist. Raises: SettingsError."""
     try:
-        return read_text(os.path.expanduser(path))
+        text = read_text(os.path.expanduser(path))
+        content = parse_yaml(text)
     except FileNotFoundError:
-        return ""
+        return "", {}
     except OSError as error:
         raise SettingsError("%s cannot be read: %s" % (path, error.strerror)) from None
     except YamlError as error:
         raise SettingsError("%s is no YAML file: %s" % (path, error)) from None
-
-
-def _parse(path: str, text: str) -> Dict[str, Any]:
-    try:
-        content = parse_yaml(text)
-    except YamlError as error:
-        raise SettingsError("%s is no YAML file: %s" % (path, error)) from None
-    if content is None:
-        return {}
-    if not isinstance(content, dict):
+    if not isinstance(content, (dict, type(None))):
         raise SettingsError("%s must hold keys and values, such as family: 36h11" % path)
-    return content
+    return text, content or {}
 
 
 def _build(content: Mapping[str, Any]) -> Settings:
