@@ -9,6 +9,8 @@ import pytest
 from hero_driver import gateway
 from hero_driver.config import read_config
 from hero_driver.gateway import Gateway
+from hero_driver.rosserial.packets import ID_LOG, encode_packet
+from hero_driver.rosserial.payloads import LOG_INFO, Log, encode_log
 from hero_driver.transport.link import Address
 
 sys.path.append(str(Path(__file__).parents[1] / "rostest"))
@@ -47,7 +49,10 @@ class Driver:
         self.gateway = Gateway(
             read_config({}),
             SimpleNamespace(call_later=lambda delay_s, call: None, call_soon=lambda call: None),
-            SimpleNamespace(log_throttled=lambda level, key, text, *_, **__: self.lines.append(text)),
+            SimpleNamespace(
+                log=lambda level, text: self.lines.append(text),
+                log_throttled=lambda level, key, text, *_, **__: self.lines.append(text),
+            ),
             SimpleNamespace(submit=lambda job, **_: True),  # nothing is registered with a master
             "/hero_driver",
             lambda: int(self.now_s * 1e9),
@@ -89,6 +94,12 @@ def test_a_robot_is_found_by_its_name_while_it_is_connected(driver):
     assert driver.find_link() is link
     link.close("closed by the robot")
     assert driver.find_link() is None
+
+
+def test_log_lines_of_a_robot_are_passed_on_with_its_name(driver):
+    link = driver.join(HOST)
+    driver.receive(link, encode_packet(ID_LOG, encode_log(Log(LOG_INFO, "hello"))))
+    assert driver.lines[-1] == "hero_0: hello"
 
 
 def test_a_link_that_has_closed_is_no_robots(driver):
