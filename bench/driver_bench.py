@@ -2,7 +2,8 @@
 
 Starts its own ROS master and the server (with --port it takes those that run), listeners and commanders, each in its
 own process; CPU time comes from the operating system's accounting (/proc). With --against, the driver and the one of
-another workspace are measured in turn, round by round: both meet the same machine. Run it with script/bench driver.
+another workspace are measured at the same time, each with its own master and robots: the speed of a virtual machine
+changes from one run to the next by more than versions differ. Run it with script/bench driver.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Dict, List
+from typing import Any, Dict, Generator, List
 
 import rosgraph
 from measuring import (
@@ -112,18 +113,32 @@ def collect(swarms):
     return dict(total, joined_s=None if None in joined_s else max(joined_s))
 
 
-def run_once(options, server_command, count, environment):
-    """Return the figures of one run with count robots."""
+def run_together(runs):
+    """Return the results of runs by name: generators that yield the time to wait before the next step, all the same."""
+    results: Dict[str, dict] = {}
+    while len(results) < len(runs):
+        for name, run in runs.items():
+            try:
+                wait_s = next(run)
+            except StopIteration as end:
+                results[name] = end.value
+                wait_s = 0.0
+        time.sleep(wait_s)
+    return results
+
+
+def run_once(options, server_command, count, environment) -> Generator[float, None, Dict[str, Any]]:
+    """Return the figures of one run with count robots, by run_together()."""
     load = [sys.executable, str(HERE / "ros_load.py")]
     with serve(options, server_command, environment) as servers:
         # The probe of the port was a connection too: let the server forget it.
-        time.sleep(1.0)
+        yield 1.0
         arguments = ["--count", str(0 if options.unheard else count)]
         listener = start([*load, "listen", *arguments], environment, stdout=subprocess.PIPE)
         commander = start([*load, "command", *arguments], environment, stdout=subprocess.PIPE)
-        time.sleep(SETTLE_S)
+        yield SETTLE_S
         swarms = start_swarms(options, count, servers, environment)
-        time.sleep(find_settling_s(count))
+        yield find_settling_s(count)
 
         def read_figures():
             server_s = sum(read_cpu_s(pid) for pid, _ in servers)
@@ -131,13 +146,14 @@ def run_once(options, server_command, count, environment):
 
         window_start_s = time.time()
         before = read_figures()
-        time.sleep(options.seconds)
+        yield options.seconds
         after = read_figures()
         ours = {pid for root in (os.getpid(), *(pid for pid, _ in servers)) for pid in find_tree(root)}
         window_end_s = time.time()
         memory_mb = sum(read_memory_mb(pid) for pid, _ in servers)
+        yield SETTLE_S
         sent = collect(swarms)
-        time.sleep(0.5)
+        yield 0.5
         listened = json.loads(stop(listener))
         commanded = json.loads(stop(commander))
     elapsed_s = after[0] - before[0]
@@ -255,14 +271,19 @@ def find_driver_command(workspace):
 
 
 def measure_all(options, commands):
-    """Return the medians for each number of robots and server; each other round begins with the other server."""
+    """Return the medians for each number of robots and server."""
     results = []
-    with use_master(options) as environment:
+    with contextlib.ExitStack() as stack:
+        environments = {name: stack.enter_context(use_master(options)) for name in commands}
         for count in options.count:
             runs: Dict[str, List[dict]] = {name: [] for name in commands}
-            for turn in range(options.rounds):
-                for name, command in sorted(commands.items(), reverse=turn % 2 == 0):
-                    runs[name].append(run_once(options, command, count, environment))
+            for _ in range(options.rounds):
+                together = {
+                    name: run_once(options, command, count, environments[name])
+                    for name, command in commands.items()
+                }
+                for name, result in run_together(together).items():
+                    runs[name].append(result)
                     print_run(name, runs[name])
             results += [{"server": name, **take_medians(runs[name])} for name in commands]
     return results
@@ -312,7 +333,7 @@ def main():
         "--against",
         type=Path,
         metavar="DIR",
-        help="measure the driver of the workspace DIR, or of the checkout DIR, in turn with this one",
+        help="measure the driver of the workspace DIR, or of the checkout DIR, at the same time as this one",
     )
     server.add_argument(
         "--port",
