@@ -11,7 +11,6 @@ import os
 import signal
 import sys
 from contextlib import suppress
-from traceback import walk_tb
 from typing import IO, Callable, NoReturn, Optional, Sequence, Tuple, Type
 
 from .errors import HeroError
@@ -105,6 +104,7 @@ def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
 
 def find_line(error: BaseException, script: Optional[str] = None) -> str:
     """Return where in the user's script an error was raised, for the end of a message; nothing for other programs."""
+    from traceback import walk_tb  # a tenth of the start of small programs
     main = sys.modules["__main__"]
     if script is None and main.__spec__ is None:  # not python3 -m
         script = getattr(main, "__file__", None)
