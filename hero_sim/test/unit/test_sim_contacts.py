@@ -178,7 +178,7 @@ def test_nothing_is_compiled_at_the_first_contact(monkeypatch):
     monkeypatch.setattr(compiled, "COMPILED_ROWS", 0)
     compiled._compile.cache_clear()
     build_world([(0.0, 0.0, 0.0)])
-    loop = compiled.compile_loop(contacts._relax, 1)
+    _, (loop,) = compiled.compile_loops(1, contacts._relax)
     known = list(loop.signatures)
     press(20, math.pi / 4, 30)
     assert known and loop.signatures == known
