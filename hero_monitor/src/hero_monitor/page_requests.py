@@ -39,7 +39,7 @@ class RefusedError(Exception):
 
 
 class PageRequests:
-    """Requests of pages for robots, programs and the recording."""
+    """Requests of pages for robots, programs and the recording: each kind of requests.REQUESTS has a method _do_KIND."""
 
     def __init__(
         self,
@@ -55,18 +55,6 @@ class PageRequests:
         self._background, self._hand_over, self._broadcast = background, hand_over, broadcast
         self.programs = Programs(rospy.get_name(), hand_over, self._stop_robots_of)
         self._pending_goals = 0
-        self._carry_out: Dict[str, Callable[[PageSocket, Request], None]] = {
-            "show": self._show,
-            "stop": self._stop,
-            "release": self._stop,
-            "end_drive": self._end_drive,
-            "stop_some": self._stop_some,
-            "end": self._end,
-            "drive": self._drive,
-            "goal": self._goal,
-            "start": self._start,
-            "record": self._record,
-        }
 
     def receive(self, page: "PageSocket", text: Union[str, bytes]) -> None:
         """Carry out a request, or tell the page why not."""
@@ -80,7 +68,7 @@ class PageRequests:
         try:
             if is_fresh(request, read_clock_ms()):
                 self._check(request["do"], request.get("robots", ()))
-                self._carry_out[request["do"]](page, request)
+                getattr(self, "_do_" + request["do"])(page, request)
             elif request["do"] != "drive":  # a button that is still held sends the next one at once
                 raise RefusedError("the request was delayed: nothing was done")
         except (RefusedError, FormationError) as error:
@@ -126,11 +114,11 @@ class PageRequests:
 
     # ---------------------------------------------------------------- view and stops
 
-    def _show(self, page: "PageSocket", request: Request) -> None:
+    def _do_show(self, page: "PageSocket", request: Request) -> None:
         page.ground_truth, page.picture = request["ground_truth"], request["picture"]
         page.visible = request["visible"]
 
-    def _stop(self, page: "PageSocket", request: Request) -> None:
+    def _do_stop(self, page: "PageSocket", request: Request) -> None:
         """Stop all robots, or release them."""
         verb, stopped_ms = request["do"], self._commander.stopped_ms
         if verb == "release" and stopped_ms is not None and read_clock_ms() - stopped_ms < 1e3 * INERT_S:
@@ -143,16 +131,18 @@ class PageRequests:
         self._hand_over(self._broadcast)
         self._background.warn("a page requests to %s all robots" % verb)
 
+    _do_release = _do_stop
+
     def end_programs_of_stopped_robots(self) -> None:
         """End all programs while all robots are stopped, from whichever source: a release then moves no robot."""
         if self._feed.stopped or not self._commander.may_drive():
             self.programs.end_all()
 
-    def _end_drive(self, page: "PageSocket", request: Request) -> None:
+    def _do_end_drive(self, page: "PageSocket", request: Request) -> None:
         for robot in request["robots"]:
             self._commander.dead_man.release(page.number, "/" + robot)
 
-    def _stop_some(self, page: "PageSocket", request: Request) -> None:
+    def _do_stop_some(self, page: "PageSocket", request: Request) -> None:
         self.programs.end_those_of(request["robots"])
         for robot in request["robots"]:
             if robot in self._feed.robots:
@@ -160,7 +150,7 @@ class PageRequests:
 
     # ---------------------------------------------------------------- motion
 
-    def _drive(self, page: "PageSocket", request: Request) -> None:
+    def _do_drive(self, page: "PageSocket", request: Request) -> None:
         linear_m_s, angular_rad_s = float(request["linear"]), float(request["angular"])
         commands = [DriveCommand("/" + robot, linear_m_s, angular_rad_s) for robot in request["robots"]]
         self._drive_robots(page.number, commands)
@@ -171,7 +161,7 @@ class PageRequests:
             verb = "is" if len(taken) == 1 else "are"
             raise RefusedError("%s %s driven from another page" % (", ".join(taken), verb))
 
-    def _goal(self, page: "PageSocket", request: Request) -> None:
+    def _do_goal(self, page: "PageSocket", request: Request) -> None:
         if self._pending_goals >= GOALS_AT_ONCE:
             raise RefusedError("too many goals at once")
         (robot,), yaw_rad = request["robots"], request.get("yaw")
@@ -186,7 +176,7 @@ class PageRequests:
 
     # ---------------------------------------------------------------- programs
 
-    def _start(self, page: "PageSocket", request: Request) -> None:
+    def _do_start(self, page: "PageSocket", request: Request) -> None:
         program, robots, values = request["program"], request["robots"], request["values"]
         if program not in self.programs.paths:
             raise RefusedError("%s is not installed" % program)
@@ -203,14 +193,14 @@ class PageRequests:
         ids = [self._feed.robots[robot].id for robot in robots]
         self.programs.start(child, make_arguments(program, ids, self._feed.placement.frame, values))
 
-    def _end(self, page: "PageSocket", request: Request) -> None:
+    def _do_end(self, page: "PageSocket", request: Request) -> None:
         self.programs.end(request["number"])
 
     def _stop_robots_of(self, child: Child) -> None:
         for robot in child.driven:
             self._commander.dead_man.stop("/" + robot)
 
-    def _record(self, page: "PageSocket", request: Request) -> None:
+    def _do_record(self, page: "PageSocket", request: Request) -> None:
         recording = self.programs.find_recording()
         if recording is not None and not request["on"]:
             recording.end()
