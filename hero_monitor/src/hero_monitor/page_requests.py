@@ -39,7 +39,7 @@ class RefusedError(Exception):
 
 
 class PageRequests:
-    """Requests of pages for robots, programs and the recording: each kind of requests.REQUESTS has a method _do_KIND."""
+    """Requests of pages: each kind of requests.REQUESTS has a method _do_KIND."""
 
     def __init__(
         self,
