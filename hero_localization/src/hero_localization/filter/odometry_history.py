@@ -100,7 +100,7 @@ class OdometryHistory:
 
 
 def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:
-    sums = (before + share * (after - before) for before, after in zip(start[1:], end[1:]))
+    sums = [before + share * (after - before) for before, after in zip(start[1:], end[1:])]
     return Odometry(interpolate_pose(start.pose, end.pose, share), *sums)
 
 

@@ -199,10 +199,11 @@ class PoseFilter:
                 estimate = self._update(predicted._replace(covariance=predicted.covariance + slip), measurement)
         if estimate is None:
             return None
-        return self._make_step(estimate, measurement)._replace(is_blocked=self._is_blocked(steps, measurement))
+        odometry = self._get_odometry(measurement.stamp_s)
+        return _Step(estimate, odometry, measurement, _is_blocked(steps, measurement, odometry))
 
-    def _make_step(self, estimate: StampedPose, measurement: Optional[StampedPose] = None) -> _Step:
-        return _Step(estimate, self._get_odometry(estimate.stamp_s), measurement)
+    def _make_step(self, estimate: StampedPose) -> _Step:
+        return _Step(estimate, self._get_odometry(estimate.stamp_s), None)
 
     def _get_odometry(self, stamp_s: float) -> Odometry:
         odometry = self.odometry.find(stamp_s)
@@ -216,18 +217,6 @@ class PoseFilter:
             odometry = newest._replace(untold_s=untold_s)
         return step._replace(odometry=odometry)
 
-    def _is_blocked(self, steps: Sequence[_Step], measurement: StampedPose) -> bool:
-        """Return whether the robot came nowhere since a pose measured a moment ago, though its wheels turned."""
-        for step in reversed(steps):
-            since_s = measurement.stamp_s - step.estimate.stamp_s
-            if step.measurement is not None and since_s >= BLOCKED_S[0]:
-                if since_s > BLOCKED_S[1]:
-                    return False
-                counted_m = measure_distance(step.odometry.pose, self._get_odometry(measurement.stamp_s).pose)
-                came_m = measure_distance(step.measurement.pose, measurement.pose)
-                return counted_m > MIN_SLIP_M and came_m < BLOCKED_SHARE * counted_m
-        return False
-
     def _start(self, measurement: StampedPose) -> None:
         self._rejected.clear()
         self._keep([self._make_step(measurement)])
@@ -239,7 +228,8 @@ class PoseFilter:
 
     def _keep(self, steps: List[_Step]) -> None:
         self.used_s = steps[-1].estimate.stamp_s
-        self._steps = [step for step in steps if step.estimate.stamp_s >= self.used_s - REPLAYED_S]
+        first = next(at for at, step in enumerate(steps) if step.estimate.stamp_s >= self.used_s - REPLAYED_S)
+        self._steps = steps[first:]
 
     def _was_moved(self) -> bool:
         """Return whether the last outliers agree with each other, so that the estimate must be wrong."""
@@ -275,7 +265,8 @@ class PoseFilter:
         drift_rad2 = (YAW_SCALE_SD_RAD_M * driven_m) ** 2
         drift_rad2 += (TURN_SCALE_SD * (end.heading_rad - step.odometry.heading_rad)) ** 2
         astray = np.array((-moved_y_m / 2.0, moved_x_m / 2.0, 1.0))
-        growth = np.diag((place_m2, place_m2, yaw_rad2)) + drift_rad2 * np.outer(astray, astray)
+        growth = np.array(((place_m2, 0.0, 0.0), (0.0, place_m2, 0.0), (0.0, 0.0, yaw_rad2)))
+        growth += drift_rad2 * (astray[:, None] * astray)
         return StampedPose(stamp_s, pose, jacobian @ start.covariance @ jacobian.T + growth)
 
     @staticmethod
@@ -330,6 +321,19 @@ def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
 
 def _follow(step: _Step, odometry: Odometry) -> Pose:
     return transform_pose(step.estimate.pose, transform_pose(invert_pose(step.odometry.pose), odometry.pose))
+
+
+def _is_blocked(steps: Sequence[_Step], measurement: StampedPose, odometry: Odometry) -> bool:
+    """Return whether the robot came nowhere since a pose measured a moment ago, though its wheels turned."""
+    for step in reversed(steps):
+        since_s = measurement.stamp_s - step.estimate.stamp_s
+        if step.measurement is not None and since_s >= BLOCKED_S[0]:
+            if since_s > BLOCKED_S[1]:
+                return False
+            counted_m = measure_distance(step.odometry.pose, odometry.pose)
+            came_m = measure_distance(step.measurement.pose, measurement.pose)
+            return counted_m > MIN_SLIP_M and came_m < BLOCKED_SHARE * counted_m
+    return False
 
 
 def _is_near(one: Pose, other: Pose) -> bool:

@@ -142,7 +142,7 @@ class PoseInput:
             raise ValueError("holds a pose that no robot can have: not finite, or beyond 1000 m")
         covariance = self._default_covariance
         if has_covariance:
-            told = np.array(content.pose.covariance).reshape(6, 6)[np.ix_(IN_PLANE, IN_PLANE)]
+            told = np.array(content.pose.covariance).reshape(6, 6)[IN_PLANE]
             covariance = told if told.any() else covariance  # may not be filled in
         # A stamp of zero says that the sender does not know the time: that of arrival is the best there is.
         stamp = content.header.stamp if content.header.stamp else rospy.get_rostime()

@@ -15,7 +15,7 @@ from hero_node.geometry import Pose
 from ..filter.pose_filter import StampedPose
 from ..filter.swarm_localizer import LocalizedRobot
 
-IN_PLANE = (0, 1, 5)
+IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
 """Of the entries of a covariance (x, y, z, and rotations about them), those of x, y and yaw."""
 
 
@@ -71,7 +71,7 @@ class Outputs:
         message.pose.pose.position.x, message.pose.pose.position.y = pose.x_m, pose.y_m
         message.pose.pose.orientation = _make_quaternion(pose.yaw_rad)
         entries = np.zeros((6, 6))
-        entries[np.ix_(IN_PLANE, IN_PLANE)] = covariance
+        entries[IN_PLANE] = covariance
         message.pose.covariance = entries.ravel().tolist()
         return message
 
