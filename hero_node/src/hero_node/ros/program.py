@@ -104,11 +104,14 @@ class Program(Clock):
             if not self.running:
                 say("")
                 return None
-        try:
-            answer = sys.stdin.readline()
-        except UnicodeDecodeError:
-            return ""  # a key that is no letter, as Enter
-        return answer.strip().lower() if answer else None
+        # Byte by byte: what a file object read ahead, the next wait would not see.
+        answer = b""
+        while not answer.endswith(b"\n"):
+            byte = os.read(sys.stdin.fileno(), 1)
+            if not byte:
+                break
+            answer += byte
+        return answer.decode(errors="replace").strip().lower() if answer else None
 
     def __enter__(self) -> "Program":
         return self

@@ -114,6 +114,8 @@ def _ask(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource,
         answer = program.ask("%s: %s. Enter starts, d drives there again, q ends: " % (label, offsets))
         if answer in (DRIVE, END, None):
             return answer or END
+        if answer != START:
+            continue  # a stray key moves no robot
         obstacle = _find_obstacle(swarm, source)
         if not obstacle:
             return START
