@@ -92,7 +92,7 @@ class RobotRunsTest(unittest.TestCase):
             self.assertLess({"/hero_%d/odom" % robot for robot in range(ROBOTS)}, set(bag.get_type_and_topic_info()[1]))
         self.assertTrue(self.watch.at_rest(*range(ROBOTS)))
 
-    def test_a_trial_that_is_stopped_does_not_count_and_none_starts_before_the_release(self):
+    def test_a_stopped_trial_does_not_count_and_none_starts_before_release(self):
         drivers = Drivers()
         self.addCleanup(drivers.close)
         self.addCleanup(drivers.request_stop, False)
