@@ -105,7 +105,7 @@ class TwoDriversTest(unittest.TestCase):
 
     def test_4_the_stop_of_the_page_reaches_both(self):
         background = Background()
-        self.addCleanup(background.close)
+        self.addCleanup(background.shutdown)
         commander = Commander(self.drivers, background)
         self.wait_until_all_move()
         commander.request_stop(True)

@@ -164,7 +164,8 @@ class Contacts:
         # Load what is compiled now: at the first contact robots in real time would pause meanwhile.
         self._reach_m = np.inf
         self.separate(np.zeros((2, rows)))
-        self._solve(*[self._hold(nothing_m)] * 2, _SETTLED_M, self._no_pair_ends, self._hold(nothing_m))
+        nothing = self._hold(nothing_m)
+        self._solve(nothing, nothing, _SETTLED_M, self._no_pair_ends, nothing)
         # How far all may still move until the lists are incomplete, and until two robots, and until a
         # robot and an obstacle could touch.
         self._reach_m = self._robots_gap_m = self._walls_gap_m = -np.inf
@@ -262,10 +263,10 @@ class Contacts:
 
 def _carry_over(entries: np.ndarray, values: Sequence[float], wanted: np.ndarray, columns: int) -> np.ndarray:
     """Return the values (W,) of the wanted entries (2, W), zero for new ones; both in ascending order."""
-    values = np.asarray(values)
-    if not np.count_nonzero(values):
+    carried = np.asarray(values)
+    if not np.count_nonzero(carried):
         return np.zeros(wanted.shape[1])
     keys, wanted_keys = entries[0] * columns + entries[1], wanted[0] * columns + wanted[1]
     found = keys.searchsorted(wanted_keys)
     known = keys.take(found, mode="clip") == wanted_keys
-    return np.where(known, values.take(found, mode="clip"), 0.0)
+    return np.where(known, carried.take(found, mode="clip"), 0.0)
