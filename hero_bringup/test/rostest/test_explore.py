@@ -44,7 +44,7 @@ class ExploreTest(unittest.TestCase):
             cls.parents.setdefault(transform.child_frame_id, set()).add(transform.header.frame_id)
 
     def test_robots_drive_and_the_map_grows(self):
-        wait_for(lambda: self.shares, "a map")
+        wait_for(lambda: self.shares and self.maps, "a map")
         first = self.shares[0]
         wait_for(lambda: self.shares[-1] > first + 0.02, lambda: "a larger map than %s" % self.shares)
         self.assertEqual("map", self.maps[-1].header.frame_id)
