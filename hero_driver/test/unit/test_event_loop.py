@@ -398,14 +398,16 @@ def test_the_loop_listens_where_it_was_told_to():
         opened._close_all()
 
 
-def test_the_handler_is_polled_every_0_05_s_and_its_links_though_it_fails(still_loop, monkeypatch):
+def test_the_handler_is_polled_and_every_other_link_though_it_fails(still_loop, monkeypatch):
     loop, handler = still_loop
-    link, polled = Stub(closed=False), []
+    links, polled = [Stub(closed=closed) for closed in (False, False, True, False)], []
     loop._timers.clear()
     monkeypatch.setattr(event_loop.time, "monotonic", lambda: 1000.0)
-    monkeypatch.setattr(loop, "_links", {5: link, 6: Stub(closed=True)})
+    monkeypatch.setattr(loop, "_links", dict(enumerate(links, 5)))
     handler.poll = lambda now_s: polled.append(now_s) or 1 / 0
-    handler.poll_link = lambda *arguments: polled.append(arguments)
+    handler.poll_link = lambda link, now_s: polled.append(links.index(link))
     loop._poll()
-    assert polled == [1000.0, (link, 1000.0)] and len(handler.bugs) == 1
+    first = polled[:]
     assert [(due_s, call) for due_s, _, call in loop._timers] == [(1000.05, loop._poll)]
+    loop._poll()
+    assert first == [1000.0, 1, 3] and polled[3:] == [1000.0, 0] and len(handler.bugs) == 2

@@ -32,8 +32,8 @@ LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver is restarted (ArduinoTcpHardware.h:99)."""
 
 POLL_INTERVAL_S = 0.05
-"""The handler is polled this often for what is due: repeated requests, silence of robots and of programs. One timer for
-all, because each costs a turn of the loop."""
+"""The handler is polled this often for what is due: silence of programs, and for every other connection in turn repeated
+requests and silence of robots. One timer for all, because each costs a turn of the loop; messages wait meanwhile."""
 
 PAUSE_S = 1.0
 """Between two turns of the loop: after more, the driver or its PC was suspended, or too busy to run the loop."""
@@ -95,6 +95,7 @@ class EventLoop(LinkOwner):
         self._turned_s = 0.0  # when the last turn ended
         self._ran_s = math.inf  # when the loop was last seen to run, on a clock that runs while the PC sleeps
         self._resumed_s = -math.inf
+        self._polls = 0
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
         self._calls = CallQueue(CALLS_MAX, self._wake, self._report_call)
@@ -349,7 +350,8 @@ class EventLoop(LinkOwner):
         self.call_later(POLL_INTERVAL_S, self._poll)
         now_s = time.monotonic()
         self._call(lambda: self._handler.poll(now_s))
-        for link in list(self._links.values()):
+        self._polls += 1
+        for link in list(self._links.values())[self._polls % 2 :: 2]:
             if not link.closed:
                 self._handler.poll_link(link, now_s)
 

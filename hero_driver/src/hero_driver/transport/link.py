@@ -59,7 +59,7 @@ class LinkHandler:
         raise NotImplementedError
 
     def poll(self, now_s: float) -> None:
-        """Called every POLL_INTERVAL_S, before poll_link() for each connection."""
+        """Called every POLL_INTERVAL_S, before poll_link() for every other connection."""
         raise NotImplementedError
 
     def poll_link(self, link: "Link", now_s: float) -> None:
