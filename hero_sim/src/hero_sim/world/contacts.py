@@ -98,6 +98,8 @@ def _relax(
     begin = wall_begin = 0
     for world in range(len(pair_ends)):
         end, wall_end = pair_ends[world], wall_ends[world]
+        if begin == end and wall_begin == wall_end:
+            continue
         pairs = [k for k in range(begin, end) if wanted[k] != 0.0]
         beside = [k for k in range(wall_begin, wall_end) if wall_wanted[k] != 0.0]
         for _ in range(_PASSES):
