@@ -32,8 +32,8 @@ LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver is restarted (ArduinoTcpHardware.h:99)."""
 
 POLL_INTERVAL_S = 0.05
-"""The handler is polled this often for what is due: silence of programs, and for every other connection in turn repeated
-requests and silence of robots. One timer for all, because each costs a turn of the loop; messages wait meanwhile."""
+"""The handler is polled this often for what is due: silence of programs, and for every other connection in turn its
+silence and repeated requests. One timer for all, because each costs a turn of the loop; messages wait meanwhile."""
 
 PAUSE_S = 1.0
 """Between two turns of the loop: after more, the driver or its PC was suspended, or too busy to run the loop."""
