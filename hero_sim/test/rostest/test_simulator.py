@@ -94,7 +94,8 @@ class SimulatorTest(unittest.TestCase):
         wait_for(driven, "distance of 0.1 m")
         publisher.publish(Twist())
         wait_for(lambda: abs(truth.message.twist.twist.linear.x) < 1e-3, "stop")
-        odom.wait_for_more()
+        stopped = truth.message.header.stamp
+        wait_for(lambda: odom.message.header.stamp > stopped, "odometry measured after the stop")
         here, believed = truth.message.pose.pose.position, odom.message.pose.pose.position
         true_m = math.hypot(here.x - start.x, here.y - start.y)
         self.assertAlmostEqual(math.hypot(believed.x - before.x, believed.y - before.y), true_m, delta=0.003)
