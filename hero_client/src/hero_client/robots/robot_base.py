@@ -78,10 +78,10 @@ class BaseRobot(Group):
                 self._link.wait_for_next(topic, self._first_data_s - self.now_s)
 
     def _check_fresh(self, topic: str) -> None:
-        if self._link.age_s(topic) <= FRESH_S:
-            return
-        self.await_first(topic)
         age_s = self._link.age_s(topic)
+        if age_s == math.inf:
+            self.await_first(topic)
+            age_s = self._link.age_s(topic)
         if age_s <= FRESH_S:
             return
         name = "%s/%s" % (self.namespace, topic)
