@@ -55,7 +55,7 @@ ROOMS = {
     "hero_swarm.behaviors": {"behavior", "steering"},
     "hero_swarm.experiments": {"behavior", "behaviors", "metrics", "safety", "trial"},
     "hero_swarm.fitting": {"trial"},
-    "hero_swarm.learning": {"behavior", "experiments", "metrics"},
+    "hero_swarm.learning": {"behavior", "metrics"},
     "hero_swarm.metrics": set(),
 }
 PURE_ROOMS = (

@@ -59,7 +59,7 @@ def show_run(options: argparse.Namespace) -> None:
         raise ExperimentError(
             "--seed %d: the experiment has seeds %d to %d" % (seed, experiment.seeds[0], experiment.seeds[-1])
         )
-    if about["code"] != hash_code(experiment.behavior):
+    if about["code"] != hash_code(experiment.behavior_source):
         text = "note: the results are of other code (%s), so this run may differ from theirs"
         print(text % about["code"], file=sys.stderr)
     trial = build_trial(experiment, cell, [seed])

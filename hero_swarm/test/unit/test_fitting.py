@@ -32,7 +32,6 @@ from hero_swarm.fitting.recording import (
 )
 from hero_swarm.fitting.replay import Motors, build_errors
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
-from hero_swarm.metrics import METRICS
 from hero_swarm.trial import OPEN
 
 PERIOD_MS = 30
@@ -167,7 +166,7 @@ metrics: [rotation]
 def test_an_experiment_takes_the_errors_of_a_file_for_its_robots(tmp_path):
     file = tmp_path / "robots.errors"
     file.write_text("# found\nslip=0.01\nrobot=1,lag_s=0.11\nrobot=7,lag_s=0.3\n", encoding="utf-8")
-    experiment = parse_experiment(EXPERIMENT % file, "e.yaml", METRICS)
+    experiment = parse_experiment(EXPERIMENT % file, "e.yaml")
     load_checked(experiment)
     errors = build_trial(experiment, experiment.cells[0], [1, 2]).rows.world.errors
     assert errors.servo_lag_s.ravel().tolist() == [0.08, 0.11, 0.08, 0.11]
@@ -180,7 +179,7 @@ def test_an_error_file_that_changes_makes_results_stale(tmp_path):
     digests = set()
     for text in ("slip=0.01", "slip=0.02"):
         file.write_text(text, encoding="utf-8")
-        experiment = parse_experiment(EXPERIMENT % file, "e.yaml", METRICS)
+        experiment = parse_experiment(EXPERIMENT % file, "e.yaml")
         digests.add(ResultsFolder(str(tmp_path), experiment, "code").name_series(0, [1]))
     assert len(digests) == 2
 
@@ -190,7 +189,7 @@ def test_wrong_error_files_are_refused_with_the_line(tmp_path):
     file.write_text("lagg_s=0.1\n", encoding="utf-8")
     for name, text in ((file, "lagg_s"), ("no_such", "no_such cannot be read")):
         with pytest.raises(ExperimentError, match="e.yaml, line 3: .*" + text):
-            load_checked(parse_experiment(EXPERIMENT % name, "e.yaml", METRICS))
+            load_checked(parse_experiment(EXPERIMENT % name, "e.yaml"))
     with pytest.raises(OptionError, match="cannot be read"):
         read_known(str(tmp_path), range(2))
 

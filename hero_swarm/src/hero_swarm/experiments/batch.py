@@ -16,9 +16,9 @@ from hero_node.errors import HeroError
 from hero_node.safe_file import replace_file
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena
-from hero_sim.world.robot_errors import draw_errors, read_known, set_known
+from hero_sim.world.robot_errors import read_known
 
-from ..behavior import Objects
+from ..behavior import Behavior, Objects
 from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..trial import OPEN, Trial
@@ -36,30 +36,39 @@ after a run's end."""
 
 
 def load_checked(experiment: Experiment) -> None:
-    """Load the behavior, arenas and starts of all cells once, to report errors before anything runs.
-
-    Raises: ExperimentError.
-    """
-    seeds = experiment.seeds[:1]
-    with _at(experiment, "behavior"):
-        behavior = find_behavior(experiment.behavior)()
-        allowed = list(behavior.numbers())
-        pushes = any(isinstance(sensor, Objects) for sensor in behavior.sensors().values())
+    """Build the first run of each cell, to report errors before anything runs. Raises: ExperimentError."""
     for cell in experiment.cells:
-        for name in cell.parameters:
-            if name not in allowed:
-                text = "%s: %s has no parameter %r; it has %s"
-                raise ExperimentError(text % (experiment.places[name], experiment.behavior, name, ", ".join(allowed)))
-        with _at(experiment, "arena"):
-            arena = load_cell_arena(cell)
-            if pushes and not arena.objects:
-                raise ExperimentError("%s pushes objects: arena must have them, as box does" % experiment.behavior)
-        with _at(experiment, "errors"):
-            read_cell_errors(cell)
-        with _at(experiment, "start"):
-            starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
-        with _at(experiment, "objects"):
-            place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds)
+        build_trial(experiment, cell, experiment.seeds[:1])
+
+
+def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Trial:
+    """Return the worlds of a cell with these seeds, at their start.
+
+    Raises: ExperimentError with the line of what cannot be used.
+    """
+    settings, files = cell.settings, experiment.list_files(cell)
+    for name, path in files.items():
+        if not os.path.exists(path):
+            text = "%s: %s %s cannot be read: no such file; paths are relative to the experiment's file, or absolute"
+            raise ExperimentError(text % (experiment.places[name], name, path))
+    behavior = make_behavior(experiment, cell)
+    with _at(experiment, "arena"):
+        arena = load_cell_arena(experiment, cell)
+        pushes = any(isinstance(sensor, Objects) for sensor in behavior.sensors().values())
+        if pushes and not arena.objects:
+            raise ExperimentError("%s pushes objects: arena must have them, as box does" % experiment.behavior)
+    with _at(experiment, "start"):
+        starts = place_robots(experiment, cell, seeds)
+    with _at(experiment, "objects"):
+        objects = place_objects(settings.get("objects", "arena"), arena, starts, seeds)
+    with _at(experiment, "errors"):
+        scale = ERRORS.get(settings.get("errors", "default"), ERRORS["default"])
+        known = read_known(files["errors"], range(settings["robots"])) if "errors" in files else []
+        delay_s = settings.get("delay_s", 0.0)
+        return Trial(
+            behavior, arena, settings["robots"], seeds,
+            starts=starts, objects=objects, errors=scale, known_errors=known, delay_s=delay_s,
+        )  # fmt: skip
 
 
 @contextmanager
@@ -72,54 +81,40 @@ def _at(experiment: Experiment, name: str) -> Iterator[None]:
         raise ExperimentError("%s: %s" % (place, error)) from error
 
 
-def load_cell_arena(cell: Cell) -> Arena:
+def make_behavior(experiment: Experiment, cell: Cell) -> Behavior:
+    """Return the behavior of a cell. Raises: ExperimentError."""
+    with _at(experiment, "behavior"):
+        kind = find_behavior(experiment.behavior_source)
+        allowed = kind().numbers()
+    for name in cell.parameters:
+        if name not in allowed:
+            text = "%s: %s has no parameter %r; it has %s"
+            raise ExperimentError(text % (experiment.places[name], experiment.behavior, name, ", ".join(allowed)))
+    return kind(**cell.parameters)
+
+
+def load_cell_arena(experiment: Experiment, cell: Cell) -> Arena:
     """Return the arena of a cell, an open plane without one. Raises: OptionError."""
-    name = cell.settings.get("arena")
+    name = experiment.list_files(cell).get("arena") or cell.settings.get("arena")
     return load_arena(name) if name else OPEN
 
 
-def read_cell_errors(cell: Cell) -> List[str]:
-    """Return the errors of a cell's file, a text for each robot; none without a file. Raises: OptionError."""
-    name, robots = cell.settings.get("errors", "default"), range(cell.settings["robots"])
-    if name in ERRORS:
-        return []
-    known, own = read_known(name, robots), draw_errors(map(np.random.RandomState, robots))
-    for text in known:
-        set_known(own, 0, text)
-    return known
+def place_robots(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> np.ndarray:
+    """Return where the robots of runs begin (W, N, 3). Raises: ExperimentError."""
+    start = experiment.start._replace(file=experiment.list_files(cell).get("file"))
+    return place_all(start, load_cell_arena(experiment, cell), cell.settings["robots"], seeds)
 
 
-def place_cell(experiment: Experiment, cell: Cell, seed: int) -> np.ndarray:
-    """Return where the robots of a run begin (N, 3)."""
-    poses: np.ndarray = place_all(experiment.start, load_cell_arena(cell), cell.settings["robots"], [seed])[0]
-    return poses
-
-
-def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Trial:
-    """Return the worlds of a cell with these seeds, at their start."""
-    behavior, arena = find_behavior(experiment.behavior)(**cell.parameters), load_cell_arena(cell)
-    starts = place_all(experiment.start, arena, cell.settings["robots"], seeds)
-    return Trial(
-        behavior,
-        arena,
-        cell.settings["robots"],
-        seeds,
-        starts=starts,
-        objects=place_objects(cell.settings.get("objects", "arena"), arena, starts, seeds),
-        errors=ERRORS.get(cell.settings.get("errors", "default"), ERRORS["default"]),
-        known_errors=read_cell_errors(cell),
-        delay_s=cell.settings.get("delay_s", 0.0),
-    )
-
-
-def compute_batch(text: str, cell_index: int, seeds: Sequence[int], stem: str) -> Tuple[List[Run], float]:
+def compute_batch(
+    text: str, folder: str, cell_index: int, seeds: Sequence[int], stem: str
+) -> Tuple[List[Run], float]:
     """Return the runs of one cell with these seeds, and the seconds that took.
 
-    Metrics over time, and poses, go to files that begin with stem. text: of the experiment's file.
+    Metrics over time, and poses, go to files that begin with stem. text, folder: of the experiment's file.
     Raises: ExperimentError, also for whatever the behavior raises.
     """
     began_s = time.monotonic()
-    experiment = parse_experiment(text, "the experiment", METRICS)
+    experiment = parse_experiment(text, "the experiment", folder)
     cell = experiment.cells[cell_index]
     trial = build_trial(experiment, cell, seeds)
     with report_place("%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1])):

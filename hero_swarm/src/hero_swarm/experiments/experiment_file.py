@@ -7,14 +7,19 @@
     seeds: {from: 1, count: 30}
     metrics: [cluster_fraction, {time_until: {dispersion_ratio: 1.15}}]
 
-Each combination of the values that vary is a cell; each cell runs with every seed.
+Each combination of the values that vary is a cell; each cell runs with every seed. Paths of files (of a behavior, an
+arena, errors, start places) are relative to the file's folder.
 """
 
 import itertools
 import json
 import math
-from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Optional, Tuple
+import os
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
+from hero_sim.world.arena_file import SHIPPED
+
+from ..metrics import FALLING, METRICS
 from .errors import ExperimentError
 from .marked_yaml import Entry, read_entries
 
@@ -41,10 +46,6 @@ _REQUIRED = ("behavior", "time_s", "seeds", "metrics")
 _KEYS = (
     "behavior", "vary", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record", "compare"
 )  # fmt: skip
-
-
-FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area", "object_distance")
-"""Metrics that a bound without <= or >= is reached from above; the others rise to it."""
 
 
 class Bound(NamedTuple):
@@ -127,6 +128,7 @@ class Experiment(NamedTuple):
         until: a run ends when this holds.
         record_hz: of trajectories; 0: none.
         places: name of a key, parameter or varied value -> file and line, for errors.
+        folder: to which paths are relative.
     """
 
     behavior: str
@@ -139,11 +141,19 @@ class Experiment(NamedTuple):
     record_hz: float
     compare: Optional[Comparing]
     places: Mapping[str, str]
+    folder: str
 
-    def list_files(self, cell: Cell) -> List[str]:
-        """Return the names of what a run of cell depends on that may be files."""
-        names = (cell.settings.get("arena"), cell.settings.get("errors"), self.start.file)
-        return [name for name in names if name]
+    @property
+    def behavior_source(self) -> str:
+        """The behavior as find_behavior() takes it from any folder."""
+        is_file = self.behavior.partition(":")[0].endswith(".py")
+        return os.path.join(self.folder, self.behavior) if is_file else self.behavior
+
+    def list_files(self, cell: Cell) -> Dict[str, str]:
+        """Return the files that a run of cell reads, without that of the behavior: name in places -> path."""
+        named = {"file": self.start.file, **{name: cell.settings.get(name) for name in ("arena", "errors")}}
+        built_in = (*SHIPPED, *ERRORS)
+        return {name: os.path.join(self.folder, path) for name, path in named.items() if path and path not in built_in}
 
     def describe_cell(self, cell: Cell) -> str:
         """Return all that a run of cell depends on besides its seed and the code, as JSON."""
@@ -159,16 +169,16 @@ class Experiment(NamedTuple):
         return json.dumps(description, sort_keys=True)
 
 
-def parse_experiment(text: str, file: str, known_metrics: Collection[str]) -> Experiment:
+def parse_experiment(text: str, file: str, folder: Optional[str] = None) -> Experiment:
     """Return the experiment in text, the contents of file.
 
-    known_metrics: names of metrics. The behavior and its parameters are checked when it is loaded.
+    folder: to which paths are relative; None: that of file. Behavior and parameters are checked when they are loaded.
     Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
     """
     root = read_entries(text, file).mapping(_KEYS, _REQUIRED)
     start = _parse_start(root.get("start"))
     cells = _parse_cells(root)
-    metrics = tuple(_parse_metric(entry, known_metrics) for entry in root["metrics"].entries())
+    metrics = tuple(_parse_metric(entry) for entry in root["metrics"].entries())
     names = [metric.name for metric in metrics]
     for entry, name in zip(root["metrics"].entries(), names):
         if names.count(name) > 1:
@@ -179,15 +189,16 @@ def parse_experiment(text: str, file: str, known_metrics: Collection[str]) -> Ex
             "such that there are at most %d runs, not %d" % (MAX_RUNS, len(cells) * len(seeds))
         )
     time_s = root["time_s"].number(0.1, MAX_TIME_S, "s")
-    until = _parse_bound(root["until"], known_metrics) if "until" in root else None
+    until = _parse_bound(root["until"]) if "until" in root else None
     record_hz = 0.0
     if "record" in root:
         record_hz = root["record"].mapping(("hz",), ("hz",))["hz"].number(0.01, 20.0, "Hz")
     compare = _parse_comparing(root["compare"], names, cells) if "compare" in root else None
     behavior = root["behavior"].text()
-    inner = [root[name].mapping() for name in ("vary", "parameters") if name in root]
-    places = {name: entry.place for entries in (root, *inner) for name, entry in entries.items()}
-    return Experiment(behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare, places)
+    inner = [root[name].mapping() for name in ("start", "vary", "parameters") if name in root]
+    places = {name: entry.place for entries in (*inner, root) for name, entry in entries.items()}
+    folder = os.path.dirname(file) if folder is None else folder
+    return Experiment(behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare, places, folder)
 
 
 def _parse_start(entry: Optional[Entry]) -> Start:
@@ -252,9 +263,9 @@ def _parse_seeds(entry: Entry) -> range:
     return range(first, first + given["count"].whole(1, MAX_RUNS))
 
 
-def _parse_bound(entry: Entry, known_metrics: Collection[str]) -> Bound:
+def _parse_bound(entry: Entry) -> Bound:
     """Return the bound of a mapping such as {dispersion_ratio: 1.15} or {order: ">= 0.9"}."""
-    name, value = entry.single(known_metrics)
+    name, value = entry.single(METRICS)
     if not isinstance(value.value, str):
         return Bound(name, value.number(-math.inf, math.inf, ""), name in FALLING)
     sign, _, text = value.value.partition(" ")
@@ -267,15 +278,15 @@ def _parse_bound(entry: Entry, known_metrics: Collection[str]) -> Bound:
     return Bound(name, limit, sign == "<=")
 
 
-def _parse_metric(entry: Entry, known_metrics: Collection[str]) -> Metric:
+def _parse_metric(entry: Entry) -> Metric:
     if not isinstance(entry.value, dict):
-        name = entry.choice(known_metrics)
+        name = entry.choice(METRICS)
         return Metric(name, name)
     kind, inner = entry.single(("time_until", "mean_of_last_s"))
     if kind == "time_until":
-        bound = _parse_bound(inner, known_metrics)
+        bound = _parse_bound(inner)
         return Metric("time_until_%s_%g_s" % (bound.metric, bound.value), bound.metric, bound=bound)
-    name, value = inner.single(known_metrics)
+    name, value = inner.single(METRICS)
     last_s = value.number(1.0, MAX_TIME_S, "s")
     return Metric("%s_mean_of_last_%g_s" % (name, last_s), name, last_s)
 

@@ -197,8 +197,8 @@ class ResultsFolder:
 
 def _digest_cell(experiment: Experiment, cell: Cell) -> str:
     digest = hashlib.sha256(experiment.describe_cell(cell).encode())
-    for name in filter(os.path.isfile, experiment.list_files(cell)):
-        with open(name, "rb") as file:
+    for path in experiment.list_files(cell).values():
+        with open(path, "rb") as file:
             digest.update(file.read())
     return digest.hexdigest()
 

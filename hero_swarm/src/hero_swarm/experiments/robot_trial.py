@@ -11,10 +11,9 @@ import numpy as np
 from hero_client.values.object_sensing import NO_OBJECTS, Things
 
 from ..behavior import Random, decide, derive_seed, sense
-from ..behaviors import find_behavior
 from ..metrics import METRICS
 from ..safety import SafetyFilter
-from .batch import SAMPLE_S, list_sources, load_cell_arena, take_values
+from .batch import SAMPLE_S, list_sources, load_cell_arena, make_behavior, take_values
 from .errors import report_place
 from .experiment_file import Cell, Experiment
 
@@ -34,8 +33,8 @@ class RobotTrial:
         self.remark = ""
         self._experiment = experiment
         self._label = "%s, seed %d" % (cell.label, seed)
-        self.behavior = find_behavior(experiment.behavior)(**cell.parameters)
-        self._objects = len(load_cell_arena(cell).objects)
+        self.behavior = make_behavior(experiment, cell)
+        self._objects = len(load_cell_arena(experiment, cell).objects)
         self._names = names
         self._filter = safety
         self._random = Random([derive_seed(seed, "behavior")], len(names))

@@ -15,7 +15,6 @@ from tqdm import tqdm
 from hero_node.parameters import given_ids_option, within
 from hero_node.yaml_text import YamlError, read_text
 
-from ..metrics import METRICS
 from . import engines
 from .batch import compute_batch, load_checked
 from .code_version import describe_machine, hash_code
@@ -33,7 +32,10 @@ _BATCHES_PER_WORKER = 2
 
 DASK = "dask:"
 
-Task = Tuple[str, int, Tuple[int, ...], str]
+FOLDER = "experiment_folder"
+"""In about.json: that of the experiment's file, to which its paths are relative, from the folder of results."""
+
+Task = Tuple[str, str, int, Tuple[int, ...], str]
 """Arguments of compute_batch()."""
 
 
@@ -86,15 +88,18 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def read_experiment(path: str) -> Tuple[str, Experiment]:
-    """Return the text of an experiment's file, and what it describes. Raises: ExperimentError."""
+def read_experiment(path: str, folder: Optional[str] = None) -> Tuple[str, Experiment]:
+    """Return the text of an experiment's file, and what it describes; folder: as of parse_experiment().
+
+    Raises: ExperimentError.
+    """
     try:
         text = read_text(path)
     except (OSError, YamlError) as error:
         raise ExperimentError(
             "%s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)
         ) from error
-    return text, parse_experiment(text, path, METRICS)
+    return text, parse_experiment(text, path, folder)
 
 
 def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
@@ -105,8 +110,10 @@ def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
     file = os.path.join(path, "experiment.yaml")
     if not os.path.isfile(file):
         raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % path)
-    with open(os.path.join(path, "about.json"), encoding="utf-8") as about:
-        return (*read_experiment(file), json.load(about))
+    with open(os.path.join(path, "about.json"), encoding="utf-8") as about_file:
+        about = json.load(about_file)
+    # Results of older versions have paths relative to the working directory.
+    return (*read_experiment(file, os.path.join(path, about[FOLDER]) if FOLDER in about else ""), about)
 
 
 def choose_batch(experiment: Experiment, cell: int) -> int:
@@ -134,7 +141,7 @@ def list_tasks(
         size = batch or min(share, choose_batch(experiment, cell))
         for start in range(0, len(seeds), size):
             chosen = tuple(seeds[start : start + size])
-            yield text, cell, chosen, folder.name_series(cell, chosen)
+            yield text, experiment.folder, cell, chosen, folder.name_series(cell, chosen)
 
 
 def _choose_engine(options: argparse.Namespace, behavior: str) -> Tuple[Callable[[], Executor], int]:
@@ -150,7 +157,7 @@ def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterato
     with tqdm(total=missing + begun, initial=begun, unit="run", disable=None, file=sys.stderr) as bar:
         for task, result in done:
             yield task, result
-            bar.update(len(task[2]))
+            bar.update(len(task[3]))
 
 
 def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFolder, List[Run]]:
@@ -161,8 +168,9 @@ def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFo
     text, experiment = read_experiment(options.file)
     load_checked(experiment)
     path = options.out or os.path.splitext(options.file)[0]
-    folder = ResultsFolder(path, experiment, hash_code(experiment.behavior))
-    runs = folder.begin(text, describe_machine(), options.fresh, SIMULATED if options.robots is None else REAL)
+    folder = ResultsFolder(path, experiment, hash_code(experiment.behavior_source))
+    about = {**describe_machine(), FOLDER: os.path.relpath(experiment.folder or ".", path)}
+    runs = folder.begin(text, about, options.fresh, SIMULATED if options.robots is None else REAL)
     return text, experiment, folder, runs
 
 
@@ -177,11 +185,11 @@ def run_experiment(options: argparse.Namespace) -> str:
     own = set(folder.list_missing(())[part - 1 :: parts])
     missing = [key for key in folder.list_missing(runs) if key in own]
     if missing:
-        opener, workers = _choose_engine(options, experiment.behavior)
+        opener, workers = _choose_engine(options, experiment.behavior_source)
         tasks = list_tasks(text, experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()
         done = engines.compute(opener, workers, compute_batch, tasks)
-        for (_, cell, seeds, _), (computed, wall_s) in _watch(done, len(missing), len(runs)):
+        for (_, _, cell, seeds, _), (computed, wall_s) in _watch(done, len(missing), len(runs)):
             folder.write_batch(computed)
             folder.note_time(cell, seeds, wall_s)
         print("%d runs in %.1f s" % (len(missing), time.monotonic() - began_s), file=sys.stderr)

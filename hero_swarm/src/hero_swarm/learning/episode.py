@@ -12,8 +12,7 @@ from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena, place_robots
 
 from ..behavior import derive_seed
-from ..experiments.experiment_file import FALLING
-from ..metrics import METRICS
+from ..metrics import FALLING, METRICS
 
 MAX_ANGULAR_RAD_S = 4.0
 

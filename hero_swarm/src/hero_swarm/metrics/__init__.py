@@ -12,7 +12,7 @@ from .objects import object_cluster_fraction, object_distance
 from .shapes import coverage, dispersion, dispersion_ratio, fatness, hull_area
 
 __all__ = [
-    "METRICS", "UNITS", "algebraic_connectivity", "cluster_fraction", "collisions", "consensus_error",
+    "FALLING", "METRICS", "UNITS", "algebraic_connectivity", "cluster_fraction", "collisions", "consensus_error",
     "coverage", "dispersion",
     "dispersion_ratio", "fatness", "hull_area", "nearest_neighbor",
     "object_cluster_fraction", "object_distance", "order", "rotation", "time_until",
@@ -43,6 +43,9 @@ METRICS: Dict[str, Metric] = {
 
 UNITS = {"consensus_error": "m", "dispersion": "m", "hull_area": "m^2", "nearest_neighbor": "m", "object_distance": "m"}
 """Of those that have one."""
+
+FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area", "object_distance")
+"""Those that get better by falling: a bound without <= or >= is reached from above; the others rise to it."""
 
 
 def time_until(times_s: np.ndarray, values: np.ndarray, limit: float, falls: bool = True) -> np.ndarray:

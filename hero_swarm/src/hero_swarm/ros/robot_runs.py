@@ -16,7 +16,7 @@ import rospy
 from hero_client import Program, StoppedError, Swarm
 from hero_node.processes import end_process
 
-from ..experiments.batch import place_cell
+from ..experiments.batch import place_robots
 from ..experiments.errors import ExperimentError
 from ..experiments.experiment_file import Experiment
 from ..experiments.results_folder import REAL, ResultsFolder, Run
@@ -58,7 +58,7 @@ def run_on_robots(
         objects = ObjectSource(frame, "", OBJECT_RADIUS_M, are_needed=False)
         for cell_index, seed in missing:
             cell = experiment.cells[cell_index]
-            starts = place_cell(experiment, cell, seed)
+            (starts,) = place_robots(experiment, cell, [seed])
             label = "%s, seed %d" % (cell.label, seed)
             answer = DRIVE
             while answer == DRIVE:

@@ -6,8 +6,6 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Bound, Start, parse_experiment
 from hero_swarm.experiments.marked_yaml import MAX_CHARACTERS
 
-METRICS = ("cluster_fraction", "dispersion")
-
 FILE = """\
 behavior: aggregation.Aggregation
 vary: {robots: [10, 25], errors: [perfect, default]}
@@ -21,7 +19,7 @@ compare: {metric: cluster_fraction, between: errors, test: wilcoxon}
 
 
 def parse(text):
-    return parse_experiment(text, "e.yaml", METRICS)
+    return parse_experiment(text, "e.yaml")
 
 
 def test_every_combination_of_what_varies_is_a_cell():
@@ -99,7 +97,7 @@ def test_a_cell_is_described_by_everything_that_its_runs_depend_on():
         ("count: 30", "count: 0", 5, "seeds.count is 0"),
         ("count: 30", "count: 999999", 5, "at most 1000000 runs"),
         ("from: 1", "first: 1", 5, "unknown 'first' in seeds; allowed are: from, count"),
-        ("[cluster_fraction", "[cluster", 6, "must be one of: cluster_fraction, dispersion"),
+        ("[cluster_fraction", "[cluster", 6, "must be one of: algebraic_connectivity, cluster_fraction"),
         ("{dispersion: 1.15}", "{dispersion: near}", 6, "dispersion is 'near', but must be a number"),
         ("time_until:", "time_after:", 6, "unknown 'time_after'"),
         ("[cluster_fraction,", "[dispersion, dispersion,", 6, "more than once"),

@@ -27,7 +27,7 @@ metrics: [dispersion, {time_until: {dispersion: 1.0}}]
 
 
 def parse(text=FILE):
-    return parse_experiment(text, "e.yaml", ("dispersion",))
+    return parse_experiment(text, "e.yaml")
 
 
 def make_run(cell, seed):

@@ -1,6 +1,7 @@
 """Whole experiments: the same table however they are computed, resumed and killed, and errors that name their place."""
 
 import csv
+import json
 import math
 import os
 import signal
@@ -166,16 +167,17 @@ def test_the_report_stands_alone_and_names_every_cell_and_remark(finished):
         (
             "start: {kind: uniform, cover: 0.05}",
             "start: {kind: file, file: none.csv}",
-            "none.csv cannot be read",
+            "line 3: file {folder}/none.csv cannot be read: no such file; paths are relative to the experiment's file",
         ),
-        ("start: {kind: uniform, cover: 0.05}", "arena: nowhere.yaml", "nowhere.yaml"),
+        ("start: {kind: uniform, cover: 0.05}", "arena: no.yaml", "line 3: arena {folder}/no.yaml cannot be read"),
+        ("[perfect, default]", "[perfect, no.errors]", "line 2: errors {folder}/no.errors cannot be read"),
     ],
 )
 def test_what_cannot_run_is_refused_before_anything_runs(old, new, words, tmp_path):
     text = FILE.replace(old, new).replace("compare: {metric: dispersion, between: errors}\n", "")
     with pytest.raises(ExperimentError) as caught:
         run(write(tmp_path, text))
-    assert words in str(caught.value) and "\n" not in str(caught.value)
+    assert words.format(folder=tmp_path) in str(caught.value) and "\n" not in str(caught.value)
     assert os.listdir(str(tmp_path)) == ["e.yaml"]
 
 
@@ -211,6 +213,46 @@ def test_changed_code_of_the_behavior_is_noticed(tmp_path):
     with pytest.raises(ExperimentError, match="computed by other code"):
         run(path)
     run(path, "--fresh")
+
+
+def test_paths_are_relative_to_the_file_wherever_programs_run(tmp_path, monkeypatch, capsys):
+    home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
+    for folder in (home, elsewhere):
+        folder.mkdir()
+    (home / "own.py").write_text(
+        "from hero_swarm.behavior import Behavior\n\n"
+        "class Own(Behavior):\n"
+        "    def step(self, sensed, memory, random):\n"
+        "        return 0.1, 0.0, None\n"
+    )
+    (home / "own.yaml").write_text("bounds_m: [-1, -1, 1, 1]\n")
+    (home / "own.errors").write_text("slip=0.01\n")
+    (home / "own.csv").write_text("0,0,0\n0,0.5,0\n")
+    path = write(
+        home,
+        "behavior: own.py:Own\nrobots: 2\narena: own.yaml\nerrors: own.errors\nstart: {kind: file, file: own.csv}\n"
+        "time_s: 1\nseeds: {count: 1}\nmetrics: [dispersion]\n",
+    )
+    monkeypatch.chdir(str(elsewhere))
+    absolute = run(path)
+    for out in (home / "e", elsewhere / "results"):
+        run(path, "--fresh", "--out", str(out))
+        report.write_report(str(out))
+    monkeypatch.chdir(str(home))
+    assert run(Path("e.yaml"), "--fresh") == Path("e"), "a file without a folder is in the working directory"
+    monkeypatch.chdir(str(elsewhere))
+    home.rename(tmp_path / "moved")
+    moved = tmp_path / "moved" / "e"
+    replay(moved, "--video", tmp_path / "run.gif")
+    assert capsys.readouterr().err.count("may differ") == 0 and absolute == home / "e"
+    # Results of the version before, whose paths are relative to the working directory.
+    about = json.loads((moved / "about.json").read_text())
+    assert about.pop("experiment_folder") == ".."
+    (moved / "about.json").write_text(json.dumps(about))
+    with pytest.raises(OSError, match="own"):
+        report.write_report(str(moved))
+    monkeypatch.chdir(str(tmp_path / "moved"))
+    report.write_report(str(moved))
 
 
 @pytest.mark.parametrize(

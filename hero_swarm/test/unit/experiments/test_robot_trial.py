@@ -27,7 +27,7 @@ STARTS = np.array([(0.0, 0.0, 0.0), (0.6, 0.0, 2.0), (0.0, 0.6, -1.0)])
 
 def drive(text=FILE, lost_s=math.inf):
     """Return the trial, when it ended, and the poses then; robot 1 has no pose from lost_s on."""
-    experiment = parse_experiment(text, "e.yaml", METRICS)
+    experiment = parse_experiment(text, "e.yaml")
     names = ["hero_%d" % number for number in range(3)]
     trial = RobotTrial(experiment, experiment.cells[0], 1, names, SafetyFilter(ROBOTS))
     rows = RobotRows(place_worlds(OPEN, STARTS[None], [1], 1.0))
@@ -52,7 +52,7 @@ def test_a_trial_ends_at_its_time_with_values_and_without_contact():
 
 @pytest.mark.parametrize("radii_m, touching", [(0.036835, 0.0), ([0.06, 0.06, 0.036835], 1.0)])
 def test_collisions_are_counted_by_the_radii_of_the_robots(radii_m, touching):
-    experiment = parse_experiment(FILE.split("metrics")[0] + "metrics: [collisions]\n", "e.yaml", METRICS)
+    experiment = parse_experiment(FILE.split("metrics")[0] + "metrics: [collisions]\n", "e.yaml")
     safety = SafetyFilter(ROBOTS)
     safety.radii_m = radii_m
     trial = RobotTrial(experiment, experiment.cells[0], 1, ["hero_0", "hero_1", "hero_2"], safety)
@@ -125,7 +125,7 @@ def test_robots_have_arrived_when_all_were_there_for_half_a_second():
 
 def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
     monkeypatch.setitem(METRICS, "consensus_error", lambda poses, velocities, *rest: velocities[:, 0, 0])
-    experiment = parse_experiment(FILE, "e.yaml", METRICS)
+    experiment = parse_experiment(FILE, "e.yaml")
     trial = RobotTrial(experiment, experiment.cells[0], 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
     for time_s in (0.0, 0.9, 1.05, 2.1, 2.1, 2.9):
         trial.step(time_s, STARTS + (0.2 * time_s, 0.0, 0.0), np.zeros(3))
