@@ -1,6 +1,7 @@
 """calibrate_camera: views of the board until the lens is known; what was found of each robot's tag is written."""
 
 import math
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -221,3 +222,16 @@ def test_what_a_part_needs_is_named(tmp_path, capsys):
     assert (options.rate, options.size, options.image, options.device, options.views, options.yaml) == (
         30.0, "1920x1080", "camera/image_raw", "", 0, None,
     )  # fmt: skip
+
+
+def test_the_arena_without_scipy_is_refused_before_a_camera_is_opened(tmp_path, monkeypatch):
+    path = str(tmp_path / "camera.yaml")
+    settings.update(path, {"references": {100 + index: [index, 0.0, 0.0] for index in range(4)}})
+    started = []
+    monkeypatch.setattr(calibrate_camera, "Program", lambda *_, **__: started.append("node") or 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        calibrate_camera.run(["arena", "--file", path])
+    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
+    with pytest.raises(ProgramError, match=r"scipy.optimize is missing \(.*\); install it: apt install python3-scipy$"):
+        calibrate_camera.run(["arena", "--file", path])
+    assert started == ["node"]

@@ -16,7 +16,7 @@ def explain_bag_errors(what: str) -> Iterator[None]:
     """Turn whatever rosbag raises in the block into one line that begins with what. Raises: RecordingError."""
     try:
         yield
-    except RecordingError:
+    except HeroError:
         raise
     except OSError as error:
         raise RecordingError("%s: %s" % (what, error.strerror or error)) from error

@@ -1,7 +1,6 @@
 """Program plot: draws figures of all robots in bags, and prints a table."""
 
 import argparse
-import importlib.util
 import os
 import sys
 from typing import Dict, List, Sequence
@@ -9,6 +8,7 @@ from typing import Dict, List, Sequence
 import numpy as np
 
 from hero_node import command_line
+from hero_node.optional import import_optional
 from hero_node.parameters import robot_ids_option
 from hero_node.safe_file import replace_file
 
@@ -128,10 +128,7 @@ def _compute_rms(values: np.ndarray) -> float:
 
 def run(options: argparse.Namespace) -> None:
     """Read, draw, print. Raises: RecordingError."""
-    if importlib.util.find_spec("matplotlib") is None:
-        raise RecordingError(
-            "matplotlib is missing; install it: apt install python3-matplotlib, or pip install matplotlib"
-        )
+    import_optional("matplotlib", "python3-matplotlib")
     bags = BagSet(options.bags)
     observations = observe(options, bags)
     print("\n".join(format_table(observations)))

@@ -9,12 +9,12 @@ Times are simulated; the same run gives the same messages.
 from contextlib import ExitStack
 from typing import Any, Dict, Sequence
 
+from hero_node.optional import import_optional
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.stepped.ros_messages import MessageType
 from hero_sim.stepped.topics import LATCHED, StepTopics
 
 from .errors import RecordingError, explain_write_errors
-from .optional import import_optional
 
 
 class StepRecorder(ExitStack):
@@ -23,7 +23,7 @@ class StepRecorder(ExitStack):
     def __init__(self, rows: RobotRows, robot_ids: Sequence[int], path: str) -> None:
         """Record the robots of the first world from now on.
 
-        Raises: RecordingError if the file exists or cannot be written, or rosbags is not installed.
+        Raises: RecordingError if the file exists or cannot be written; ProgramError without the package rosbags.
         """
         super().__init__()
         rosbag1: Any = import_optional("rosbags.rosbag1", "rosbags")

@@ -9,6 +9,7 @@ import pytest
 import rosbag
 from synthetic_bag import DELAY_S, START_S, make_localized, write_bag
 
+from hero_node.errors import ProgramError
 from hero_recording import export
 from hero_recording.errors import RecordingError
 
@@ -175,7 +176,7 @@ def test_mcap_has_no_offsets_of_groups_that_it_does_not_have(bag, tmp_path, caps
 def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, monkeypatch, kind, package):
     for module in ("pyarrow", "mcap.writer", "rosbags.rosbag2"):
         monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(RecordingError, match="-m pip install '%s" % package):
+    with pytest.raises(ProgramError, match="-m pip install '%s" % package):
         run_export(capsys, bag, "--out", tmp_path / "out", "--format", kind)
     assert not list(tmp_path.iterdir())
 

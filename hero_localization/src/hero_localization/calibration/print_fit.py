@@ -67,6 +67,7 @@ class _Print:
 
 def _refine(gray: np.ndarray, tag: TagCorners, cells: np.ndarray) -> TagCorners:
     from scipy.optimize import least_squares  # takes 0.1 s, which --help does not need
+
     half_px = math.ceil(0.85 * tag.side_px)
     corner_px, size_px = np.rint(tag.center).astype(int) - half_px, 2 * half_px + 1
     if corner_px.min() < 0 or (corner_px + size_px > gray.shape[::-1]).any():

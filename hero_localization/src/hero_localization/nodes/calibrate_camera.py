@@ -22,6 +22,7 @@ from hero_node import command_line
 from hero_node.command_line import say
 from hero_node.errors import HeroError
 from hero_node.geometry import Pose
+from hero_node.optional import import_optional
 from hero_node.parameters import robot_ids_option
 
 from ..calibration.arena_calibration import (
@@ -349,6 +350,8 @@ def run(arguments: Sequence[str]) -> int:
     if options.part == "lens" and options.yaml:
         return import_lens(options)
     settings = _check_file(options)
+    if options.part == "arena":
+        import_optional("scipy.optimize", "python3-scipy")  # print_fit does, but after all images
     with Program("calibrate_camera", anonymous=True) as program:
         images = Images(options, program, settings.controls)
         try:

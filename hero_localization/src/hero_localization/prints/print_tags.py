@@ -5,7 +5,6 @@ rosrun hero_localization print_tags --board
 """
 
 import argparse
-import importlib.util
 import math
 import sys
 from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
@@ -13,6 +12,7 @@ from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from hero_node import command_line
+from hero_node.optional import import_optional
 from hero_node.parameters import given_ids_option
 from hero_node.safe_file import replace_file
 
@@ -224,10 +224,9 @@ def _draw_square(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Write the PDF and say what is in it. Raises: LocalizationError."""
-    for module, package in (("matplotlib", "matplotlib"), ("cv2", "opencv")):
-        if importlib.util.find_spec(module) is None:
-            raise LocalizationError("%s is missing; install it: apt install python3-%s" % (module, package))
+    """Write the PDF and say what is in it. Raises: LocalizationError; ProgramError if a library is missing."""
+    import_optional("matplotlib", "python3-matplotlib")
+    import_optional("cv2", "python3-opencv")
     from matplotlib.backends.backend_pdf import PdfPages
 
     sheets = list_sheets(options, FAMILIES[options.family].cells)

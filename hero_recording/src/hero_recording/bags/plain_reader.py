@@ -4,7 +4,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Sequence, Tuple
 
-from ..optional import import_optional
+from hero_node.optional import import_optional
+
 from .topics import Message, RawMessage
 
 
@@ -14,7 +15,7 @@ class Reader(ExitStack):
     unindexed = ("ReaderError", "AnyReaderError")
 
     def __init__(self, path: str, skip_index: bool = False) -> None:
-        """Open the file, with its index in any case. Raises: RecordingError without rosbags; whatever it raises."""
+        """Open the file, with its index in any case. Raises: ProgramError without rosbags; whatever it raises."""
         super().__init__()
         del skip_index
         self._bag: Any = import_optional("rosbags.highlevel", "rosbags").AnyReader([Path(path)])

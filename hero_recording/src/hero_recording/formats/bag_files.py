@@ -5,16 +5,17 @@ import io
 from pathlib import Path
 from typing import Any, Dict, Tuple
 
+from hero_node.optional import import_optional
+
 from ..bags.bag_set import BagSet
 from ..bags.topics import RawMessage
 from ..errors import RecordingError, explain_write_errors
-from ..optional import import_optional
 
 
 def write_mcap(bags: BagSet, path: str) -> int:
     """Copy every message, as recorded, into an MCAP file of profile ros1; return the number of messages.
 
-    Source: https://mcap.dev/spec/registry. Raises: RecordingError, also without the package mcap.
+    Source: https://mcap.dev/spec/registry. Raises: RecordingError; ProgramError without the package mcap.
     """
     writers = import_optional("mcap.writer", "mcap")
     count = 0
@@ -53,7 +54,7 @@ def write_mcap(bags: BagSet, path: str) -> int:
 def write_ros2(bags: BagSet, folder: str) -> int:
     """Convert every message to CDR, in a folder that `ros2 bag` reads; return the number of messages.
 
-    Raises: RecordingError, also without the package rosbags.
+    Raises: RecordingError; ProgramError without the package rosbags.
     """
     requirement = "rosbags>=0.10"
     storage: Any = import_optional("rosbags.rosbag2", requirement)

@@ -9,9 +9,10 @@ from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
 
+from hero_node.optional import import_optional
+
 from ..bags.tables import TABLES, TEXT_COLUMNS, Row
 from ..errors import explain_write_errors
-from ..optional import import_optional
 
 BATCH_ROWS = 4096
 """Buffered rows of a table: 8 numbers take some 0.8 MB."""
@@ -68,7 +69,7 @@ class CsvFiles:
 
 
 def load_writer(name: str) -> Callable[[str, Columns], None]:
-    """Return what writes columns into a file of another format. Raises: RecordingError without its library."""
+    """Return what writes columns into a file of another format. Raises: ProgramError without its library."""
     if name == NPZ:
         return lambda path, columns: np.savez_compressed(path, **columns)
     requirement = "pyarrow<20"  # which takes the numpy of Debian 12, too
