@@ -114,7 +114,7 @@ def draw_on_floor(cell_px, contrast=0.7):
     return np.clip(cv2.GaussianBlur(image, (0, 0), 0.8) + noise, 0, 255).astype(np.uint8), part
 
 
-@pytest.mark.parametrize(("cell_px", "contrast"), [(3, 0.7), (15, 0.7), (60, 0.7), (2, 0.15)])
+@pytest.mark.parametrize(("cell_px", "contrast"), [(3, 0.7), (15, 0.7), (60, 0.7), (2, 0.15), (3, 0.07), (5, 0.07)])
 @pytest.mark.parametrize("decimate", [1.0, 2.0])
 def test_corners_are_the_same_where_noise_of_the_ground_is_removed(cell_px, contrast, decimate, monkeypatch):
     pytest.importorskip("apriltag")
