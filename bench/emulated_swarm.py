@@ -17,7 +17,7 @@ import time
 from typing import List, Tuple
 
 from hero_driver.rosserial import packets, payloads
-from hero_sim.robot import declarations
+from hero_sim.robot.declarations import SERVICE, STOCK_TOPICS, assign_ids, encode_declarations
 
 BURST_PERIOD_S = 0.034
 LASER_PERIOD_S = 0.201
@@ -26,12 +26,13 @@ TIME_PERIOD_S = 2.53
 
 ZERO = bytes(48)
 
+TOPICS = [topic for topic in STOCK_TOPICS if topic.kinds != SERVICE]
+SENT, RECEIVED = assign_ids(TOPICS)
+
 
 def declare(number):
     """Return the packets with which robot number declares its topics (services are left out)."""
-    time_request = packets.encode_packet(packets.ID_TIME, bytes(8))
-    topics = [entry for entry in declarations.DECLARATIONS if entry[0] in (declarations.PUB, declarations.SUB)]
-    return time_request + declarations.encode_entries("hero_%d" % number, topics)
+    return packets.encode_packet(packets.ID_TIME, bytes(8)) + encode_declarations("hero_%d" % number, TOPICS)
 
 
 def text(value):
@@ -72,12 +73,12 @@ class Templates:
         encoder_tail = self._encoder_frame + bytes(88)
         encoder_changes = slice(4, 12 + len(self._encoder_frame) + 16)
         no_header = b"\xff\xff\xff\xff" + bytes(8)
-        self._odom = Packet(declarations.ID_ODOM, bytes(12) + odom_tail, slice(0, 12))
+        self._odom = Packet(SENT["odom"], bytes(12) + odom_tail, slice(0, 12))
         self._transforms = [
-            Packet(declarations.ID_TF, b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
+            Packet(SENT["tf"], b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
         ]
-        self._encoder = Packet(declarations.ID_ENCODER, no_header + encoder_tail, encoder_changes)
-        self._laser = Packet(declarations.ID_LASER, bytes(12) + laser_tail, slice(4, 12))
+        self._encoder = Packet(SENT["encoder"], no_header + encoder_tail, encoder_changes)
+        self._laser = Packet(SENT["laser"], bytes(12) + laser_tail, slice(4, 12))
 
     def make_burst(self, number, stamp):
         """Return the packets of one burst with stamp (8 bytes).
@@ -155,7 +156,7 @@ class EmulatedRobot:
             elif topic_id == packets.ID_TIME and self.synchronized_s is None:
                 self.synchronized_s = now_s
                 is_new = True
-            elif topic_id == declarations.ID_VELOCITY_CMD_VEL and payload != ZERO:
+            elif topic_id == RECEIVED["velocity_controller/cmd_vel"] and payload != ZERO:
                 # Zeros are the driver's own: it stops robots whose commander has disconnected.
                 self.commands += 1
                 if self._keeps_times:

@@ -20,14 +20,16 @@ from hero_driver.rosserial import packets, payloads
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
 from hero_sim.population import build_world
-from hero_sim.robot import declarations
+from hero_sim.robot.models import HERO
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.kinematics import split_to_wheels
 from hero_sim.world.world import STEP_MS
 
 _STOCK_ODOM_HZ = 29.27
 _SPEEDS = (0.08, 0.6)
-_TWIST = packets.encode_packet(declarations.ID_VELOCITY_CMD_VEL, struct.pack("<6d", _SPEEDS[0], 0, 0, 0, 0, _SPEEDS[1]))
+_TWIST_ID = HERO.received_ids["velocity_controller/cmd_vel"]
+_TWIST = packets.encode_packet(_TWIST_ID, struct.pack("<6d", _SPEEDS[0], 0, 0, 0, 0, _SPEEDS[1]))
+_ODOM_ID = HERO.sent_ids["odom"]
 _ARRIVAL_S, _SETTLE_S = 30.0, 4.0
 """On a busy machine the simulator's modules load for seconds."""
 
@@ -96,7 +98,7 @@ class _Server:
 
     def _receive(self, peer: _Peer) -> None:
         for frame in peer.reader.receive_bytes(peer.socket.recv(65536)):
-            if frame.topic_id == declarations.ID_ODOM:
+            if frame.topic_id == _ODOM_ID:
                 peer.odoms += 1
             elif frame.topic_id == packets.ID_TIME:
                 now = payloads.split_seconds(time.time())

@@ -20,7 +20,7 @@ import numpy as np
 
 from hero_driver.rosserial import packets
 from hero_sim.main import build_parser, simulate
-from hero_sim.robot import declarations
+from hero_sim.robot.models import HERO
 from hero_sim.world.world import STEP_MS
 
 REST_M_S = 0.005
@@ -30,10 +30,10 @@ STEPS_KEPT = 2000
 READING_LENGTH = 1000
 """A robot's reading with odometry and encoders is longer, everything else shorter."""
 
-PULSES = packets.encode_packet(declarations.ID_CMD_MOTOR, bytes(4))[:7]
+PULSES = packets.encode_packet(HERO.received_ids["cmd_motor"], bytes(4))[:7]
 """Everything of such a packet in front of its payload."""
 
-ZERO = packets.encode_packet(declarations.ID_VELOCITY_CMD_VEL, bytes(48))
+ZERO = packets.encode_packet(HERO.received_ids["velocity_controller/cmd_vel"], bytes(48))
 
 
 class Watch:

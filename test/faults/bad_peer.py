@@ -25,7 +25,7 @@ from nav_msgs.msg import Odometry
 
 from hero_driver.rosserial import packets, payloads
 from hero_driver.rosserial.payloads import TopicInfo
-from hero_sim.robot import declarations
+from hero_sim.robot.models import HERO
 
 OWN_NUMBER = 66
 STRING_MD5 = "992ce8a1687cec8c8bd883ec73ca41d1"
@@ -169,9 +169,9 @@ def never_reads(peer):
 
 def huge_packets(peer):
     """The longest packets there are, and headers that promise more."""
-    packet = packets.encode_packet(declarations.ID_LASER, bytes(4096))
+    packet = packets.encode_packet(HERO.sent_ids["laser"], bytes(4096))
     promise = b"\xff\xfe\xff\xff\x01\x7d\x00"
-    too_long = packets.encode_packet(declarations.ID_LASER, bytes(65535))
+    too_long = packets.encode_packet(HERO.sent_ids["laser"], bytes(65535))
     peer.flood(emulated_swarm.declare(OWN_NUMBER), repeat_piece(packet * 4 + promise + too_long))
 
 

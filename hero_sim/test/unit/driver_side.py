@@ -6,9 +6,14 @@ import struct
 from hero_driver.rosserial import packets, payloads
 from hero_sim import main
 from hero_sim.build import build_swarm
-from hero_sim.robot import declarations as ids
+from hero_sim.robot.models import HERO
 
 SERVER_START_S = 1_700_000_000
+
+SENT, RECEIVED = HERO.sent_ids, HERO.received_ids
+"""Ids of the stock robot's topics."""
+
+VELOCITY, POSITION = (RECEIVED[kind + "_controller/cmd_vel"] for kind in ("velocity", "position"))
 
 STOCK_SUBSCRIPTIONS = [1, 1, 3, 3, 1, 3, 1, 3, 3, 1, 3, 3]
 """Ids of the packets by which a robot declares what it reads: topics 1, requests of services 3."""
@@ -73,7 +78,7 @@ class DriverSide:
     def send_bytes(self, index, data):
         self.swarm.robots[index].receive_bytes(self.swarm.now_ms, data)
 
-    def send_twist(self, index, linear_m_s, turn_rad_s, topic_id=ids.ID_VELOCITY_CMD_VEL):
+    def send_twist(self, index, linear_m_s, turn_rad_s, topic_id=VELOCITY):
         self.send(index, topic_id, struct.pack("<6d", linear_m_s, 0, 0, 0, 0, turn_rad_s))
 
     def start_streaming(self):
@@ -87,7 +92,7 @@ class DriverSide:
         self.run(1700)
         assert all(robot.configured and not robot.motors.motors.attached for robot in self.swarm.robots)
 
-    def drive(self, index, linear_m_s, turn_rad_s, ms, topic_id=ids.ID_VELOCITY_CMD_VEL):
+    def drive(self, index, linear_m_s, turn_rad_s, ms, topic_id=VELOCITY):
         """Repeat a Twist every 100 ms for so long."""
         for _ in range(ms // 100):
             self.send_twist(index, linear_m_s, turn_rad_s, topic_id)

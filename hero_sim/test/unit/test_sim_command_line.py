@@ -14,12 +14,11 @@ import time
 
 import numpy as np
 import pytest
-from driver_side import read_odom
+from driver_side import POSITION, RECEIVED, SENT, read_odom
 
 from hero_driver.rosserial import packets, payloads
 from hero_sim import main
 from hero_sim.faults import KINDS
-from hero_sim.robot import declarations as ids
 from hero_sim.world.robot_errors import KINDS as ERROR_KINDS
 from hero_test.processes import Program, find_free_port
 from hero_test.waiting import wait_for
@@ -141,7 +140,7 @@ def request_when_ready(server, count):
     )
     for peer in server.peers:
         peer.send(packets.ID_PUBLISHER)
-    server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 3 for peer in server.peers))
+    server.run_until(lambda: all(peer.count(SENT["odom"]) > 3 for peer in server.peers))
 
 
 @pytest.mark.slow
@@ -157,11 +156,11 @@ def test_robots_connect_declare_stream_and_drive(simulate, server):
 
     def moved():
         if len(peer.packets) % 5 == 0:
-            peer.send(ids.ID_POSITION_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
-        return read_odom(peer.last(ids.ID_ODOM))[2][0] > 0.05
+            peer.send(POSITION, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
+        return read_odom(peer.last(SENT["odom"]))[2][0] > 0.05
 
     server.run_until(moved)
-    assert read_odom(server.peers[1].last(ids.ID_ODOM))[2][0] == 0.0
+    assert read_odom(server.peers[1].last(SENT["odom"]))[2][0] == 0.0
     assert all(peer.reader.bad_packets == 0 for peer in server.peers)
 
 
@@ -186,7 +185,7 @@ def test_a_robot_that_leaves_closes_and_streams_on_when_it_is_back(simulate, ser
     simulate("--port", str(server.port), "--fault", "leave@16:for=2")
     request_when_ready(server, 1)
     server.run_until(lambda: server.peers[0].closed)
-    server.run_until(lambda: len(server.peers) == 2 and server.peers[1].count(ids.ID_ODOM) > 0)
+    server.run_until(lambda: len(server.peers) == 2 and server.peers[1].count(SENT["odom"]) > 0)
     assert server.peers[1].count(packets.ID_PUBLISHER) == 0
     assert not any("Firmware" in text for text in server.peers[1].logs())
 
@@ -204,7 +203,7 @@ def test_zero_topics_are_declared_at_the_second_request_only(simulate, server):
     server.run_until(lambda: server.peers and any("Conected" in text for text in server.peers[-1].logs()))
     peer = server.peers[-1]
     peer.send(packets.ID_PUBLISHER)
-    server.run_until(lambda: peer.count(ids.ID_ODOM) > 3)
+    server.run_until(lambda: peer.count(SENT["odom"]) > 3)
     assert peer.count(packets.ID_PUBLISHER) == 0
     peer.send(packets.ID_PUBLISHER)
     server.run_until(lambda: peer.count(packets.ID_PUBLISHER) == 5)
@@ -216,8 +215,8 @@ def test_garbage_costs_at_most_the_packet_beside_it(simulate, server):
     request_when_ready(server, 1)
     peer = server.peers[0]
     server.run_until(lambda: peer.reader.bad_packets and peer.reader.skipped_bytes > 190)
-    seen = peer.count(ids.ID_ODOM)
-    server.run_until(lambda: peer.count(ids.ID_ODOM) > seen + 5)
+    seen = peer.count(SENT["odom"])
+    server.run_until(lambda: peer.count(SENT["odom"]) > seen + 5)
     assert not peer.closed
 
 
@@ -228,11 +227,11 @@ def test_a_frozen_robot_is_silent_and_goes_on(simulate, server):
     peer = server.peers[0]
 
     def list_stamps_s():
-        return [read_odom(p.payload)[0][0] for p in peer.packets if p.topic_id == ids.ID_ODOM]
+        return [read_odom(p.payload)[0][0] for p in peer.packets if p.topic_id == SENT["odom"]]
 
     server.run_until(lambda: np.diff(list_stamps_s()).max() >= 5)
-    seen = peer.count(ids.ID_ODOM)
-    server.run_until(lambda: peer.count(ids.ID_ODOM) > seen + 5)
+    seen = peer.count(SENT["odom"])
+    server.run_until(lambda: peer.count(SENT["odom"]) > seen + 5)
     assert not peer.closed
 
 
@@ -245,10 +244,10 @@ def test_what_exceeds_the_receive_window_of_a_robot_stays_with_the_sender(simula
     peer, other = sorted(server.peers, key=lambda peer: "hero_1" in peer.logs()[0])
     server.run_until(lambda: program.find_lines("fault"))
     for _ in range(100):
-        peer.send(ids.ID_LASER_ENABLE, bytes(100))
+        peer.send(RECEIVED["laser_enable"], bytes(100))
     # The simulator has looked at all its sockets meanwhile.
-    other.send(ids.ID_SET_ODOM, bytes(24))
-    server.run_until(lambda: other.count(ids.ID_SET_ODOM_ANSWER) == 1)
+    other.send(RECEIVED["set_odom"], bytes(24))
+    server.run_until(lambda: other.count(SENT["set_odom"]) == 1)
     assert not is_acknowledged(peer.socket)
     wait_for(lambda: is_acknowledged(peer.socket), "the acknowledgement of what waited")
 
@@ -258,7 +257,7 @@ def test_a_clock_that_jumps_shows_in_the_stamps(simulate, server):
     simulate("--port", str(server.port), "--fault", "clock-jump@16:by=-100")
     request_when_ready(server, 1)
     peer = server.peers[0]
-    server.run_until(lambda: time.time() - read_odom(peer.last(ids.ID_ODOM))[0][0] > 98)
+    server.run_until(lambda: time.time() - read_odom(peer.last(SENT["odom"]))[0][0] > 98)
 
 
 @pytest.mark.slow
@@ -267,8 +266,8 @@ def test_a_slow_service_answers_late(simulate, server):
     request_when_ready(server, 1)
     peer = server.peers[0]
     called_s = time.monotonic()
-    peer.send(ids.ID_SET_ODOM, struct.pack("<3d", 0, 0, 0))
-    server.run_until(lambda: peer.count(ids.ID_SET_ODOM_ANSWER) == 1)
+    peer.send(RECEIVED["set_odom"], struct.pack("<3d", 0, 0, 0))
+    server.run_until(lambda: peer.count(SENT["set_odom"]) == 1)
     assert time.monotonic() - called_s > 1.0
 
 
@@ -297,7 +296,7 @@ def test_a_server_that_comes_late_finds_the_robots_waiting(simulate):
 def test_a_network_with_delays_still_carries_everything(simulate, server):
     simulate("--count", "2", "--port", str(server.port), "--wifi", "hotspot")
     request_when_ready(server, 2)
-    server.run_until(lambda: all(peer.count(ids.ID_ODOM) > 60 for peer in server.peers))
+    server.run_until(lambda: all(peer.count(SENT["odom"]) > 60 for peer in server.peers))
     assert all(peer.reader.bad_packets == 0 and peer.reader.skipped_bytes == 0 for peer in server.peers)
 
 

@@ -1,32 +1,31 @@
 import struct
 
 import pytest
-from driver_side import DriverSide, read_laser
+from driver_side import POSITION, RECEIVED, SENT, DriverSide, read_laser
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import packets
-from hero_sim.robot import declarations as ids
 
 
 def test_laser_enable_stops_and_starts_the_laser_and_a_restart_forgets_it():
     driver = DriverSide()
     driver.start_streaming()
-    driver.send(0, ids.ID_LASER_ENABLE, b"\x00")
+    driver.send(0, RECEIVED["laser_enable"], b"\x00")
     driver.run(100)
     since_ms = driver.swarm.now_ms
     driver.run(1000)
-    assert not driver.list_packets(0, ids.ID_LASER, since_ms)
-    driver.send(0, ids.ID_LASER_ENABLE, b"\x01")
+    assert not driver.list_packets(0, SENT["laser"], since_ms)
+    driver.send(0, RECEIVED["laser_enable"], b"\x01")
     driver.run(1000)
-    assert len(driver.list_packets(0, ids.ID_LASER, since_ms)) >= 4
+    assert len(driver.list_packets(0, SENT["laser"], since_ms)) >= 4
 
 
 def test_the_laser_sees_the_wall_in_front():
     driver = DriverSide("--perfect")
     driver.start_streaming()
-    driver.drive(0, 0.2, 0.0, 8000, ids.ID_POSITION_CMD_VEL)
-    _, ranges, counts = read_laser(driver.list_packets(0, ids.ID_LASER)[-1].payload)
+    driver.drive(0, 0.2, 0.0, 8000, POSITION)
+    _, ranges, counts = read_laser(driver.list_packets(0, SENT["laser"])[-1].payload)
     assert ranges[8] == pytest.approx(0.0368 + 0.021, abs=0.01)
     assert counts[8] > 900
     assert ranges[0] > 0.23
@@ -41,7 +40,7 @@ def test_the_light_is_blue_at_the_start_then_as_commanded_for_15_s():
 
     driver.run(2500)
     assert light() == (0.0, 0.0, 1.0, 1.0)
-    driver.send(0, ids.ID_LED, struct.pack("<4f", 1, 0.5, 0, 1))
+    driver.send(0, RECEIVED["led"], struct.pack("<4f", 1, 0.5, 0, 1))
     driver.run(14900)
     assert light() == (1.0, 0.5, 0.0, 1.0)
     driver.run(300)
@@ -68,7 +67,7 @@ def test_an_id_in_an_empty_slot_is_ignored():
 def test_a_packet_in_two_pieces_is_lost_unless_both_arrive_in_one_spin():
     driver = DriverSide()
     driver.start_streaming()
-    packet = packets.encode_packet(ids.ID_LASER_ENABLE, b"\x00")
+    packet = packets.encode_packet(RECEIVED["laser_enable"], b"\x00")
     driver.send_bytes(0, packet[:5])
     driver.run(60)
     driver.send_bytes(0, packet[5:])
@@ -87,7 +86,7 @@ def test_garbage_from_the_server_does_no_harm():
     driver.run(200)
     driver.send_bytes(0, b"\xff\xfe\xff\xff\x01" + b"x" * 50)
     driver.run(200)
-    driver.send(0, ids.ID_LASER_ENABLE, b"\x00")
+    driver.send(0, RECEIVED["laser_enable"], b"\x00")
     driver.run(100)
     assert not driver.swarm.robots[0].sensing.laser_enabled
 
@@ -118,10 +117,10 @@ def test_a_service_is_answered_in_its_time_and_later_if_it_is_slow():
         robot.answer_delay_ms = 300 * (robot.robot_id % 2)
     sent_ms = driver.swarm.now_ms
     for index in range(12):
-        driver.send(index, ids.ID_SET_ODOM, struct.pack("<3d", 1.0, 2.0, 0.5))
+        driver.send(index, RECEIVED["set_odom"], struct.pack("<3d", 1.0, 2.0, 0.5))
     driver.run(500)
     for index in range(12):
-        (answer,) = driver.list_packets(index, ids.ID_SET_ODOM_ANSWER, sent_ms)
+        (answer,) = driver.list_packets(index, SENT["set_odom"], sent_ms)
         waits_ms.append(answer.at_ms - sent_ms - 300 * (index % 2))
     assert min(waits_ms) >= 42 and max(waits_ms) <= 76 and len(set(waits_ms)) > 5
 

@@ -2,16 +2,15 @@ import math
 import struct
 
 import pytest
-from driver_side import DriverSide, read_encoder, read_odom
+from driver_side import POSITION, RECEIVED, SENT, VELOCITY, DriverSide, read_encoder, read_odom
 
 from hero_driver.rosserial import packets
 from hero_node.geometry import Pose, find_frame
-from hero_sim.robot import declarations as ids
 from hero_sim.robot.imu_hat import ImuHat
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 
 both_controllers = pytest.mark.parametrize(
-    "controller", [ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL], ids=["velocity", "position"]
+    "controller", [VELOCITY, POSITION], ids=["velocity", "position"]
 )
 
 
@@ -31,9 +30,9 @@ def test_tx_stop_leaves_log_lines_and_a_moving_robot_runs_away():
 @pytest.mark.parametrize(
     "topic_id, payload, seconds",
     [
-        (ids.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0), 2.0),
-        (ids.ID_POSITION_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0), 4.0),
-        (ids.ID_CMD_MOTOR, struct.pack("<2h", 1600, 1600), 1.0),
+        (VELOCITY, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0), 2.0),
+        (POSITION, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0), 4.0),
+        (RECEIVED["cmd_motor"], struct.pack("<2h", 1600, 1600), 1.0),
     ],
     ids=["velocity", "position", "motor"],
 )
@@ -88,7 +87,7 @@ def test_a_stop_within_50_ms_of_the_last_command_is_dropped():
     driver = DriverSide()
     driver.start_streaming()
     driver.drive(0, 0.1, 0.0, 1000)
-    move = packets.encode_packet(ids.ID_VELOCITY_CMD_VEL, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
+    move = packets.encode_packet(VELOCITY, struct.pack("<6d", 0.1, 0, 0, 0, 0, 0))
     driver.run(60)
     driver.send_bytes(0, move)
     driver.send_twist(0, 0.0, 0.0)
@@ -131,7 +130,7 @@ def test_what_waited_beyond_the_receive_window_is_read_in_the_next_spin():
     driver.swarm.reschedule(0)
     move = struct.pack("<6d", 0.1, 0, 0, 0, 0, 0)
     for _ in range(RECEIVE_WINDOW_LENGTH // 56 + 1):
-        driver.send(0, ids.ID_VELOCITY_CMD_VEL, move)
+        driver.send(0, VELOCITY, move)
     driver.send_twist(0, 0.0, 0.0)
     driver.run(540)
     assert driver.measure_speed(0) > 0.01
@@ -143,7 +142,7 @@ def test_a_command_that_is_not_finite_is_reported_and_changes_nothing():
     driver = DriverSide()
     driver.start_streaming()
     driver.send_twist(0, float("nan"), 0.0)
-    driver.send(0, ids.ID_VELOCITY_CMD_VEL, b"short")
+    driver.send(0, VELOCITY, b"short")
     driver.run(200)
     assert driver.measure_speed(0) == 0.0
     assert [report.split(" with ")[0] for report in driver.reports] == [
@@ -153,7 +152,7 @@ def test_a_command_that_is_not_finite_is_reported_and_changes_nothing():
 
 
 @pytest.mark.parametrize(
-    "controller, least, most", [(ids.ID_VELOCITY_CMD_VEL, 0.38, 0.70), (ids.ID_POSITION_CMD_VEL, 0.97, 1.03)]
+    "controller, least, most", [(VELOCITY, 0.38, 0.70), (POSITION, 0.97, 1.03)]
 )
 def test_odometry_loses_distance_while_the_velocity_controller_drives(controller, least, most):
     driver = DriverSide("--perfect")
@@ -163,7 +162,7 @@ def test_odometry_loses_distance_while_the_velocity_controller_drives(controller
     driver.send_twist(0, 0.0, 0.0, controller)
     driver.run(1000)
     true_m = driver.true_pose(0)[0] - start_m
-    odom_m = read_odom(driver.list_packets(0, ids.ID_ODOM)[-1].payload)[2][0]
+    odom_m = read_odom(driver.list_packets(0, SENT["odom"])[-1].payload)[2][0]
     assert true_m > 0.3
     assert least <= odom_m / true_m <= most
 
@@ -177,7 +176,7 @@ def test_the_ticks_lose_nothing():
     driver.run(1000)
     true_m = driver.true_pose(0)[0] - start_m
     # Without slip and wheel errors only a tick may be missing.
-    encoder = read_encoder(driver.list_packets(0, ids.ID_ENCODER)[-1].payload)
+    encoder = read_encoder(driver.list_packets(0, SENT["encoder"])[-1].payload)
     assert encoder[0] * 0.00053669 == pytest.approx(true_m, abs=0.002)
 
 
@@ -188,14 +187,14 @@ def test_set_odom_sets_the_pose_zeroes_the_ticks_and_answers_in_time():
     driver.send_twist(0, 0.0, 0.0)
     driver.run(1000)
     called_ms = driver.swarm.now_ms
-    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 1.0, 2.0, 0.5))
+    driver.send(0, RECEIVED["set_odom"], struct.pack("<3d", 1.0, 2.0, 0.5))
     driver.run(200)
-    (answer,) = driver.list_packets(0, ids.ID_SET_ODOM_ANSWER)
+    (answer,) = driver.list_packets(0, SENT["set_odom"])
     assert answer.payload == b"\x01\x15\x00\x00\x00Odometry was changed!"
     assert 42 <= answer.at_ms - called_ms <= 75 + 1
-    pose = read_odom(driver.list_packets(0, ids.ID_ODOM)[-1].payload)[2]
+    pose = read_odom(driver.list_packets(0, SENT["odom"])[-1].payload)[2]
     assert pose == pytest.approx((1.0, 2.0, 0.247404, 0.968912), abs=1e-6)
-    assert read_encoder(driver.list_packets(0, ids.ID_ENCODER)[-1].payload)[:2] == (0.0, 0.0)
+    assert read_encoder(driver.list_packets(0, SENT["encoder"])[-1].payload)[:2] == (0.0, 0.0)
     assert "[HERO] Odometry was changed!" in [text for _, text in driver.list_logs(0)]
 
 
@@ -208,11 +207,11 @@ def test_a_server_that_does_not_read_blocks_the_robot_and_its_watchdogs():
     driver.swarm.reschedule(0)
     since_ms = driver.swarm.now_ms
     driver.run(4900)
-    assert not driver.list_packets(0, ids.ID_ODOM, since_ms + 1)
+    assert not driver.list_packets(0, SENT["odom"], since_ms + 1)
     assert driver.measure_speed(0) > 0.05
     driver.run(4000)
     assert driver.measure_speed(0) < 0.002
-    assert driver.list_packets(0, ids.ID_ODOM, since_ms + 5000)
+    assert driver.list_packets(0, SENT["odom"], since_ms + 5000)
 
 
 def test_a_frozen_robot_keeps_its_pulses_and_then_resumes_its_command():
@@ -235,9 +234,9 @@ def test_a_robot_with_an_imu_takes_its_yaw_from_it_not_from_set_odom():
     driver.start_streaming()
     driver.drive(0, 0.0, 1.0, 2000)
     driver.send_twist(0, 0.0, 0.0)
-    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.0, 0.0, -2.0))
+    driver.send(0, RECEIVED["set_odom"], struct.pack("<3d", 0.0, 0.0, -2.0))
     driver.run(1000)
-    _, _, _, turn_w = read_odom(driver.list_packets(0, ids.ID_ODOM)[-1].payload)[2]
+    _, _, _, turn_w = read_odom(driver.list_packets(0, SENT["odom"])[-1].payload)[2]
     assert 2.0 * math.acos(turn_w) == pytest.approx(driver.true_pose(0)[2], abs=0.01)
 
 
@@ -253,13 +252,13 @@ def test_the_odom_frame_survives_a_restart_and_follows_set_odom():
     driver.start_streaming()
     robot = driver.swarm.robots[0]
     start = driver.true_pose(0)
-    driver.drive(0, 0.1, 0.5, 3000, ids.ID_POSITION_CMD_VEL)
-    driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.drive(0, 0.1, 0.5, 3000, POSITION)
+    driver.send_twist(0, 0.0, 0.0, POSITION)
     driver.run(1000)
     robot.switch_on(driver.swarm.now_ms)
     assert robot.body.odom_origin == pytest.approx(start)
     driver.swarm.reschedule(0)
     driver.start_streaming()
-    driver.send(0, ids.ID_SET_ODOM, struct.pack("<3d", 0.5, 0.0, 1.0))
+    driver.send(0, RECEIVED["set_odom"], struct.pack("<3d", 0.5, 0.0, 1.0))
     driver.run(200)
     assert robot.body.odom_origin == pytest.approx(find_frame(Pose(*driver.true_pose(0)), Pose(0.5, 0.0, 1.0)))

@@ -1,12 +1,11 @@
 import struct
 
 import pytest
-from driver_side import SERVER_START_S, STOCK_SUBSCRIPTIONS, DriverSide, read_odom
+from driver_side import RECEIVED, SENT, SERVER_START_S, STOCK_SUBSCRIPTIONS, VELOCITY, DriverSide, read_odom
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import packets, payloads
-from hero_sim.robot import declarations as ids
 
 
 def test_a_boot_speaks_first_and_at_the_stock_robots_times():
@@ -62,7 +61,7 @@ def test_a_request_before_the_robot_advertised_gets_undeclared_data():
     driver.run(3000)
     assert len(driver.list_packets(0, packets.ID_TIME)) >= 1
     assert not driver.list_packets(0, packets.ID_PUBLISHER)
-    assert driver.list_packets(0, ids.ID_ODOM)
+    assert driver.list_packets(0, SENT["odom"])
     driver.send(0, packets.ID_PUBLISHER)
     driver.run(200)
     assert len(driver.list_packets(0, packets.ID_PUBLISHER)) == 5
@@ -86,15 +85,15 @@ def test_rates_are_the_stock_robots():
     assert rates[125] == pytest.approx(4.87, abs=0.02)
     assert rates[7] == pytest.approx(1.0, abs=0.01)
     assert rates[10] == pytest.approx(0.395, abs=0.01)
-    assert not driver.list_packets(0, ids.ID_IMU)
+    assert not driver.list_packets(0, SENT["imu"])
 
 
 def test_the_imu_hat_is_declared_by_all_but_published_only_where_it_is():
     driver = DriverSide("--imu-hat")
     driver.start_streaming()
     driver.run(2000)
-    imus = driver.list_packets(0, ids.ID_IMU)
-    assert len(imus) == len(driver.list_packets(0, ids.ID_ODOM))
+    imus = driver.list_packets(0, SENT["imu"])
+    assert len(imus) == len(driver.list_packets(0, SENT["odom"]))
     assert len(imus[0].payload) + 8 == 335
     values = struct.unpack_from("<37d", imus[-1].payload, len(imus[-1].payload) - 37 * 8)
     assert values[3] == 0.99993896484375
@@ -105,7 +104,7 @@ def test_the_imu_hat_is_declared_by_all_but_published_only_where_it_is():
 def test_stamps_are_uptime_before_the_first_answer_and_server_time_after():
     driver = DriverSide()
     driver.start_streaming()
-    odoms = driver.list_packets(0, ids.ID_ODOM)
+    odoms = driver.list_packets(0, SENT["odom"])
     stamps = [read_odom(arrival.payload)[0] for arrival in odoms]
     assert stamps[0][0] < 10
     assert 1 <= sum(stamp[0] < 10 for stamp in stamps) <= 3
@@ -124,7 +123,7 @@ def test_a_late_answer_puts_the_clock_ahead_by_its_lateness():
     made_ms = driver.swarm.now_ms
     driver.send(0, packets.ID_TIME, payloads.encode_time(driver.server_time()))
     driver.run(200)
-    arrival = driver.list_packets(0, ids.ID_ODOM)[-1]
+    arrival = driver.list_packets(0, SENT["odom"])[-1]
     seconds, nanoseconds = read_odom(arrival.payload)[0]
     ahead_s = seconds + nanoseconds * 1e-9 - (SERVER_START_S + arrival.at_ms / 1000.0)
     assert ahead_s == pytest.approx((made_ms - asked_ms) / 1000.0, abs=0.002)
@@ -138,11 +137,11 @@ def test_without_time_answers_a_robot_streams_for_eleven_seconds():
     asked = [arrival.at_ms for arrival in driver.list_packets(0, packets.ID_TIME)]
     assert len(asked) == 5
     assert all(2501 <= later - earlier <= 2551 for earlier, later in zip(asked, asked[1:]))
-    last_ms = driver.list_packets(0, ids.ID_ODOM)[-1].at_ms
+    last_ms = driver.list_packets(0, SENT["odom"])[-1].at_ms
     assert last_ms - asked[0] == pytest.approx(11000, abs=60)
     driver.send(0, packets.ID_PUBLISHER)
     driver.run(200)
-    assert driver.list_packets(0, ids.ID_ODOM, last_ms + 1)
+    assert driver.list_packets(0, SENT["odom"], last_ms + 1)
 
 
 def test_a_robot_without_connection_retries_each_spin_and_streams_at_once():
@@ -158,7 +157,7 @@ def test_a_robot_without_connection_retries_each_spin_and_streams_at_once():
     driver.run(60)
     back_ms = driver.connects[0][-1]
     driver.run(60)
-    assert driver.list_packets(0, ids.ID_ODOM, back_ms)[0].at_ms - back_ms <= 35
+    assert driver.list_packets(0, SENT["odom"], back_ms)[0].at_ms - back_ms <= 35
     assert not driver.list_packets(0, packets.ID_PUBLISHER, back_ms)
 
 
@@ -178,10 +177,10 @@ def test_a_zero_that_came_with_the_end_of_a_connection_is_lost():
 packet_bytes = st.sampled_from(
     [
         packets.encode_packet(packets.ID_PUBLISHER, b""),
-        packets.encode_packet(ids.ID_LED, bytes(16)) * 5,
-        packets.encode_packet(ids.ID_CMD_MOTOR, bytes(4)) * 5,
-        packets.encode_packet(ids.ID_VELOCITY_CMD_VEL, bytes(48)),
-        packets.encode_packet(ids.ID_VELOCITY_PID_CALIBRATION, b""),
+        packets.encode_packet(RECEIVED["led"], bytes(16)) * 5,
+        packets.encode_packet(RECEIVED["cmd_motor"], bytes(4)) * 5,
+        packets.encode_packet(VELOCITY, bytes(48)),
+        packets.encode_packet(RECEIVED["velocity_controller/pid_calibration"], b""),
     ]
 )
 happenings = st.sampled_from(["lost", "made", "failed", "frozen", "blocked", "unblocked", "restarted"])

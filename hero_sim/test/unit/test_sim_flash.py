@@ -4,10 +4,9 @@ import os
 import struct
 
 import pytest
-from driver_side import DriverSide
+from driver_side import RECEIVED, DriverSide
 
 from hero_sim.errors import OptionError
-from hero_sim.robot import declarations as ids
 from hero_sim.robot.flash import Flash
 
 CENTERS = struct.pack("<2h", 1490, 1512)
@@ -16,7 +15,7 @@ CENTERS = struct.pack("<2h", 1490, 1512)
 def set_centers(*arguments):
     driver = DriverSide(*arguments)
     driver.start_streaming()
-    driver.send(0, ids.ID_MOTORS_PARAMETERS, CENTERS)
+    driver.send(0, RECEIVED["motors_parameters"], CENTERS)
     driver.run(200)
     return driver
 
@@ -24,9 +23,9 @@ def set_centers(*arguments):
 def test_all_parameters_are_kept_over_a_restart_of_the_simulator(tmp_path):
     driver = set_centers("--flash-dir", str(tmp_path))
     for topic_id, payload in (
-        (ids.ID_IR_CALIBRATION, struct.pack("<8d", *[0.4 + 0.01 * index for index in range(8)])),
-        (ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", 1, 2, 3, 4, 5, 6)),
-        (ids.ID_POSITION_PID_PARAMETERS, struct.pack("<6f", 7, 8, 9, 10, 11, 12)),
+        (RECEIVED["ir_calibration"], struct.pack("<8d", *[0.4 + 0.01 * index for index in range(8)])),
+        (RECEIVED["velocity_controller/pid_parameters"], struct.pack("<6f", 1, 2, 3, 4, 5, 6)),
+        (RECEIVED["position_controller/pid_parameters"], struct.pack("<6f", 7, 8, 9, 10, 11, 12)),
     ):
         driver.send(0, topic_id, payload)
         driver.run(200)
@@ -51,7 +50,7 @@ def test_a_folder_that_goes_away_costs_no_robot_but_is_reported(tmp_path):
     driver = DriverSide("--flash-dir", str(tmp_path / "flash"))
     driver.start_streaming()
     os.rmdir(str(tmp_path / "flash"))
-    driver.send(0, ids.ID_MOTORS_PARAMETERS, CENTERS)
+    driver.send(0, RECEIVED["motors_parameters"], CENTERS)
     driver.run(200)
     assert any("cannot be written" in report for report in driver.reports)
     assert driver.swarm.robots[0].motors.motors.centers_us == [1490, 1512]
@@ -63,10 +62,10 @@ NAN_GAINS = struct.pack("<6f", math.nan, 2, 3, 4, 5, 6)
 @pytest.mark.parametrize(
     "topic_id, payload",
     [
-        (ids.ID_VELOCITY_PID_PARAMETERS, NAN_GAINS),
-        (ids.ID_POSITION_PID_PARAMETERS, NAN_GAINS),
-        (ids.ID_IR_CALIBRATION, struct.pack("<8d", *[0.5] * 7, math.nan)),
-        (ids.ID_IR_CALIBRATION, struct.pack("<8d", *[0.5] * 7, math.inf)),
+        (RECEIVED["velocity_controller/pid_parameters"], NAN_GAINS),
+        (RECEIVED["position_controller/pid_parameters"], NAN_GAINS),
+        (RECEIVED["ir_calibration"], struct.pack("<8d", *[0.5] * 7, math.nan)),
+        (RECEIVED["ir_calibration"], struct.pack("<8d", *[0.5] * 7, math.inf)),
     ],
     ids=["velocity nan", "position nan", "infrared nan", "infrared inf"],
 )

@@ -8,7 +8,8 @@ import pytest
 
 from hero_driver.rosserial import packets, payloads
 from hero_node.geometry import Pose
-from hero_sim.robot import declarations, messages
+from hero_sim.robot import messages
+from hero_sim.robot.declarations import STOCK_TOPICS, encode_declarations
 from hero_sim.robot.models import MODELS
 
 ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
@@ -59,21 +60,24 @@ def test_wheel_transforms_are_one_tick_ahead_and_turn_back_after_288():
 
 
 def test_a_laser_has_sixteen_ranges_of_which_the_odd_ones_are_averages():
-    packet = read_packets(messages.LaserMessages("hero_0").encode(5, (1, 2), list(range(8)), [10.0] * 8))[0]
-    seq, ranges, counts = driver_side.read_laser(packet.payload)
-    assert (packet.topic_id, len(packet.payload) + 8, seq) == (125, 205, 5)
+    payload = messages.encode_laser("hero_0", 5, (1, 2), list(range(8)), [10.0] * 8)
+    seq, ranges, counts = driver_side.read_laser(payload)
+    assert (len(payload) + 8, seq) == (205, 5)
     assert ranges == (0, 0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6, 6.5, 7, 3.5)
     assert counts == (10.0,) * 16
 
 
 def test_declarations_have_the_stock_order_names_and_length():
-    data = MODELS["hero"].encode_declarations("hero_0")
+    data = encode_declarations("hero_0", STOCK_TOPICS)
     assert len(data) == 2469
     declared = read_packets(data)
     infos = [payloads.decode_topic_info(packet.payload) for packet in declared]
     assert [info.topic_id for info in infos] == list(range(125, 137)) + list(range(100, 112))
     assert [packet.topic_id for packet in declared] == [0, 2, 0, 0, 0, 0] + [2] * 6 + driver_side.STOCK_SUBSCRIPTIONS
-    assert infos[13].name == "hero_0/laser_enable"
+    names = {info.topic_id: info.name for info in infos}
+    assert [names[topic_id] for topic_id in (128, 129, 130, 101, 109)] == [
+        "/hero_0/encoder", "/tf", "/hero_0/odom", "hero_0/laser_enable", "/hero_0/velocity_controller/cmd_vel"
+    ]  # fmt: skip
     assert all(info.name.startswith("/") for info in infos if info.topic_id != 101)
     assert {info.buffer_length for info in infos} == {4096}
 
@@ -129,14 +133,13 @@ def test_the_stock_cycles_are_rebuilt_byte_for_byte(capture):
 def test_the_stock_handshake_and_laser_are_rebuilt_byte_for_byte(capture):
     declared = [packet for packet in capture if packet.topic_id < 4]
     burst = b"".join(packets.encode_packet(*packet) for packet in declared)
-    assert burst == MODELS["hero"].encode_declarations("hero_0")
+    assert burst == encode_declarations("hero_0", STOCK_TOPICS)
     lasers = [packet for packet in capture if packet.topic_id == 125]
-    encoder = messages.LaserMessages("hero_0")
     for packet in lasers:
         seq, stamp_s, stamp_ns = struct.unpack_from("<III", packet.payload)
         _, ranges_m, counts = driver_side.read_laser(packet.payload)
-        ours = encoder.encode(seq, (stamp_s, stamp_ns), ranges_m[::2], counts[::2])
-        assert read_packets(ours)[0] == packet
+        ours = messages.encode_laser("hero_0", seq, (stamp_s, stamp_ns), ranges_m[::2], counts[::2])
+        assert ours == packet.payload
 
 
 def read_transform(payload):
@@ -188,12 +191,12 @@ def test_hero_plus_sends_how_far_its_counters_are_apart_too():
     values = [5.0, -2.0, *range(2, 11)]
     data = messages.CycleMessages("hero_3", plus).encode((7, 8), Pose(0.0, 0.0, 0.0), (0.0, 0.0), (0, 0), values)
     packet = read_packets(data)[6]
-    assert packet.topic_id == plus.own_ids[declarations.ID_ENCODER]
+    assert packet.topic_id == plus.sent_ids["encoder"]
     assert struct.unpack_from("<12d", packet.payload, len(packet.payload) - 96) == (*values[:6], 7.0, *values[6:])
 
 
 def test_a_laser_has_the_fields_of_the_stock_scan():
-    payload = read_packets(messages.LaserMessages("hero_3").encode(2**32 + 5, (1, 2), [0.1] * 8, [9.0] * 8))[0].payload
+    payload = messages.encode_laser("hero_3", 2**32 + 5, (1, 2), [0.1] * 8, [9.0] * 8)
     assert struct.unpack_from("<III", payload) == (5, 1, 2)
     frame, start = driver_side.read_text(payload, 12)
     assert frame == "hero_3/laser_link"
@@ -203,11 +206,11 @@ def test_a_laser_has_the_fields_of_the_stock_scan():
 
 
 def test_an_imu_message_has_its_values_between_symmetric_covariances():
-    (packet,) = read_packets(messages.ImuMessages("hero_3").encode((7, 8), 2.0, 500.0))
-    assert struct.unpack_from("<III", packet.payload) == (messages.SEQ_NEVER_COUNTED, 7, 8)
-    frame, start = driver_side.read_text(packet.payload, 12)
-    assert frame == "hero_3/hat_link" and packet.topic_id == declarations.ID_IMU
-    values = struct.unpack_from("<37d", packet.payload, start)
+    payload = messages.encode_imu("hero_3", (7, 8), 2.0, 500.0)
+    assert struct.unpack_from("<III", payload) == (messages.SEQ_NEVER_COUNTED, 7, 8)
+    frame, start = driver_side.read_text(payload, 12)
+    assert frame == "hero_3/hat_link" and len(payload) == start + 37 * 8
+    values = struct.unpack_from("<37d", payload, start)
     turn = (0.0, 0.0, math.sin(1.0) * 16383 / 16384, math.cos(1.0) * 16383 / 16384)
     assert values[:4] == pytest.approx(turn, abs=1e-7) and not any(values[4:13])
     assert values[13:16] == (0.0, 0.0, 500.0) and values[25:28] == pytest.approx((0.0, 0.0, 8.192))

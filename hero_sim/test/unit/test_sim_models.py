@@ -12,7 +12,6 @@ from hero_driver.corrections.message_layouts import drop_tick_difference, read_e
 from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5, PLUS_WHEELS
 from hero_driver.corrections.tick_odometry import TickOdometry, WheelGeometry
 from hero_driver.rosserial import packets, payloads
-from hero_sim.robot import declarations as ids
 from hero_sim.robot.models import MODELS
 from hero_sim.world.arena import build_rectangle
 from hero_sim.world.robot_errors import draw_errors
@@ -46,17 +45,16 @@ def test_hero_plus_declares_its_encoder_and_a_distance_but_no_imu():
 @pytest.mark.parametrize("name", MODELS)
 def test_the_drivers_odometry_of_a_model_is_right_within_one_percent(name):
     model = MODELS[name]
-    is_plus = model.encoder_md5 is not None
     driver = DriverSide("--perfect", "--model", name, "--error", "slip=0")
     driver.start_streaming()
     start = driver.true_pose(0)
-    odometry = TickOdometry(PLUS_WHEELS if is_plus else WheelGeometry())
+    odometry = TickOdometry(PLUS_WHEELS if model.is_plus else WheelGeometry())
     since_ms = driver.swarm.now_ms
-    twist_id, encoder_id = (model.own_ids[stock] for stock in (ids.ID_VELOCITY_CMD_VEL, ids.ID_ENCODER))
+    twist_id, encoder_id = model.received_ids["velocity_controller/cmd_vel"], model.sent_ids["encoder"]
     driver.drive(0, 0.1, 0.5, 3000, twist_id)
     driver.drive(0, 0.0, 0.0, 600, twist_id)
     for arrival in driver.list_packets(0, encoder_id, since_ms):
-        payload = drop_tick_difference(arrival.payload) if is_plus else arrival.payload
+        payload = drop_tick_difference(arrival.payload) if model.is_plus else arrival.payload
         stamp_ns, left_ticks, right_ticks = read_encoder(payload)
         odometry.integrate(left_ticks, right_ticks, stamp_ns / 1e9)
     x_m, y_m, yaw_rad = driver.true_pose(0)
@@ -79,7 +77,7 @@ def test_hero_plus_measures_the_distance_ahead_twenty_times_a_second():
     driver.start_streaming()
     since_ms = driver.swarm.now_ms
     driver.run(1000)
-    readings = driver.list_packets(0, MODELS["hero_plus"].own_ids[ids.ID_IMU], since_ms)
+    readings = driver.list_packets(0, MODELS["hero_plus"].sent_ids["distance"], since_ms)
     assert 19 <= len(readings) <= 21
     x_m, _, theta_rad = driver.true_pose(0)
     assert theta_rad == 0.0
@@ -90,10 +88,10 @@ def test_hero_plus_measures_the_distance_ahead_twenty_times_a_second():
 def test_a_service_of_the_older_firmware_is_answered_under_its_own_id():
     driver = DriverSide("--model", "v3.0")
     driver.start_streaming()
-    own_ids = MODELS["v3.0"].own_ids
-    driver.send(0, own_ids[ids.ID_SET_ODOM], struct.pack("<3d", 1.0, 2.0, 0.0))
+    model = MODELS["v3.0"]
+    driver.send(0, model.received_ids["set_odom"], struct.pack("<3d", 1.0, 2.0, 0.0))
     driver.run(200)
-    assert len(driver.list_packets(0, own_ids[ids.ID_SET_ODOM_ANSWER])) == 1
+    assert len(driver.list_packets(0, model.sent_ids["set_odom"])) == 1
     assert driver.swarm.robots[0].sensing.odometry.pose[:2] == (1.0, 2.0)
 
 

@@ -2,12 +2,11 @@ import struct
 
 import numpy as np
 import pytest
-from driver_side import DriverSide, read_encoder
+from driver_side import POSITION, RECEIVED, SENT, VELOCITY, DriverSide, read_encoder
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import packets
-from hero_sim.robot import declarations as ids
 from hero_sim.robot.motor_pid import Gains, MotorPid
 from hero_sim.robot_constants import TICK_M
 
@@ -20,13 +19,13 @@ def start(*arguments):
 
 def push(driver, left_us, right_us):
     """Return the wheels' speeds that these pulses lead to."""
-    driver.send(0, ids.ID_CMD_MOTOR, struct.pack("<2h", left_us, right_us))
+    driver.send(0, RECEIVED["cmd_motor"], struct.pack("<2h", left_us, right_us))
     driver.run(600)
     return driver.swarm.world.speeds_m_s[0].tolist()
 
 
 def set_velocity_gains(driver, *gains):
-    driver.send(0, ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", *gains, *gains))
+    driver.send(0, RECEIVED["velocity_controller/pid_parameters"], struct.pack("<6f", *gains, *gains))
     driver.run(200)
 
 
@@ -97,7 +96,7 @@ def test_a_robot_without_calibrated_centers_creeps_until_they_are_set():
     driver.drive(0, 0.1, 0.0, 1000)
     # All that the controller gives is what it takes for the middle: 1500 is beyond both dead zones, backward.
     assert world.speeds_m_s[0] == pytest.approx([-30 * 0.25 / 220, -10 * 0.25 / 220], rel=0.05)
-    driver.send(0, ids.ID_MOTORS_PARAMETERS, struct.pack("<2h", 1440, 1540))
+    driver.send(0, RECEIVED["motors_parameters"], struct.pack("<2h", 1440, 1540))
     driver.run(100)
     driver.drive(0, 0.1, 0.0, 1000)
     assert world.speeds_m_s[0] == pytest.approx([0.0, 0.0], abs=1e-3)
@@ -126,7 +125,7 @@ def test_the_integral_gain_closes_the_gap_the_sooner_the_larger_it_is():
 
 def test_each_wheel_has_gains_of_its_own():
     driver = start()
-    driver.send(0, ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", 1200, 2300, 0.1, 1e-3, 0, 0))
+    driver.send(0, RECEIVED["velocity_controller/pid_parameters"], struct.pack("<6f", 1200, 2300, 0.1, 1e-3, 0, 0))
     driver.run(200)
     left_m_s, right_m_s = measure_mean_speed(driver)
     assert left_m_s > 0.06
@@ -148,7 +147,7 @@ def test_a_stop_and_a_reversal_reset_the_integral():
 
 def test_a_position_command_drives_as_far_as_its_speed_in_one_second():
     driver = start()
-    driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.1, 0.0, POSITION)
     distances_m = []
     for _ in range(290):
         driver.run(10)
@@ -161,9 +160,9 @@ def test_the_gains_of_the_position_controller_matter():
     distances_m = []
     for gains in ((5.0, 9.0, 0.1), (1.0, 0.0, 0.0)):
         driver = start()
-        driver.send(0, ids.ID_POSITION_PID_PARAMETERS, struct.pack("<6f", *gains, *gains))
+        driver.send(0, RECEIVED["position_controller/pid_parameters"], struct.pack("<6f", *gains, *gains))
         driver.run(200)
-        driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+        driver.send_twist(0, 0.1, 0.0, POSITION)
         driver.run(2900)
         distances_m.append(driver.swarm.world.travels_m[0, 0])
     # With 1 us per tick the wheel stops where the output meets the dead zone of 30 us.
@@ -173,8 +172,8 @@ def test_the_gains_of_the_position_controller_matter():
 
 def test_a_zero_for_one_controller_leaves_the_other_driving():
     for driving, stopped in (
-        (ids.ID_POSITION_CMD_VEL, ids.ID_VELOCITY_CMD_VEL),
-        (ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL),
+        (POSITION, VELOCITY),
+        (VELOCITY, POSITION),
     ):
         driver = start()
         driver.send_twist(0, 0.1, 0.0, driving)
@@ -187,13 +186,13 @@ def test_a_zero_for_one_controller_leaves_the_other_driving():
 
 def test_both_zeros_in_one_send_stop_whatever_was_commanded():
     driver = start()
-    driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.1, 0.0, POSITION)
     driver.send_twist(0, 0.1, 1.0)
-    driver.send(0, ids.ID_CMD_MOTOR, struct.pack("<2h", 1300, 1700))
+    driver.send(0, RECEIVED["cmd_motor"], struct.pack("<2h", 1300, 1700))
     driver.run(110)
     assert driver.measure_speed(0) > 0.02
     driver.send_twist(0, 0.0, 0.0)
-    driver.send_twist(0, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.0, 0.0, POSITION)
     driver.run(60)
     assert not driver.swarm.robots[0].motors.motors.attached
     driver.run(600)
@@ -202,7 +201,7 @@ def test_both_zeros_in_one_send_stop_whatever_was_commanded():
 
 def test_both_controllers_at_once_write_pulses_in_turn():
     driver = start()
-    driver.send_twist(0, 0.1, 0.0, ids.ID_POSITION_CMD_VEL)
+    driver.send_twist(0, 0.1, 0.0, POSITION)
     driver.run(60)
     driver.send_twist(0, -0.1, 0.0)
     driver.run(200)
@@ -237,30 +236,30 @@ def test_until_3_s_of_uptime_the_position_controller_runs():
 
 def test_the_encoders_measure_the_wheels_not_the_commands():
     driver = start("--error", "right_gain=0.5")
-    driver.send(0, ids.ID_CMD_MOTOR, struct.pack("<2h", 1400, 1600))
+    driver.send(0, RECEIVED["cmd_motor"], struct.pack("<2h", 1400, 1600))
     driver.run(900)
-    left, right = read_encoder(driver.list_packets(0, ids.ID_ENCODER)[-1].payload)[:2]
+    left, right = read_encoder(driver.list_packets(0, SENT["encoder"])[-1].payload)[:2]
     assert right / left == pytest.approx(0.5, abs=0.05)
 
 
 twists = st.tuples(
-    st.sampled_from((ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL)),
+    st.sampled_from((VELOCITY, POSITION)),
     st.tuples(st.floats(-1.0, 1.0), st.floats(-20.0, 20.0)).map(
         lambda pair: struct.pack("<6d", pair[0], 0, 0, 0, 0, pair[1])
     ),
 )
 pulses = st.tuples(
-    st.just(ids.ID_CMD_MOTOR),
+    st.just(RECEIVED["cmd_motor"]),
     st.tuples(st.integers(-(2**15), 2**15 - 1), st.integers(-(2**15), 2**15 - 1)).map(
         lambda pair: struct.pack("<2h", *pair)
     ),
 )
 gains = st.tuples(
-    st.sampled_from((ids.ID_VELOCITY_PID_PARAMETERS, ids.ID_POSITION_PID_PARAMETERS)),
+    st.sampled_from((RECEIVED["velocity_controller/pid_parameters"], RECEIVED["position_controller/pid_parameters"])),
     st.lists(st.floats(-1e9, 1e9, width=32), min_size=6, max_size=6).map(lambda six: struct.pack("<6f", *six)),
 )
 tunings = st.tuples(
-    st.sampled_from((ids.ID_VELOCITY_PID_CALIBRATION, ids.ID_POSITION_PID_CALIBRATION)), st.just(b"")
+    st.sampled_from([RECEIVED[kind + "_controller/pid_calibration"] for kind in ("velocity", "position")]), st.just(b"")
 )
 
 
@@ -282,10 +281,10 @@ def test_no_commands_drive_robots_into_walls_or_keep_them_from_stopping(seed, se
         driver.run(100)
     for robot in range(5):
         # Behind packets that hold its loop for 55 ms a robot accepts zeros, also while it tunes itself.
-        neutral = packets.encode_packet(ids.ID_CMD_MOTOR, struct.pack("<2h", 1500, 1500))
+        neutral = packets.encode_packet(RECEIVED["cmd_motor"], struct.pack("<2h", 1500, 1500))
         driver.send_bytes(robot, neutral * 110)
         driver.send_twist(robot, 0.0, 0.0)
-        driver.send_twist(robot, 0.0, 0.0, ids.ID_POSITION_CMD_VEL)
+        driver.send_twist(robot, 0.0, 0.0, POSITION)
     driver.run(700)
     in_robots_m, in_walls_m = map(max, zip(*overlaps))
     assert in_robots_m < 5e-4 and in_walls_m < 1e-6

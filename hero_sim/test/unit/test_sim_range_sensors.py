@@ -2,9 +2,9 @@ import math
 
 import numpy as np
 import pytest
-from driver_side import DriverSide
+from driver_side import SENT, DriverSide
 
-from hero_sim.robot import declarations, ranges
+from hero_sim.robot import ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors
 from hero_sim.world.arena import Segments, build_default
@@ -186,7 +186,7 @@ def test_robots_that_stream_expect_all_of_their_readings():
     looks = log_readings(driver.swarm.world)
     start_ms = driver.swarm.now_ms
     driver.run(4100)
-    sent = sum(len(driver.list_packets(index, declarations.ID_LASER, start_ms)) for index in range(12))
+    sent = sum(len(driver.list_packets(index, SENT["laser"], start_ms)) for index in range(12))
     assert sent == 12 * 20
     # Few are lost to other work of a robot, which delays its reading into the next step.
     assert sent <= sum(map(len, looks)) < 1.05 * sent

@@ -2,17 +2,18 @@ import math
 import struct
 
 import pytest
-from driver_side import DriverSide
+from driver_side import RECEIVED, SENT, DriverSide
 
 from hero_driver.rosserial import packets
-from hero_sim.robot import declarations as ids
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 
-VELOCITY = (ids.ID_VELOCITY_CMD_VEL, ids.ID_VELOCITY_PID_CALIBRATION, ids.ID_VELOCITY_PID_CALIBRATION_ANSWER)
-POSITION = (ids.ID_POSITION_CMD_VEL, ids.ID_POSITION_PID_CALIBRATION, ids.ID_POSITION_PID_CALIBRATION_ANSWER)
+VELOCITY, POSITION = (
+    (RECEIVED[kind + "cmd_vel"], RECEIVED[kind + "pid_calibration"], SENT[kind + "pid_calibration"])
+    for kind in ("velocity_controller/", "position_controller/")
+)
 ZERO = bytes(48)
-NEUTRAL_PULSES = packets.encode_packet(ids.ID_CMD_MOTOR, struct.pack("<2h", 1500, 1500))
-DARK = packets.encode_packet(ids.ID_LED, bytes(16))
+NEUTRAL_PULSES = packets.encode_packet(RECEIVED["cmd_motor"], struct.pack("<2h", 1500, 1500))
+DARK = packets.encode_packet(RECEIVED["led"], bytes(16))
 
 both_controllers = pytest.mark.parametrize("controller", [VELOCITY, POSITION], ids=["velocity", "position"])
 

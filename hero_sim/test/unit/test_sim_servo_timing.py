@@ -4,21 +4,20 @@ import argparse
 import struct
 
 import pytest
-from driver_side import DriverSide
+from driver_side import RECEIVED, SENT, DriverSide
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import packets
 from hero_sim.population import draw_servo_timing
-from hero_sim.robot import declarations as ids
 from hero_sim.robot.servo_pins import CORE_2, CORE_3, PERIOD_US, ServoPins
 
 ZERO = bytes(48)
-NEUTRAL_PULSES = packets.encode_packet(ids.ID_CMD_MOTOR, struct.pack("<2h", 1500, 1500))
-DARK = packets.encode_packet(ids.ID_LED, bytes(16))
-TWISTS = (ids.ID_VELOCITY_CMD_VEL, ids.ID_POSITION_CMD_VEL)
+NEUTRAL_PULSES = packets.encode_packet(RECEIVED["cmd_motor"], struct.pack("<2h", 1500, 1500))
+DARK = packets.encode_packet(RECEIVED["led"], bytes(16))
+TWISTS = (RECEIVED["velocity_controller/cmd_vel"], RECEIVED["position_controller/cmd_vel"])
 ZEROS = b"".join(packets.encode_packet(topic, ZERO) for topic in TWISTS)
-TUNINGS = (ids.ID_VELOCITY_PID_CALIBRATION, ids.ID_POSITION_PID_CALIBRATION)
+TUNINGS = (RECEIVED["velocity_controller/pid_calibration"], RECEIVED["position_controller/pid_calibration"])
 DEAD_ZONE_US = 15
 
 both_cores = pytest.mark.parametrize("timing", [CORE_2, CORE_3])
@@ -50,7 +49,7 @@ def measure_gap(driver, run):
     """Return the longest time (ms) without a reading of the wheels while run() takes its time."""
     since_ms = driver.swarm.now_ms
     run()
-    arrivals = driver.list_packets(0, ids.ID_ENCODER, since_ms - 100)
+    arrivals = driver.list_packets(0, SENT["encoder"], since_ms - 100)
     times_ms = [arrival.at_ms for arrival in arrivals] + [driver.swarm.now_ms]
     return max(later - earlier for earlier, later in zip(times_ms, times_ms[1:]))
 
@@ -116,7 +115,7 @@ def test_a_driven_robot_sends_its_readings_and_keeps_its_speed(timing):
 @both_cores
 def test_pulses_that_are_not_renewed_end_after_a_second(timing):
     driver = start(timing)
-    send_and_wait(driver, packets.encode_packet(ids.ID_CMD_MOTOR, struct.pack("<2h", 1400, 1600)), 900)
+    send_and_wait(driver, packets.encode_packet(RECEIVED["cmd_motor"], struct.pack("<2h", 1400, 1600)), 900)
     assert driver.measure_speed(0) > 0.05
     driver.run(900)
     assert driver.measure_speed(0) < 0.001

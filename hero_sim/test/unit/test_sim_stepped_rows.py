@@ -6,6 +6,7 @@ import struct
 
 import numpy as np
 import pytest
+from driver_side import RECEIVED, SENT
 from stepped_worlds import build_world
 
 from hero_driver.commands.velocity_shaper import (
@@ -19,11 +20,10 @@ from hero_driver.corrections.robot_models import PLUS_WHEELS
 from hero_driver.corrections.tick_odometry import TickOdometry, WheelGeometry
 from hero_driver.rosserial import packets, payloads
 from hero_node.geometry import Pose
-from hero_sim.robot import declarations as ids
 from hero_sim.robot.commands import CommandTable
 from hero_sim.robot.firmware import Firmware
 from hero_sim.robot.flash import Flash
-from hero_sim.robot.messages import LaserMessages
+from hero_sim.robot.messages import encode_laser
 from hero_sim.robot.models import HERO, MODELS
 from hero_sim.robot.motor_control import MotorControl
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
@@ -39,9 +39,9 @@ READY_MS = 5000
 """The scalar robots were switched on so long ago: in its first 3 s a position controller always runs."""
 
 SHAPED_TYPES = {
-    ids.ID_VELOCITY_CMD_VEL: "geometry_msgs/Twist",
-    ids.ID_POSITION_CMD_VEL: "geometry_msgs/Twist",
-    ids.ID_CMD_MOTOR: "hero_msgs/Motor",
+    RECEIVED["velocity_controller/cmd_vel"]: "geometry_msgs/Twist",
+    RECEIVED["position_controller/cmd_vel"]: "geometry_msgs/Twist",
+    RECEIVED["cmd_motor"]: "hero_msgs/Motor",
 }
 
 
@@ -69,12 +69,12 @@ class ScalarRobot:
             name, body, self.sensing.odometry, flash, ServoPins(CORE_2), rng, lambda text: None
         )
         self.table = CommandTable(name, self.sensing, self.motors, flash, lambda text: None, pytest.fail, model)
-        self.model, self.own_ids = model, model.own_ids
+        self.model = model
         self.shapers = {
             topic_id: VelocityShaper(STOP_PAYLOADS[kind], round(COMMAND_INTERVAL_S * 1000))
             for topic_id, kind in SHAPED_TYPES.items()
         }
-        self.odometry = TickOdometry(PLUS_WHEELS if model.measures_distance else WheelGeometry())
+        self.odometry = TickOdometry(PLUS_WHEELS if model.is_plus else WheelGeometry())
         self.inbox = []
         self.ticks = (0.0, 0.0)
         self.distance_m = math.nan
@@ -89,7 +89,7 @@ class ScalarRobot:
         self.table.receive(packets.Packet(topic_id, payload), READY_MS + now_ms, now_ms)
 
     def set_odometry(self, now_ms, *pose):
-        self.call(ids.ID_SET_ODOM, struct.pack("<3d", *pose), now_ms)
+        self.call(RECEIVED["set_odom"], struct.pack("<3d", *pose), now_ms)
         self.odometry.set_pose(Pose(*pose))
         self.ticks = (0.0, 0.0)
 
@@ -106,17 +106,17 @@ class ScalarRobot:
 
     def run_cycle(self, now_ms):
         for packet in packets.PacketReader().receive_bytes(self.sensing.run_cycle(READY_MS + now_ms, now_ms, (0, 0))):
-            if packet.topic_id == self.own_ids[ids.ID_LASER]:
+            if packet.topic_id == SENT["laser"]:
                 header = len(packet.payload) - struct.calcsize("<7fI16fI16f")
                 self.counts = struct.unpack_from("<16f", packet.payload, header + 28 + 4 + 64 + 4)[::2]
                 self.proximity = read_proximity(packet.payload)
-            elif packet.topic_id == self.own_ids[ids.ID_ENCODER]:
+            elif packet.topic_id == SENT["encoder"]:
                 (frame_length,) = struct.unpack_from("<I", packet.payload, 12)
                 self.ticks = struct.unpack_from("<2d", packet.payload, 16 + frame_length)
                 self.odometry.integrate(*self.ticks, now_ms / 1000.0)
 
     def measure_distance(self, now_ms):
-        if self.model.measures_distance and now_ms % DISTANCE_MS == 0:
+        if self.model.is_plus and now_ms % DISTANCE_MS == 0:
             packet = self.sensing.measure_distance(READY_MS + now_ms)
             (self.distance_m,) = struct.unpack_from("<f", packet, len(packet) - 5)
 
@@ -200,15 +200,15 @@ def act_at_random(rng, rows, scalar):
     if deed in ("velocity", "stop"):
         twist = (0.0, 0.0) if deed == "stop" else twist
         rows.send_velocity(row, *twist)
-        robot.offer(now_ms, ids.ID_VELOCITY_CMD_VEL, encode_twist(*twist))
+        robot.offer(now_ms, RECEIVED["velocity_controller/cmd_vel"], encode_twist(*twist))
     elif deed in ("position", "stop position"):
         twist = (0.0, 0.0) if deed == "stop position" else twist
         rows.send_position(row, *twist)
-        robot.offer(now_ms, ids.ID_POSITION_CMD_VEL, encode_twist(*twist))
+        robot.offer(now_ms, RECEIVED["position_controller/cmd_vel"], encode_twist(*twist))
     elif deed in ("pulses", "rest"):
         pulses_us = (1500, 1500) if deed == "rest" else rng.randint(900, 2100, 2).tolist()
         rows.send_pulses(row, *pulses_us)
-        robot.offer(now_ms, ids.ID_CMD_MOTOR, struct.pack("<2h", *pulses_us))
+        robot.offer(now_ms, RECEIVED["cmd_motor"], struct.pack("<2h", *pulses_us))
     elif deed == "odometry":
         pose = rng.uniform(-4.0, 4.0, 3).tolist()
         rows.set_odometry(row, *pose)
@@ -216,11 +216,11 @@ def act_at_random(rng, rows, scalar):
     elif deed == "gains":
         gains = np.float32(rng.uniform(-50.0, 2000.0, 6)).tolist()
         rows.set_velocity_gains(row, gains)
-        robot.call(ids.ID_VELOCITY_PID_PARAMETERS, struct.pack("<6f", *gains), now_ms)
+        robot.call(RECEIVED["velocity_controller/pid_parameters"], struct.pack("<6f", *gains), now_ms)
     elif deed == "centers":
         centers_us = rng.randint(1480, 1520, 2).tolist()
         rows.set_motor_centers(row, centers_us)
-        robot.call(ids.ID_MOTORS_PARAMETERS, struct.pack("<2h", *centers_us), now_ms)
+        robot.call(RECEIVED["motors_parameters"], struct.pack("<2h", *centers_us), now_ms)
     else:
         constants = rng.choice([np.nan, 0.4, 0.5], 8).tolist()
         rows.set_infrared_calibration(row, constants)
@@ -243,14 +243,12 @@ def test_robot_rows_do_what_the_scalar_robots_and_the_driver_do(seed):
 
 
 def test_ranges_of_all_counts_are_those_of_the_driver():
-    messages = LaserMessages("hero_0")
     for constant in (np.nan, 0.5, 0.423, 0.05):
         counts = np.arange(1024.0).reshape(-1, 8)
         ranges_m = measure_ranges(counts, np.full(8, constant))
-        reader, seen = packets.PacketReader(), []
+        seen = []
         for row in convert_to_ranges(counts, np.full(8, constant)).tolist():
-            (packet,) = reader.receive_bytes(messages.encode(0, (0, 0), row, [0.0] * 8))
-            seen.append(read_proximity(packet.payload))
+            seen.append(read_proximity(encode_laser("hero_0", 0, (0, 0), row, [0.0] * 8)))
         np.testing.assert_array_equal(correct_ranges(ranges_m), seen)
     assert {0.0, np.inf} < set(np.ravel(seen))
 
@@ -265,7 +263,7 @@ class WholeFirmware:
         body = Body(world, 0, SharedReadings(world))
         self.firmware = Firmware(0, body, flash, rng, "127.0.0.1", False, CORE_2, pytest.fail)
         self.firmware.switch_on(0)
-        while not self.has_sent(ids.ID_ODOM):
+        while not self.has_sent(SENT["odom"]):
             now_ms = self.firmware.due_ms
             if now_ms >= READY_MS and not self.firmware.configured:
                 self.send(now_ms, packets.ID_PUBLISHER)
@@ -297,14 +295,14 @@ def test_the_timers_are_those_of_the_whole_firmware():
     for now_ms in range(1, 10000):
         rows.advance(now_ms)
         whole.run_millisecond(now_ms)
-        assert whole.has_sent(ids.ID_ODOM) == (cycles[-1:] == [now_ms])
-        assert whole.has_sent(ids.ID_LASER) == (scans[-1:] == [now_ms])
+        assert whole.has_sent(SENT["odom"]) == (cycles[-1:] == [now_ms])
+        assert whole.has_sent(SENT["laser"]) == (scans[-1:] == [now_ms])
         assert rows.world.commands_m_s.tolist() == whole.world.commands_m_s.tolist()
         if now_ms >= command_ms:
             # Never a zero, after which the firmware's controllers begin at another time than ours.
             twist = (rng.uniform(0.05, 0.2), rng.uniform(-2.0, 2.0))
             rows.send_velocity(0, *twist)
-            whole.send(whole.start_ms + now_ms, ids.ID_VELOCITY_CMD_VEL, encode_twist(*twist))
+            whole.send(whole.start_ms + now_ms, RECEIVED["velocity_controller/cmd_vel"], encode_twist(*twist))
             whole.send(whole.start_ms + now_ms, packets.ID_TIME, payloads.encode_time(payloads.split_seconds(1e9)))
             command_ms = now_ms + int(rng.randint(60, 900))
     assert rows.world.travels_m.tolist() == whole.world.travels_m.tolist()

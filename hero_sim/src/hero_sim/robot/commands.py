@@ -12,7 +12,6 @@ from hero_node.geometry import Pose
 
 from ..errors import CommandError
 from ..robot_constants import MAX_PARAMETER
-from . import declarations as ids
 from . import messages
 from .flash import Flash
 from .models import HERO, RobotModel
@@ -34,7 +33,7 @@ Answer = Tuple[bool, str]
 
 
 class CommandTable:
-    """The callbacks of one robot, by its topic ids.
+    """The callbacks of one robot, by the ids of what it receives.
 
     Attributes:
         blocked_us: how long the last callback blocked the robot's loop.
@@ -51,7 +50,6 @@ class CommandTable:
         model: RobotModel = HERO,
     ) -> None:
         """Serve the parts of the robot called name; log takes lines for the server, warn lines for users."""
-        self._own_ids = own_ids = model.own_ids
         self._name = name
         self._sensing = sensing
         self._motors = motors
@@ -61,23 +59,25 @@ class CommandTable:
         self._millis = 0
         self._now_ms = 0
         self.blocked_us = 0
-        velocity, position = motors.velocity, motors.position
-        callbacks: Dict[int, Tuple[str, Callable[..., Optional[Answer]]]] = {
+        callbacks: Dict[str, Tuple[str, Callable[..., Optional[Answer]]]] = {
             # layout of the message or request, in the order of its fields, and what it does
-            ids.ID_LED: ("<4f", self._set_light),
-            ids.ID_LASER_ENABLE: ("<?", self._enable_laser),
-            ids.ID_IR_CALIBRATION: ("<8d", self._calibrate_ir),
-            ids.ID_SET_ODOM: ("<3d", self._set_odom),
-            ids.ID_CMD_MOTOR: ("<2h", self._drive_motors),
-            ids.ID_MOTORS_PARAMETERS: ("<2h", self._set_motors),
-            ids.ID_POSITION_CMD_VEL: (_TWIST, partial(self._drive, position)),
-            ids.ID_POSITION_PID_PARAMETERS: ("<6f", partial(self._set_gains, position)),
-            ids.ID_POSITION_PID_CALIBRATION: ("", partial(self._tune, position)),
-            ids.ID_VELOCITY_CMD_VEL: (_TWIST, partial(self._drive, velocity)),
-            ids.ID_VELOCITY_PID_PARAMETERS: ("<6f", partial(self._set_gains, velocity)),
-            ids.ID_VELOCITY_PID_CALIBRATION: ("", partial(self._tune, velocity)),
+            "led": ("<4f", self._set_light),
+            "laser_enable": ("<?", self._enable_laser),
+            "ir_calibration": ("<8d", self._calibrate_ir),
+            "set_odom": ("<3d", self._set_odom),
+            "cmd_motor": ("<2h", self._drive_motors),
+            "motors_parameters": ("<2h", self._set_motors),
         }
-        self._callbacks = {own_ids[stock]: (stock, *callbacks[stock]) for stock in callbacks if stock in own_ids}
+        for kind, controller in (("position", motors.position), ("velocity", motors.velocity)):
+            callbacks[kind + "_controller/cmd_vel"] = (_TWIST, partial(self._drive, controller))
+            callbacks[kind + "_controller/pid_parameters"] = ("<6f", partial(self._set_gains, controller))
+            callbacks[kind + "_controller/pid_calibration"] = ("", partial(self._tune, controller))
+        received_ids, sent_ids = model.received_ids, model.sent_ids
+        self._callbacks = {
+            received_ids[topic.key]: (topic.message_type, sent_ids.get(topic.key, 0), *callbacks[topic.key])
+            for topic in model.topics
+            if topic.key in received_ids
+        }
 
     def receive(self, packet: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
         """Execute packet at millis of the robot, now_ms of the world; return a service's answer, as a packet.
@@ -88,19 +88,19 @@ class CommandTable:
         self.blocked_us = 0
         if packet.topic_id not in self._callbacks:
             return None  # The slots without a subscriber are empty: the firmware ignores them.
-        stock_id, layout, callback = self._callbacks[packet.topic_id]
+        message_type, answer_id, layout, callback = self._callbacks[packet.topic_id]
         length, expected_length = len(packet.payload), struct.calcsize(layout)
         if length != expected_length:
             text = "%s has %d bytes instead of %d"
-            raise CommandError(text % (ids.find_type(stock_id), length, expected_length))
+            raise CommandError(text % (message_type, length, expected_length))
         values = struct.unpack(layout, packet.payload)
         if not all(abs(value) < MAX_PARAMETER for value in values):
             text = "%s with %s, with which a real robot would do anything"
-            raise CommandError(text % (ids.find_type(stock_id), list(values)))
+            raise CommandError(text % (message_type, list(values)))
         answer = callback(*values)
         if answer is None:
             return None
-        return packets.encode_packet(self._own_ids[ids.ANSWER_IDS[stock_id]], messages.encode_answer(*answer))
+        return packets.encode_packet(answer_id, messages.encode_answer(*answer))
 
     def _set_light(self, *color: float) -> None:
         self._sensing.set_light(self._millis, color)

@@ -116,7 +116,7 @@ class Firmware:
         pins = ServoPins(self._servo_timing)
         self.motors = MotorControl(name, body, self.sensing.odometry, flash, pins, self.rng, self.log)
         self._commands = CommandTable(name, self.sensing, self.motors, flash, self.log, self.warn, self.model)
-        self._declarations = self.model.encode_declarations(name)
+        self._declarations = declarations.encode_declarations(name, self.model.topics)
         self.configured = False
         self.crash_reason: Optional[str] = None
         self.outbox.clear()
@@ -284,7 +284,7 @@ class Firmware:
     def _log_imu(self, now_ms: int) -> None:
         del now_ms
         self._advertised = True
-        if self.model.measures_distance:
+        if self.model.is_plus:
             self.log("\x1b[92m[%s] TOF sensor initialized!\x1b[0m" % self.name)
         elif self._has_imu_hat:
             self.log("\x1b[92m[%s] IMU hat detected!\x1b[0m" % self.name)
@@ -406,7 +406,7 @@ class Firmware:
             self._receive_time(packet.payload, millis)
         elif topic_id == packets.ID_TX_STOP:
             self._unconfigure()
-        elif declarations.ID_LED <= topic_id <= declarations.ID_LAST_SUBSCRIBER_SLOT:
+        elif packets.FIRST_TOPIC_ID <= topic_id < declarations.FIRST_SENT_ID:
             self._receive_command(packet, millis, now_ms)
         elif topic_id != packets.ID_PARAMETER_REQUEST:  # answers for parameters, which this firmware ignores
             self.crash_reason = "id %d, which is outside its table of subscribers" % topic_id

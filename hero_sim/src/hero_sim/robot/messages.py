@@ -1,8 +1,8 @@
-"""The robot's messages as the bytes of their packets, as the stock firmware writes them.
+"""The robot's messages as bytes, as the stock firmware writes them.
 
-Pure. A message is built once per robot as a template; afterwards only the fields that change are patched, so
-that a hundred robots cost little. float64 fields hold float32 values, because the robot's ros_lib computes in
-single precision (serializeAvrFloat64). Field order: the ROS message definitions.
+Pure. What is sent in each cycle is built once per robot as a template, of which only the fields that change are
+patched, so that a hundred robots cost little. float64 fields hold float32 values, because the robot's ros_lib computes
+in single precision (serializeAvrFloat64). Field order: the ROS message definitions.
 """
 
 import functools
@@ -14,7 +14,6 @@ from hero_driver.rosserial import packets
 from hero_node.geometry import Pose
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
-from . import declarations
 from .models import HERO, RobotModel
 
 SEQ_NEVER_COUNTED = 0xFFFFFFFF
@@ -81,34 +80,12 @@ def round_to_float32(values: Sequence[float]) -> Tuple[float, ...]:
     return form.unpack(form.pack(*values))
 
 
-class _Template:
-    """The packets of one burst in one buffer, of which fields are patched and the checksums updated."""
-
-    def __init__(self, messages: Sequence[Tuple[int, bytes]]) -> None:
-        self.data = bytearray()
-        self.payload_starts: List[int] = []
-        self._sums: List[Tuple[int, int]] = []  # first byte that is summed, and the checksum's place behind the last
-        for topic_id, payload in messages:
-            start = len(self.data)
-            self.data += packets.encode_packet(topic_id, payload)
-            self._sums.append((start + _SUMMED_OFFSET, len(self.data) - 1))
-            self.payload_starts.append(start + packets.HEADER_LENGTH)
-
-    def seal(self) -> bytes:
-        """Return the burst with right checksums."""
-        view = memoryview(self.data)
-        for first, last in self._sums:
-            self.data[last] = 255 - packets.sum_bytes(view[first:last])
-        return bytes(self.data)
-
-
 class CycleMessages:
     """One odom packet, five transforms and one encoder packet: what a robot sends 29 times a second."""
 
     def __init__(self, name: str, model: RobotModel = HERO) -> None:
         """Build the templates of the robot called name (hero_N)."""
-        own_ids = model.own_ids
-        self._encoder_form = _ENCODER if model.encoder_md5 is None else _PLUS_ENCODER
+        self._encoder_form = _PLUS_ENCODER if model.is_plus else _ENCODER
         odom_id, base_id = name + "/odom", name + "/base_link"
         odom = _header(SEQ_NEVER_COUNTED, odom_id) + _text(base_id)
         odom += bytes(_POSE.size + _COVARIANCE_LENGTH + _TWIST.size + _COVARIANCE_LENGTH)
@@ -120,12 +97,16 @@ class CycleMessages:
             _build_transform(base_id, name + "/hat_link", _HAT_M),
             _build_transform(base_id, name + "/laser_link", _LASER_M),
         ]
-        messages = [(own_ids[declarations.ID_ODOM], odom)]
-        messages += [(own_ids[declarations.ID_TF], transform) for transform in transforms]
-        messages += [(own_ids[declarations.ID_ENCODER], encoder)]
-        self._template = _Template(messages)
-        starts = self._template.payload_starts
-        ends = [start + len(payload) for start, (_, payload) in zip(starts, messages)]
+        payloads = [("odom", odom), *(("tf", transform) for transform in transforms), ("encoder", encoder)]
+        self._data = bytearray()
+        self._sums: List[Tuple[int, int]] = []  # first byte that is summed, and the checksum's place behind the last
+        starts, ends = [], []
+        for topic, payload in payloads:
+            start = len(self._data)
+            self._data += packets.encode_packet(model.sent_ids[topic], payload)
+            starts.append(start + packets.HEADER_LENGTH)
+            ends.append(len(self._data) - 1)
+            self._sums.append((start + _SUMMED_OFFSET, ends[-1]))
         # Behind the sequence number; in a tfMessage the number of transforms comes first.
         self._stamps = [starts[0] + 4] + [start + 8 for start in starts[1:6]] + [starts[6] + 4]
         self._twist = ends[0] - _COVARIANCE_LENGTH - _TWIST.size
@@ -149,7 +130,7 @@ class CycleMessages:
             (pose.x_m, pose.y_m, math.sin(half_rad), math.cos(half_rad), *twist)
             + (math.sin(left_rad), math.cos(left_rad), math.sin(right_rad), math.cos(right_rad), *encoder)
         )
-        data = self._template.data
+        data = self._data
         for place in self._stamps:
             _STAMP.pack_into(data, place, *stamp)
         for place in self._poses:
@@ -160,7 +141,10 @@ class CycleMessages:
         if self._encoder_form is _PLUS_ENCODER:
             values.insert(6, abs(values[0] - values[1]))
         self._encoder_form.pack_into(data, self._encoder, *values)
-        return self._template.seal()
+        view = memoryview(data)
+        for first, last in self._sums:
+            data[last] = 255 - packets.sum_bytes(view[first:last])
+        return bytes(data)
 
 
 def _build_transform(parent: str, child: str, place_m: Sequence[float]) -> bytes:
@@ -174,29 +158,16 @@ def _wheel_half_angle(ticks: float) -> float:
     return (math.fmod(ticks, TICKS_PER_TURN) + 1.0) * math.pi / TICKS_PER_TURN
 
 
-class LaserMessages:
-    """The stock LaserScan of one robot."""
+def encode_laser(
+    name: str, seq: int, stamp: Tuple[int, int], ranges_m: Sequence[float], counts: Sequence[float]
+) -> bytes:
+    """Return the stock LaserScan of the eight sensors.
 
-    def __init__(self, name: str) -> None:
-        """Build the template of the robot called name (hero_N)."""
-        angles_rad = (-math.pi, math.pi, LASER_ANGLE_INCREMENT_RAD)
-        head = _header(0, name + "/laser_link")
-        head += struct.pack("<7f", *angles_rad, 0.0, 0.0, LASER_RANGE_MIN_M, LASER_RANGE_MAX_M)
-        values = _LENGTH.pack(16) + bytes(64)
-        self._template = _Template([(declarations.ID_LASER, head + values + values)])
-        self._start = self._template.payload_starts[0]
-        self._ranges = self._start + len(head) + _LENGTH.size
-
-    def encode(
-        self, seq: int, stamp: Tuple[int, int], ranges_m: Sequence[float], counts: Sequence[float]
-    ) -> bytes:
-        """Return the packet for the eight sensors: odd values are averages of their neighbors (quirk of the
-        firmware, RangeSensor.ino:167)."""
-        data = self._template.data
-        _HEADER.pack_into(data, self._start, seq & 0xFFFFFFFF, *stamp)
-        struct.pack_into("<16f", data, self._ranges, *_interpolate(ranges_m))
-        struct.pack_into("<16f", data, self._ranges + 64 + _LENGTH.size, *_interpolate(counts))
-        return self._template.seal()
+    Odd values are averages of their neighbors (quirk of the firmware, RangeSensor.ino:167).
+    """
+    limits = (-math.pi, math.pi, LASER_ANGLE_INCREMENT_RAD, 0.0, 0.0, LASER_RANGE_MIN_M, LASER_RANGE_MAX_M)
+    values = struct.pack("<7fI16fI16f", *limits, 16, *_interpolate(ranges_m), 16, *_interpolate(counts))
+    return _HEADER.pack(seq & 0xFFFFFFFF, *stamp) + _text(name + "/laser_link") + values
 
 
 def _interpolate(values: Sequence[float]) -> List[float]:
@@ -207,28 +178,16 @@ def _interpolate(values: Sequence[float]) -> List[float]:
     return filled
 
 
-class ImuMessages:
-    """The Imu of the hat: angular speeds in raw counts, acceleration in counts / 1000 (IMUSensor.ino:182-188)."""
+def encode_imu(name: str, stamp: Tuple[int, int], heading_rad: float, angular_counts: float) -> bytes:
+    """Return the Imu of a hat that turns about z only.
 
-    def __init__(self, name: str, model: RobotModel = HERO) -> None:
-        """Build the template of the robot called name (hero_N)."""
-        head = _header(SEQ_NEVER_COUNTED, name + "/hat_link")
-        gravity = round_to_float32((0.0, 0.0, _GRAVITY))
-        values = [0.0] * (4 + 9 + 3) + [*_ANGULAR_COVARIANCE, *gravity, *_LINEAR_COVARIANCE]
-        self._template = _Template([(model.own_ids[declarations.ID_IMU], head + struct.pack("<37d", *values))])
-        start = self._template.payload_starts[0]
-        self._stamp = start + 4
-        self._quaternion = start + len(head)
-
-    def encode(self, stamp: Tuple[int, int], heading_rad: float, angular_counts: float) -> bytes:
-        """Return the packet of a robot that turns about z only."""
-        data = self._template.data
-        turn = math.sin(heading_rad / 2.0) * _UNIT_QUATERNION, math.cos(heading_rad / 2.0) * _UNIT_QUATERNION
-        yaw_z, yaw_w, angular_z = round_to_float32((*turn, angular_counts))
-        _STAMP.pack_into(data, self._stamp, *stamp)
-        _QUATERNION.pack_into(data, self._quaternion, 0.0, 0.0, yaw_z, yaw_w)
-        struct.pack_into("<d", data, self._quaternion + 8 * 15, angular_z)
-        return self._template.seal()
+    Angular speeds are raw counts, accelerations counts / 1000 (IMUSensor.ino:182-188).
+    """
+    turn = math.sin(heading_rad / 2.0) * _UNIT_QUATERNION, math.cos(heading_rad / 2.0) * _UNIT_QUATERNION
+    yaw_z, yaw_w, angular_z, gravity = round_to_float32((*turn, angular_counts, _GRAVITY))
+    turned = (0.0, 0.0, yaw_z, yaw_w, *[0.0] * 9, 0.0, 0.0, angular_z, *_ANGULAR_COVARIANCE)
+    values = struct.pack("<37d", *turned, 0.0, 0.0, gravity, *_LINEAR_COVARIANCE)
+    return _HEADER.pack(SEQ_NEVER_COUNTED, *stamp) + _text(name + "/hat_link") + values
 
 
 def encode_answer(success: bool, text: str) -> bytes:

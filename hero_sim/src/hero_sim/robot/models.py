@@ -5,13 +5,12 @@ computes with the stock wheels; the older stock firmware whose binary is publish
 is as in the stock robot; HeRo+'s own law for its motors, too, is that of the stock robot here.
 """
 
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Tuple
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M, TICK_M, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from ..world.robot_errors import RobotErrors
-from . import declarations
-from .declarations import DECLARATIONS, Declaration
+from .declarations import PUB, STOCK_TOPICS, Topic, assign_ids
 
 
 class RobotModel(NamedTuple):
@@ -19,58 +18,47 @@ class RobotModel(NamedTuple):
 
     versions: str
     """In the line that it logs at boot."""
-    declarations: Tuple[Declaration, ...] = DECLARATIONS
-    encoder_md5: Optional[str] = None
-    """None: the stock robot's."""
+    topics: Tuple[Topic, ...] = STOCK_TOPICS
     tick_m: float = TICK_M
     """Travel per tick as the firmware computes it."""
     wheel_diameter_m: float = WHEEL_DIAMETER_M
     wheel_separation_m: float = WHEEL_SEPARATION_M
     radius_m: float = BODY_RADIUS_M
-    measures_distance: bool = False
-    """Whether it has the distance sensor, and no IMU."""
-
-    def encode_declarations(self, name: str) -> bytes:
-        """Return the packets with which the robot called name (hero_N) declares everything, in one burst."""
-        own_ids = self.own_ids
-        entries = [(kind, own_ids[stock_id], pattern, text) for kind, stock_id, pattern, text in self.declarations]
-        return declarations.encode_entries(name, entries, self.encoder_md5)
+    is_plus: bool = False
+    """HeRo+: it has the distance sensor and no IMU, and its Encoder says how far the counters are apart, too."""
 
     @property
-    def own_ids(self) -> Dict[int, int]:
-        """Ids of this model's topics by those of the stock robot's; both are given in call order."""
-        kinds = {declarations.PUB: 125, declarations.ANS: 125, declarations.SUB: 100, declarations.REQ: 100}
-        counts = {125: 0, 100: 0}
-        own = {}
-        for kind, stock_id, _, _ in self.declarations:
-            first = kinds[kind]
-            own[stock_id] = first + counts[first]
-            counts[first] += 1
-        return own
+    def sent_ids(self) -> Dict[str, int]:
+        """Ids of what it sends, by the topics' keys."""
+        return assign_ids(self.topics)[0]
+
+    @property
+    def received_ids(self) -> Dict[str, int]:
+        """Ids of what it receives, by the topics' keys."""
+        return assign_ids(self.topics)[1]
 
 
 _NEWER_NAMES = ("ir_calibration", "laser_enable", "motors_parameters")
+_PLUS_TOPICS = {
+    "imu": Topic(PUB, "/%s/distance", "std_msgs/Float32", "73fcbf46b49191e672908e50842a83d4"),
+    "encoder": Topic(PUB, "/%s/encoder", "hero_common/Encoder", "ec5c02e99365233af779a0f9f54cb0df"),
+}
 
 HERO = RobotModel("Firmware: v3.8 | Hardware: v2.5 | Config: v2.3")
 MODELS: Dict[str, RobotModel] = {
     "hero": HERO,
     "v3.0": RobotModel(
         "Firmware: v3.0 | Hardware: v2.5",
-        tuple(entry for entry in DECLARATIONS if not entry[2].endswith(_NEWER_NAMES)),
+        tuple(topic for topic in STOCK_TOPICS if topic.key not in _NEWER_NAMES),
     ),
     "hero_plus": RobotModel(
         HERO.versions,
-        tuple(
-            (kind, topic_id, "/%s/distance", "std_msgs/Float32") if topic_id == declarations.ID_IMU else entry
-            for entry in DECLARATIONS
-            for kind, topic_id in [entry[:2]]
-        ),
-        encoder_md5="ec5c02e99365233af779a0f9f54cb0df",
+        tuple(_PLUS_TOPICS.get(topic.key, topic) for topic in STOCK_TOPICS),
         tick_m=TICK_M * TICKS_PER_TURN / 96.0,
         wheel_diameter_m=0.050,
         wheel_separation_m=0.065,
         radius_m=0.060,
-        measures_distance=True,
+        is_plus=True,
     ),
 }
 

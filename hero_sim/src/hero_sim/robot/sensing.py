@@ -14,7 +14,7 @@ from hero_node.geometry import Pose
 
 from ..robot_constants import LED_WATCHDOG_MS
 from ..world.body import Body
-from . import declarations, messages
+from . import messages
 from .clock import NEVER_MS
 from .flash import Flash
 from .imu_hat import ImuHat
@@ -57,19 +57,17 @@ class Sensing:
         self, name: str, body: Body, has_imu_hat: bool, flash: Flash, model: RobotModel = HERO
     ) -> None:
         """Build the sensors of the robot called name (hero_N)."""
-        self.distance_due_ms = 0 if model.measures_distance else NEVER_MS
-        self._distance_id = model.own_ids[declarations.ID_IMU]
+        self.distance_due_ms = 0 if model.is_plus else NEVER_MS
+        self._name = name
+        self._ids = model.sent_ids
         self.due_ms = 0
         self.laser_enabled = True
         left_m, right_m = body.travels_m
         self.odometry = WheelOdometry(left_m, right_m, model.tick_m)
         self._body = body
         self._flash = flash
-        has_imu_hat = has_imu_hat and not model.measures_distance
-        self._imu = ImuHat(body.true_pose.yaw_rad) if has_imu_hat else None
+        self._imu = ImuHat(body.true_pose.yaw_rad) if has_imu_hat and not model.is_plus else None
         self._cycle_messages = messages.CycleMessages(name, model)
-        self._laser_messages = messages.LaserMessages(name)
-        self._imu_messages = messages.ImuMessages(name, model)
         self._laser_seq = 0
         self._laser_at_ms = 0
         self._light = _DARK
@@ -123,15 +121,17 @@ class Sensing:
     def measure_distance(self, millis: int) -> bytes:
         """Return the packet of the distance sensor."""
         self.distance_due_ms = millis + DISTANCE_MS
-        return packets.encode_packet(self._distance_id, struct.pack("<f", self._body.read_distance()))
+        return packets.encode_packet(self._ids["distance"], struct.pack("<f", self._body.read_distance()))
 
     def _measure_laser(self, stamp: Tuple[int, int]) -> bytes:
         self._laser_seq += 1
         counts = self._body.read_infrared()
         ranges_m = convert_to_ranges(counts, np.array(self._flash.ir_calibration_counts_m2))
-        return self._laser_messages.encode(self._laser_seq, stamp, ranges_m.tolist(), counts.tolist())
+        payload = messages.encode_laser(self._name, self._laser_seq, stamp, ranges_m.tolist(), counts.tolist())
+        return packets.encode_packet(self._ids["laser"], payload)
 
     def _measure_imu(self, imu: ImuHat, millis: int, stamp: Tuple[int, int]) -> bytes:
         heading_rad, angular_counts = imu.read(millis, self._body.true_pose.yaw_rad, self._body.angular_rad_s)
         self.odometry.set_heading(heading_rad)
-        return self._imu_messages.encode(stamp, heading_rad, angular_counts)
+        payload = messages.encode_imu(self._name, stamp, heading_rad, angular_counts)
+        return packets.encode_packet(self._ids["imu"], payload)

@@ -11,7 +11,7 @@ from typing import Callable, Collection, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5, PLUS_WHEELS
+from hero_driver.corrections.robot_models import PLUS_WHEELS
 from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.robot_constants import SERVO_CENTER_US
 
@@ -98,12 +98,11 @@ class RobotRows:
         errors = world.errors
         self._calibration_counts_m2 = calibrate(errors.alpha_counts_m2, errors.beta_counts)
         self._encoders = WheelEncoders(world, np.array([model.tick_m for model in models]))
-        is_plus = [model.encoder_md5 == PLUS_ENCODER_MD5 for model in models]
-        self._odometry = TickOdometryRows([PLUS_WHEELS if plus else WheelGeometry() for plus in is_plus])
+        self._odometry = TickOdometryRows([PLUS_WHEELS if model.is_plus else WheelGeometry() for model in models])
         self.ticks, self.odometry_ms = received.ticks, received.odometry_ms
         self.scan_ms, self.distance_ms = received.scan_ms, received.distance_ms
         self._view: Optional[View] = None  # of the newest scan, until it is read
-        self.distance_rows = np.array([model.measures_distance for model in models]).nonzero()[0]
+        self.distance_rows = np.array([model.is_plus for model in models]).nonzero()[0]
         self._distance_view: Optional[View] = None
         self._distance_due_ms = now_ms if len(self.distance_rows) else NEVER_MS
         self._servos = ServoPulses(world, np.rint(errors.servo_center_us.T))
