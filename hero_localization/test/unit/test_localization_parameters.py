@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from hero_localization.nodes import localize, map_arena, track
-from hero_node.parameter_list import make_list
+from hero_test.parameter_list import make_list
 
 README = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
 

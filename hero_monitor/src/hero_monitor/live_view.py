@@ -24,7 +24,7 @@ from hero_sim.stepped.topics import LATCHED, StepTopics
 from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
 from .foxglove.hub import TopicMessage, TopicType
 from .serving.access import Access
-from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits
+from .serving.client_limits import CONNECTIONS_MAX, ClientLimits
 from .serving.server import Server
 
 WAITING_MAX = 20_000
@@ -101,7 +101,7 @@ class LiveView(ExitStack):
         asyncio.set_event_loop(asyncio.new_event_loop())
         self._loop = tornado.ioloop.IOLoop.current()
         endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), self._origins)
-        server = Server(Access(None, ()), ConnectionLimits(CONNECTIONS_MAX), None, endpoint.route)
+        server = Server(Access(None, ()), ClientLimits(CONNECTIONS_MAX), None, endpoint.route)
         try:
             listening.set_result(server.listen("127.0.0.1", port))
         except OSError as error:

@@ -25,7 +25,7 @@ from .fleet_feed.page_state import encode
 from .page_requests import PageRequests
 from .parameters import Parameters, list_host_names, load_parameters, read_token
 from .serving.access import Access
-from .serving.connection_limits import CONNECTIONS_MAX, ConnectionLimits
+from .serving.client_limits import CONNECTIONS_MAX, ClientLimits
 
 LINGER_S = 10.0
 """Time that subscriptions outlive the last page, which may only reload."""
@@ -70,7 +70,7 @@ class Monitor:
             self._feed.picture.find_jpeg,
         )
         # The other half of the files is for ROS: some per robot.
-        limits = ConnectionLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
+        limits = ClientLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         topics = RosTopics(self._background)
         source = TopicSource(topics.find_types, topics.want, topics.take)
         publisher = Publisher(self._enter, self._requests.publish, self._leave)

@@ -10,7 +10,7 @@ from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.control.requests import CLOCK_PERIOD_S, read_clock_ms
 from hero_monitor.fleet_feed.page_state import encode
 from hero_monitor.serving.access import Access
-from hero_monitor.serving.connection_limits import ConnectionLimits
+from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import Actions, Server
 from hero_test.waiting import wait_for
 
@@ -88,7 +88,7 @@ class ScriptedMonitor:
         asyncio.set_event_loop(asyncio.new_event_loop())
         self._loop = tornado.ioloop.IOLoop.current()
         actions = Actions(self._open, self._receive, lambda number: None, lambda: b"")
-        self._server = Server(Access(None, []), ConnectionLimits(400), actions)
+        self._server = Server(Access(None, []), ClientLimits(400), actions)
         self.port = self._server.listen("127.0.0.1", 0)
         clock = tornado.ioloop.PeriodicCallback(self._send_clock, 1e3 * CLOCK_PERIOD_S)
         clock.start()

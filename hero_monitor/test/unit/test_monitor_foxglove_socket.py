@@ -18,7 +18,7 @@ from hero_monitor.foxglove.endpoint import (
 )
 from hero_monitor.foxglove.hub import Client, TopicMessage, TopicType
 from hero_monitor.serving.access import Access
-from hero_monitor.serving.connection_limits import ConnectionLimits
+from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import TOKEN_BURST
 from hero_node.token_bucket import TokenBuckets
 
@@ -74,7 +74,7 @@ def connect(
         tornado.web.Application(cookie_secret="secret"),
         request,
         access=Access(token, []),
-        limits=ConnectionLimits(9),
+        limits=ClientLimits(9),
         **values,
     )
 

@@ -10,7 +10,7 @@ import tornado.web
 
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import Access
-from hero_monitor.serving.connection_limits import ConnectionLimits
+from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import (
     SOCKETS_MAX,
     TOKEN_BURST,
@@ -40,7 +40,7 @@ def ask(
     )
     request.remote_ip = address
     application = tornado.web.Application(cookie_secret="secret")
-    handler = handler_class(application, request, access=Access(token, []), limits=ConnectionLimits(400), **values)
+    handler = handler_class(application, request, access=Access(token, []), limits=ClientLimits(400), **values)
 
     async def execute():
         await handler._execute([], *arguments)

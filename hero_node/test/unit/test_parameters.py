@@ -6,7 +6,6 @@ import math
 import pytest
 
 from hero_node.errors import ProgramError
-from hero_node.parameter_list import make_list
 from hero_node.parameters import (
     MAX_COORDINATE_M,
     MAX_ROBOTS_IN_RANGE,
@@ -61,18 +60,6 @@ def test_a_wrong_value_is_one_line_with_what_is_allowed(name, value, allowed):
     with pytest.raises(ProgramError) as raised:
         check_parameters(DECLARED, {name: value})
     assert allowed in str(raised.value) and "\n" not in str(raised.value)
-
-
-def test_a_list_says_what_is_declared():
-    assert make_list(DECLARED) == [
-        "- `~rate_hz` (`10.0`, 1.0 to 30.0 Hz): of updates",
-        "- `~port` (`8088`, 0 to 65,535): TCP port",
-        "- `~control` (`false`): whether pages may drive",
-        "- `~view` (`orbit`, `top`): of the camera",
-        "- `~frame` (`map`): where poses are",
-        "- `~robots` (`0-2`): their ids",
-    ]
-    assert make_list({"mean": words("x", "many words " * 20)})[0].splitlines()[1].startswith("  ")
 
 
 @pytest.mark.parametrize("low, high, unit", [(1.0, 30.0, ""), (-1.0, 1.0, "m")])

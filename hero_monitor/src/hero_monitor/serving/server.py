@@ -25,7 +25,7 @@ from hero_node.token_bucket import TokenBuckets
 
 from ..fleet_feed.page_state import encode
 from .access import Access
-from .connection_limits import ConnectionLimits, group_address
+from .client_limits import ClientLimits, group_address
 
 WEB = Path(__file__).resolve().parents[1] / "web"
 FILES = {path.relative_to(WEB).as_posix(): path for path in WEB.glob("**/*") if path.is_file()}
@@ -88,7 +88,7 @@ class BaseHandler(tornado.web.RequestHandler):
     """A request whose Host names this PC; every answer has headers that keep foreign content out."""
 
     access: Access
-    limits: ConnectionLimits
+    limits: ClientLimits
     wrong_tokens: TokenBuckets
     actions: Actions
     pages: List["PageSocket"]
@@ -281,7 +281,7 @@ def choose_served(pages: List[PageSocket]) -> List[PageSocket]:
 class LimitedServer(tornado.httpserver.HTTPServer):
     """An HTTP server that asks the limits about every new connection."""
 
-    limits: ConnectionLimits
+    limits: ClientLimits
 
     def handle_stream(self, stream: tornado.iostream.IOStream, address: Tuple[Any, ...]) -> None:
         """Serve a new connection, or close it."""
@@ -295,7 +295,7 @@ class Server:
     """The server, from its start to its end."""
 
     def __init__(
-        self, access: Access, limits: ConnectionLimits, actions: Optional[Actions], *routes: Route
+        self, access: Access, limits: ClientLimits, actions: Optional[Actions], *routes: Route
     ) -> None:
         """actions: of pages; None: there are no pages, only the routes."""
         # tornado logs each invalid request and cookie: any client could fill the disk.

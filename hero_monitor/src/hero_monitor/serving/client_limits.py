@@ -47,7 +47,7 @@ def group_address(address: str) -> str:
     return str(ipaddress.ip_network((parsed, 64), strict=False))
 
 
-class ConnectionLimits:
+class ClientLimits:
     """The open connections of one server."""
 
     def __init__(self, connections_max: int, per_address_max: int = UNTRUSTED_PER_ADDRESS_MAX) -> None:

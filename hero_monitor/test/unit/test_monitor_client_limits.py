@@ -2,9 +2,9 @@
 
 import pytest
 
-from hero_monitor.serving.connection_limits import (
+from hero_monitor.serving.client_limits import (
     UNTRUSTED_S,
-    ConnectionLimits,
+    ClientLimits,
     group_address,
 )
 
@@ -34,13 +34,13 @@ def count_open(connections):
 
 
 def test_an_address_with_too_many_connections_loses_its_oldest():
-    limits = ConnectionLimits(100, 5)
+    limits = ClientLimits(100, 5)
     connections = connect(limits, UNTRUSTED, 7)
     assert [connection.closed() for connection in connections] == [True] * 2 + [False] * 5
 
 
 def test_trusted_connections_do_not_count_for_their_address():
-    limits = ConnectionLimits(100, 5)
+    limits = ClientLimits(100, 5)
     own = connect(limits, OWNER, 5)
     for connection in own:
         limits.trust(connection)
@@ -49,7 +49,7 @@ def test_trusted_connections_do_not_count_for_their_address():
 
 
 def test_where_all_places_are_taken_the_address_with_the_most_loses_one():
-    limits = ConnectionLimits(10, 8)
+    limits = ClientLimits(10, 8)
     own, others = connect(limits, OWNER, 2), connect(limits, UNTRUSTED, 8)
     own += connect(limits, OWNER)
     assert count_open(own) == 3
@@ -57,7 +57,7 @@ def test_where_all_places_are_taken_the_address_with_the_most_loses_one():
 
 
 def test_a_trusted_connection_is_never_evicted_for_another():
-    limits = ConnectionLimits(10, 50)
+    limits = ClientLimits(10, 50)
     (own,) = connect(limits, OWNER)
     limits.trust(own)
     for number in range(200):
@@ -66,7 +66,7 @@ def test_a_trusted_connection_is_never_evicted_for_another():
 
 
 def test_a_new_connection_is_refused_only_where_all_are_trusted():
-    limits = ConnectionLimits(3, 3)
+    limits = ClientLimits(3, 3)
     own = connect(limits, OWNER, 3)
     for connection in own:
         limits.trust(connection)
@@ -76,7 +76,7 @@ def test_a_new_connection_is_refused_only_where_all_are_trusted():
 
 
 def test_closed_connections_make_room():
-    limits = ConnectionLimits(10, 3)
+    limits = ClientLimits(10, 3)
     first = connect(limits, UNTRUSTED, 3)
     first[2].close()
     connect(limits, UNTRUSTED)
@@ -84,7 +84,7 @@ def test_closed_connections_make_room():
 
 
 def test_a_connection_without_a_login_is_closed_after_a_while():
-    limits = ConnectionLimits(10, 10)
+    limits = ClientLimits(10, 10)
     silent, own = connect(limits, UNTRUSTED, 2, now_s=5.0)
     limits.trust(own)
     limits.expire(5.0 + UNTRUSTED_S)

@@ -5,7 +5,7 @@ from typing import Any, List, Mapping
 
 import yaml
 
-from .parameters import Parameter
+from hero_node.parameters import Parameter
 
 LINE_LENGTH = 120
 
