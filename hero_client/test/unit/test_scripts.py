@@ -12,13 +12,13 @@ import hero_client
 
 @pytest.mark.slow
 @pytest.mark.parametrize("statement", ["Robot(0)", "Swarm([0, 1])", "Swarm.discover()"])
-def test_a_plain_script_without_a_master_ends_with_one_line(monkeypatch, statement):
+def test_a_plain_script_with_a_bad_master_uri_ends_with_one_line(monkeypatch, statement):
     monkeypatch.setenv("ROS_MASTER_URI", "localhost")
     script = "from hero_client import Robot, Swarm; %s" % statement
     ended = subprocess.run([sys.executable, "-c", script], capture_output=True, check=False)
     assert ended.returncode == 1
     (line,) = ended.stderr.decode().splitlines()
-    assert "no ROS master at 'localhost'" in line
+    assert "ROS_MASTER_URI is 'localhost', but must be like http://localhost:11311" in line
 
 
 def test_every_public_name_is_imported_for_editors_and_on_first_use():

@@ -15,7 +15,6 @@ import signal
 import sys
 import threading
 import time
-import urllib.parse
 import xmlrpc.client
 from typing import Any, Callable, List, Optional
 
@@ -24,7 +23,7 @@ import rospy
 
 from hero_node.errors import NodeError, ProgramError
 from hero_node.ros.connections import limit_xmlrpc_connections, open_tcpros_server
-from hero_node.ros.master import find_running_node
+from hero_node.ros.master import find_running_node, read_master_uri
 from hero_node.ros.master_watch import MasterWatch
 from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
@@ -251,13 +250,7 @@ def main(argv: Optional[List[str]] = None) -> int:
 
 def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     """Become a ROS node. Raises: ProgramError where the environment does not allow it."""
-    try:
-        _wait_for_master()
-    except (ValueError, OSError) as error:
-        uri = ascii(rosgraph.get_master_uri())
-        raise ProgramError(
-            "ROS_MASTER_URI is %s: %s; it must be like http://localhost:11311" % (uri, error)
-        ) from error
+    _wait_for_master(read_master_uri())
     running = find_running_node(NODE_NAME)
     if running:
         raise ProgramError(
@@ -274,18 +267,12 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     tell_of_lost_log_lines()
 
 
-def _wait_for_master() -> None:
-    """Return when a ROS master answers; rospy would wait too, but could not be interrupted.
-
-    Raises: ValueError or OSError where ROS_MASTER_URI is no address.
-    """
-    # Not a name that may exist later on: UnicodeError is a ValueError.
-    (urllib.parse.urlparse(rosgraph.get_master_uri()).hostname or "").encode("idna")
+def _wait_for_master(uri: str) -> None:
+    """Return when a ROS master answers; rospy would wait too, but could not be interrupted."""
     if rosgraph.is_master_online():
         return
     sys.stderr.write(
-        "hero_driver: no ROS master at %s yet, waiting; start one with roscore, or set ROS_MASTER_URI\n"
-        % rosgraph.get_master_uri()
+        "hero_driver: no ROS master at %s yet, waiting; start one with roscore, or set ROS_MASTER_URI\n" % uri
     )
     while not rosgraph.is_master_online():
         time.sleep(MASTER_CHECK_S)

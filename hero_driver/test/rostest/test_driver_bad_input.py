@@ -81,6 +81,7 @@ class TestDriverBadInput(OwnDriverCase):
                     ("ROS_MASTER_URI", "localhost:11311", "http://localhost:11311"),
                     ("ROS_MASTER_URI", "ftp://localhost:11311", "http://localhost:11311"),
                     ("ROS_MASTER_URI", "http://10.42.0..1:11311", "http://localhost:11311"),
+                    ("ROS_MASTER_URI", "http://localhost:99999", "http://localhost:11311"),
                     ("ROS_LOG_DIR", file.name, "ROS_LOG_DIR"),
                     ("ROS_LOG_DIR", "/dev/null", "ROS_LOG_DIR"),
                 )

@@ -12,13 +12,11 @@ import xmlrpc.client
 from contextlib import suppress
 from typing import Tuple
 
-import rosgraph
-import rosgraph.network
 import rospy
 
 from hero_node.command_line import call
 from hero_node.errors import NodeError
-from hero_node.ros.master import find_running_node
+from hero_node.ros.master import find_running_node, read_master_uri
 from hero_node.ros.master_watch import MasterWatch
 from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
@@ -76,18 +74,6 @@ class FaultService:
             return InjectFaultResponse(False, "the simulator did not answer within %g s" % SERVICE_LIMIT_S)
 
 
-def check_environment() -> None:
-    """Raise OptionError if no ROS master can ever be at ROS_MASTER_URI; one that does not run yet is waited for."""
-    uri = rosgraph.get_master_uri()
-    try:
-        rosgraph.network.parse_http_host_and_port(uri)
-        if uri.startswith("http://"):
-            return
-    except ValueError:
-        pass  # no host, no port, one beyond 65535
-    raise OptionError("ROS_MASTER_URI is %r, but must be like http://ADDRESS:11311" % uri)
-
-
 def wait_for_driver(name: str) -> bool:
     """Wait for the first report of the driver with this node name; return whether it came before the end.
 
@@ -124,7 +110,7 @@ def _run() -> None:
     parser.add_argument("--no-tf", action="store_true", help="leave transforms to odom frames to localization")
     parser.add_argument("--driver", metavar="NODE", help="connect once this driver, of the same ROS master, reports")
     options = command_line.parse_options(parser, rospy.myargv(sys.argv)[1:])
-    check_environment()
+    read_master_uri()  # one that does not run yet is waited for
     # Until the master answers, init_node() waits for as long as it takes: let a signal end that.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     running = find_running_node(NODE_NAME)

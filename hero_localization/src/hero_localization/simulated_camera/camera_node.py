@@ -20,6 +20,7 @@ from tf2_msgs.msg import TFMessage
 
 from hero_node import command_line
 from hero_node.parameters import within
+from hero_node.ros.master import check_master
 from hero_sim.world.arena import Arena, build_default
 from hero_sim.world.arena_file import load_arena
 
@@ -262,6 +263,7 @@ def _run() -> None:
     if options.print_references:
         print(describe_references(list_references(_load_arena(options), options.family)))
         return
+    check_master()
     rospy.init_node(NODE)
     CameraNode(options).run()
 

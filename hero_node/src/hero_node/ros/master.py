@@ -5,6 +5,7 @@ Source: ROS Master API, ROS Slave API.
 
 import errno
 import http.client
+import urllib.parse
 import xmlrpc.client
 from typing import Any
 from xml.parsers.expat import ExpatError
@@ -19,6 +20,10 @@ MASTER_TIMEOUT_S = 3.0
 
 SUCCESS = 1
 """First part of an answer of the master (ROS Master API)."""
+
+
+CALL_ERRORS = (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError)
+"""Of calls to what is no master or node, or to none; two of them for an address that a node gave as its own."""
 
 
 class MasterRefusalError(NodeError):
@@ -44,17 +49,31 @@ class LimitedTransport(xmlrpc.client.Transport):
             raise OSError(errno.ETIMEDOUT, "no answer within %g s" % MASTER_TIMEOUT_S) from None
 
 
+def read_master_uri() -> str:
+    """Return the address of the ROS master. Raises: NodeError where there can never be one."""
+    try:
+        uri: str = rosgraph.get_master_uri()
+    except ValueError as error:  # of __master:=
+        raise NodeError(str(error)) from None
+    try:
+        parts = urllib.parse.urlsplit(uri)
+        if parts.scheme == "http" and parts.port and (parts.hostname or "").encode("idna"):
+            return uri
+    except ValueError:  # a port beyond 65535, half an IPv6 address, a host with two dots
+        pass
+    raise NodeError("ROS_MASTER_URI is %s, but must be like http://localhost:11311" % ascii(uri))
+
+
 def ask_master(method: str, *arguments: Any) -> Any:
     """Call a method of the ROS master (Master API) and return its value.
 
     Raises: MasterRefusalError if the master refuses, another NodeError if it does not answer in time.
     """
-    uri = ""
+    uri = read_master_uri()
     try:
-        uri = rosgraph.get_master_uri()
         with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as master:
             code, text, value = getattr(master, method)(rospy.get_name(), *arguments)
-    except (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError) as error:
+    except CALL_ERRORS as error:
         raise NodeError("no ROS master at %r (%s)" % (uri, error)) from None
     if code != SUCCESS:
         raise MasterRefusalError("the ROS master refuses %s: %s" % (method, text))
@@ -63,6 +82,7 @@ def ask_master(method: str, *arguments: Any) -> Any:
 
 def check_master() -> None:
     """Raise NodeError with what to do if no ROS master answers."""
+    read_master_uri()
     try:
         ask_master("getPid")
     except NodeError as error:
@@ -84,6 +104,6 @@ def find_running_node(default_name: str) -> str:
     try:
         with xmlrpc.client.ServerProxy(ask_master("lookupNode", name), transport=LimitedTransport()) as node:
             node.getPid(name)
-    except (NodeError, OSError, http.client.HTTPException, xmlrpc.client.Error, ExpatError):
+    except (NodeError, *CALL_ERRORS):
         return ""
     return name

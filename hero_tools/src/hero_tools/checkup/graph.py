@@ -16,7 +16,7 @@ from rosgraph_msgs.msg import Log
 from hero_client.values.robot_states import STATES
 from hero_msgs.msg import Robot, RobotArray
 from hero_node.errors import NodeError
-from hero_node.ros.master import ask_master
+from hero_node.ros.master import ask_master, read_master_uri
 
 from .network import HOST_REMEDY, Address, find_source_address, is_loopback, is_own, resolve
 from .points import Finding, fail, ok, wait_until, warn
@@ -29,10 +29,8 @@ CLEAN_UP = "did it end without a word? rosnode cleanup"
 
 def read_master_host() -> str:
     """Return the host of ROS_MASTER_URI; empty if that is no address of a master."""
-    with contextlib.suppress(ValueError):  # a port beyond 65535, half an IPv6 address
-        parts = urllib.parse.urlsplit(rosgraph.get_master_uri())
-        if parts.scheme == "http" and parts.hostname and parts.port:
-            return parts.hostname
+    with contextlib.suppress(NodeError):
+        return urllib.parse.urlsplit(read_master_uri()).hostname or ""
     return ""
 
 
