@@ -138,12 +138,11 @@ def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):
         return [text["message"] for text in texts]
 
     assert ask(op="subscribe", subscriptions=[{"id": number, "channelId": 1} for number in (5, 6, 7)]) == [
-        "subscription 7 to channel 1 refused"
+        "subscriptions refused: [7]"
     ]
     assert ask(op="unsubscribe", subscriptionIds=[5]) == [] and list(client.subscriptions) == [6]
     assert ask(op="subscribe", subscriptions=[{"id": 6, "channelId": 1}, {"id": 8, "channelId": 2}]) == [
-        "subscription 6 to channel 1 refused",
-        "subscription 8 to channel 2 refused",
+        "subscriptions refused: [6, 8]"
     ]
     channels = [{"id": number, "topic": "/b", "schemaName": "std_msgs/Bool", "encoding": "ros1"} for number in range(3)]
     assert ask(op="advertise", channels=channels) == [] and list(client.published) == [0, 1]

@@ -1,19 +1,34 @@
 """Which client gets which topic: channels as topics appear and vanish, subscriptions, a queue per client. Pure."""
 
+import json
 from collections import defaultdict, deque
-from typing import Callable, DefaultDict, Deque, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple, Union
+from typing import (
+    Any,
+    Callable,
+    DefaultDict,
+    Deque,
+    Dict,
+    Iterable,
+    List,
+    NamedTuple,
+    Optional,
+    Set,
+    Tuple,
+    Union,
+)
+
+from hero_node.number_checks import is_whole_number
+from hero_node.texts import shorten
 
 from .protocol import (
     WARNING,
     Channel,
-    ProtocolError,
-    Request,
     encode_message,
     make_advertise,
     make_server_info,
     make_status,
     make_unadvertise,
-    read_request,
+    read_message,
 )
 
 QUEUE_BYTES_MAX = 4_000_000
@@ -131,52 +146,66 @@ class Hub:
     def receive(self, client: Client, message: Union[str, bytes]) -> None:
         """Carry out a client's request, or tell it why not."""
         try:
-            request = read_request(message)
-        except ProtocolError as error:
-            client.send_text(make_status(WARNING, str(error)))
-            return
-        if request.op == "subscribe":
+            if isinstance(message, bytes):
+                refusal = self._pass_on(client, *read_message(message))
+            else:
+                refusal = self._carry_out(client, json.loads(message))
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            refusal = "invalid request: %s" % type(error).__name__
+        if refusal:
+            client.send_text(make_status(WARNING, refusal))
+
+    def _carry_out(self, client: Client, request: Any) -> str:
+        """Carry out a request as the protocol names its fields; return why not, empty if it is done.
+
+        Raises: ValueError, TypeError or KeyError for other fields.
+        """
+        op = request["op"]
+        if op == "subscribe":
             channels = {channel.id: channel for channel in self._channels.values()}
-            for number, channel_id in request.subscriptions:
-                self._subscribe(client, number, channel_id, channels)
-        elif request.op == "unsubscribe":
-            for number, _ in request.subscriptions:
+            pairs = [(each["id"], channels.get(each["channelId"])) for each in request["subscriptions"]]
+            refused = [number for number, channel in pairs if not self._subscribe(client, number, channel)]
+            return "subscriptions refused: %s" % shorten(refused) if refused else ""
+        if op == "unsubscribe":
+            for number in request["subscriptionIds"]:
                 client.subscriptions.pop(number, None)
         elif self._publish is None:
-            client.send_text(make_status(WARNING, NO_PUBLISHING))
-        elif request.op == "advertise":
-            client.published.update((channel.id, channel) for channel in request.channels[:PUBLISHED_MAX])
-            while len(client.published) > PUBLISHED_MAX:
-                client.published.popitem()
-        elif request.op == "unadvertise":
-            for channel in request.channels:
-                client.published.pop(channel.id, None)
-        elif request.op == "publish":
-            self._pass_on(client, request, self._publish)
+            return NO_PUBLISHING
+        elif op == "advertise":
+            for each in request["channels"]:
+                topic, kind, encoding = (str(each[name]) for name in ("topic", "schemaName", "encoding"))
+                if encoding != "ros1":
+                    return "%s: this server takes messages as ros1, not as %s" % (shorten(topic), shorten(encoding))
+                if len(client.published) < PUBLISHED_MAX:
+                    client.published[each["id"]] = Channel(each["id"], topic, kind, "")
+        elif op == "unadvertise":
+            for number in request["channelIds"]:
+                client.published.pop(number, None)
         else:
-            client.send_text(make_status(WARNING, "this server does not know %s" % request.op))
+            return "this server does not know %s" % shorten(op)
+        return ""
 
-    @staticmethod
-    def _pass_on(client: Client, request: Request, publish: Publish) -> None:
-        """Pass a message on, or tell the client once why not."""
-        channel = client.published.get(request.channel_id)
-        if channel is None:
-            refusal = "channel %d is not advertised" % request.channel_id
+    def _pass_on(self, client: Client, channel_id: int, content: bytes) -> str:
+        """Pass a message on; return why not, said once."""
+        channel = client.published.get(channel_id)
+        if self._publish is None:
+            refusal = NO_PUBLISHING
+        elif channel is None:
+            refusal = "channel %d is not advertised" % channel_id
         else:
-            refusal = publish(client.number, channel.topic, channel.type, request.content)
-        if refusal and refusal != client.refusal:
-            client.send_text(make_status(WARNING, refusal))
-        client.refusal = refusal
+            refusal = self._publish(client.number, channel.topic, channel.type, content)
+        is_said, client.refusal = refusal == client.refusal, refusal
+        return "" if is_said else refusal
 
-    def _subscribe(self, client: Client, number: int, channel_id: int, channels: Dict[int, Channel]) -> None:
-        channel = channels.get(channel_id)
-        if channel is None or number in client.subscriptions or len(client.subscriptions) >= SUBSCRIPTIONS_MAX:
-            client.send_text(make_status(WARNING, "subscription %d to channel %d refused" % (number, channel_id)))
-            return
+    def _subscribe(self, client: Client, number: Any, channel: Optional[Channel]) -> bool:
+        is_free = is_whole_number(number, 0, 2**32 - 1) and number not in client.subscriptions
+        if channel is None or not is_free or len(client.subscriptions) >= SUBSCRIPTIONS_MAX:
+            return False
         client.subscriptions[number] = channel
         # ROS sends a latched message once per node: a later client gets it from here.
         for message in self._latched.get(channel.topic, {}).values():
             client.put(number, message)
+        return True
 
     def deliver(self, messages: Iterable[TopicMessage]) -> None:
         """Queue messages for the clients that subscribe to their topics."""

@@ -5,24 +5,19 @@ Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 
 import json
 import struct
-from typing import Any, Iterable, List, NamedTuple, Tuple, Union
+from typing import Iterable, NamedTuple, Tuple
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 """Both carry the messages below."""
 
-INFO, WARNING, ERROR = 0, 1, 2
-"""Levels of a status."""
+WARNING = 1
+"""Level of a status."""
 
 MESSAGE_DATA = 0x01
 _HEADER = struct.Struct("<BIQ")  # opcode, id of the subscription, time of arrival in ns
 _CLIENT_HEADER = struct.Struct("<BI")  # opcode, id of the client's channel
 _BINARY = 0x82  # first byte of a WebSocket frame that is a whole binary message
 _SHORT_FRAME, _FRAME, _LONG_FRAME = struct.Struct("!BB"), struct.Struct("!BBH"), struct.Struct("!BBQ")
-
-
-
-class ProtocolError(Exception):
-    """A client sent what is not a request; the message says why."""
 
 
 class Channel(NamedTuple):
@@ -32,19 +27,6 @@ class Channel(NamedTuple):
     topic: str
     type: str
     definition: str
-
-
-class Request(NamedTuple):
-    """Message of a client."""
-
-    op: str
-    subscriptions: List[Tuple[int, int]] = []
-    """Of subscribe: ids of subscription and channel; of unsubscribe: id of the subscription, and 0."""
-    channels: List[Channel] = []
-    """Of advertise, without definitions; of unadvertise, only with ids."""
-    channel_id: int = 0
-    content: bytes = b""
-    """Of publish."""
 
 
 def make_server_info(takes_messages: bool) -> str:
@@ -91,37 +73,8 @@ def encode_message(subscription: int, time_ns: int, content: bytes) -> bytes:
     return head + _HEADER.pack(MESSAGE_DATA, subscription, time_ns) + content
 
 
-def read_request(message: Union[str, bytes]) -> Request:
-    """Parse what a client sent. Raises: ProtocolError."""
-    if isinstance(message, bytes):
-        if len(message) < _CLIENT_HEADER.size or message[0] != MESSAGE_DATA:
-            raise ProtocolError("invalid request: neither text nor a message")
-        channel_id = _CLIENT_HEADER.unpack_from(message)[1]
-        return Request("publish", channel_id=channel_id, content=message[_CLIENT_HEADER.size :])
-    try:
-        value = json.loads(message)
-        op = value["op"]
-        if op == "subscribe":
-            return Request(op, [(_read_id(each["id"]), _read_id(each["channelId"])) for each in value["subscriptions"]])
-        if op == "unsubscribe":
-            return Request(op, [(_read_id(each), 0) for each in value["subscriptionIds"]])
-        if op == "advertise":
-            return Request(op, channels=[_read_channel(each) for each in value["channels"]])
-        if op == "unadvertise":
-            return Request(op, channels=[Channel(_read_id(each), "", "", "") for each in value["channelIds"]])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise ProtocolError("invalid request: %s" % type(error).__name__) from None
-    return Request(str(op)[:40])
-
-
-def _read_channel(value: Any) -> Channel:
-    topic, kind, encoding = (str(value[name]) for name in ("topic", "schemaName", "encoding"))
-    if encoding != "ros1":
-        raise ProtocolError("%s: this server takes messages as ros1, not as %s" % (topic[:80], encoding[:40]))
-    return Channel(_read_id(value["id"]), topic, kind, "")
-
-
-def _read_id(value: Any) -> int:
-    if type(value) is not int or not 0 <= value < 2**32:
-        raise ValueError(value)
-    return value
+def read_message(frame: bytes) -> Tuple[int, bytes]:
+    """Return the channel and the content of a message of a client. Raises: ValueError."""
+    if len(frame) < _CLIENT_HEADER.size or frame[0] != MESSAGE_DATA:
+        raise ValueError("no message")
+    return _CLIENT_HEADER.unpack_from(frame)[1], frame[_CLIENT_HEADER.size :]
