@@ -3,6 +3,7 @@
 from typing import Dict, List, NamedTuple, Tuple
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world.arena import Arena, Segments
@@ -26,7 +27,6 @@ _MAX_GAP_S = 0.5
 """Between poses: where a robot is within a longer gap is not known."""
 
 _MIN_READINGS = 20
-_ITERATIONS = 10
 _FAR_SDS = 1.5
 """Readings farther off, at edges of walls and of bodies, count as if they were so far off (P. Huber)."""
 
@@ -66,11 +66,9 @@ def fit_infrared(recordings: List[Recording], arena: Arena, end_share: float) ->
     drawn = np.append(np.full(len(fitted_beams), ALPHA_COUNTS_M2), BETA_COUNTS)
     slopes_m = 2.0 * ALPHA_COUNTS_M2 * bright**1.5  # counts for each m that the distance is wrong
     sds = np.hypot(NOISE_COUNTS, slopes_m * _POSE_SD_M)
-    fitted, own = drawn, ~is_held_out
-    for _ in range(_ITERATIONS):
-        off_sds = np.abs(terms @ fitted + fixed - counts) / sds
-        weights = np.sqrt(_FAR_SDS / np.maximum(off_sds, _FAR_SDS))[own] / sds[own]
-        fitted = np.linalg.lstsq(terms[own] * weights[:, None], (counts - fixed)[own] * weights, rcond=None)[0]
+    own = ~is_held_out
+    slopes, zero = (terms / sds[:, None])[own], ((fixed - counts) / sds)[own]
+    fitted = least_squares(lambda one: slopes @ one + zero, drawn, loss="huber", f_scale=_FAR_SDS).x
     before, after = (float(np.median(np.abs(terms @ one + fixed - counts)[is_held_out])) for one in (drawn, fitted))
     keys = ["alpha%d_counts_m2" % beam for beam in fitted_beams] + ["beta_counts"]
     return InfraredFit(dict(zip(keys, fitted.tolist())), before, after)
