@@ -13,7 +13,6 @@ from hero_node.geometry import Pose
 from .background import Background
 from .control.client_commands import read_command
 from .control.commander import Commander
-from .control.dead_man import DriveCommand
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
 from .control.programs import PROGRAMS_MAX, Child, Programs
 from .control.requests import RequestError, is_fresh, read_clock_ms, read_request
@@ -21,6 +20,7 @@ from .fleet_feed.feed import FleetFeed
 from .parameters import Parameters
 
 if TYPE_CHECKING:
+    from .foxglove.hub import Client
     from .serving.server import PageSocket
 
 Request = Dict[str, Any]
@@ -67,33 +67,31 @@ class PageRequests:
             return
         try:
             if is_fresh(request, read_clock_ms()):
-                self._check(request["do"], request.get("robots", ()))
-                getattr(self, "_do_" + request["do"])(page, request)
+                self._carry_out(page, request)
+                if request["do"] in ("stop", "release"):
+                    page.acknowledge(request["do"])
             elif request["do"] != "drive":  # a button that is still held sends the next one at once
                 raise RefusedError("the request was delayed: nothing was done")
         except (RefusedError, FormationError) as error:
             page.tell("error", str(error))
 
-    def publish(self, client: int, topic: str, message_type: str, content: bytes) -> str:
+    def publish(self, client: "Client", topic: str, message_type: str, content: bytes) -> str:
         """Carry out a message of a Foxglove client by the rules of the page; return why it is refused, empty if not."""
-        command = read_command(topic, message_type, content)
-        if command is None:
+        request = read_command(topic, message_type, content)
+        if request is None:
             return "%s: only /hero_N/cmd_vel (geometry_msgs/Twist) and stop_request (std_msgs/Bool) are taken" % topic
-        if command is False:
+        if request["do"] == "release":
             return "robots are released on the page only"
-        if command is True:
-            self._commander.request_stop(True)
-            self.end_programs_of_stopped_robots()
-            self._background.warn("a Foxglove client requests to stop all robots")
-        elif not (command.linear_m_s or command.angular_rad_s):
-            self._commander.dead_man.release(client, command.namespace)
-        else:
-            try:
-                self._check("drive", [command.namespace.strip("/")])
-                self._drive_robots(client, [command])
-            except RefusedError as error:
-                return str(error)
+        try:
+            self._carry_out(client, request)
+        except RefusedError as error:
+            return str(error)
         return ""
+
+    def _carry_out(self, page: Union["PageSocket", "Client"], request: Request) -> None:
+        """Raises: RefusedError or FormationError."""
+        self._check(request["do"], request.get("robots", ()))
+        getattr(self, "_do_" + request["do"])(page, request)
 
     def _check(self, do: str, robots: Sequence[str]) -> None:
         """Check whether a page may request this. Raises: RefusedError."""
@@ -126,10 +124,9 @@ class PageRequests:
         self._commander.request_stop(verb == "stop")
         self.end_programs_of_stopped_robots()
         self._feed.read_stop()
-        page.acknowledge(verb)
         # After the acknowledgement has left.
         self._hand_over(self._broadcast)
-        self._background.warn("a page requests to %s all robots" % verb)
+        self._background.warn("a page or Foxglove client requests to %s all robots" % verb)
 
     _do_release = _do_stop
 
@@ -140,23 +137,19 @@ class PageRequests:
 
     def _do_end_drive(self, page: "PageSocket", request: Request) -> None:
         for robot in request["robots"]:
-            self._commander.dead_man.release(page.number, "/" + robot)
+            self._commander.dead_man.release(page.number, robot)
 
     def _do_stop_some(self, page: "PageSocket", request: Request) -> None:
         self.programs.end_those_of(request["robots"])
         for robot in request["robots"]:
             if robot in self._feed.robots:
-                self._commander.dead_man.stop("/" + robot)
+                self._commander.dead_man.stop(robot)
 
     # ---------------------------------------------------------------- motion
 
     def _do_drive(self, page: "PageSocket", request: Request) -> None:
-        linear_m_s, angular_rad_s = float(request["linear"]), float(request["angular"])
-        commands = [DriveCommand("/" + robot, linear_m_s, angular_rad_s) for robot in request["robots"]]
-        self._drive_robots(page.number, commands)
-
-    def _drive_robots(self, page: int, commands: Sequence[DriveCommand]) -> None:
-        taken = [command.namespace.strip("/") for command in commands if not self._commander.drive(page, command)]
+        velocity = float(request["linear"]), float(request["angular"])
+        taken = [robot for robot in request["robots"] if not self._commander.drive(page.number, robot, *velocity)]
         if taken:
             verb = "is" if len(taken) == 1 else "are"
             raise RefusedError("%s %s driven from another page" % (", ".join(taken), verb))
@@ -167,7 +160,7 @@ class PageRequests:
         (robot,), yaw_rad = request["robots"], request.get("yaw")
         frame, goal = self._feed.placement.to_goal(robot, Pose(request["x"], request["y"], yaw_rad or 0.0))
         self._pending_goals += 1
-        sending = self._background.submit(self._commander.send_goal, "/" + robot, frame, goal, yaw_rad is not None)
+        sending = self._background.submit(self._commander.send_goal, robot, frame, goal, yaw_rad is not None)
         sending.add_done_callback(lambda sent: self._hand_over(self._tell_outcome, page, sent))
 
     def _tell_outcome(self, page: "PageSocket", sent: "Future[Tuple[str, str]]") -> None:
@@ -189,7 +182,7 @@ class PageRequests:
         child = Child(program, robots, place_robots(values, len(robots)))
         for robot in robots:
             # A stop at the end of the program then finds it open.
-            self._commander.prepare("/" + robot)
+            self._commander.prepare(robot)
         ids = [self._feed.robots[robot].id for robot in robots]
         self.programs.start(child, make_arguments(program, ids, self._feed.placement.frame, values))
 
@@ -198,7 +191,7 @@ class PageRequests:
 
     def _stop_robots_of(self, child: Child) -> None:
         for robot in child.driven:
-            self._commander.dead_man.stop("/" + robot)
+            self._commander.dead_man.stop(robot)
 
     def _do_record(self, page: "PageSocket", request: Request) -> None:
         recording = self.programs.find_recording()

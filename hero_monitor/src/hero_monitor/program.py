@@ -43,7 +43,8 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do.
         import tornado.ioloop
 
-        from .foxglove.endpoint import FoxgloveEndpoint, Publisher, TopicSource
+        from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
+        from .foxglove.hub import Publisher
         from .foxglove.ros_topics import RosTopics
         from .serving.server import Actions, Server
 

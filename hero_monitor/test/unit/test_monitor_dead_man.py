@@ -2,54 +2,51 @@
 
 import pytest
 
-from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, DeadMan, DriveCommand
-
-FORWARD = DriveCommand("/hero_0", 0.1, 0.0)
-STOPPED = DriveCommand("/hero_0", 0.0, 0.0)
+from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, DeadMan
 
 
 @pytest.fixture()
 def held():
     dead_man = DeadMan()
-    assert dead_man.hold(1, FORWARD, now_s=10.0)
+    assert dead_man.hold(1, "hero_0", now_s=10.0)
     return dead_man
 
 
 def test_nothing_is_stopped_while_a_button_is_held(held):
     for step in range(20):
         now_s = 10.0 + 0.1 * step
-        assert held.hold(1, FORWARD, now_s)
+        assert held.hold(1, "hero_0", now_s)
         assert held.take_stops(now_s) == []
 
 
 def test_a_released_button_stops_the_robot_and_then_leaves_it_alone(held):
-    held.release(1, "/hero_0")
-    assert held.take_stops(10.05) == [STOPPED]
+    held.release(1, "hero_0")
+    assert held.take_stops(10.05) == ["hero_0"]
     assert held.take_stops(99.0) == []
 
 
 def test_silence_stops_the_robot(held):
     assert held.take_stops(9.99 + HOLD_TIMEOUT_S) == []
-    assert held.take_stops(10.01 + HOLD_TIMEOUT_S) == [STOPPED]
+    assert held.take_stops(10.01 + HOLD_TIMEOUT_S) == ["hero_0"]
 
 
 def test_a_page_that_is_gone_stops_its_robots_and_no_others(held):
-    held.hold(1, DriveCommand("/hero_1", 0.1, 0.0), 10.0)
-    held.hold(2, DriveCommand("/hero_2", 0.1, 0.0), 10.0)
+    held.hold(1, "hero_1", 10.0)
+    held.hold(2, "hero_2", 10.0)
     held.drop_page(1)
-    assert {velocity.namespace for velocity in held.take_stops(10.1)} == {"/hero_0", "/hero_1"}
+    assert held.take_stops(10.1) == ["hero_0", "hero_1"]
 
 
 def test_the_end_of_the_program_stops_all(held):
-    held.hold(2, DriveCommand("/hero_2", 0.1, 0.0), 10.0)
+    held.hold(2, "hero_2", 10.0)
     held.drop_all()
-    assert {velocity.namespace for velocity in held.take_stops(10.1)} == {"/hero_0", "/hero_2"}
+    assert held.take_stops(10.1) == ["hero_0", "hero_2"]
 
 
 def test_a_robot_is_driven_from_one_page_at_a_time(held):
-    assert not held.hold(2, STOPPED, 10.1)
-    held.release(2, "/hero_0")
+    assert not held.hold(2, "hero_0", 10.1)
+    held.release(2, "hero_0")
     assert held.take_stops(10.2) == []
-    held.release(1, "/hero_0")
-    assert held.hold(2, FORWARD, 10.3)
+    held.release(1, "hero_0")
+    assert held.hold(2, "hero_0", 10.3)
     assert held.take_stops(10.3) == []

@@ -7,9 +7,8 @@ import struct
 import pytest
 
 from hero_monitor.control.client_commands import read_command
-from hero_monitor.control.dead_man import DriveCommand
 from hero_monitor.foxglove import hub as hub_module
-from hero_monitor.foxglove.hub import Client, Hub, TopicMessage, TopicType
+from hero_monitor.foxglove.hub import Client, Hub, Publisher, TopicMessage, TopicType
 
 POSE = TopicType("geometry_msgs/Pose2D", "float64 x\nfloat64 y\nfloat64 theta\n")
 FLAG = TopicType("std_msgs/Bool", "bool data\n")
@@ -55,6 +54,10 @@ def read_frame(frame):
 
 def make_message(topic, content=b"content", time_ns=5, latched_by=""):
     return TopicMessage(topic, content, time_ns, latched_by)
+
+
+def make_publisher(publish):
+    return Publisher(lambda number: None, publish, lambda number: None)
 
 
 @pytest.fixture
@@ -180,7 +183,7 @@ def test_a_slow_client_loses_the_oldest_and_others_lose_nothing(hub, monkeypatch
 )
 @pytest.mark.parametrize("publishes", [False, True])
 def test_other_requests_are_answered_by_a_status(text, publishes):
-    hub = Hub((lambda *message: "") if publishes else None)
+    hub = Hub(make_publisher(lambda *message: "") if publishes else None)
     if publishes and text == '{"op": "advertise", "channels": []}':
         return
     reader = Reader(hub)
@@ -202,14 +205,14 @@ def test_messages_of_every_length_are_whole_frames(hub, length):
 
 def test_messages_of_clients_are_passed_on_and_a_refusal_is_said_once():
     heard, refusals = [], ["", "view only", "view only", ""]
-    hub = Hub(lambda *message: heard.append(message) or refusals[len(heard) - 1])
+    hub = Hub(make_publisher(lambda *message: heard.append(message) or refusals[len(heard) - 1]))
     reader = Reader(hub)
     assert reader.texts[0]["capabilities"] == ["clientPublish"]
     channel = {"id": 7, "topic": "/hero_0/cmd_vel", "schemaName": "geometry_msgs/Twist", "encoding": "ros1"}
     reader.send(op="advertise", channels=[channel])
     for _ in refusals:
         hub.receive(reader.client, struct.pack("<BI", 1, 7) + b"twist")
-    assert heard == [(0, "/hero_0/cmd_vel", "geometry_msgs/Twist", b"twist")] * 4
+    assert heard == [(reader.client, "/hero_0/cmd_vel", "geometry_msgs/Twist", b"twist")] * 4
     assert [text["message"] for text in reader.find("status")] == ["view only"]
     reader.send(op="unadvertise", channelIds=[7])
     hub.receive(reader.client, struct.pack("<BI", 1, 7) + b"twist")
@@ -217,21 +220,22 @@ def test_messages_of_clients_are_passed_on_and_a_refusal_is_said_once():
 
 
 TWIST = "geometry_msgs/Twist"
+DRIVE_FAST = {"do": "drive", "robots": ["hero_3"], "linear": 0.2, "angular": 8.0}
 
 
 @pytest.mark.parametrize(
     "topic, message_type, content, command",
     [
-        ("/hero_3/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, -2.0), DriveCommand("/hero_3", 0.1, -2.0)),
-        ("/hero_3/velocity_controller/cmd_vel", TWIST, (9.0, 0, 0, 0, 0, 99.0), DriveCommand("/hero_3", 0.2, 8.0)),
-        ("/hero_3/cmd_vel", "geometry_msgs/msg/Twist", (0.0,) * 6, DriveCommand("/hero_3", 0.0, 0.0)),
+        ("/hero_3/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, -2.0), {**DRIVE_FAST, "linear": 0.1, "angular": -2.0}),
+        ("/hero_3/velocity_controller/cmd_vel", TWIST, (9.0, 0, 0, 0, 0, 99.0), DRIVE_FAST),
+        ("/hero_3/cmd_vel", "geometry_msgs/msg/Twist", (0.0,) * 6, {"do": "end_drive", "robots": ["hero_3"]}),
         ("/hero_3/cmd_vel", TWIST, (math.nan, 0, 0, 0, 0, 0), None),
         ("/hero_3/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, math.inf), None),
         ("/hero_3/cmd_vel", TWIST, (0.1,), None),
         ("/hero_3/position_controller/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, 0), None),
         ("/turtle/cmd_vel", TWIST, (0.1, 0, 0, 0, 0, 0), None),
-        ("/hero_driver/stop_request", "std_msgs/Bool", b"\1", True),
-        ("/hero_driver/stop_request", "std_msgs/Bool", b"\0", False),
+        ("/hero_driver/stop_request", "std_msgs/Bool", b"\1", {"do": "stop"}),
+        ("/hero_driver/stop_request", "std_msgs/Bool", b"\0", {"do": "release"}),
         ("/hero_driver/stop_request", "std_msgs/Bool", b"", None),
     ],
 )

@@ -13,10 +13,9 @@ from hero_monitor.foxglove.endpoint import (
     CLIENTS_MAX,
     FoxgloveEndpoint,
     FoxgloveSocket,
-    Publisher,
     TopicSource,
 )
-from hero_monitor.foxglove.hub import Client, TopicMessage, TopicType
+from hero_monitor.foxglove.hub import Client, Publisher, TopicMessage, TopicType
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import TOKEN_BURST
@@ -149,7 +148,7 @@ def test_topics_are_subscribed_to_while_there_is_a_client(topics):
     assert not endpoint._tick.is_on
     reading = FoxgloveEndpoint(topics.source, [])
     reading.add(make_socket())
-    reading.remove(reading._sockets[0])
+    reading.remove(next(iter(reading._sockets)))
     assert opened == [7] and closed == [7], "without a publisher nothing is opened or closed"
 
 

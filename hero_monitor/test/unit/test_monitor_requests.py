@@ -13,7 +13,7 @@ from hero_client.ros.stop_status import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import commander as commander_module
 from hero_monitor.control.commander import LISTENER_TIMEOUT_S, Commander
-from hero_monitor.control.dead_man import HOLD_TIMEOUT_S, DriveCommand
+from hero_monitor.control.dead_man import HOLD_TIMEOUT_S
 from hero_monitor.control.programs import PROGRAMS_MAX
 from hero_monitor.control.requests import AGE_MAX_S
 from hero_monitor.fleet_feed.placement import Placement
@@ -63,11 +63,11 @@ class Desk:
             may_drive=lambda: self.may_drive,
             request_stop=lambda stop: self.note("request_stop", stop),
             dead_man=SimpleNamespace(
-                release=lambda page, namespace: self.note("end_drive", page, namespace),
-                stop=lambda namespace: self.note("stop_robot", namespace),
+                release=lambda page, robot: self.note("end_drive", page, robot),
+                stop=lambda robot: self.note("stop_robot", robot),
             ),
-            prepare=lambda namespace: self.note("prepare", namespace),
-            drive=lambda page, velocity: self.note("drive", page, *velocity) or velocity.namespace not in self.taken,
+            prepare=lambda robot: self.note("prepare", robot),
+            drive=lambda page, robot, *speeds: self.note("drive", page, robot, *speeds) or robot not in self.taken,
             send_goal=None,
         )
         self.commander = commander
@@ -126,14 +126,14 @@ def make_desk(monkeypatch):
 
 def test_a_button_drives_each_robot_of_its_page(desk):
     assert desk.ask("drive", **DRIVE) == []
-    assert desk.take() == [("drive", 1, "/hero_0", 0.1, -1.0), ("drive", 1, "/hero_1", 0.1, -1.0)]
-    desk.taken = {"/hero_1"}
+    assert desk.take() == [("drive", 1, "hero_0", 0.1, -1.0), ("drive", 1, "hero_1", 0.1, -1.0)]
+    desk.taken = {"hero_1"}
     assert desk.ask("drive", **DRIVE) == ["hero_1 is driven from another page"]
-    desk.taken = {"/hero_0", "/hero_1"}
+    desk.taken = {"hero_0", "hero_1"}
     assert desk.ask("drive", **DRIVE) == ["hero_0, hero_1 are driven from another page"]
     desk.take()
     assert desk.ask("end_drive", page=1, robots=["hero_0", "hero_7"]) == []
-    assert desk.take() == [("end_drive", 2, "/hero_0"), ("end_drive", 2, "/hero_7")]
+    assert desk.take() == [("end_drive", 2, "hero_0"), ("end_drive", 2, "hero_7")]
 
 
 def test_what_makes_robots_move_is_refused_with_the_reason(monkeypatch, desk):
@@ -190,14 +190,14 @@ def test_programs_end_while_all_robots_are_stopped(desk):
         assert desk.take() == [("end_all",)]
     desk.feed.stopped, desk.may_drive = False, True
     assert desk.ask("stop_some", robots=["hero_1", "hero_7"]) == []
-    assert desk.take() == [("end_those_of", "hero_1", "hero_7"), ("stop_robot", "/hero_1")]
+    assert desk.take() == [("end_those_of", "hero_1", "hero_7"), ("stop_robot", "hero_1")]
     assert desk.ask("end", number=3) == [] and desk.take() == [("end", 3)]
 
 
 def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
     assert desk.ask("goal", yaw=1.5, **GOAL) == [] == desk.ask("goal", **GOAL)
-    (namespace, frame, goal, with_heading), future = desk.submitted[0]
-    assert (namespace, frame, goal, with_heading) == ("/hero_0", "hero_0/odom", pytest.approx((1.0, 0.5, 1.5)), True)
+    (robot, frame, goal, with_heading), future = desk.submitted[0]
+    assert (robot, frame, goal, with_heading) == ("hero_0", "hero_0/odom", pytest.approx((1.0, 0.5, 1.5)), True)
     assert desk.submitted[1][0][3] is False
     for _ in range(GOALS_AT_ONCE - 2):
         assert desk.ask("goal", **GOAL) == []
@@ -213,10 +213,10 @@ def test_a_program_is_started_with_its_robots_and_their_topics_open(desk, monkey
     assert desk.ask("start", **WALK) == []
     ((child, arguments),) = desk.started
     assert (child.program, child.robots, child.places) == ("random_walk", ["hero_0", "hero_1"], [])
-    assert '_robots:="0 1"' in arguments and desk.take() == [("prepare", "/hero_0"), ("prepare", "/hero_1")]
+    assert '_robots:="0 1"' in arguments and desk.take() == [("prepare", "hero_0"), ("prepare", "hero_1")]
     child.end()
     desk.requests._stop_robots_of(child)
-    assert desk.take() == [("stop_robot", "/hero_0"), ("stop_robot", "/hero_1")]
+    assert desk.take() == [("stop_robot", "hero_0"), ("stop_robot", "hero_1")]
     formation = {"shape": "line", "spacing_m": 0.3, "turn_deg": 0.0, "x_m": 1.0, "y_m": 0.0, "linear_m_s": 0.08}
     go = {"program": "swarm_go_to", "robots": ["hero_0"], "values": formation}
     assert desk.ask("start", **go) == [] and desk.started[1][0].places == [(1.0, 0.0)]
@@ -267,8 +267,8 @@ def test_a_page_says_what_it_shows(desk):
 
 
 def test_foxglove_clients_drive_and_stop_by_the_rules_of_pages(desk, monkeypatch):
-    def publish(topic, kind, content, client=9):
-        return desk.requests.publish(client, topic, kind, content)
+    def publish(topic, kind, content):
+        return desk.requests.publish(SimpleNamespace(number=9), topic, kind, content)
 
     def drive(*velocity):
         return publish(
@@ -276,9 +276,9 @@ def test_foxglove_clients_drive_and_stop_by_the_rules_of_pages(desk, monkeypatch
         )
 
     assert drive(0.1, 0.0) == "" == drive(0.0, 0.5)
-    assert desk.take() == [("drive", 9, "/hero_0", 0.1, 0.0), ("drive", 9, "/hero_0", 0.0, 0.5)]
-    assert drive(0.0, 0.0) == "" and desk.take() == [("end_drive", 9, "/hero_0")]
-    desk.taken = {"/hero_0"}
+    assert desk.take() == [("drive", 9, "hero_0", 0.1, 0.0), ("drive", 9, "hero_0", 0.0, 0.5)]
+    assert drive(0.0, 0.0) == "" and desk.take() == [("end_drive", 9, "hero_0")]
+    desk.taken = {"hero_0"}
     assert drive(0.1, 0.0) == "hero_0 is driven from another page"
     desk.feed.stopped = True
     desk.take()
@@ -339,15 +339,15 @@ class Ros:
         return [(topic, message.linear.x, message.angular.z) for topic, message in sent]
 
 
-MOVE = DriveCommand("/hero_0", 0.1, 0.5)
+MOVE = ("hero_0", 0.1, 0.5)
 TOPIC = "/hero_0/velocity_controller/cmd_vel"
 
 
 def test_a_topic_is_opened_once_and_a_stop_waits_for_it(monkeypatch):
     ros = Ros(monkeypatch, connect_s=0.3)
-    assert ros.commander.drive(1, MOVE) and ros.commander.drive(1, MOVE)
+    assert ros.commander.drive(1, *MOVE) and ros.commander.drive(1, *MOVE)
     assert len(ros.queued) == 1 and ros.take() == []
-    ros.commander.dead_man.release(1, "/hero_0")
+    ros.commander.dead_man.release(1, "hero_0")
     for _ in range(3):
         ros.commander.step()
     assert ros.take() == [], "not lost: the topic is yet to be opened"
@@ -357,15 +357,15 @@ def test_a_topic_is_opened_once_and_a_stop_waits_for_it(monkeypatch):
     assert ros.take() == [(TOPIC, 0.0, 0.0)]
     ros.commander.step()
     assert ros.take() == []
-    assert ros.commander.drive(1, MOVE) and ros.take() == [(TOPIC, 0.1, 0.5)]
+    assert ros.commander.drive(1, *MOVE) and ros.take() == [(TOPIC, 0.1, 0.5)]
 
 
 def test_a_driver_that_never_connects_is_waited_for_two_seconds(monkeypatch):
     ros = Ros(monkeypatch, connect_s=math.inf)
-    ros.commander.prepare("/hero_0")
+    ros.commander.prepare("hero_0")
     ros.work()
     assert ros.now_s == pytest.approx(100.0 + LISTENER_TIMEOUT_S, abs=0.03)
-    ros.commander.drive(1, MOVE)
+    ros.commander.drive(1, *MOVE)
     assert ros.take() == [(TOPIC, 0.1, 0.5)]
 
 
@@ -373,22 +373,22 @@ def test_silence_the_end_of_a_page_and_a_stop_of_all_stop_robots(monkeypatch):
     for end in (
         lambda ros: ros.sleep(HOLD_TIMEOUT_S + 0.01),
         lambda ros: ros.commander.dead_man.drop_page(1),
-        lambda ros: ros.commander.dead_man.stop("/hero_0"),
+        lambda ros: ros.commander.dead_man.stop("hero_0"),
         lambda ros: ros.commander.request_stop(True),
         lambda ros: ros.commander.close(),
     ):
         ros = Ros(monkeypatch)
-        ros.commander.drive(1, MOVE)
+        ros.commander.drive(1, *MOVE)
         ros.work()
-        ros.commander.drive(1, MOVE)
-        assert not ros.commander.drive(2, MOVE)
+        ros.commander.drive(1, *MOVE)
+        assert not ros.commander.drive(2, *MOVE)
         ros.commander.dead_man.drop_page(2)
         ros.commander.step()
         assert ros.take() == [(TOPIC, 0.1, 0.5)]
         end(ros)
         ros.commander.step()
         assert ros.take() == [(TOPIC, 0.0, 0.0)]
-        assert ros.commander.drive(2, MOVE)
+        assert ros.commander.drive(2, *MOVE)
 
 
 def test_pages_may_drive_when_the_outcome_of_a_stop_is_known(monkeypatch):
@@ -407,7 +407,7 @@ def test_a_goal_is_sent_to_a_program_that_takes_it(monkeypatch):
     ros = Ros(monkeypatch, connect_s=0.5)
 
     def send(with_heading):
-        return ros.commander.send_goal("/hero_12", "map", Pose(1.0, 2.0, math.pi / 2.0), with_heading)
+        return ros.commander.send_goal("hero_12", "map", Pose(1.0, 2.0, math.pi / 2.0), with_heading)
 
     ros.listeners = {"/hero_12/goal": ["/hero_monitor"]}
     level, text = send(True)

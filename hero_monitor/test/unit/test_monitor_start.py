@@ -10,7 +10,7 @@ from hero_monitor import parameters as parameters_module
 from hero_monitor.background import Background
 from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.foxglove import hub as hub_module
-from hero_monitor.foxglove.hub import Client, Hub, TopicType
+from hero_monitor.foxglove.hub import Client, Hub, Publisher, TopicType
 from hero_monitor.parameters import list_host_names, load_parameters, read_token
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
@@ -128,7 +128,8 @@ def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):
     monkeypatch.setattr(hub_module, "SUBSCRIPTIONS_MAX", 2)
     monkeypatch.setattr(hub_module, "PUBLISHED_MAX", 2)
     texts = []
-    hub, client = Hub(lambda *message: ""), Client(lambda text: texts.append(json.loads(text)))
+    hub = Hub(Publisher(texts.append, lambda *message: "", texts.append))
+    client = Client(lambda text: texts.append(json.loads(text)))
     hub.update_topics({"/a": TopicType("std_msgs/Bool", "bool data")})
     hub.add(client)
 

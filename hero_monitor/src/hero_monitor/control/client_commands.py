@@ -3,28 +3,29 @@
 import math
 import re
 import struct
-from typing import Optional, Union
+from typing import Any, Dict, Optional
 
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_node.geometry import clamp
-
-from .dead_man import DriveCommand
 
 _VELOCITY_TOPIC = re.compile(r"/(hero_[0-9]+)(?:/velocity_controller)?/cmd_vel")
 _STOP_TOPIC = re.compile(r"/(?:[A-Za-z0-9_/]+/)?stop_request")
 _TWIST = struct.Struct("<6d")
 
 
-def read_command(topic: str, message_type: str, content: bytes) -> Optional[Union[bool, DriveCommand]]:
-    """Return the velocity in a message within the firmware's limits, or whether it asks for a stop; None for others."""
+def read_command(topic: str, message_type: str, content: bytes) -> Optional[Dict[str, Any]]:
+    """Return a message as a page's request: a velocity within the firmware's limits, or a stop; None for others."""
     message_type = message_type.replace("/msg/", "/")  # as some clients write it
     velocity_topic = _VELOCITY_TOPIC.fullmatch(topic)
     if velocity_topic and message_type == "geometry_msgs/Twist" and len(content) == _TWIST.size:
         linear_m_s, _, _, _, _, angular_rad_s = _TWIST.unpack(content)
         if not math.isfinite(linear_m_s + angular_rad_s):
             return None
-        linear_m_s, angular_rad_s = clamp(linear_m_s, MAX_LINEAR_M_S), clamp(angular_rad_s, MAX_ANGULAR_RAD_S)
-        return DriveCommand("/" + velocity_topic[1], linear_m_s, angular_rad_s)
+        robots = {"robots": [velocity_topic[1]]}
+        if not (linear_m_s or angular_rad_s):
+            return {"do": "end_drive", **robots}
+        linear, angular = clamp(linear_m_s, MAX_LINEAR_M_S), clamp(angular_rad_s, MAX_ANGULAR_RAD_S)
+        return {"do": "drive", **robots, "linear": linear, "angular": angular}
     if _STOP_TOPIC.fullmatch(topic) and message_type == "std_msgs/Bool" and len(content) == 1:
-        return content != b"\0"
+        return {"do": "release" if content == b"\0" else "stop"}
     return None

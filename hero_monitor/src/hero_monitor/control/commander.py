@@ -18,7 +18,7 @@ from hero_node.geometry import Pose
 from hero_node.ros.master import ask_master
 
 from ..background import Background
-from .dead_man import DeadMan, DriveCommand
+from .dead_man import DeadMan
 from .requests import read_clock_ms
 
 LISTENER_TIMEOUT_S = 2.0
@@ -43,53 +43,53 @@ class Commander:
         self._goals: Dict[str, rospy.Publisher] = {}
         self.stopped_ms: Optional[int] = None
 
-    def drive(self, page: int, velocity: DriveCommand) -> bool:
+    def drive(self, page: int, robot: str, linear_m_s: float, angular_rad_s: float) -> bool:
         """Drive a robot for HOLD_TIMEOUT_S; return False if another page drives it."""
-        if not self.dead_man.hold(page, velocity, time.monotonic()):
+        if not self.dead_man.hold(page, robot, time.monotonic()):
             return False
-        self._publish(velocity)
+        self._publish(robot, linear_m_s, angular_rad_s)
         return True
 
-    def prepare(self, namespace: str) -> None:
+    def prepare(self, robot: str) -> None:
         """Open a robot's topic, which takes a moment."""
-        if namespace not in self._velocities:
-            self._velocities[namespace] = None
-            self._background.submit(self._open_velocity, namespace)
+        if robot not in self._velocities:
+            self._velocities[robot] = None
+            self._background.submit(self._open_velocity, robot)
 
     def step(self) -> None:
         """Send the stops that are due; to be called every STOP_PERIOD_S."""
-        for velocity in self.dead_man.take_stops(time.monotonic()):
-            if not self._publish(velocity):
-                self.dead_man.stop(velocity.namespace)
+        for robot in self.dead_man.take_stops(time.monotonic()):
+            if not self._publish(robot, 0.0, 0.0):
+                self.dead_man.stop(robot)
 
-    def _publish(self, velocity: DriveCommand) -> bool:
+    def _publish(self, robot: str, linear_m_s: float, angular_rad_s: float) -> bool:
         """Send a velocity; return False while the topic is being opened."""
-        publisher = self._velocities.get(velocity.namespace)
+        publisher = self._velocities.get(robot)
         if publisher is not None:
             message = Twist()
-            message.linear.x, message.angular.z = velocity.linear_m_s, velocity.angular_rad_s
+            message.linear.x, message.angular.z = linear_m_s, angular_rad_s
             publisher.publish(message)
         else:
-            self.prepare(velocity.namespace)
+            self.prepare(robot)
         return publisher is not None
 
-    def _open_velocity(self, namespace: str) -> None:
-        topic = namespace + "/velocity_controller/cmd_vel"
+    def _open_velocity(self, robot: str) -> None:
+        topic = "/%s/velocity_controller/cmd_vel" % robot
         publisher = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
         # A stop is sent once: it must not be lost before the driver is connected.
         _wait_for_connections(publisher, 1)
-        self._velocities[namespace] = publisher
+        self._velocities[robot] = publisher
 
-    def send_goal(self, namespace: str, frame: str, goal: Pose, with_heading: bool) -> Tuple[str, str]:
+    def send_goal(self, robot: str, frame: str, goal: Pose, with_heading: bool) -> Tuple[str, str]:
         """Send a goal in a frame to the program that takes goals for this robot; may take seconds.
 
         Return level (info, warn, error) and text for the users of a page.
         """
-        name, topic = namespace.strip("/"), namespace + "/goal"
+        topic = "/%s/goal" % robot
         try:
             if not self._has_listener(topic):
-                launch = "roslaunch hero_examples go_to_goal.launch robots:=%s" % name.rpartition("_")[2]
-                return "error", "no program takes goals for %s: start one here, or %s" % (name, launch)
+                launch = "roslaunch hero_examples go_to_goal.launch robots:=%s" % robot.rpartition("_")[2]
+                return "error", "no program takes goals for %s: start one here, or %s" % (robot, launch)
         except NodeError as error:
             return "error", str(error)
         message = PoseStamped()
@@ -100,7 +100,7 @@ class Commander:
             message.pose.orientation.z = math.sin(goal.yaw_rad / 2.0)
             message.pose.orientation.w = math.cos(goal.yaw_rad / 2.0)
         self._goals[topic].publish(message)
-        return "info", "%s has a new goal" % name
+        return "info", "%s has a new goal" % robot
 
     def _has_listener(self, topic: str) -> bool:
         """Return whether another node subscribes to a topic, as soon as it is connected."""

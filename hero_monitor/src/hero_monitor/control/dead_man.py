@@ -10,14 +10,6 @@ HOLD_TIMEOUT_S = 0.4
 """Pages report every 0.1 s while a button is held; a robot is stopped after this time without a report."""
 
 
-class DriveCommand(NamedTuple):
-    """The velocity of one robot, as in Twist."""
-
-    namespace: str
-    linear_m_s: float
-    angular_rad_s: float
-
-
 class Hold(NamedTuple):
     """A button that is held."""
 
@@ -32,39 +24,39 @@ class DeadMan:
         self._holds: Dict[str, Hold] = {}
         self._stops: Set[str] = set()
 
-    def hold(self, page: int, velocity: DriveCommand, now_s: float) -> bool:
+    def hold(self, page: int, robot: str, now_s: float) -> bool:
         """Note that a page drives a robot; return False if another page drives it already."""
-        held = self._holds.get(velocity.namespace)
+        held = self._holds.get(robot)
         if held is not None and held.page != page:
             return False
-        self._holds[velocity.namespace] = Hold(page, now_s)
-        self._stops.discard(velocity.namespace)
+        self._holds[robot] = Hold(page, now_s)
+        self._stops.discard(robot)
         return True
 
-    def release(self, page: int, namespace: str) -> None:
+    def release(self, page: int, robot: str) -> None:
         """Stop a robot, if this page drives it."""
-        held = self._holds.get(namespace)
+        held = self._holds.get(robot)
         if held is not None and held.page == page:
-            self.stop(namespace)
+            self.stop(robot)
 
     def drop_page(self, page: int) -> None:
         """Stop all robots that this page drives."""
-        for namespace in [name for name, held in self._holds.items() if held.page == page]:
-            self.stop(namespace)
+        for robot in [name for name, held in self._holds.items() if held.page == page]:
+            self.stop(robot)
 
     def drop_all(self) -> None:
         """Stop all robots that are driven."""
-        for namespace in list(self._holds):
-            self.stop(namespace)
+        for robot in list(self._holds):
+            self.stop(robot)
 
-    def stop(self, namespace: str) -> None:
+    def stop(self, robot: str) -> None:
         """Stop a robot, whichever program drives it."""
-        self._holds.pop(namespace, None)
-        self._stops.add(namespace)
+        self._holds.pop(robot, None)
+        self._stops.add(robot)
 
-    def take_stops(self, now_s: float) -> List[DriveCommand]:
-        """Return the stops that are due at this step, each once: the driver repeats them."""
-        for namespace in [name for name, held in self._holds.items() if now_s - held.last_s > HOLD_TIMEOUT_S]:
-            self.stop(namespace)
+    def take_stops(self, now_s: float) -> List[str]:
+        """Return the robots that are to be stopped at this step, each once: the driver repeats stops."""
+        for robot in [name for name, held in self._holds.items() if now_s - held.last_s > HOLD_TIMEOUT_S]:
+            self.stop(robot)
         due, self._stops = self._stops, set()
-        return [DriveCommand(namespace, 0.0, 0.0) for namespace in sorted(due)]
+        return sorted(due)

@@ -7,7 +7,7 @@ integers in mm and angles in mrad: short, and finer than a screen can show.
 import json
 import math
 from collections import deque
-from typing import Any, Deque, Dict, List, NamedTuple, Optional, Sequence
+from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
 from hero_node.geometry import Pose
 from hero_node.texts import make_printable
@@ -23,17 +23,6 @@ MAX_DISTANCE_M = 10000.0
 """Coordinates and sizes beyond this are not drawn: the map would show nothing but an endless grid."""
 
 MAX_RIM_RANGE_M = 100.0
-
-
-class LogLine(NamedTuple):
-    """One line of /rosout."""
-
-    number: int  # of all lines since the start
-    time_s: float
-    level: int  # as in rosgraph_msgs/Log: 1 debug, 2 info, 4 warn, 8 error, 16 fatal
-    node: str
-    robot: str  # the robot that it concerns; empty if none
-    text: str
 
 
 def encode(value: Any) -> str:
@@ -72,16 +61,16 @@ def encode_color(red: float, green: float, blue: float) -> Optional[str]:
 
 
 class LogRing:
-    """The newest lines of the log."""
+    """The newest lines of /rosout, each with its number of all since the start."""
 
     def __init__(self) -> None:
         self.count = 0
-        self._lines: Deque[LogLine] = deque(maxlen=LOG_LINES_KEPT)
+        self._lines: Deque[Tuple[Any, ...]] = deque(maxlen=LOG_LINES_KEPT)
 
     def append(self, time_s: float, level: int, node: str, robot: str, text: str) -> None:
-        """Add a line, without unprintable characters."""
+        """Add a line, made printable. level: as in rosgraph_msgs/Log; robot: that it concerns, empty for none."""
         self.count += 1
-        self._lines.append(LogLine(self.count, round(time_s, 3), level, shorten(node), robot, shorten(text)))
+        self._lines.append((self.count, round(time_s, 3), level, shorten(node), robot, shorten(text)))
 
     def skip(self, count: int) -> None:
         """Count lines that were dropped unread."""
@@ -89,8 +78,8 @@ class LogRing:
 
     def encode_after(self, number: int) -> str:
         """Return the newest lines after that number as JSON, and how many are missing before them."""
-        new = [line for line in self._lines if line.number > number][-LOG_LINES_AT_ONCE:]
-        first = new[0].number if new else self.count + 1
+        new = [line for line in self._lines if line[0] > number][-LOG_LINES_AT_ONCE:]
+        first = new[0][0] if new else self.count + 1
         return encode({"missed": max(0, first - number - 1) if number else 0, "lines": new})
 
 

@@ -9,7 +9,7 @@ import tornado.web
 import tornado.websocket
 
 from ..serving.server import BaseHandler, PageSocket, Route
-from .hub import Client, Hub, Publish, TopicMessage, TopicType
+from .hub import Client, Hub, Publisher, TopicMessage, TopicType
 from .protocol import SUBPROTOCOLS
 
 CLIENTS_MAX = 10
@@ -25,14 +25,6 @@ class TopicSource(NamedTuple):
     want: Callable[[Set[str]], bool]
     """Takes the topics whose messages take() is to return; returns whether those, and no others, are received."""
     take: Callable[[], List[TopicMessage]]
-
-
-class Publisher(NamedTuple):
-    """Receiver of clients' messages; all return at once."""
-
-    open_client: Callable[[int], None]
-    publish: Publish
-    close_client: Callable[[int], None]
 
 
 class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
@@ -112,30 +104,24 @@ class FoxgloveEndpoint:
 
     def __init__(self, source: TopicSource, origins: List[str], publisher: Optional[Publisher] = None) -> None:
         """origins: of other servers whose pages may connect; publisher: takes messages, None: clients only read."""
-        self.hub = Hub(None if publisher is None else publisher.publish)
-        self._publisher = publisher
+        self.hub = Hub(publisher)
         self._source = source
-        self._sockets: List[FoxgloveSocket] = []
+        self._sockets: Set[FoxgloveSocket] = set()
         self._tick = tornado.ioloop.PeriodicCallback(self._update, 1000.0 * FLUSH_PERIOD_S)
         values = {"endpoint": self, "origins": frozenset(origin.lower() for origin in origins)}
         self.route: Route = (r"/foxglove/?", FoxgloveSocket, values)
 
     def add(self, socket: FoxgloveSocket) -> None:
         """Serve a client."""
-        self._sockets.append(socket)
+        self._sockets.add(socket)
         self.hub.add(socket.client)
-        if self._publisher is not None:
-            self._publisher.open_client(socket.client.number)
         if not self._tick.is_running():
             self._tick.start()
 
     def remove(self, socket: FoxgloveSocket) -> None:
         """Serve a client no longer; safe twice."""
-        if socket in self._sockets:
-            self._sockets.remove(socket)
-            self.hub.remove(socket.client)
-            if self._publisher is not None:
-                self._publisher.close_client(socket.client.number)
+        self._sockets.discard(socket)
+        self.hub.remove(socket.client)
 
     def _update(self) -> None:
         is_done = self._source.want(self.hub.wanted_topics)

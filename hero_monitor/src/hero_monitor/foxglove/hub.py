@@ -39,9 +39,6 @@ PUBLISHED_MAX = 1_000
 
 NO_PUBLISHING = "this server takes no messages: start the monitor with foxglove_publish:=true"
 
-Publish = Callable[[int, str, str, bytes], str]
-"""Takes number of the client, topic, type and content of a message; returns why it is refused, empty if it is not."""
-
 
 class TopicType(NamedTuple):
     """Type of a topic and its full definition."""
@@ -93,12 +90,21 @@ class Client:
         return frames
 
 
+class Publisher(NamedTuple):
+    """Receiver of clients' messages; all return at once."""
+
+    open_client: Callable[[int], None]
+    publish: Callable[[Client, str, str, bytes], str]
+    """Takes topic, type and content of a message; returns why it is refused, empty if it is not."""
+    close_client: Callable[[int], None]
+
+
 class Hub:
     """All clients and channels."""
 
-    def __init__(self, publish: Optional[Publish] = None) -> None:
-        """publish: takes messages of clients; None: they only read."""
-        self._publish = publish
+    def __init__(self, publisher: Optional[Publisher] = None) -> None:
+        """publisher: takes messages of clients; None: they only read."""
+        self._publisher = publisher
         self.clients: Set[Client] = set()
         self._channels: Dict[str, Channel] = {}
         self._latched: Dict[str, Dict[str, TopicMessage]] = {}
@@ -112,12 +118,16 @@ class Hub:
     def add(self, client: Client) -> None:
         """Greet a client."""
         self.clients.add(client)
-        client.send_text(make_server_info(self._publish is not None))
+        client.send_text(make_server_info(self._publisher is not None))
         if self._channels:
             client.send_text(make_advertise(self._channels.values()))
+        if self._publisher is not None:
+            self._publisher.open_client(client.number)
 
     def remove(self, client: Client) -> None:
         """Forget a client; safe twice."""
+        if client in self.clients and self._publisher is not None:
+            self._publisher.close_client(client.number)
         self.clients.discard(client)
 
     def update_topics(self, topics: Dict[str, TopicType]) -> None:
@@ -169,7 +179,7 @@ class Hub:
         if op == "unsubscribe":
             for number in request["subscriptionIds"]:
                 client.subscriptions.pop(number, None)
-        elif self._publish is None:
+        elif self._publisher is None:
             return NO_PUBLISHING
         elif op == "advertise":
             for each in request["channels"]:
@@ -188,12 +198,12 @@ class Hub:
     def _pass_on(self, client: Client, channel_id: int, content: bytes) -> str:
         """Pass a message on; return why not, said once."""
         channel = client.published.get(channel_id)
-        if self._publish is None:
+        if self._publisher is None:
             refusal = NO_PUBLISHING
         elif channel is None:
             refusal = "channel %d is not advertised" % channel_id
         else:
-            refusal = self._publish(client.number, channel.topic, channel.type, content)
+            refusal = self._publisher.publish(client, channel.topic, channel.type, content)
         is_said, client.refusal = refusal == client.refusal, refusal
         return "" if is_said else refusal
 

@@ -6,7 +6,7 @@ Source: ROS TCPROS and Slave API.
 
 import contextlib
 import errno
-import select
+import selectors
 import socket
 import struct
 import xmlrpc.client
@@ -116,39 +116,35 @@ class StreamSet:
     """Streams by their sources."""
 
     def __init__(self) -> None:
-        self._streams: Dict[Source, Stream] = {}
-        self._by_file: Dict[int, Source] = {}
-        self._poll = select.poll()
+        self._keys: Dict[Source, selectors.SelectorKey] = {}
+        self._selector = selectors.DefaultSelector()
         self._unread: List[Source] = []  # whose first message may have come with the header
 
     def __contains__(self, source: Source) -> bool:
-        return source in self._streams
+        return source in self._keys
 
     def __iter__(self) -> Any:
-        return iter(list(self._streams))
+        return iter(list(self._keys))
 
     def add(self, source: Source, stream: Stream) -> None:
         """Read a stream from now on."""
-        self._streams[source] = stream
-        self._by_file[stream.fileno()] = source
-        self._poll.register(stream, select.POLLIN)
+        self._keys[source] = self._selector.register(stream, selectors.EVENT_READ, source)
         self._unread.append(source)
 
     def drop(self, source: Source) -> None:
         """Close a stream."""
-        stream = self._streams.pop(source)
-        del self._by_file[stream.fileno()]
-        self._poll.unregister(stream)
+        stream: Any = self._keys.pop(source).fileobj
+        self._selector.unregister(stream)
         stream.close()
 
     def read(self) -> List[Any]:
         """Return (source, header, messages) of all that have some, and drop those that have ended; returns at once."""
         found = []
-        ready = [self._by_file[file] for file, _ in self._poll.poll(0)]
-        ready += [source for source in self._unread if source in self._streams and source not in ready]
+        ready = [key.data for key, _ in self._selector.select(0)]
+        ready += [source for source in self._unread if source in self and source not in ready]
         self._unread = []
         for source in ready:
-            stream = self._streams[source]
+            stream: Any = self._keys[source].fileobj
             messages = stream.read()
             if messages:
                 found.append((source, stream.header, messages))
