@@ -456,7 +456,7 @@ def test_outlines_are_the_edges_and_discs_where_they_are():
 def test_the_force_of_a_body_and_its_work_are_those_of_the_limit_surface():
     body = PushedBody(BOX, Pose(0.0, 0.0, 0.0), 0.5, 0.4)
     assert body.friction_n == pytest.approx(0.5 * 0.4 * 9.81)
-    assert body.yield_to(1.0, 2.0, 3.0) == pytest.approx((1.0, 2.0, 3.0 / BOX.friction_radius_m**2))
+    assert body.radius_m2 == pytest.approx(BOX.friction_radius_m**2)
     work_j = body.friction_n * math.sqrt(0.03**2 + 0.04**2 + (BOX.friction_radius_m * 0.2) ** 2)
     assert body.measure_work((0.03, 0.04, 0.2)) == pytest.approx(work_j)
 

@@ -25,6 +25,7 @@ class PushedBody:
         pose: of its center, frame world.
         body: its shape at this pose.
         friction_n: the force through its center that just moves it.
+        radius_m2: the square of c.
     """
 
     def __init__(self, shape: Shape, pose: Pose, mass_kg: float, friction: float) -> None:
@@ -37,7 +38,7 @@ class PushedBody:
                 raise ValueError("%s must be more than 0, not %g" % (name, value))
         self.friction_n = mass_kg * friction * GRAVITY_M_S2
         self._shape = shape
-        self._radius_m2 = shape.friction_radius_m * shape.friction_radius_m
+        self.radius_m2 = shape.friction_radius_m * shape.friction_radius_m
         self._heading = (math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
         self._set(pose)
 
@@ -45,15 +46,11 @@ class PushedBody:
         self.pose = pose
         self.body: Body = place(self._shape, pose.x_m, pose.y_m, *self._heading)
 
-    def yield_to(self, force_x: float, force_y: float, moment_m: float) -> Motion:
-        """Return the motion for one unit of force and moment, before friction_n is divided out."""
-        return force_x, force_y, moment_m / self._radius_m2
-
     def measure_work(self, motion: Motion) -> float:
         """Return the work (J) against the floor's friction of a motion."""
         x_m, y_m, rotation_rad = motion
         return self.friction_n * math.sqrt(
-            x_m * x_m + y_m * y_m + self._radius_m2 * rotation_rad * rotation_rad
+            x_m * x_m + y_m * y_m + self.radius_m2 * rotation_rad * rotation_rad
         )
 
     def move(self, motion: Motion) -> None:

@@ -7,7 +7,7 @@ more from one of them, the bodies stay, and its wheels slip. Nothing moves witho
 
 import itertools
 import math
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, Optional, Sequence, Tuple
 
 from ...robot_constants import BODY_RADIUS_M
 from .pushed_body import Motion, PushedBody
@@ -34,21 +34,85 @@ COMPLIANCE = 0.002
 Place = Sequence[float]
 """x m, y m."""
 
+Motions = Dict[int, Motion]
+"""By the indices of the bodies that move."""
 
-class _Touch(NamedTuple):
+Ends = Sequence[Tuple[int, float, PushedBody]]
+"""The bodies of a contact that can move: index, sign of the motion, body."""
+
+
+class _Axis:
+    """The normal or the tangent of a contact, and the bodies that move under pressure along it.
+
+    Attributes:
+        x, y: its direction.
+        give_m: how far the touching points come apart for one unit of pressure.
+    """
+
+    def __init__(self, contact: Contact, x: float, y: float, ends: Ends) -> None:
+        self.x, self.y = x, y
+        # Last: the moment arm (m) of the pressure about the body's center.
+        self._ends = [
+            (index, sign, body, (contact.x_m - body.pose.x_m) * y - (contact.y_m - body.pose.y_m) * x)
+            for index, sign, body in ends
+        ]
+        self.give_m = sum((1.0 + arm_m / body.radius_m2 * arm_m) / body.friction_n for _, _, body, arm_m in self._ends)
+
+    def measure_motion(self, motions: Motions) -> float:
+        """Return how far the second body's point has moved along the axis, seen from the first one's."""
+        moved_m = 0.0
+        for index, sign, _, arm_m in self._ends:
+            if index in motions:
+                x_m, y_m, rotation_rad = motions[index]
+                moved_m += sign * (x_m * self.x + y_m * self.y + rotation_rad * arm_m)
+        return moved_m
+
+    def press(self, pressure: float, motions: Motions) -> None:
+        """Add to motions what pressure does to the bodies."""
+        if pressure == 0.0:
+            return
+        for index, sign, body, arm_m in self._ends:
+            share = sign * pressure / body.friction_n
+            x_m, y_m, rotation_rad = motions.get(index, (0.0, 0.0, 0.0))
+            motions[index] = x_m + share * self.x, y_m + share * self.y, rotation_rad + share * arm_m / body.radius_m2
+
+
+class _Touch:
     """A contact of which the second body is pushed.
 
     Attributes:
-        pusher: index of the body that presses; None: a robot or a wall.
-        robot: index of the robot that presses, or None.
-        moved_m: how far the robot moved in this step.
+        robot: index of the robot that presses; None: a body or a wall.
+        along, across: pressure along the normal and the tangent.
     """
 
-    contact: Contact
-    pusher: Optional[int]
-    pushed: int
-    robot: Optional[int]
-    moved_m: Place
+    def __init__(
+        self, contact: Contact, ends: Ends, robot: Optional[int] = None, moved_m: Place = (0.0, 0.0)
+    ) -> None:
+        """moved_m: how far the robot moved in this step."""
+        self.normal = _Axis(contact, contact.normal_x, contact.normal_y, ends)
+        self.tangent = _Axis(contact, -contact.normal_y, contact.normal_x, ends)
+        self.robot = robot
+        self.along = self.across = 0.0
+        self._depth_m = contact.depth_m
+        self._slid_m = moved_m[0] * self.tangent.x + moved_m[1] * self.tangent.y
+        self._softness = 0.0 if robot is None else COMPLIANCE
+
+    def relax(self, limit: float, motions: Motions) -> float:
+        """Resolve the pressure, of a robot up to limit; return how far that moved anything."""
+        give_m = self.normal.give_m * (1.0 + self._softness)
+        missing_m = self._depth_m - self.normal.measure_motion(motions) - self._softness * self.along * give_m
+        along = max(0.0, self.along + missing_m / give_m)
+        if self.robot is not None:
+            along = min(along, limit)
+        change = along - self.along
+        self.along = along
+        self.normal.press(change, motions)
+        slide_m = self._slid_m - self.tangent.measure_motion(motions)
+        cone = CONTACT_FRICTION * along
+        across = min(max(self.across + slide_m / self.tangent.give_m, -cone), cone)
+        self.tangent.press(across - self.across, motions)
+        self.across = across
+        return abs(change) * give_m
 
 
 class Pushing:
@@ -79,15 +143,13 @@ class Pushing:
         touches = pushes + self._list_others()
         limit = math.inf
         for _ in range(SLIPS):
-            motions, pressures = self._solve(touches, limit)
-            if self._has_traction(touches, motions, pressures):
+            motions = _solve(touches, limit)
+            if self._has_traction(pushes, motions):
                 for index, motion in motions.items():
                     self.bodies[index].move(motion)
                 break
             # The wheels of the robot that presses hardest slip, until others carry their share.
-            limit = (
-                max(along for touch, (along, _) in zip(touches, pressures) if touch.robot is not None) / 2.0
-            )
+            limit = max(push.along for push in pushes) / 2.0
         return self.push_out(after_m)
 
     def push_out(self, places_m: Sequence[Place]) -> List[Place]:
@@ -105,7 +167,7 @@ class Pushing:
                     contact = touch_circle(place_m[0], place_m[1], radius_m, body)
                     if contact.depth_m > 0.0:
                         moved_m = (place_m[0] - old_m[0], place_m[1] - old_m[1])
-                        pushes.append(_Touch(contact, None, index, robot, moved_m))
+                        pushes.append(_Touch(contact, [(index, 1.0, pushed)], robot, moved_m))
         return pushes
 
     def _list_others(self) -> List[_Touch]:
@@ -113,113 +175,31 @@ class Pushing:
         touches = []
         for second, pushed in enumerate(self.bodies):
             for first in range(second):
-                pusher = self.bodies[first].body
-                reach_m = pusher.shape.reach_m + pushed.body.shape.reach_m + MARGIN_M
-                away_x, away_y = pushed.body.x_m - pusher.x_m, pushed.body.y_m - pusher.y_m
+                pusher = self.bodies[first]
+                reach_m = pusher.body.shape.reach_m + pushed.body.shape.reach_m + MARGIN_M
+                away_x, away_y = pushed.body.x_m - pusher.body.x_m, pushed.body.y_m - pusher.body.y_m
                 if away_x * away_x + away_y * away_y < reach_m * reach_m:
-                    contacts = find_contacts(pusher, pushed.body, MARGIN_M)
-                    touches += [_Touch(contact, first, second, None, (0.0, 0.0)) for contact in contacts]
+                    ends = [(second, 1.0, pushed), (first, -1.0, pusher)]
+                    contacts = find_contacts(pusher.body, pushed.body, MARGIN_M)
+                    touches += [_Touch(contact, ends) for contact in contacts]
             contacts = touch_walls(pushed.body, self._walls_m, MARGIN_M)
             obstacles = (touch_circle(*circle_m, pushed.body) for circle_m in self._circles_m)
             contacts += [contact for contact in obstacles if contact.depth_m > -MARGIN_M]
-            touches += [_Touch(contact, None, second, None, (0.0, 0.0)) for contact in contacts]
+            touches += [_Touch(contact, [(second, 1.0, pushed)]) for contact in contacts]
         return touches
 
-    def _solve(
-        self, touches: Sequence[_Touch], limit: float
-    ) -> Tuple[Dict[int, Motion], List[Tuple[float, float]]]:
-        """Return the motion of each body that moves, and the pressure along and across the normal of each touch.
-
-        limit: of the pressure of a robot.
-        """
-        motions: Dict[int, Motion] = {}
-        pressures = [(0.0, 0.0)] * len(touches)
-        for _ in range(SWEEPS):
-            largest_m = 0.0
-            for number, touch in enumerate(touches):
-                pressures[number], change_m = self._relax(touch, pressures[number], limit, motions)
-                largest_m = max(largest_m, change_m)
-            if largest_m < TOLERANCE_M:
-                break
-        return motions, pressures
-
-    def _relax(
-        self, touch: _Touch, pressure: Tuple[float, float], limit: float, motions: Dict[int, Motion]
-    ) -> Tuple[Tuple[float, float], float]:
-        """Resolve the pressure of one touch; return its pressure, and how far that moved anything."""
-        contact = touch.contact
-        normal = contact.normal_x, contact.normal_y
-        tangent = -contact.normal_y, contact.normal_x
-        softness = COMPLIANCE if touch.robot is not None else 0.0
-        give_m = self._measure_give(touch, normal) * (1.0 + softness)
-        missing_m = (
-            contact.depth_m - self._measure_motion(touch, normal, motions) - softness * pressure[0] * give_m
-        )
-        most = limit if touch.robot is not None else math.inf
-        along = min(max(0.0, pressure[0] + missing_m / give_m), most)
-        self._press(touch, normal, along - pressure[0], motions)
-        change_m = abs(along - pressure[0]) * give_m
-        slide_m = (
-            touch.moved_m[0] * tangent[0]
-            + touch.moved_m[1] * tangent[1]
-            - self._measure_motion(touch, tangent, motions)
-        )
-        cone = CONTACT_FRICTION * along
-        across = min(max(pressure[1] + slide_m / self._measure_give(touch, tangent), -cone), cone)
-        self._press(touch, tangent, across - pressure[1], motions)
-        return (along, across), change_m
-
-    def _measure_give(self, touch: _Touch, direction: Place) -> float:
-        """Return how far the touching points come apart along direction for one unit of pressure."""
-        give_m = 0.0
-        for index, _ in _list_ends(touch):
-            pushed = self.bodies[index]
-            arm_m = _find_arm(pushed, touch.contact, direction)
-            _, _, rotation_rad = pushed.yield_to(direction[0], direction[1], arm_m)
-            give_m += (1.0 + rotation_rad * arm_m) / pushed.friction_n
-        return give_m
-
-    def _measure_motion(self, touch: _Touch, direction: Place, motions: Dict[int, Motion]) -> float:
-        """Return how far the second body's point has moved along direction, seen from the first one's."""
-        moved_m = 0.0
-        for index, sign in _list_ends(touch):
-            if index in motions:
-                x_m, y_m, rotation_rad = motions[index]
-                arm_m = _find_arm(self.bodies[index], touch.contact, direction)
-                moved_m += sign * (x_m * direction[0] + y_m * direction[1] + rotation_rad * arm_m)
-        return moved_m
-
-    def _press(self, touch: _Touch, direction: Place, pressure: float, motions: Dict[int, Motion]) -> None:
-        if pressure == 0.0:
-            return
-        for index, sign in _list_ends(touch):
-            pushed = self.bodies[index]
-            share = sign * pressure / pushed.friction_n
-            arm_m = _find_arm(pushed, touch.contact, direction)
-            x_m, y_m, rotation_rad = pushed.yield_to(
-                share * direction[0], share * direction[1], share * arm_m
-            )
-            old = motions.get(index, (0.0, 0.0, 0.0))
-            motions[index] = old[0] + x_m, old[1] + y_m, old[2] + rotation_rad
-
-    def _has_traction(
-        self, touches: Sequence[_Touch], motions: Dict[int, Motion], pressures: Sequence[Tuple[float, float]]
-    ) -> bool:
+    def _has_traction(self, pushes: Sequence[_Touch], motions: Motions) -> bool:
         """Return whether no robot has to push harder than it can: the robots' work is that against friction."""
         friction_j = sum(self.bodies[index].measure_work(motion) for index, motion in motions.items())
-        pushed_j, loads = 0.0, {}  # type: Tuple[float, Dict[int, float]]
-        for touch, (along, across) in zip(touches, pressures):
-            if touch.robot is not None:
-                contact = touch.contact
-                normal, tangent = (contact.normal_x, contact.normal_y), (-contact.normal_y, contact.normal_x)
-                pushed_j += along * self._measure_motion(touch, normal, motions)
-                pushed_j += across * self._measure_motion(touch, tangent, motions)
-                load = math.sqrt(along * along + across * across)
-                loads[touch.robot] = loads.get(touch.robot, 0.0) + load
+        pushed_j = 0.0
+        loads: Dict[Optional[int], float] = {}
+        for push in pushes:
+            pushed_j += push.along * push.normal.measure_motion(motions)
+            pushed_j += push.across * push.tangent.measure_motion(motions)
+            load = math.sqrt(push.along * push.along + push.across * push.across)
+            loads[push.robot] = loads.get(push.robot, 0.0) + load
         # Wedged between walls bodies move nowhere, whatever presses.
-        if pushed_j <= 0.0:
-            return False
-        return max(loads.values()) * friction_j <= MAX_PUSH_N * pushed_j
+        return pushed_j > 0.0 and max(loads.values()) * friction_j <= MAX_PUSH_N * pushed_j
 
     def _leave(self, place_m: Place, radius_m: float) -> Place:
         for pushed in self.bodies:
@@ -236,14 +216,12 @@ class Pushing:
         return place_m
 
 
-def _list_ends(touch: _Touch) -> List[Tuple[int, float]]:
-    """Return the bodies of a touch that can move, and the sign of their motion."""
-    ends = [(touch.pushed, 1.0)]
-    if touch.pusher is not None:
-        ends.append((touch.pusher, -1.0))
-    return ends
-
-
-def _find_arm(pushed: PushedBody, contact: Contact, direction: Place) -> float:
-    """Return the moment arm (m) about the body's center of a force along direction at the contact."""
-    return (contact.x_m - pushed.pose.x_m) * direction[1] - (contact.y_m - pushed.pose.y_m) * direction[0]
+def _solve(touches: Sequence[_Touch], limit: float) -> Motions:
+    """Press the bodies of touches apart, robots up to limit; return their motions."""
+    motions: Motions = {}
+    for touch in touches:
+        touch.along = touch.across = 0.0
+    for _ in range(SWEEPS):
+        if max([touch.relax(limit, motions) for touch in touches]) < TOLERANCE_M:
+            break
+    return motions
