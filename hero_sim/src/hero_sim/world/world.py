@@ -7,15 +7,16 @@ only operations that IEEE 754 defines to the last bit, and random numbers are ro
 which the differences between mathematical libraries vanish.
 """
 
-from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
+import math
+from typing import Any, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from .arena import Arena, MovableObject, Segments
-from .body_motion import BodyMotion
-from .kinematics import join_wheels
+from .contacts import Contacts
+from .kinematics import find_heading, follow_arcs, join_wheels
 from .noise import draw_normal
-from .pushing.pushing import Pushing
+from .pushing.pushing import Place, Pushing
 from .pushing.shapes import Body, list_outlines
 from .range_sensors import (
     BEAMS,
@@ -40,6 +41,9 @@ _SCAN_ROWS = 200
 """Robots whose sensors are computed at once: what they see fits the processor's cache."""
 
 _REST_M_S = 1e-6
+
+_PASSES = 4
+"""In which robots leave objects and each other: between an object and other robots one has no better place."""
 
 Rows = Union[int, slice, np.ndarray]  # the number of one row, or several of them
 
@@ -110,10 +114,18 @@ class World:
         self._scan_seeds = [int(rng.randint(0, 2**31 - 1)) for rng in rngs]
         self._scan_rng = np.random.RandomState(0)
         objects = [arena.objects] * self.worlds if objects is None else objects
-        poses = np.array(poses, dtype=float).reshape(rows, 3).T.copy()
-        self._bodies = BodyMotion(arena, objects, poses, errors.radius_m[:, 0], errors.wheel_separation_m[:, 0])
-        self._poses = self._bodies.poses.T
-        self._poses.flags.writeable = False
+        self._poses = np.array(poses, dtype=float).reshape(rows, 3).T.copy()
+        self._shown_poses = self._poses.T
+        self._shown_poses.flags.writeable = False
+        self._headings = np.array(find_heading(self._poses[2]))  # cosine and sine
+        self._separations_m, radii_m = errors.wheel_separation_m[:, 0], errors.radius_m[:, 0]
+        self._contacts = Contacts(arena, self.worlds, radii_m)
+        obstacles = arena.segments_m.tolist(), arena.circles_m.tolist()
+        self._pushing = [
+            Pushing([thing.put_down() for thing in things], *obstacles, radii_m=own_m)
+            for things, own_m in zip(objects, radii_m.reshape(self.worlds, -1).tolist())
+            if things
+        ]
         self._commands = np.zeros((2, rows))
         self._wheels = np.zeros((4, rows))
         self._travels, self._speeds = self._wheels[:2], self._wheels[2:]
@@ -134,7 +146,7 @@ class World:
     def poses(self) -> np.ndarray:
         """True poses at time_ms (R, 3), read only: x m, y m, theta rad, frame world. Ask anew after each step."""
         self._move_bodies()
-        return self._poses
+        return self._shown_poses
 
     @property
     def wheel_rows(self) -> List[List[float]]:
@@ -183,24 +195,61 @@ class World:
     def _move_bodies(self) -> None:
         """Move the bodies by the wheels' steps."""
         if self._body_step < self._block_step:
-            self._bodies.roll(self._ground_m[self._body_step : self._block_step])
+            self._roll(self._ground_m[self._body_step : self._block_step])
             self._body_step = self._block_step
+
+    def _roll(self, ground_m: np.ndarray) -> None:
+        """Move all bodies by K steps of their left and right wheels over the ground (K, 2, R)."""
+        travels_m, rotations_rad = join_wheels(ground_m[:, 0], ground_m[:, 1], self._separations_m)
+        fastest_m = np.abs(travels_m).max(axis=1).tolist()
+        displacements_m, self._headings[:] = follow_arcs(self._headings, travels_m, rotations_rad)
+        places_m, theta_rad = self._poses[:2], self._poses[2]
+        for moved_m, displacement_m, rotation_rad in zip(fastest_m, displacements_m, rotations_rad):
+            before_m = places_m.copy() if self._pushing else places_m
+            places_m += displacement_m
+            theta_rad += rotation_rad
+            if self._contacts.could_touch(moved_m):
+                self._contacts.separate(places_m)
+            if self._pushing:
+                self._push(before_m)
+
+    def _push(self, before_m: np.ndarray) -> None:
+        """Push objects by the robots that moved from before_m (2, R), and move all bodies out of each other."""
+        places_m = self._poses[:2]
+        befores_m, afters_m = self._list_places(before_m), self._list_places(places_m)
+        slipped_m = self._place(map(Pushing.step, self._pushing, befores_m, afters_m))
+        for _ in range(_PASSES):
+            if slipped_m == 0.0 or not self._contacts.could_touch(slipped_m):
+                return
+            self._contacts.separate(places_m)
+            slipped_m = self._place(map(Pushing.push_out, self._pushing, self._list_places(places_m)))
+
+    def _list_places(self, places_m: np.ndarray) -> List[List[Place]]:
+        """Return the places of the robots of each world."""
+        return places_m.T.reshape(self.worlds, -1, 2).tolist()
+
+    def _place(self, worlds_m: Iterable[List[Place]]) -> float:
+        """Put the robots of each world at new places; return how far the farthest moved."""
+        places_m = np.concatenate(list(worlds_m)).T
+        moved_m = float(np.abs(places_m - self._poses[:2]).max()) * math.sqrt(2.0)
+        self._poses[:2] = places_m
+        return moved_m
 
     def measure_overlaps(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""
-        return self._bodies.contacts.measure_overlaps(self.poses[:, :2].T)
+        return self._contacts.measure_overlaps(self.poses[:, :2].T)
 
     def measure_body_speeds(self) -> np.ndarray:
         """Return linear (m/s) and angular speed (rad/s) of each robot (R, 2), as its wheels have it."""
         left_m_s, right_m_s = self._speeds
-        return np.column_stack(join_wheels(left_m_s, right_m_s, self.errors.wheel_separation_m[:, 0]))
+        return np.column_stack(join_wheels(left_m_s, right_m_s, self._separations_m))
 
     def observe(self) -> View:
         """Return where all bodies are now."""
         self._views += 1
         places_m = self.poses[:, :2].copy()
-        obstacles = [self._list_obstacles(pushing) for pushing in self._bodies.pushing]
-        return View(self._views, places_m, self._bodies.headings.T.copy(), obstacles)
+        obstacles = [self._list_obstacles(pushing) for pushing in self._pushing]
+        return View(self._views, places_m, self._headings.T.copy(), obstacles)
 
     def _list_obstacles(self, pushing: Pushing) -> Obstacles:
         """Return the walls and the circles of a world, with its objects where they are now."""
@@ -212,13 +261,13 @@ class World:
     def object_poses(self) -> np.ndarray:
         """True poses of the objects at time_ms (W, M, 3), as of robots; each world has as many."""
         self._move_bodies()
-        worlds = [[pushed.pose for pushed in pushing.bodies] for pushing in self._bodies.pushing]
+        worlds = [[pushed.pose for pushed in pushing.bodies] for pushing in self._pushing]
         return np.array(worlds, dtype=float).reshape(self.worlds, -1, 3) if worlds else np.empty((self.worlds, 0, 3))
 
     def list_objects(self) -> List[Body]:
         """Return the objects of the first world, where they are at time_ms."""
         self._move_bodies()
-        return [pushed.body for pushing in self._bodies.pushing[:1] for pushed in pushing.bodies]
+        return [pushed.body for pushing in self._pushing[:1] for pushed in pushing.bodies]
 
     def read_infrared(self, which: np.ndarray, view: Optional[View] = None) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).
