@@ -5,9 +5,9 @@ from typing import Deque, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
+from hero_client.values.stamped_history import StampedHistory, interpolate_pose
 from hero_node.geometry import Pose
 
-from ..filter.stamped_history import StampedHistory, interpolate_pose
 from .occupancy_grid import OccupancyGrid
 
 KEPT_S = 2.0

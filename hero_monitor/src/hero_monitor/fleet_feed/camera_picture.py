@@ -5,10 +5,10 @@ it comes, more on a busy computer: the page draws robots on it where they were w
 """
 
 import math
-from collections import deque
-from typing import Any, Deque, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional
 
-from hero_node.geometry import Pose, wrap_angle
+from hero_client.values.stamped_history import StampedHistory, interpolate_pose
+from hero_node.geometry import Pose
 
 from .page_state import MAX_DISTANCE_M, encode_pose
 
@@ -25,13 +25,11 @@ JPEGS_KEPT = 5
 SILENT_S = 3.0
 """The tracker publishes five pictures a second; an older one shows no robot where it is."""
 
-TRACK_POSES = 50
-"""Kept of each robot: the map reads ten a second."""
+KEPT_S = 5.0
+"""Of each robot's poses."""
 
 AHEAD_S = 0.1
 """A robot's newest pose shows where it was so long after it."""
-
-Track = Deque[Tuple[float, Pose]]
 
 
 class CameraPicture:
@@ -44,7 +42,7 @@ class CameraPicture:
         self._frame = ""
         self._box_mm: Optional[List[int]] = None
         self._stamp_s = -math.inf
-        self._tracks: Dict[str, Track] = {}
+        self._histories: Dict[str, StampedHistory[Pose]] = {}
 
     def receive(self, picture: Any, now_s: float) -> None:
         """Take a sensor_msgs/CompressedImage, unless it comes too soon, or is none that a browser can show."""
@@ -71,10 +69,7 @@ class CameraPicture:
 
     def follow(self, name: str, stamp_s: float, pose: Pose) -> None:
         """Remember a robot's pose in the common frame."""
-        track = self._tracks.setdefault(name, deque(maxlen=TRACK_POSES))
-        if track and stamp_s < track[-1][0]:
-            track.clear()  # a recording is played again
-        track.append((stamp_s, pose))
+        self._histories.setdefault(name, StampedHistory(KEPT_S, interpolate_pose)).add(stamp_s, pose)
 
     def describe(self, map_frame: str, now_s: float) -> Optional[Dict[str, Any]]:
         """Return the picture's number and box, and where robots were when it was taken; None without a picture.
@@ -86,20 +81,11 @@ class CameraPicture:
             return None
         if self._frame != map_frame or self._box_mm is None:
             return {"number": self._number, "box": None, "poses": {}}
-        poses = {name: encode_pose(find_pose(track, self._stamp_s)) for name, track in self._tracks.items()}
+        poses = {name: encode_pose(self._find_pose(history)) for name, history in self._histories.items()}
         known = {name: pose for name, pose in poses.items() if pose is not None}
         return {"number": self._number, "box": self._box_mm, "poses": known}
 
-
-def find_pose(track: Track, stamp_s: float) -> Optional[Pose]:
-    """Return where a robot was at a time, None if that is not known."""
-    for (start_s, start), (end_s, end) in zip(track, list(track)[1:]):
-        if start_s <= stamp_s <= end_s and start_s < end_s:
-            share = (stamp_s - start_s) / (end_s - start_s)
-            return Pose(
-                start.x_m + share * (end.x_m - start.x_m),
-                start.y_m + share * (end.y_m - start.y_m),
-                wrap_angle(start.yaw_rad + share * wrap_angle(end.yaw_rad - start.yaw_rad)),
-            )
-    newest_s, newest = track[-1]
-    return newest if newest_s <= stamp_s <= newest_s + AHEAD_S else None
+    def _find_pose(self, history: StampedHistory[Pose]) -> Optional[Pose]:
+        """Return where a robot was when the picture was taken, None if that is not known."""
+        is_ahead = history.newest_s <= self._stamp_s <= history.newest_s + AHEAD_S
+        return history.newest if is_ahead else history.find(self._stamp_s)

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from hero_localization.filter.stamped_history import StampedHistory, interpolate_pose
+from hero_client.values.stamped_history import StampedHistory, interpolate_pose
 from hero_node.geometry import Pose
 
 
