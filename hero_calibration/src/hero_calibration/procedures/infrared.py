@@ -56,14 +56,14 @@ def calibrate_infrared(session: Session) -> Dict[int, InfraredResult]:
     """Calibrate all active robots, which face a wall; return the results by robot."""
     say("infrared: about %.0f s" % (model.BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0)))
     walls: Dict[int, Pose] = {}
-    counts_m2: Dict[int, List[float]] = {}
     first = _face_wall_with_each_sensor(session, "infrared", model.SAMPLES, walls)
 
-    def write(probe: Probe) -> None:
-        counts_m2[probe.robot_id] = model.compute_calibration(first[probe.robot_id])
-        probe.write("infrared_counts_m2", counts_m2[probe.robot_id])
+    def write(probe: Probe) -> List[float]:
+        counts_m2 = model.compute_calibration(first[probe.robot_id])
+        probe.write("infrared_counts_m2", counts_m2)
+        return counts_m2
 
-    session.for_each("infrared", write)
+    counts_m2 = session.for_each("infrared", write)
     second = _face_wall_with_each_sensor(session, "check of infrared", model.CHECK_SAMPLES, walls)
     return {
         probe.robot_id: InfraredResult(
@@ -92,9 +92,8 @@ def _face_wall_with_each_sensor(
             lambda: all(probe.count_scans() >= samples for probe in session.active),
             SCAN_TIMEOUT_S,
         )
-        targets_rad: Dict[int, float] = {}
 
-        def evaluate(probe: Probe, sensor: int = sensor, targets_rad: Dict[int, float] = targets_rad) -> None:
+        def evaluate(probe: Probe, sensor: int = sensor) -> float:
             probe.check_alive(session.now_s)
             counts, ranges_m = probe.read_scans()
             pose = probe.pose
@@ -103,10 +102,9 @@ def _face_wall_with_each_sensor(
             wall = walls.setdefault(probe.robot_id, pose._replace(yaw_rad=pose.yaw_rad - misalignment_rad))
             moved_m = transform_pose(invert_pose(wall), pose).x_m
             facings[probe.robot_id].append(facing._replace(moved_m=moved_m))
-            targets_rad[probe.robot_id] = pose.yaw_rad - misalignment_rad + model.BEAM_STEP_RAD
+            return pose.yaw_rad - misalignment_rad + model.BEAM_STEP_RAD
 
-        session.for_each(title, evaluate)
-        _turn(session, title, targets_rad)
+        _turn(session, title, session.for_each(title, evaluate))
     return facings
 
 

@@ -49,7 +49,6 @@ def calibrate_motors(session: Session) -> Dict[int, MotorResult]:
     """Calibrate all active robots; return the results by robot."""
     say("motors: pulses are swept up and down, about 40 s")
     pulses_us = dead_zone.list_pulses()
-    results: Dict[int, MotorResult] = {}
 
     def sweep(probes: Sequence[Probe]) -> List[float]:
         start_times_s = []
@@ -61,11 +60,10 @@ def calibrate_motors(session: Session) -> Dict[int, MotorResult]:
         session.settle()
         return start_times_s
 
-    def evaluate(probe: Probe, start_times_s: List[float], _is_last: bool) -> None:
+    def evaluate(probe: Probe, start_times_s: List[float], _is_last: bool) -> MotorResult:
         speeds_m_s = dead_zone.measure_sweep(probe.read_wheels(), start_times_s)
         result = evaluate_sweep(pulses_us, speeds_m_s)
         probe.write("motor_centers_us", result.to_file()["motor_centers_us"])
-        results[probe.robot_id] = result
+        return result
 
-    session.repeat("motors", TRIES, sweep, evaluate)
-    return results
+    return session.repeat("motors", TRIES, sweep, evaluate)

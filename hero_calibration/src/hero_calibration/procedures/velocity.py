@@ -106,7 +106,6 @@ def write_gains(probe: Probe, gains: Sequence[Gains]) -> None:
 
 def _test(session: Session) -> Dict[int, List[Response]]:
     """Turn all active robots to the left and to the right; return the responses of both wheels by robot."""
-    results: Dict[int, List[Response]] = {}
 
     def turn(probes: Sequence[Probe]) -> List[float]:
         start_times_s: List[float] = []
@@ -120,8 +119,7 @@ def _test(session: Session) -> Dict[int, List[Response]]:
         session.settle()
         return start_times_s
 
-    def evaluate(probe: Probe, start_times_s: List[float], is_last: bool) -> None:
-        results[probe.robot_id] = evaluate_test(probe.read_wheels(), start_times_s, may_be_late=is_last)
+    def evaluate(probe: Probe, start_times_s: List[float], is_last: bool) -> List[Response]:
+        return evaluate_test(probe.read_wheels(), start_times_s, may_be_late=is_last)
 
-    session.repeat("velocity", TRIES, turn, evaluate)
-    return results
+    return session.repeat("velocity", TRIES, turn, evaluate)

@@ -113,11 +113,9 @@ def calibrate_wheels(session: Session, ask: Optional[Ask] = None) -> Dict[int, W
 
     ask: asks for what the user measures with a tape; None: localize tells where robots are.
     """
-    results: Dict[int, WheelResult] = {}
     if ask is not None:
         legs = _drive_for_tape(session, ask)
-        session.for_each("wheels", lambda probe: results.update({probe.robot_id: fit_wheels(legs[probe.robot_id])}))
-        return results
+        return session.for_each("wheels", lambda probe: fit_wheels(legs[probe.robot_id]))
     say("wheels: squares to the left and to the right, about 1 min")
 
     def drive(probes: Sequence[Probe]) -> List[Stop]:
@@ -127,17 +125,16 @@ def calibrate_wheels(session: Session, ask: Optional[Ask] = None) -> Dict[int, W
             stops.append(_stop_and_look(session))
         return stops
 
-    def evaluate(probe: Probe, stops: List[Stop], _is_last: bool) -> None:
+    def evaluate(probe: Probe, stops: List[Stop], _is_last: bool) -> WheelResult:
         legs = []
         for (start_s, starts), (end_s, ends) in zip(stops, stops[1:]):
             start, end = starts[probe.robot_id], ends[probe.robot_id]
             if start is None or end is None:
                 raise CalibrationError("localize does not track it: is its tag in view? Or measure by --tape")
             legs.append(Leg(_take_ticks(probe, start_s, end_s), transform_pose(invert_pose(start), end)))
-        results[probe.robot_id] = fit_wheels(legs)
+        return fit_wheels(legs)
 
-    session.repeat("wheels", TRIES, drive, evaluate)
-    return results
+    return session.repeat("wheels", TRIES, drive, evaluate)
 
 
 def _list_square(side: float) -> List[Drive]:
@@ -184,13 +181,13 @@ def _drive_for_tape(session: Session, ask: Ask) -> Dict[int, List[Leg]]:
         for part in parts:
             _drive(session, session.active, part)
         session.pause(MEASURE_S)
-        session.for_each("wheels", partial(_add_leg, legs, ask, start_s, session.now_s, sd))
+        measured = session.for_each("wheels", partial(_ask_for_leg, ask, start_s, session.now_s, sd))
+        for robot_id, leg in measured.items():
+            legs[robot_id].append(leg)
     return legs
 
 
-def _add_leg(
-    legs: Dict[int, List[Leg]], ask: Ask, start_s: float, end_s: float, sd: Tuple[float, float, float], probe: Probe
-) -> None:
+def _ask_for_leg(ask: Ask, start_s: float, end_s: float, sd: Tuple[float, float, float], probe: Probe) -> Leg:
     wanted = 1 if math.isinf(sd[1]) else 2
     what = "ahead" if wanted == 1 else "ahead and to the left, such as 12 -5"
     question = "%s: mm from its mark, %s: " % (probe.name, what)
@@ -200,5 +197,4 @@ def _add_leg(
             x_m, y_m, *_ = [float(word) / 1e3 for word in words] + [0.0] * (2 - wanted)
         except ValueError:
             continue  # asked again
-        legs[probe.robot_id].append(Leg(_take_ticks(probe, start_s, end_s), Pose(x_m, y_m, 0.0), sd))
-        return
+        return Leg(_take_ticks(probe, start_s, end_s), Pose(x_m, y_m, 0.0), sd)

@@ -5,7 +5,7 @@ clock of this computer: a subclass has the time, and waits (ros_session).
 """
 
 from concurrent.futures import ThreadPoolExecutor
-from typing import Callable, List, Optional, Sequence, TypeVar
+from typing import Callable, Dict, List, Optional, Sequence, TypeVar
 
 from hero_client.values.background_motion import SEND_TIME_S
 from hero_node.clock import Clock
@@ -15,6 +15,7 @@ from ..errors import CalibrationError, EndedError
 from .probe import Probe
 
 T = TypeVar("T")
+M = TypeVar("M")
 
 POLL_S = 0.02
 SETTLE_S = 0.6
@@ -61,13 +62,19 @@ class Session(Clock):
         """Robots that have not failed."""
         return [probe for probe in self.probes if probe.failure is None]
 
-    def for_each(self, step: str, work: Callable[[Probe], None], probes: Optional[Sequence[Probe]] = None) -> None:
-        """Do work for robots (None: all active) side by side; a CalibrationError fails that robot alone."""
+    def for_each(
+        self, step: str, work: Callable[[Probe], T], probes: Optional[Sequence[Probe]] = None
+    ) -> Dict[int, T]:
+        """Do work for robots (None: all active) side by side; return the results by robot.
+
+        A CalibrationError fails that robot alone.
+        """
         probes = self.active if probes is None else probes
+        results: Dict[int, T] = {}
 
         def work_on(probe: Probe) -> None:
             try:
-                work(probe)
+                results[probe.robot_id] = work(probe)
             except CalibrationError as error:
                 probe.failure = "%s: %s" % (step, error)
 
@@ -76,40 +83,39 @@ class Session(Clock):
             if probe.failure is not None:
                 probe.stop()
                 say("%s failed: %s" % (probe.name, probe.failure))
+        return results
 
     def repeat(
         self,
         step: str,
         tries: int,
-        move: Callable[[Sequence[Probe]], T],
-        evaluate: Callable[[Probe, T, bool], None],
-    ) -> None:
+        move: Callable[[Sequence[Probe]], M],
+        evaluate: Callable[[Probe, M, bool], T],
+    ) -> Dict[int, T]:
         """Move robots and evaluate their data; those whose data is unusable try again, and fail in the end.
 
         Wi-Fi stalls for a second now and then, and delays readings and commands. evaluate receives what move returned,
-        and whether this is the last try.
+        and whether this is the last try. Return the results by robot.
         """
+        results: Dict[int, T] = {}
         waiting = self.active
         for left in reversed(range(tries)):
-            again: List[Probe] = []
             moved = move(waiting)
 
-            def try_evaluating(
-                probe: Probe, moved: T = moved, is_last: bool = not left, again: List[Probe] = again
-            ) -> None:
+            def try_evaluating(probe: Probe, moved: M = moved, is_last: bool = not left) -> None:
                 try:
-                    evaluate(probe, moved, is_last)
+                    results[probe.robot_id] = evaluate(probe, moved, is_last)
                 except CalibrationError as error:
                     if is_last:
                         raise
                     probe.check_alive(self.now_s)
                     say("%s once more: %s: %s" % (probe.name, step, error))
-                    again.append(probe)
 
             self.for_each(step, try_evaluating, waiting)
-            waiting = again
+            waiting = [probe for probe in self.active if probe.robot_id not in results]
             if not waiting:
-                return
+                break
+        return results
 
     def stop(self) -> None:
         """Stop all robots, including those that failed; works while the program ends."""
