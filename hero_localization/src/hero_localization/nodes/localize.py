@@ -6,7 +6,7 @@ rosrun hero_localization localize _pose_topic:=/vrpn_client_node/hero_{id}/pose
 
 import threading
 from functools import partial
-from typing import Any, Dict, List, Optional
+from typing import Any, Callable, Dict, List, Optional
 
 import rospy
 
@@ -60,19 +60,17 @@ class LocalizationNode:
             self._outputs.add_robot(robot_id)
             topic = self._pose_topic.replace("{id}", str(robot_id))
             warn = partial(rospy.logwarn_throttle, 10.0)
-            subscribe_odometry("/hero_%d" % robot_id, partial(self._receive_odometry, robot_id))
-            receive = partial(self._receive_pose, robot_id)
-            self._inputs[robot_id] = PoseInput(topic, self._pose_frame, self._covariance, receive, warn)
+            follow = partial(self._call, self._localizer.add_odometry, robot_id)
+            subscribe_odometry("/hero_%d" % robot_id, follow)
+            correct = partial(self._call, self._localizer.add_measurement, robot_id)
+            self._inputs[robot_id] = PoseInput(topic, self._pose_frame, self._covariance, correct, warn)
 
-    def _receive_odometry(self, robot_id: int, stamp_s: float, pose: Pose) -> None:
+    def _call(self, work: Callable[..., List[str]], *values: Any) -> None:
+        """Call a method of the localizer, and log the lines that it returns."""
         with self._lock:
-            lines = self._localizer.add_odometry(robot_id, stamp_s, pose)
-        _log(lines)
-
-    def _receive_pose(self, robot_id: int, measurement: StampedPose) -> None:
-        with self._lock:
-            lines = self._localizer.add_measurement(robot_id, measurement)
-        _log(lines)
+            lines = work(*values)
+        for line in lines:
+            rospy.loginfo(line)
 
     def _receive_swarm(self, report: RobotPoses) -> None:
         """Take the poses of all robots that one image shows."""
@@ -80,7 +78,6 @@ class LocalizationNode:
             text = "%s is in the frame %r, but must be in %r: give its publisher and this node the same ~frame"
             rospy.logwarn_throttle(10.0, text % (self._swarm_topic, report.header.frame_id, self._frame))
             return
-        lines: List[str] = []
         for robot in report.robots:
             pose = Pose(robot.x, robot.y, robot.yaw)
             if robot.id not in self._inputs:
@@ -89,13 +86,11 @@ class LocalizationNode:
                 is_told = 0.0 < robot.position_sd < MAX_SD and 0.0 < robot.yaw_sd < MAX_SD
                 covariance = make_covariance(robot.position_sd, robot.yaw_sd) if is_told else self._covariance
                 measurement = StampedPose(robot.stamp.to_sec(), pose, covariance)
-                with self._lock:
-                    lines += self._localizer.add_measurement(robot.id, measurement)
+                self._call(self._localizer.add_measurement, robot.id, measurement)
         with self._lock:
             lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
             self._localizer.distrust(report.header.stamp.to_sec(), lost)
         self._image_used.set()
-        _log(lines)
 
     def step(self, period_s: float) -> None:
         """Wait for the poses of an image, or for period_s, and publish."""
@@ -105,10 +100,9 @@ class LocalizationNode:
             report = share_drivers().read()
             self._add_robots(sorted(robot.id for robot in report.robots if robot.id >= 0) if report else [])
         now_s = rospy.get_time()
+        self._call(self._localizer.find_lost, now_s)
         with self._lock:
-            lines = self._localizer.find_lost(now_s)
             robots = self._localizer.list_robots(now_s)
-        _log(lines)
         self._outputs.publish(robots)
         if not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
@@ -129,11 +123,6 @@ def _check_topic(topic: Any) -> str:
     if "{id}" not in str(topic):
         raise ProgramError('~pose_topic is %r, but must hold {id}, such as "/hero_{id}/measured_pose"' % (topic,))
     return str(topic)
-
-
-def _log(lines: List[str]) -> None:
-    for line in lines:
-        rospy.loginfo(line)
 
 
 SD_TEXT = "standard deviation, in x and y each, of poses that come without covariance; `track` tells its own"
