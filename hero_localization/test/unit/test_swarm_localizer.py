@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from hero_localization.filter.loss_lines import LossLines
 from hero_localization.filter.pose_filter import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_msgs.msg import RobotPose
@@ -204,7 +203,8 @@ def test_many_robots_lost_and_found_make_one_line_in_ten_seconds():
     assert len(singles) == 4 and all("lost: " in line for line in singles)
     summaries = [line for line in swarm.lines if " more lines " in line]
     assert len(summaries) == 2
-    assert summaries[1].startswith("64 more lines on robots lost or found again in 10 s: 8 robots (hero_0, ")
+    names = ", ".join("hero_%d" % robot_id for robot_id in robots)
+    assert summaries[1] == "64 more lines on robots lost or found again: " + names
 
 
 def test_after_a_quiet_while_each_lost_robot_has_a_line_again():
@@ -300,16 +300,17 @@ def test_robots_are_listed_by_id_each_with_the_origin_of_its_odometry():
     assert swarm[2].state is RobotState.TRACKED, "one that is expected already goes on"
 
 
-def test_of_ten_seconds_four_lines_are_passed_on_and_the_others_counted():
-    losses = LossLines()
-    assert [losses.add(robot_id, "line", 100.0) for robot_id in range(4)] == [["line"]] * 4
-    assert all(losses.add(robot_id, "line", 109.9) == [] for robot_id in (7, 1, 2, 3, 4, 7, 5))
-    assert losses.end_period(109.9) == []
-    names = "hero_7, hero_1, hero_2, hero_3, hero_4, ..."
-    text = "%d more lines on robots lost or found again in 10 s: %d robots (%s)"
-    assert losses.end_period(110.0) == [text % (7, 6, names)]
-    for robot_id in range(5):
-        assert losses.add(robot_id, "line", 111.0) == [], "not before a period without any"
-    assert losses.end_period(119.9) == []
-    assert losses.end_period(120.0) == [text % (5, 5, "hero_0, hero_1, hero_2, hero_3, hero_4")]
-    assert losses.end_period(130.0) == [] and losses.add(1, "line", 130.0) == ["line"]
+def test_four_lines_on_lost_robots_are_passed_on_and_the_others_counted():
+    robots = range(16)
+    places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}
+    swarm = Swarm(*robots).run(1.0, places, robots=robots)
+    swarm.lines.clear()
+    swarm.run(9.9, robots=robots)
+    assert swarm.lines == ["hero_%d lost: its pose follows its odometry" % robot_id for robot_id in range(4)]
+    names = ", ".join("hero_%d" % robot_id for robot_id in range(4, 14))
+    assert swarm.run(2.0).lines[4:] == ["12 more lines on robots lost or found again: %s and 2 more" % names]
+    assert swarm.run(9.0, {0: places[0]}).lines[5:] == [], "not before ten seconds"
+    assert swarm.run(2.0, {0: places[0]}).lines[5:] == ["1 more lines on robots lost or found again: hero_0"]
+    assert len(swarm.run(50.0, {0: places[0]}).lines) == 6
+    swarm.run(1.0, places, robots=robots)
+    assert len([line for line in swarm.lines[6:] if "found again after" in line]) == 4

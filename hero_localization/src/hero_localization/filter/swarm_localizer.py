@@ -5,12 +5,14 @@ now_s and stamps are ROS time.
 
 import enum
 import math
+from collections import Counter
 from typing import Dict, Iterable, List, NamedTuple, Optional
 
 from hero_node.geometry import Pose, measure_distance, wrap_angle
+from hero_node.texts import list_names
+from hero_node.token_bucket import TokenBucket
 
 from .heading_check import HeadingCheck, is_upside_down
-from .loss_lines import LossLines
 from .pose_filter import Outcome, PoseFilter, StampedPose
 
 LOST_S = 1.0
@@ -30,6 +32,9 @@ SILENT_S = 1.0
 
 AHEAD_S = 0.2
 """A simulated clock may go in steps of 0.1 s."""
+
+LOSS_LINES, LOSS_PERIOD_S = 4, 10.0
+"""So many lines at once, and one in each such time, on robots lost or found: a busy computer loses all at once."""
 
 PUBLISH_RATE_HZ = 25.0
 """Default publish rate of localize."""
@@ -84,7 +89,8 @@ class SwarmLocalizer:
     def __init__(self) -> None:
         self._robots: Dict[int, _Robot] = {}
         self._now_s = -math.inf
-        self._losses = LossLines()
+        self._loss_lines = _limit_loss_lines()
+        self._summed: Dict[str, int] = Counter()
 
     def add_robots(self, robot_ids: Iterable[int]) -> None:
         """Expect these robots too."""
@@ -148,7 +154,7 @@ class SwarmLocalizer:
         if was_lost:
             unseen_s = measurement.stamp_s - used_s
             line = "hero_%d found again after %.1f s, %s off its odometry" % (robot_id, unseen_s, step)
-            return self._losses.add(robot_id, line, self._now_s)
+            return self._tell_loss(robot_id, line)
         return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
 
     def distrust(self, stamp_s: float, robot_ids: Iterable[int]) -> None:
@@ -170,15 +176,25 @@ class SwarmLocalizer:
         if now_s < self._now_s - LOST_S:
             lines.append("time jumped back by %.1f s: all robots are localized again" % (self._now_s - now_s))
             self._robots = {robot_id: _Robot() for robot_id in self._robots}
-            self._losses = LossLines()
+            self._loss_lines = _limit_loss_lines()
         self._now_s = now_s
-        lines += self._losses.end_period(now_s)
+        if self._summed and self._loss_lines.take(1.0, now_s):
+            text = "%d more lines on robots lost or found again: %s"
+            lines.append(text % (sum(self._summed.values()), list_names(list(self._summed))))
+            self._summed.clear()
         for robot_id, robot in sorted(self._robots.items()):
             seen_s = max(robot.filter.used_s, robot.untrusted_s)
             if not robot.is_lost and -math.inf < seen_s < now_s - LOST_S:
                 robot.is_lost = True
-                lines += self._losses.add(robot_id, "hero_%d lost: its pose follows its odometry" % robot_id, now_s)
+                lines += self._tell_loss(robot_id, "hero_%d lost: its pose follows its odometry" % robot_id)
         return lines
+
+    def _tell_loss(self, robot_id: int, line: str) -> List[str]:
+        """Return a line on a robot that is lost or found; of many, find_lost() tells how many there were."""
+        if self._loss_lines.take(1.0, self._now_s):
+            return [line]
+        self._summed["hero_%d" % robot_id] += 1
+        return []
 
     def list_robots(self, now_s: float) -> List[LocalizedRobot]:
         """Return what is known of all robots, in the order of their ids."""
@@ -220,6 +236,10 @@ class SwarmLocalizer:
         if robot.outliers:
             return "%d measured poses in a row disagree with its odometry" % robot.outliers
         return ""
+
+
+def _limit_loss_lines() -> TokenBucket:
+    return TokenBucket(LOSS_LINES, 1.0 / LOSS_PERIOD_S, 0.0)
 
 
 def _describe_pose(pose: Pose) -> str:
