@@ -1,11 +1,11 @@
 """The session over ROS: its robots, as the drivers report them, its time, which may be simulated, and its end."""
 
 import time
-from typing import Dict, List, Optional, Sequence, Set
+from typing import List, Optional, Sequence
 
 import rospy
 
-from hero_client.ros.drivers import Drivers
+from hero_client.ros.drivers import share_drivers
 from hero_msgs.msg import Robot
 from hero_node.ros.program import Program
 
@@ -41,43 +41,28 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Ro
 
     Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
     """
-    drivers = Drivers()
-    try:
-        robots = _wait_for_robots(program, drivers, robot_ids)
-    finally:
-        drivers.close()
-    ready = _list_ready(robots)
-    wanted = sorted(ready if robot_ids is None else robot_ids)
-    for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
-        if drivers.is_stopped(driver):
-            raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
-    if not ready.intersection(wanted):
-        raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
-    probes = [RosProbe(robot_id, robots[robot_id].model if robot_id in robots else "") for robot_id in wanted]
-    for probe in probes:
-        probe.failure = None if probe.robot_id in ready else "is not connected to the driver: is it on?"
-    return probes
-
-
-def _list_ready(robots: Dict[int, Robot]) -> Set[int]:
-    return {robot_id for robot_id, robot in robots.items() if robot.state == Robot.READY}
-
-
-def _wait_for_robots(program: Program, drivers: Drivers, robot_ids: Optional[Sequence[int]]) -> Dict[int, Robot]:
-    """Return the report of all robots by id, as soon as those wanted are ready, or after TIMEOUT_S."""
+    drivers = share_drivers()
     report = None
-    robots: Dict[int, Robot] = {}
+    ready: List[int] = []
     deadline_s = time.monotonic() + TIMEOUT_S
     while time.monotonic() < deadline_s:
         if not program.sleep(0.05):
             raise CalibrationError("ended before a robot was found")
         report = drivers.read()
-        robots = {robot.id: robot for robot in report.robots if robot.id >= 0} if report else {}
-        ready = _list_ready(robots)
-        if ready and (drivers.is_settled if robot_ids is None else ready.issuperset(robot_ids)):
+        ready = [robot.id for robot in report.robots if robot.state == Robot.READY and robot.id >= 0] if report else []
+        if ready and (drivers.is_settled if robot_ids is None else set(ready).issuperset(robot_ids)):
             break
     if report is None:
         raise CalibrationError(
             "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
         )
-    return robots
+    wanted = sorted(ready if robot_ids is None else robot_ids)
+    for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
+        if drivers.is_stopped(driver):
+            raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
+    if not set(ready).intersection(wanted):
+        raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
+    probes = [RosProbe(robot_id, drivers.find_model("/hero_%d" % robot_id)) for robot_id in wanted]
+    for probe in probes:
+        probe.failure = None if probe.robot_id in ready else "is not connected to the driver: is it on?"
+    return probes
