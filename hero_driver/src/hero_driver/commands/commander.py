@@ -96,6 +96,7 @@ class Commanders:
         self._by_topic: Dict[str, Commander] = {}
         self._zero: Optional[_Zero] = None  # until its effect shows
         self._looked_s = math.inf
+        self._silent_from_s = -math.inf  # until then none can have been silent for long enough
 
     def note_command(
         self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float
@@ -106,6 +107,8 @@ class Commanders:
         ends_motion = not moves and self.are_moving
         if commander is None or commander.sender is not sender or commander.source != source:
             commander = self._by_topic[name] = Commander(sender, node, source)
+        if moves and not commander.moves:
+            self._silent_from_s = -math.inf
         commander.note_command(moves, now_s)
         if moves:
             self._zero = None
@@ -159,9 +162,15 @@ class Commanders:
         """
         self._forgive_pause(now_s)
         self._looked_s = now_s
+        if now_s < self._silent_from_s:
+            return None
+        first_s = math.inf
         for commander in self._by_topic.values():
-            if commander.moves and commander.has_fallen_silent(silence_s, now_s):
-                return commander
+            if commander.moves:
+                if commander.has_fallen_silent(silence_s, now_s):
+                    return commander
+                first_s = min(first_s, commander.commanded_s)
+        self._silent_from_s = first_s + silence_s
         return None
 
     def has_more_to_stop(self, commander: Commander, now_s: float) -> bool:

@@ -60,23 +60,25 @@ class WheelMotion:
     def read_ticks(self, left_ticks: float, right_ticks: float) -> None:
         """Take a reading of the wheels' counters; one that is not finite shows no turn."""
         tolerance_ticks = self._tolerance_ticks
+        left_turn, right_turn = left_ticks - self._left_ticks, right_ticks - self._right_ticks
         # Comparisons with what is not finite fail.
         if (
-            -tolerance_ticks <= left_ticks - self._left_ticks <= tolerance_ticks
-            and -tolerance_ticks <= right_ticks - self._right_ticks <= tolerance_ticks
+            -tolerance_ticks <= left_turn <= tolerance_ticks
+            and -tolerance_ticks <= right_turn <= tolerance_ticks
             and self._has_anchor
         ):
             self.readings += 1
             self.still_readings += 1
             self._moves.append(0.0)
             return
-        if not math.isfinite(left_ticks + right_ticks):
+        distance = abs(left_turn) + abs(right_turn)
+        if not math.isfinite(distance):
             return
         self.readings += 1
         # The first reading has none before it to compare with.
         if self._has_anchor:
             self.still_readings = 0
-            self._moves.append(abs(left_ticks - self._left_ticks) + abs(right_ticks - self._right_ticks))
+            self._moves.append(distance)
             self._tolerance_ticks = REST_TICKS
         self._has_anchor = True
         self._left_ticks, self._right_ticks = left_ticks, right_ticks
