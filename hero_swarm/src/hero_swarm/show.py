@@ -6,10 +6,10 @@ A run is computed again: seed and code give the same bytes, and nothing has to h
 import argparse
 import sys
 from collections import deque
-from importlib import import_module
-from typing import Any, Optional, Sequence
+from typing import Optional, Sequence
 
 from hero_node import command_line
+from hero_node.optional import import_optional
 from hero_node.parameters import within
 
 from .experiments.batch import build_trial
@@ -41,15 +41,6 @@ def _choose_cell(experiment: Experiment, number: int) -> Cell:
     return experiment.cells[number - 1]
 
 
-def _find(module: str) -> Any:
-    """Import a module of a package that hero_swarm otherwise does without. Raises: ExperimentError."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        text = "%s needs %s: install it, by pip or as python3-%s"
-        raise ExperimentError(text % (module, error.name, error.name)) from None
-
-
 def show_run(options: argparse.Namespace) -> None:
     """Replay the run that options name. Raises: ExperimentError."""
     _, experiment, about = read_results(options.folder)
@@ -71,11 +62,13 @@ def show_run(options: argparse.Namespace) -> None:
         write_video(trial, experiment.time_s, options.speed, options.video)
         print(options.video)
     elif options.bag:
-        with _find("hero_recording.step_recorder").StepRecorder(trial.rows, robot_ids, options.bag):
+        recording = import_optional("hero_recording.step_recorder", "hero-swarm[bags]")
+        with recording.StepRecorder(trial.rows, robot_ids, options.bag):
             deque(trial.run(experiment.time_s), maxlen=0)
         print(options.bag)
     elif options.foxglove is not None:
-        with _find("hero_monitor.live_view").LiveView(trial.rows, robot_ids, options.foxglove, options.speed) as view:
+        live = import_optional("hero_monitor.live_view", "python3-tornado")
+        with live.LiveView(trial.rows, robot_ids, options.foxglove, options.speed) as view:
             print("Foxglove: ws://127.0.0.1:%d/foxglove" % view.port, flush=True)
             deque(trial.run(experiment.time_s), maxlen=0)
     else:

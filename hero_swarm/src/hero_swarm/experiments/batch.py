@@ -134,12 +134,19 @@ def list_sources(experiment: Experiment) -> List[str]:
     return sorted(set(names))
 
 
+def measure(experiment: Experiment, *state: Any) -> Tuple[np.ndarray, np.ndarray]:
+    """Return a sample (W, metrics), and whether the condition that ends a run holds (W,); state: as METRICS take it."""
+    names, until = list_sources(experiment), experiment.until
+    sample = np.column_stack([METRICS[name](*state) for name in names])
+    holds = np.zeros(len(sample), dtype=bool) if until is None else until.holds(sample[:, names.index(until.metric)])
+    return sample, holds
+
+
 def _run(experiment: Experiment, trial: Trial, stem: str) -> Tuple[np.ndarray, List[int]]:
     """Run a trial; return the samples (T, W, metrics) and the last sample of each world."""
-    names, until = list_sources(experiment), experiment.until
     worlds, robots, _ = trial.poses.shape
     samples = math.floor(experiment.time_s / SAMPLE_S + 1e-9) + 1
-    series = np.full((samples, worlds, len(names)), np.nan)
+    series = np.full((samples, worlds, len(list_sources(experiment))), np.nan)
     ends = np.full(worlds, samples - 1)
     running = np.ones(worlds, dtype=bool)
     recorded, poses_path = 0, stem + POSES_ENDING
@@ -154,11 +161,9 @@ def _run(experiment: Experiment, trial: Trial, stem: str) -> Tuple[np.ndarray, L
             recorded += 1
         sample = math.floor(now_s / SAMPLE_S + 1e-6)
         if sample < samples and np.isnan(series[sample]).all():
-            state = trial.poses, trial.velocities, trial.things.poses
-            series[sample] = np.column_stack([METRICS[name](*state) for name in names])
-            if until is not None:
-                held = running & until.holds(series[sample, :, names.index(until.metric)])
-                ends[held], running[held] = sample, False
+            series[sample], holds = measure(experiment, trial.poses, trial.velocities, trial.things.poses)
+            ended = running & holds
+            ends[ended], running[ended] = sample, False
         if now_s >= experiment.time_s - 1e-6 or not running.any():
             break
         now_s = trial.step()

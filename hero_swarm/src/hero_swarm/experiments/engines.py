@@ -19,6 +19,7 @@ from concurrent.futures import (
 )
 from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
 
+from hero_node.optional import import_optional
 from hero_node.texts import one_line
 
 from .errors import ExperimentError
@@ -60,26 +61,20 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
     """Return an executor on the cluster at address (tcp://HOST:PORT, or the path of a scheduler file), and its workers.
 
     check() returns which code a process runs; a worker on which it differs is refused.
-    Raises: ExperimentError without dask, without a cluster, or for a worker with other code.
+    Raises: ProgramError without dask. ExperimentError without a cluster, or for a worker with other code.
     """
-    try:
-        from distributed import Client
-        from distributed import TimeoutError as DaskTimeoutError
-    except ImportError as error:
-        raise ExperimentError(
-            "--executor dask needs distributed: apt install python3-distributed, or pip install distributed"
-        ) from error
+    distributed = import_optional("distributed", "python3-distributed")
     is_address = "://" in address
     if not is_address and not os.path.isfile(address):  # Dask would wait for it without end
         text = "no Dask scheduler file %s: start dask-scheduler --scheduler-file %s"
         raise ExperimentError(text % (address, address))
     try:
-        client = Client(
+        client = distributed.Client(
             address if is_address else None, scheduler_file=None if is_address else address, timeout=DASK_TIMEOUT_S
         )
         client.wait_for_workers(1, timeout=DASK_TIMEOUT_S)
         threads = client.nthreads()
-    except (OSError, ValueError, DaskTimeoutError) as error:
+    except (OSError, ValueError, distributed.TimeoutError) as error:
         text = "no Dask cluster with workers at %s (%s): start dask-scheduler and dask-worker"
         raise ExperimentError(text % (address, one_line(error))) from error
     own = check()

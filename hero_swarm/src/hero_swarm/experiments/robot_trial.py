@@ -11,9 +11,8 @@ import numpy as np
 from hero_client.values.object_sensing import NO_OBJECTS, Things
 
 from ..behavior import Random, decide, derive_seed, sense
-from ..metrics import METRICS
 from ..safety import SafetyFilter
-from .batch import SAMPLE_S, list_sources, load_cell_arena, make_behavior, take_values
+from .batch import SAMPLE_S, load_cell_arena, make_behavior, measure, take_values
 from .errors import report_place
 from .experiment_file import Cell, Experiment
 
@@ -39,7 +38,7 @@ class RobotTrial:
         self._filter = safety
         self._random = Random([derive_seed(seed, "behavior")], len(names))
         self._memory = None
-        self._samples: List[List[float]] = []
+        self._samples: List[np.ndarray] = []
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._reached = False
 
@@ -74,11 +73,9 @@ class RobotTrial:
         else:
             velocities = (poses - self._last[1]) / max(time_s - self._last[0], 1e-3)
         self._last = (time_s, poses.copy())
-        names, until = list_sources(self._experiment), self._experiment.until
-        seen = poses[None], velocities[None], things.poses, self._filter.radii_m
-        values = [float(METRICS[name](*seen)[0]) for name in names]
-        self._samples.append(values)
-        self._reached = until is not None and bool(until.holds(values[names.index(until.metric)]))
+        state = poses[None], velocities[None], things.poses, self._filter.radii_m
+        (sample,), (self._reached,) = measure(self._experiment, *state)
+        self._samples.append(sample)
 
     def list_values(self) -> Tuple[float, ...]:
         """Return the values of the columns, from the samples that were taken; nan without any."""

@@ -52,11 +52,13 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
     arena = trial.rows.world.arena
     axes.add_collection(LineCollection(arena.segments_m.reshape(-1, 2, 2), colors="0.4", linewidths=2))
     axes.add_collection(_make_circles(axes, arena.circles_m, "#c07a2e"))
-    moving = Film(axes)
 
     def draw_frames() -> Iterator[np.ndarray]:
+        parts: List[Any] = []
         for number, frame in enumerate(frames):
-            moving.show(number * speed / FRAMES_PER_S, *frame)
+            for part in parts:
+                part.remove()
+            parts = draw_moving(axes, number * speed / FRAMES_PER_S, *frame)
             canvas.draw()
             yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
@@ -99,28 +101,18 @@ def _find_limits(trial: Trial, frames: List[Any]) -> Tuple[np.ndarray, np.ndarra
     return places_m.min(axis=0) - _MARGIN_M, places_m.max(axis=0) + _MARGIN_M
 
 
-class Film:
-    """The moving parts of the picture."""
-
-    def __init__(self, axes: Any) -> None:
-        """Draw nothing yet."""
-        self._axes = axes
-        self._parts: List[Any] = []
-
-    def show(self, time_s: float, poses: np.ndarray, edges_m: Sequence[Any], discs_m: Sequence[Any]) -> None:
-        """Draw robots, objects (see list_outlines()) and the time in place of what was drawn before."""
-        for part in self._parts:
-            part.remove()
-        places_m, headings = poses[:, :2], np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])))
-        noses_m = np.stack((places_m, places_m + BODY_RADIUS_M * headings), axis=1)
-        bodies_m = np.column_stack((places_m, np.full(len(poses), BODY_RADIUS_M)))
-        self._parts = [
-            self._axes.add_collection(collection)
-            for collection in (
-                LineCollection(np.reshape(edges_m, (-1, 2, 2)), colors="#c07a2e", linewidths=2),
-                _make_circles(self._axes, np.reshape(discs_m, (-1, 3)), "#c07a2e"),
-                _make_circles(self._axes, bodies_m, "#0072B2"),
-                LineCollection(noses_m, colors="white", linewidths=1),
-            )
-        ]
-        self._parts.append(self._axes.text(0.02, 0.97, "%.1f s" % time_s, transform=self._axes.transAxes, va="top"))
+def draw_moving(
+    axes: Any, time_s: float, poses: np.ndarray, edges_m: Sequence[Any], discs_m: Sequence[Any]
+) -> List[Any]:
+    """Draw robots, objects (see list_outlines()) and the time; return the parts."""
+    places_m, headings = poses[:, :2], np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])))
+    noses_m = np.stack((places_m, places_m + BODY_RADIUS_M * headings), axis=1)
+    bodies_m = np.column_stack((places_m, np.full(len(poses), BODY_RADIUS_M)))
+    collections = (
+        LineCollection(np.reshape(edges_m, (-1, 2, 2)), colors="#c07a2e", linewidths=2),
+        _make_circles(axes, np.reshape(discs_m, (-1, 3)), "#c07a2e"),
+        _make_circles(axes, bodies_m, "#0072B2"),
+        LineCollection(noses_m, colors="white", linewidths=1),
+    )
+    text = axes.text(0.02, 0.97, "%.1f s" % time_s, transform=axes.transAxes, va="top")
+    return [*map(axes.add_collection, collections), text]

@@ -12,6 +12,7 @@ from std_msgs.msg import Float32
 from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program, ProgramError, Swarm, read_parameters, run
+from hero_client.swarm import open_swarm
 from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 
@@ -144,9 +145,7 @@ def behavior() -> None:
     with Program("behavior") as program:
         parameters = read_parameters(PARAMETERS)
         _make_behavior(parameters)
-        ids = parameters["robots"]
-        with (Swarm.discover(odom=False, proximity=False, sleep=program.sleep) if ids is None
-              else Swarm(ids, odom=False, proximity=False)) as swarm:  # fmt: skip
+        with open_swarm(program, parameters["robots"], odom=False, proximity=False) as swarm:
             node = BehaviorNode(swarm, parameters)
             end_s = parameters["time_s"] or np.inf
             text = "%s drives %d robots; its metric, %s, is on %s"

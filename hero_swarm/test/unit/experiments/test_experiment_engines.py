@@ -9,6 +9,7 @@ from concurrent.futures import Executor, Future
 
 import pytest
 
+from hero_node.errors import ProgramError
 from hero_swarm.experiments import engines
 from hero_swarm.experiments.errors import ExperimentError
 
@@ -60,7 +61,7 @@ def test_an_error_of_the_users_code_reaches_the_program():
 
 def test_without_dask_the_error_names_its_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ExperimentError, match="python3-distributed"):
+    with pytest.raises(ProgramError, match="python3-distributed"):
         engines.open_dask("tcp://127.0.0.1:1", lambda: "")
 
 

@@ -36,7 +36,7 @@ def catch_frames(monkeypatch):
 
 def test_frames_are_a_tenth_of_a_second_of_the_video_apart(written, monkeypatch):
     shown = []
-    monkeypatch.setattr(video.Film, "show", lambda film, *frame: shown.append(frame))
+    monkeypatch.setattr(video, "draw_moving", lambda axes, *frame: shown.append(frame) or [])
     video.write_video(make_trial(), 2.0, 4.0, "run.gif")
     ((writer, path, frames),) = written
     assert (writer, path, len(frames)) == ("_write_gif", "run.gif", 5)
@@ -76,12 +76,24 @@ def test_obstacles_and_objects_are_shown_where_they_are(name, written):
     assert around and all((patch == (0xC0, 0x7A, 0x2E)).all(axis=2).any() for patch in around)
 
 
-def test_each_frame_replaces_the_one_before():
+def test_each_frame_replaces_the_one_before(written):
+    trial = make_trial(load_arena("empty"))
+    video.write_video(trial, 3.0, 10.0, "run.gif")
+    ((_, _, (first, *_, last)),) = written
+    scale, middle = len(first) / (float(trial.rows.world.arena.bounds_m[2]) + 0.2) / 2.0, len(first) // 2
+    rear = middle, middle + round(scale * (-0.5 - 0.02))
+    assert first[rear].tolist() == [0x00, 0x72, 0xB2] and last[rear].tolist() == [0xFF] * 3
+
+
+def test_a_frame_is_drawn_in_parts_that_can_be_removed():
     axes = Figure(figsize=(6.0, 6.0)).add_axes((0.0, 0.0, 1.0, 1.0))
-    film = video.Film(axes)
+    parts = []
     poses = np.array([(1.0, 2.0, 0.0), (3.0, 4.0, np.pi / 2.0)])
     for time_s, shift_m in ((0.0, 5.0), (1.25, 0.0)):
-        film.show(time_s, poses + (shift_m, 0.0, 0.0), [(0.0, 0.0, 1.0, 0.0)], [(0.0, 0.0, 0.3)])
+        for part in parts:
+            part.remove()
+        objects = [(0.0, 0.0, 1.0, 0.0)], [(0.0, 0.0, 0.3)]
+        parts = video.draw_moving(axes, time_s, poses + (shift_m, 0.0, 0.0), *objects)
         assert len(axes.collections) == 4 and len(axes.texts) == 1
     outlines, objects, robots, noses = axes.collections
     assert outlines.get_segments()[0].tolist() == [[0.0, 0.0], [1.0, 0.0]]

@@ -9,6 +9,8 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from hero_node.optional import import_optional
+
 from ..errors import ExperimentError
 
 RESAMPLES = 9999
@@ -83,7 +85,7 @@ def cliffs_delta(first: Sequence[float], second: Sequence[float]) -> float:
 def compare_pairs(first: Sequence[float], second: Sequence[float]) -> Comparison:
     """Compare values of the same seeds, in the same order.
 
-    Raises: ExperimentError for samples of different lengths, for a value that is not finite, or without scipy.
+    Raises: ExperimentError for samples of different lengths, or a value that is not finite. ProgramError without scipy.
     """
     ours, theirs = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if len(ours) != len(theirs):
@@ -102,13 +104,7 @@ def _signed_rank(differences: np.ndarray) -> float:
     unequal = differences[differences != 0.0]
     if not len(unequal):
         return 1.0
-    try:
-        from scipy.stats import wilcoxon
-    except ImportError as error:
-        raise ExperimentError(
-            "comparing cells needs scipy: apt install python3-scipy, or pip install scipy"
-        ) from error
-    return float(wilcoxon(unequal).pvalue)
+    return float(import_optional("scipy.stats", "python3-scipy").wilcoxon(unequal).pvalue)
 
 
 def correct_by_holm(p_values: Sequence[float]) -> Tuple[float, ...]:
