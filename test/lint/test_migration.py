@@ -45,7 +45,9 @@ def test_launch_files_that_are_the_same_exist(name):
 def test_topics_and_services_that_are_the_same_are_those_of_the_robots(name):
     robot = sources.ROOT / "hero_sim" / "src" / "hero_sim" / "robot"
     declared = (robot / "declarations.py").read_text() + (robot / "models.py").read_text()
-    assert '%%s/%s"' % name in declared
+    controller, _, last = name.rpartition("/")
+    parts = ['%%s/%s/"' % controller, '+ "%s"' % last] if controller else ['%%s/%s"' % name]  # of both controllers
+    assert all(part in declared for part in parts)
 
 
 @pytest.mark.parametrize("name", NAMES["other"]["types"])
