@@ -16,9 +16,8 @@ from .robot.models import parse_models
 from .robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from .simulator import Simulator
 from .swarm import Swarm
-from .world.body import Body
+from .world.body import Body, SharedReadings
 from .world.robot_errors import SERVO_CENTER_US, RobotErrors
-from .world.shared_readings import SharedReadings
 
 BOOT_SPREAD_MS = 200
 """Robots that are started together come up within this time of each other."""

@@ -8,10 +8,9 @@ from hero_sim.robot import ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import range_sensors
 from hero_sim.world.arena import Segments, build_default
-from hero_sim.world.body import Body
+from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.kinematics import find_heading
 from hero_sim.world.robot_errors import draw_errors
-from hero_sim.world.shared_readings import SharedReadings
 from hero_sim.world.world import STEP_MS, World
 
 NO_WALLS = np.empty((0, 4))

@@ -5,10 +5,9 @@ import pytest
 
 from hero_sim.world import world as worlds
 from hero_sim.world.arena import build_default, place_robots
-from hero_sim.world.body import Body
+from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.kinematics import split_to_wheels
 from hero_sim.world.robot_errors import MAX_WHEEL_M_S, SERVO_LAG_S, draw_errors
-from hero_sim.world.shared_readings import SharedReadings
 
 
 def build_world(robots=1, arena=None, errors=0.0, poses=None, seed=0):

@@ -21,9 +21,9 @@ SEQ_NEVER_COUNTED = 0xFFFFFFFF
 
 _STAMP = struct.Struct("<II")
 _HEADER = struct.Struct("<III")
-_LENGTH = struct.Struct("<I")
-_POSE = struct.Struct("<7d")
-_TWIST = struct.Struct("<6d")
+LENGTH_FORM = struct.Struct("<I")
+POSE_FORM = struct.Struct("<7d")
+TWIST_FORM = struct.Struct("<6d")
 _QUATERNION = struct.Struct("<4d")
 _ENCODER = struct.Struct("<11d")
 _PLUS_ENCODER = struct.Struct("<12d")
@@ -60,13 +60,15 @@ _LINEAR_COVARIANCE = (
 )  # fmt: skip
 
 
-def _text(value: str) -> bytes:
-    data = value.encode("ascii")
-    return _LENGTH.pack(len(data)) + data
+def encode_text(value: str) -> bytes:
+    """Return a string as it lies in a message."""
+    data = value.encode()
+    return LENGTH_FORM.pack(len(data)) + data
 
 
-def _header(seq: int, frame_id: str) -> bytes:
-    return _HEADER.pack(seq, 0, 0) + _text(frame_id)
+def encode_header(seq: int, frame_id: str, stamp: Tuple[int, int] = (0, 0)) -> bytes:
+    """Return a Header; stamp: s, ns."""
+    return _HEADER.pack(seq, *stamp) + encode_text(frame_id)
 
 
 @functools.lru_cache(maxsize=None)
@@ -87,9 +89,9 @@ class CycleMessages:
         """Build the templates of the robot called name (hero_N)."""
         self._encoder_form = _PLUS_ENCODER if model.is_plus else _ENCODER
         odom_id, base_id = name + "/odom", name + "/base_link"
-        odom = _header(SEQ_NEVER_COUNTED, odom_id) + _text(base_id)
-        odom += bytes(_POSE.size + _COVARIANCE_LENGTH + _TWIST.size + _COVARIANCE_LENGTH)
-        encoder = _header(SEQ_NEVER_COUNTED, name + "/encoder") + bytes(self._encoder_form.size)
+        odom = encode_header(SEQ_NEVER_COUNTED, odom_id) + encode_text(base_id)
+        odom += bytes(POSE_FORM.size + _COVARIANCE_LENGTH + TWIST_FORM.size + _COVARIANCE_LENGTH)
+        encoder = encode_header(SEQ_NEVER_COUNTED, name + "/encoder") + bytes(self._encoder_form.size)
         transforms = [
             _build_transform(odom_id, base_id, (0.0, 0.0, 0.0)),
             _build_transform(base_id, name + "/left_wheel_link", (0.0, _WHEEL_Y_M, _WHEEL_Z_M)),
@@ -109,8 +111,8 @@ class CycleMessages:
             self._sums.append((start + _SUMMED_OFFSET, ends[-1]))
         # Behind the sequence number; in a tfMessage the number of transforms comes first.
         self._stamps = [starts[0] + 4] + [start + 8 for start in starts[1:6]] + [starts[6] + 4]
-        self._twist = ends[0] - _COVARIANCE_LENGTH - _TWIST.size
-        self._poses = (self._twist - _COVARIANCE_LENGTH - _POSE.size, ends[1] - _POSE.size)
+        self._twist = ends[0] - _COVARIANCE_LENGTH - TWIST_FORM.size
+        self._poses = (self._twist - _COVARIANCE_LENGTH - POSE_FORM.size, ends[1] - POSE_FORM.size)
         self._left_wheel = ends[2] - _QUATERNION.size
         self._right_wheel = ends[3] - _QUATERNION.size
         self._encoder = ends[6] - self._encoder_form.size
@@ -134,8 +136,8 @@ class CycleMessages:
         for place in self._stamps:
             _STAMP.pack_into(data, place, *stamp)
         for place in self._poses:
-            _POSE.pack_into(data, place, x_m, y_m, 0.0, 0.0, 0.0, yaw_z, yaw_w)
-        _TWIST.pack_into(data, self._twist, linear, 0.0, 0.0, 0.0, 0.0, angular)
+            POSE_FORM.pack_into(data, place, x_m, y_m, 0.0, 0.0, 0.0, yaw_z, yaw_w)
+        TWIST_FORM.pack_into(data, self._twist, linear, 0.0, 0.0, 0.0, 0.0, angular)
         _QUATERNION.pack_into(data, self._left_wheel, 0.0, left_y, 0.0, left_w)
         _QUATERNION.pack_into(data, self._right_wheel, 0.0, right_y, 0.0, right_w)
         if self._encoder_form is _PLUS_ENCODER:
@@ -150,7 +152,7 @@ class CycleMessages:
 def _build_transform(parent: str, child: str, place_m: Sequence[float]) -> bytes:
     """Return a tfMessage with one transform, without rotation."""
     values = round_to_float32((*place_m, 0.0, 0.0, 0.0, 1.0))
-    return _LENGTH.pack(1) + _header(0, parent) + _text(child) + _POSE.pack(*values)
+    return LENGTH_FORM.pack(1) + encode_header(0, parent) + encode_text(child) + POSE_FORM.pack(*values)
 
 
 def _wheel_half_angle(ticks: float) -> float:
@@ -167,7 +169,7 @@ def encode_laser(
     """
     limits = (-math.pi, math.pi, LASER_ANGLE_INCREMENT_RAD, 0.0, 0.0, LASER_RANGE_MIN_M, LASER_RANGE_MAX_M)
     values = struct.pack("<7fI16fI16f", *limits, 16, *_interpolate(ranges_m), 16, *_interpolate(counts))
-    return _HEADER.pack(seq & 0xFFFFFFFF, *stamp) + _text(name + "/laser_link") + values
+    return encode_header(seq & 0xFFFFFFFF, name + "/laser_link", stamp) + values
 
 
 def _interpolate(values: Sequence[float]) -> List[float]:
@@ -187,9 +189,9 @@ def encode_imu(name: str, stamp: Tuple[int, int], heading_rad: float, angular_co
     yaw_z, yaw_w, angular_z, gravity = round_to_float32((*turn, angular_counts, _GRAVITY))
     turned = (0.0, 0.0, yaw_z, yaw_w, *[0.0] * 9, 0.0, 0.0, angular_z, *_ANGULAR_COVARIANCE)
     values = struct.pack("<37d", *turned, 0.0, 0.0, gravity, *_LINEAR_COVARIANCE)
-    return _HEADER.pack(SEQ_NEVER_COUNTED, *stamp) + _text(name + "/hat_link") + values
+    return encode_header(SEQ_NEVER_COUNTED, name + "/hat_link", stamp) + values
 
 
 def encode_answer(success: bool, text: str) -> bytes:
     """Return the payload of a service's response: bool success, string message."""
-    return bytes((success,)) + _text(text)
+    return bytes((success,)) + encode_text(text)

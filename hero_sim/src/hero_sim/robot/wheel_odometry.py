@@ -50,8 +50,7 @@ class WheelOdometry:
         self.pose = Pose(0.0, 0.0, 0.0)
         self.ticks = (0, 0)
         self.filtered_m_s = (0.0, 0.0)
-        self._counted_ticks = (math.floor(left_m / self.tick_m), math.floor(right_m / self.tick_m))
-        self._base_ticks = self._counted_ticks
+        self._base_ticks = (math.floor(left_m / tick_m), math.floor(right_m / tick_m))
         self._diff_ticks = (0, 0)
         self._read_at_us = 0
         self._timestep_s = 0.0
@@ -60,12 +59,9 @@ class WheelOdometry:
 
     def read_encoders(self, now_us: int, left_m: float, right_m: float) -> None:
         """Take the wheels' travel (m) at now_us of the robot's own clock; overwrites the last interval."""
-        tick_m = self.tick_m
-        left, right = math.floor(left_m / tick_m), math.floor(right_m / tick_m)
-        self._counted_ticks = (left, right)
-        ticks = (left - self._base_ticks[0], right - self._base_ticks[1])
-        self._diff_ticks = (ticks[0] - self.ticks[0], ticks[1] - self.ticks[1])
-        self.ticks = ticks
+        left, right = self.count_ticks(left_m, right_m)
+        self._diff_ticks = (left - self.ticks[0], right - self.ticks[1])
+        self.ticks = (left, right)
         self._timestep_s = (now_us - self._read_at_us) / 1e6
         self._read_at_us = now_us
         if self._timestep_s > 0.0:
@@ -96,7 +92,7 @@ class WheelOdometry:
     def set_pose(self, pose: Pose) -> None:
         """Begin anew at this pose; the tick counters go to zero (Odometry.ino:234)."""
         self.pose = pose
-        self._base_ticks = self._counted_ticks
+        self._base_ticks = (self._base_ticks[0] + self.ticks[0], self._base_ticks[1] + self.ticks[1])
         self.ticks = self._diff_ticks = (0, 0)
 
     def set_heading(self, yaw_rad: float) -> None:

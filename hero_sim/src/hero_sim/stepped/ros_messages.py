@@ -9,6 +9,7 @@ from typing import Dict, Iterable, List, NamedTuple, Sequence, Tuple
 
 from hero_node.geometry import Pose
 
+from ..robot.messages import LENGTH_FORM, POSE_FORM, TWIST_FORM, encode_header, encode_text
 from ..scene import Shape
 
 
@@ -87,21 +88,12 @@ MARKER_ARRAY = _define(
     *("geometry_msgs/Vector3", "std_msgs/ColorRGBA"),
 )
 
-_LENGTH = struct.Struct("<I")
-_HEADER = struct.Struct("<III")
-_POSE = struct.Struct("<7d")
-_TWIST = struct.Struct("<6d")
 _MARKER = struct.Struct("<3i10d4f2i?2I")  # id to the number of colors
 _NO_COVARIANCE = bytes(36 * 8)
 
 
-def _text(value: str) -> bytes:
-    data = value.encode()
-    return _LENGTH.pack(len(data)) + data
-
-
 def _header(time_ns: int, frame: str) -> bytes:
-    return _HEADER.pack(0, *divmod(time_ns, 10**9)) + _text(frame)
+    return encode_header(0, frame, divmod(time_ns, 10**9))
 
 
 def _place(pose: Pose, z_m: float = 0.0) -> Tuple[float, ...]:
@@ -111,14 +103,14 @@ def _place(pose: Pose, z_m: float = 0.0) -> Tuple[float, ...]:
 
 def encode_twist(linear_m_s: float, angular_rad_s: float) -> bytes:
     """Return a TWIST in the plane."""
-    return _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
+    return TWIST_FORM.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
 
 
 def encode_odometry(
     time_ns: int, frames: Tuple[str, str], pose: Pose, linear_m_s: float, angular_rad_s: float
 ) -> bytes:
     """Return an ODOMETRY; frames: of the pose, and of the robot."""
-    content = _header(time_ns, frames[0]) + _text(frames[1]) + _POSE.pack(*_place(pose)) + _NO_COVARIANCE
+    content = _header(time_ns, frames[0]) + encode_text(frames[1]) + POSE_FORM.pack(*_place(pose)) + _NO_COVARIANCE
     return content + encode_twist(linear_m_s, angular_rad_s) + _NO_COVARIANCE
 
 
@@ -133,9 +125,10 @@ def encode_scan(time_ns: int, frame: str, ranges_m: Sequence[float], limits_m: T
 def encode_transforms(time_ns: int, transforms: Iterable[Tuple[str, str, Pose]]) -> bytes:
     """Return a TF_MESSAGE; each transform: parent, child, pose of the child in the parent."""
     encoded = [
-        _header(time_ns, parent) + _text(child) + _POSE.pack(*_place(pose)) for parent, child, pose in transforms
+        _header(time_ns, parent) + encode_text(child) + POSE_FORM.pack(*_place(pose))
+        for parent, child, pose in transforms
     ]
-    return _LENGTH.pack(len(encoded)) + b"".join(encoded)
+    return LENGTH_FORM.pack(len(encoded)) + b"".join(encoded)
 
 
 def encode_markers(time_ns: int, frame: str, shapes: Iterable[Shape]) -> bytes:
@@ -144,5 +137,6 @@ def encode_markers(time_ns: int, frame: str, shapes: Iterable[Shape]) -> bytes:
     for shape in shapes:
         values = (shape.number, shape.kind, 0, *_place(shape.pose, shape.z_m), *shape.size_m, *shape.color)
         body = _MARKER.pack(*values, 0, 0, False, 0, 0)
-        encoded.append(_header(time_ns, frame) + _text(shape.namespace) + body + _text(shape.text) + _text("") + b"\0")
-    return _LENGTH.pack(len(encoded)) + b"".join(encoded)
+        head = _header(time_ns, frame) + encode_text(shape.namespace)
+        encoded.append(head + body + encode_text(shape.text) + encode_text("") + b"\0")
+    return LENGTH_FORM.pack(len(encoded)) + b"".join(encoded)
