@@ -55,12 +55,12 @@ def count_ticks_from_rest(driver):
     counts = {}
     driver.send_twist(0, 0.1, 0.0)
     first_ms = None
-    start_m = driver.swarm.world.travels_m[0, 0]
+    robot, start_m = driver.swarm.robots[0], driver.swarm.world.travels_m[0, 0]
     for ms in range(3100):
         if ms % 100 == 99:
             driver.send_twist(0, 0.1, 0.0)
         driver.run(1)
-        ticks = (driver.swarm.robots[0].body.read_wheels(driver.swarm.now_ms)[0] - start_m) / TICK_M
+        ticks = (robot.body.read_wheels(robot.to_millis(driver.swarm.now_ms))[0] - start_m) / TICK_M
         if first_ms is None and ticks >= 1.0:
             first_ms = driver.swarm.now_ms
         if first_ms is not None:

@@ -60,6 +60,7 @@ class ScalarRobot:
     def __init__(self, world, index, model, infrared):
         name, errors = "hero_%d" % index, world.errors
         body = Body(world, index, infrared)
+        body.booted_ms = -READY_MS
         calibration = calibrate(errors.alpha_counts_m2[index], errors.beta_counts[index])
         self.flash = flash = Flash(calibration.tolist(), np.rint(errors.servo_center_us[index]).tolist())
         self.sensing = Sensing(name, body, False, flash, model)
@@ -85,7 +86,7 @@ class ScalarRobot:
         self.send(now_ms)  # the driver takes at once what may go
 
     def call(self, topic_id, payload, now_ms):
-        self.table.receive(packets.Packet(topic_id, payload), READY_MS + now_ms, now_ms)
+        self.table.receive(packets.Packet(topic_id, payload), READY_MS + now_ms)
 
     def set_odometry(self, now_ms, *pose):
         self.call(RECEIVED["set_odom"], struct.pack("<3d", *pose), now_ms)
@@ -104,7 +105,7 @@ class ScalarRobot:
             self.call(*command, now_ms)
 
     def run_cycle(self, now_ms):
-        for packet in packets.PacketReader().receive_bytes(self.sensing.run_cycle(READY_MS + now_ms, now_ms, (0, 0))):
+        for packet in packets.PacketReader().receive_bytes(self.sensing.run_cycle(READY_MS + now_ms, (0, 0))):
             if packet.topic_id == SENT["laser"]:
                 header = len(packet.payload) - struct.calcsize("<7fI16fI16f")
                 self.counts = struct.unpack_from("<16f", packet.payload, header + 28 + 4 + 64 + 4)[::2]
@@ -122,7 +123,7 @@ class ScalarRobot:
     def run_motors(self, now_ms, control):
         motors = self.motors.motors
         if control or (motors.attached and READY_MS + now_ms >= motors.stop_at_ms):
-            self.motors.run(READY_MS + now_ms, now_ms, self.sensing.read_encoders)
+            self.motors.run(READY_MS + now_ms)
 
 
 class ScalarRobots:

@@ -56,7 +56,6 @@ class CommandTable:
         self._flash = flash
         self._log = log
         self._warn = warn
-        self._millis = 0
         self._now_ms = 0
         self.blocked_us = 0
         callbacks: Dict[str, Tuple[str, Callable[..., Optional[Answer]]]] = {
@@ -79,12 +78,12 @@ class CommandTable:
             if topic.key in received_ids
         }
 
-    def receive(self, packet: packets.Packet, millis: int, now_ms: int) -> Optional[bytes]:
-        """Execute packet at millis of the robot, now_ms of the world; return a service's answer, as a packet.
+    def receive(self, packet: packets.Packet, now_ms: int) -> Optional[bytes]:
+        """Execute packet at now_ms of the robot; return a service's answer, as a packet.
 
         Raises: CommandError for a payload that is not the declared message, or numbers that no robot computes with.
         """
-        self._millis, self._now_ms = millis, now_ms
+        self._now_ms = now_ms
         self.blocked_us = 0
         if packet.topic_id not in self._callbacks:
             return None  # The slots without a subscriber are empty: the firmware ignores them.
@@ -103,7 +102,7 @@ class CommandTable:
         return packets.encode_packet(answer_id, messages.encode_answer(*answer))
 
     def _set_light(self, *color: float) -> None:
-        self._sensing.set_light(self._millis, color)
+        self._sensing.set_light(self._now_ms, color)
         self.blocked_us = LIGHT_US
 
     def _enable_laser(self, is_enabled: bool) -> None:
@@ -112,11 +111,11 @@ class CommandTable:
     def _drive(self, controller: Controller, linear_m_s: float, angular_rad_s: float) -> None:
         # The robot's ros_lib reads a float64 into single precision (deserializeAvrFloat64).
         twist = messages.round_to_float32((linear_m_s, angular_rad_s))
-        if self._motors.receive_twist(controller, self._millis, self._now_ms, *twist):
+        if self._motors.receive_twist(controller, self._now_ms, *twist):
             self.blocked_us = STOP_US
 
     def _drive_motors(self, left_us: int, right_us: int) -> None:
-        self._motors.receive_pulses(self._millis, left_us, right_us)
+        self._motors.receive_pulses(self._now_ms, left_us, right_us)
         self.blocked_us = PULSES_US
 
     def _calibrate_ir(self, *calibration_counts_m2: float) -> Answer:
@@ -159,7 +158,7 @@ class CommandTable:
         self._log("\x1b[92m[/%s] %s\x1b[0m" % (self._name, text))
 
     def _tune(self, controller: Controller) -> Answer:
-        self._motors.start_tuning(controller, self._millis, self._now_ms)
+        self._motors.start_tuning(controller, self._now_ms)
         self.blocked_us = PULSES_US
         # The firmware never sets success here (VelocityControl.ino:229-245).
         return False, "PID Autotuning!"

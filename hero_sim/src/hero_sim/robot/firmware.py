@@ -104,7 +104,6 @@ class Firmware:
         self._servo_timing = servo_timing
         self._report = report
         self._phase = _PHASE_OFF
-        self._booted_at_ms = 0
         self._setup: List[Tuple[int, Callable[[int], None]]] = []
         self._reset_memory()
 
@@ -143,7 +142,7 @@ class Firmware:
             self.robot_id = robot_id
             self.name = "hero_%d" % robot_id
         self.switch_off()
-        self._booted_at_ms = now_ms
+        self.body.booted_ms = now_ms
         self._phase = _PHASE_BOOT
         self.due_ms = now_ms + BOOT_MS
 
@@ -247,7 +246,7 @@ class Firmware:
             self._run_loop(now_ms)
 
     def _connect_first(self, now_ms: int) -> None:
-        timeout_at_ms = self._booted_at_ms + BOOT_MS + CONNECT_TIMEOUT_MS
+        timeout_at_ms = self.body.booted_ms + BOOT_MS + CONNECT_TIMEOUT_MS
         if not self.connected and not self.wants_connection and now_ms < timeout_at_ms:
             self.sensing.show_searching()
             self.wants_connection = True
@@ -299,7 +298,7 @@ class Firmware:
 
     def to_millis(self, now_ms: int) -> int:
         """Return the robot's own count at now_ms, from power-on."""
-        return now_ms - self._booted_at_ms
+        return now_ms - self.body.booted_ms
 
     def _run_loop(self, now_ms: int) -> None:
         """Run one pass of loop() (firmware.ino:160-190), or continue a spin that blocks it."""
@@ -309,7 +308,7 @@ class Firmware:
                 self.log("\x1b[96m[/%s] Conected at time %d\x1b[0m" % (self.name, millis))
                 self._next_log_ms = now_ms + (LOG_MS if self.configured else UNCONFIGURED_LOG_MS)
             if self.configured and not self._is_held:
-                self._run_configured(millis, now_ms)
+                self._run_configured(millis)
                 self._is_held = self._hold(now_ms)
                 if self._is_held:
                     return
@@ -327,24 +326,24 @@ class Firmware:
     def _find_due(self) -> int:
         due_ms = min(self._next_log_ms, self._next_spin_ms)
         if self.configured:
-            due_ms = min(due_ms, self._booted_at_ms + min(self.sensing.due_ms, self.sensing.distance_due_ms))
+            due_ms = min(due_ms, self.body.booted_ms + min(self.sensing.due_ms, self.sensing.distance_due_ms))
             if self.motors.due_ms is not None:
-                due_ms = min(due_ms, self._booted_at_ms + self.motors.due_ms)
+                due_ms = min(due_ms, self.body.booted_ms + self.motors.due_ms)
         return min(due_ms, self._answers[0][0]) if self._answers else due_ms
 
     def _is_controller_due(self, millis: int) -> bool:
         due_ms = self.motors.due_ms
         return self.configured and due_ms is not None and millis >= due_ms
 
-    def _run_configured(self, millis: int, now_ms: int) -> None:
+    def _run_configured(self, millis: int) -> None:
         """Run sensors and controllers."""
         if millis >= self.sensing.due_ms:
             # Sending a cycle takes about a millisecond; a controller that is due waits for it.
-            self.send(self.sensing.run_cycle(millis, now_ms, self.clock.stamp(millis)))
+            self.send(self.sensing.run_cycle(millis, self.clock.stamp(millis)))
         elif millis >= self.sensing.distance_due_ms:
             self.send(self.sensing.measure_distance(millis))
         elif self._is_controller_due(millis):
-            self.motors.run(millis, now_ms, self.sensing.read_encoders)
+            self.motors.run(millis)
 
     # -- conversation --------------------------------------------------------------------------------------
 
@@ -415,7 +414,7 @@ class Firmware:
 
     def _receive_command(self, packet: packets.Packet, millis: int, now_ms: int) -> None:
         try:
-            answer = self._commands.receive(packet, millis, now_ms)
+            answer = self._commands.receive(packet, millis)
             self._blocked_us += self._commands.blocked_us
         except CommandError as error:
             self.warn(str(error))

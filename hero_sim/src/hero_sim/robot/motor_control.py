@@ -224,18 +224,16 @@ class MotorControl:
             if due_ms is not None and (self.due_ms is None or due_ms < self.due_ms):
                 self.due_ms = due_ms
 
-    def receive_twist(
-        self, controller: Controller, now_ms: int, world_ms: int, linear_m_s: float, angular_rad_s: float
-    ) -> bool:
+    def receive_twist(self, controller: Controller, now_ms: int, linear_m_s: float, angular_rad_s: float) -> bool:
         """Receive a Twist for a controller; return whether it was a zero that was accepted.
 
-        The position controller drives as far as that speed reaches in a second; world_ms is the world's time of now_ms.
+        The position controller drives as far as that speed reaches in a second.
         """
         if controller.is_too_early(now_ms):
             return False
         targets = _limit_to_wheels(linear_m_s, angular_rad_s)
         if controller is self.position:
-            self._start_ticks = self._count_ticks(world_ms)
+            self._start_ticks = self._count_ticks(now_ms)
             targets = (targets[0] / self._odometry.tick_m, targets[1] / self._odometry.tick_m)
         stops = not any(targets)
         if stops:
@@ -252,31 +250,27 @@ class MotorControl:
         self.motors.write(now_ms, left_us, right_us)
         self._reschedule(now_ms)
 
-    def start_tuning(self, controller: Controller, now_ms: int, world_ms: int) -> None:
+    def start_tuning(self, controller: Controller, now_ms: int) -> None:
         """Begin a controller's self-tuning, which ends by its own failure or by a Twist that is not dropped."""
         self._log("\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self._name)
         is_position = controller is self.position
         limits_ms = POSITION_TUNING_MS if is_position else VELOCITY_TUNING_MS
         controller.start_tuning(now_ms, int(self._rng.randint(*limits_ms)))
-        self._tuning_start_ticks = self._count_ticks(world_ms)
+        self._tuning_start_ticks = self._count_ticks(now_ms)
         self._relay = [1, 1]
         start_us = 0 if is_position else _VELOCITY_TUNING_START_US
         self.motors.drive(now_ms, (start_us, start_us))
         self._reschedule(now_ms)
 
-    def run(self, now_ms: int, world_ms: int, read_encoders: Callable[[int, int], None]) -> None:
-        """Do what is due.
-
-        The velocity controller reads the encoders anew with read_encoders(now_ms, world_ms), and so takes a
-        reading away from the odometry.
-        """
+    def run(self, now_ms: int) -> None:
+        """Do what is due; the velocity controller reads the encoders, and so takes a reading away from the odometry."""
         if self.position.is_due(now_ms):
             if self.position.tuning:
-                self._tune_position(now_ms, self._count_ticks_since(world_ms, self._tuning_start_ticks))
+                self._tune_position(now_ms, self._count_ticks_since(now_ms, self._tuning_start_ticks))
             else:
-                self.position.run_pids(now_ms, self._count_ticks_since(world_ms, self._start_ticks))
+                self.position.run_pids(now_ms, self._count_ticks_since(now_ms, self._start_ticks))
         if self.velocity.is_due(now_ms):
-            read_encoders(now_ms, world_ms)
+            self._odometry.read_encoders(now_ms * 1000, *self._body.read_wheels(now_ms))
             if self.velocity.tuning:
                 self._tune(self.velocity, now_ms, self._odometry.filtered_m_s, _VELOCITY_TUNING_US)
             else:
@@ -303,11 +297,11 @@ class MotorControl:
         text = "[%f,%f], [%f,%f]->[%d,%d]" % (*controller.targets, *measured, *outputs_us)
         self._log("\x1b[93m[/%s] Tunning Motor Set: %s\x1b[0m" % (self._name, text))
 
-    def _count_ticks(self, world_ms: int) -> List[int]:
-        return self._odometry.count_ticks(*self._body.read_wheels(world_ms))
+    def _count_ticks(self, now_ms: int) -> List[int]:
+        return self._odometry.count_ticks(*self._body.read_wheels(now_ms))
 
-    def _count_ticks_since(self, world_ms: int, start_ticks: Sequence[int]) -> List[int]:
-        return [now - start for now, start in zip(self._count_ticks(world_ms), start_ticks)]
+    def _count_ticks_since(self, now_ms: int, start_ticks: Sequence[int]) -> List[int]:
+        return [now - start for now, start in zip(self._count_ticks(now_ms), start_ticks)]
 
 
 def _limit_to_wheels(linear_m_s: float, angular_rad_s: float) -> Tuple[float, float]:

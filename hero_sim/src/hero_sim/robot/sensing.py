@@ -95,32 +95,28 @@ class Sensing:
         """Return the visible color."""
         return self._light if now_ms <= self._light_until_ms else _DARK
 
-    def read_encoders(self, millis: int, now_ms: int) -> None:
-        """Read the encoders, which takes the last interval away from the odometry."""
-        self.odometry.read_encoders(millis * 1000, *self._body.read_wheels(now_ms))
-
-    def run_cycle(self, millis: int, now_ms: int, stamp: Tuple[int, int]) -> bytes:
-        """Return the packets of one cycle; millis is the robot's time, now_ms the world's."""
+    def run_cycle(self, now_ms: int, stamp: Tuple[int, int]) -> bytes:
+        """Return the packets of one cycle."""
         parts: List[bytes] = []
         odometry = self.odometry
         odometry.integrate()
         if self._imu is not None:
-            parts.append(self._measure_imu(self._imu, millis, stamp))
-        if self.laser_enabled and millis - self._laser_at_ms > LASER_GATE_MS:
-            self._laser_at_ms = millis
+            parts.append(self._measure_imu(self._imu, now_ms, stamp))
+        if self.laser_enabled and now_ms - self._laser_at_ms > LASER_GATE_MS:
+            self._laser_at_ms = now_ms
             parts.append(self._measure_laser(stamp))
         shown = (odometry.pose, odometry.twist, odometry.ticks)
-        self.read_encoders(millis, now_ms)
+        odometry.read_encoders(now_ms * 1000, *self._body.read_wheels(now_ms))
         parts.append(self._cycle_messages.encode(stamp, *shown, odometry.list_encoder_values()))
-        self.due_ms = millis + CYCLE_MS
+        self.due_ms = now_ms + CYCLE_MS
         if self.laser_enabled and self.due_ms - self._laser_at_ms > LASER_GATE_MS:
             self.due_ms += LASER_READ_MS
-            self._body.expect_infrared(now_ms + self.due_ms - millis)
+            self._body.expect_infrared(self.due_ms)
         return b"".join(parts)
 
-    def measure_distance(self, millis: int) -> bytes:
+    def measure_distance(self, now_ms: int) -> bytes:
         """Return the packet of the distance sensor."""
-        self.distance_due_ms = millis + DISTANCE_MS
+        self.distance_due_ms = now_ms + DISTANCE_MS
         return packets.encode_packet(self._ids["distance"], struct.pack("<f", self._body.read_distance()))
 
     def _measure_laser(self, stamp: Tuple[int, int]) -> bytes:
@@ -130,8 +126,8 @@ class Sensing:
         payload = messages.encode_laser(self._name, self._laser_seq, stamp, ranges_m.tolist(), counts.tolist())
         return packets.encode_packet(self._ids["laser"], payload)
 
-    def _measure_imu(self, imu: ImuHat, millis: int, stamp: Tuple[int, int]) -> bytes:
-        heading_rad, angular_counts = imu.read(millis, self._body.true_pose.yaw_rad, self._body.angular_rad_s)
+    def _measure_imu(self, imu: ImuHat, now_ms: int, stamp: Tuple[int, int]) -> bytes:
+        heading_rad, angular_counts = imu.read(now_ms, self._body.true_pose.yaw_rad, self._body.angular_rad_s)
         self.odometry.set_heading(heading_rad)
         payload = messages.encode_imu(self._name, stamp, heading_rad, angular_counts)
         return packets.encode_packet(self._ids["imu"], payload)

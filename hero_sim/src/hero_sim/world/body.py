@@ -1,6 +1,6 @@
 """The hardware of one robot, as its firmware sees it: one row of the world's arrays.
 
-Pure: time is the world's, ms.
+Pure: time is the robot's own, ms since it was switched on.
 """
 
 from typing import Dict, List
@@ -49,6 +49,7 @@ class Body:
 
     Attributes:
         index: its row in the world.
+        booted_ms: the world's time at which it was switched on.
         odom_origin: true pose of the robot's odom frame, since its odometry was last set. A restart of the
             firmware does not change it: odometry continues where it was.
     """
@@ -57,6 +58,7 @@ class Body:
         """Be the robot at index of world, whose infrared readings all its robots share."""
         self._world = world
         self.index = index
+        self.booted_ms = 0
         self._infrared = infrared
         centers_us, dead_zone_us = world.errors.servo_center_us[index], world.errors.dead_zone_us[index, 0]
         self._servos = centers_us.tolist(), [float(dead_zone_us)] * 2, world.servo_gains_m_s_us[index].tolist()
@@ -83,15 +85,15 @@ class Body:
         """Place the odom frame where the robot's odometry is now pose."""
         self.odom_origin = find_frame(self.true_pose, pose)
 
-    def read_wheels(self, time_ms: int) -> List[float]:
+    def read_wheels(self, now_ms: int) -> List[float]:
         """Return the travel (m) of the left and right wheel, at a time within the running step."""
         left_m, right_m, left_m_s, right_m_s = self._world.wheel_rows[self.index]
-        since_step_s = (time_ms - self._world.time_ms) / 1000.0
+        since_step_s = (self.booted_ms + now_ms - self._world.time_ms) / 1000.0
         return [left_m + left_m_s * since_step_s, right_m + right_m_s * since_step_s]
 
-    def expect_infrared(self, time_ms: int) -> None:
+    def expect_infrared(self, at_ms: int) -> None:
         """Note when the next reading of the eight sensors is due."""
-        self._infrared.due_ms[self.index] = time_ms
+        self._infrared.due_ms[self.index] = self.booted_ms + at_ms
 
     def read_infrared(self) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors."""
