@@ -13,6 +13,7 @@ import rospy
 from hero_node.command_line import run
 from hero_node.errors import ProgramError
 from hero_node.file_limit import raise_file_limit
+from hero_node.optional import import_optional
 from hero_node.ros.program import Program
 
 from .background import Background
@@ -40,7 +41,7 @@ class Monitor:
     """Pages, the fleet that they show, and what they may do with it."""
 
     def __init__(self, parameters: Parameters, program: Program) -> None:
-        # Here, so that a machine without tornado gets a line that says what to do.
+        # Here, so that a machine without tornado gets a line that says what to do: see _main().
         import tornado.ioloop
 
         from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
@@ -195,14 +196,8 @@ class Monitor:
 def _main() -> None:
     with Program("hero_monitor") as program:
         parameters = load_parameters()
-        try:
-            monitor = Monitor(parameters, program)
-        except ImportError as error:
-            raise ProgramError(
-                "needs the Python package %s: apt-get install python3-tornado, or conda install tornado"
-                % (error.name or "tornado")
-            ) from None
-        monitor.run()
+        import_optional("tornado", "python3-tornado")
+        Monitor(parameters, program).run()
 
 
 def main() -> None:

@@ -1,24 +1,30 @@
-// A button that acts when it is held for a while, by finger, mouse or keyboard: no tap does it by mistake.
+// Buttons that are held by finger, mouse or keyboard; one that acts after a while, which no tap does by mistake.
 
 const STEP_MS = 50;
 const GAP_MS = 400; // the page was suspended: the hold does not count
+
+/** Call begin(event) when a pointer or one of these keys holds a button, and end() however that ends. */
+export function listenToHold(button, keys, begin, end) {
+  button.addEventListener("pointerdown", begin);
+  for (const name of ["pointerup", "pointercancel", "pointerleave", "lostpointercapture", "blur"]) {
+    button.addEventListener(name, end);
+  }
+  button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("keydown", (event) => {
+    if (!keys.includes(event.code)) return;
+    event.preventDefault();
+    if (!event.repeat) begin(event);
+  });
+  button.addEventListener("keyup", (event) => keys.includes(event.code) && end());
+}
 
 export class HoldButton {
   /** mayHold(): whether a hold may begin or continue. */
   constructor(button, holdMs, { mayHold, onHeld, onShort }) {
     Object.assign(this, { button, holdMs, mayHold, onHeld, onShort });
     this.timer = null;
-    button.addEventListener("pointerdown", (event) => event.isPrimary && event.button === 0 && this.begin());
-    for (const end of ["pointerup", "pointercancel", "pointerleave", "blur"]) {
-      button.addEventListener(end, () => this.end());
-    }
-    button.addEventListener("contextmenu", (event) => event.preventDefault());
-    button.addEventListener("keydown", (event) => {
-      if (event.code !== "Space" && event.code !== "Enter") return;
-      event.preventDefault();
-      if (!event.repeat) this.begin();
-    });
-    button.addEventListener("keyup", () => this.end());
+    const begin = ({ isPrimary = true, button = 0 }) => isPrimary && button === 0 && this.begin();
+    listenToHold(button, ["Space", "Enter"], begin, () => this.end());
     document.addEventListener("visibilitychange", () => this.end());
   }
 

@@ -7,6 +7,7 @@
 import { Lines, element, isPressed, make, setPressed, setText } from "../dom.js";
 import { colorOf } from "../map/colors.js";
 import { isLate } from "../connection.js";
+import { listenToHold } from "../hold.js";
 import { healthOf, spanOf } from "./fleet.js";
 import { nearestOf } from "../history.js";
 import { stateOf } from "../losses.js";
@@ -29,27 +30,18 @@ export class RobotPanel {
     const pad = element("pad");
     for (const button of pad.querySelectorAll("button")) {
       const direction = button.dataset.direction.split(" ").map(Number);
-      button.addEventListener("pointerdown", (event) => {
+      const begin = (event) => {
         event.preventDefault();
         if (isLate(event)) return;
-        pad.focus();
-        button.setPointerCapture(event.pointerId);
+        if ("pointerId" in event) {
+          pad.focus();
+          button.setPointerCapture(event.pointerId);
+        }
         button.classList.add("down");
         this.hold(direction);
-      });
-      for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
-        button.addEventListener(end, () => {
-          button.classList.remove("down");
-          this.endDrive();
-        });
-      }
-      button.addEventListener("contextmenu", (event) => event.preventDefault());
+      };
       // A button that is reached with Tab is held with the space bar.
-      button.addEventListener("keydown", (event) => {
-        if (event.code === "Space" && !event.repeat && !isLate(event)) this.hold(direction);
-        if (event.code === "Space") event.preventDefault();
-      });
-      button.addEventListener("keyup", (event) => event.code === "Space" && this.endDrive());
+      listenToHold(button, ["Space"], begin, () => this.endDrive());
     }
     pad.addEventListener("keydown", (event) => this.pressKey(event));
     pad.addEventListener("keyup", (event) => this.liftKey(event));
