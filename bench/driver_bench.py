@@ -20,6 +20,7 @@ from typing import Any, Dict, Generator, List
 
 import rosgraph
 from measuring import (
+    find_environment,
     find_tree,
     measure_machine_us,
     percentile_ms,
@@ -256,20 +257,6 @@ def take_medians(runs):
     return result
 
 
-def find_driver_command(workspace):
-    """Return the command that starts the driver of a built workspace, or of a checkout that script/test has built.
-
-    Raises: SystemExit if there is none.
-    """
-    for folder in (workspace, workspace / ".work" / "ws"):
-        environment = folder / "devel" / "env.sh"
-        if environment.is_file():
-            return "%s %s" % (environment.absolute(), DRIVER_COMMAND)
-    raise SystemExit(
-        "bench: %s is not a built workspace; in a checkout, script/test unit builds one" % workspace
-    )
-
-
 def measure_all(options, commands):
     """Return the medians for each number of robots and server."""
     results = []
@@ -351,8 +338,8 @@ def main():
     if options.against:
         # Both are started in the same way.
         commands = {
-            "this driver": find_driver_command(HERE.parent),
-            "the other": find_driver_command(options.against),
+            "this driver": "%s %s" % (find_environment(HERE.parent), DRIVER_COMMAND),
+            "the other": "%s %s" % (find_environment(options.against), DRIVER_COMMAND),
         }
     machine_us = measure_machine_us()
     print_machine(machine_us)

@@ -114,6 +114,18 @@ def stop(process, number=signal.SIGINT):
         return process.communicate()[0]
 
 
+def find_environment(workspace):
+    """Return the program that runs a command in a built workspace, or in a checkout that script/test has built.
+
+    Raises: SystemExit if there is none.
+    """
+    for folder in (workspace, workspace / ".work" / "ws"):
+        environment = folder / "devel" / "env.sh"
+        if environment.is_file():
+            return str(environment.absolute())
+    raise SystemExit("bench: %s is not a built workspace; in a checkout, script/test unit builds one" % workspace)
+
+
 @contextlib.contextmanager
 def start_master():
     """Start a ROS master that ends with the context; give the environment in which programs find it."""

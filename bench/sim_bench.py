@@ -1,8 +1,10 @@
 """CPU of the simulator: behind real sockets at real time, stepped by a program, and its physics alone.
 
 Behind sockets a small server in this process takes the driver's place: it requests topics, answers the time, and drives
-every robot in a circle ten times a second. Only the simulator's process is counted. The other figures are seconds of
-simulated time in a second of CPU time, so what else runs on the machine matters little. Run it with script/bench sim.
+every robot in a circle ten times a second. Only the simulator's process is counted. With --against, the simulator of
+another workspace is measured at the same time: the speed of a virtual machine changes from one run to the next. The
+other figures are seconds of simulated time in a second of CPU time, so what else runs on the machine matters little.
+Run it with script/bench sim.
 """
 
 import argparse
@@ -11,10 +13,12 @@ import socket
 import struct
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import List, NamedTuple
 
 import numpy as np
-from measuring import measure_machine_us, print_machine, read_cpu_s, start, stop
+from measuring import find_environment, measure_machine_us, print_machine, read_cpu_s, start, stop
 
 from hero_driver.rosserial import packets, payloads
 from hero_sim.build import build_swarm
@@ -45,7 +49,6 @@ class Measurement(NamedTuple):
     robots: int
     cpu_percent: float  # of one core
     odom_share: float  # odoms that came, of those due at the stock rate
-    fastest: float  # simulated seconds per second of CPU, without sockets
 
 
 class _Peer:
@@ -111,10 +114,10 @@ class _Server:
         self._selector.close()
 
 
-def measure(robots: int, seconds: float) -> Measurement:
-    """Run so many robots for so long behind a server of ours."""
+def measure(python: List[str], robots: int, seconds: float) -> Measurement:
+    """Run so many robots of the simulator that a Python finds for so long behind a server of ours."""
     server = _Server()
-    command = [sys.executable, "-m", "hero_sim", "--count", str(robots), "--port", str(server.port)]
+    command = [*python, "-m", "hero_sim", "--count", str(robots), "--port", str(server.port)]
     process = start([*command, "--quiet"], None)
     try:
         deadline_s = time.monotonic() + _ARRIVAL_S
@@ -137,7 +140,6 @@ def measure(robots: int, seconds: float) -> Measurement:
         robots,
         100.0 * cpu_s / elapsed_s,
         odoms / (robots * _STOCK_ODOM_HZ * elapsed_s),
-        measure_fastest(robots),
     )
 
 
@@ -204,18 +206,30 @@ def main() -> None:
     parser.add_argument("--count", type=int, nargs="+", default=[1, 20, 50, 100])
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row behind sockets")
     parser.add_argument("--only", choices=_PARTS, nargs="+", default=_PARTS, help="parts to measure")
+    parser.add_argument(
+        "--against",
+        type=Path,
+        metavar="DIR",
+        help="measure the simulator of the workspace DIR, or of the checkout DIR, behind sockets at the same time",
+    )
     options = parser.parse_args()
+    simulators = {"this": [sys.executable]}
+    if options.against:
+        simulators["the other"] = [find_environment(options.against), sys.executable]
     print_machine(measure_machine_us())
     if "sockets" in options.only:
-        print("| behind sockets | CPU of one core | odoms of the stock rate | simulated s per s of CPU, no sockets |")
-        print("|---|---|---|---|")
+        print("| behind sockets | simulator | CPU of one core | odoms of the stock rate |\n|---|---|---|---|")
         for robots in options.count:
-            row = measure(robots, options.seconds)
-            print(
-                "| %d | %.1f %% | %.1f %% | %.1f |"
-                % (row.robots, row.cpu_percent, 100.0 * row.odom_share, row.fastest),
-                flush=True,
-            )
+            with ThreadPoolExecutor() as pool:
+                rows = pool.map(lambda python: measure(python, robots, options.seconds), simulators.values())  # noqa: B023
+                for name, row in zip(simulators, rows):
+                    print(
+                        "| %d | %s | %.1f %% | %.1f %% |" % (row.robots, name, row.cpu_percent, 100.0 * row.odom_share),
+                        flush=True,
+                    )
+        print("\n| robots, no sockets, as fast as they can | simulated s per s of CPU |\n|---|---|")
+        for robots in options.count:
+            print("| %d | %.1f |" % (robots, measure_fastest(robots)), flush=True)
     if "steps" in options.only:
         print("\n| stepped, each robot read and commanded at 10 Hz | simulated s per s of CPU |\n|---|---|")
         for robots in options.count:
