@@ -62,20 +62,11 @@ class Span(NamedTuple):
 
 def read_path(robot: RobotObservations) -> Path:
     """Return the path of a robot by odometry, in the shared frame, or in its own if there is none."""
-    return transform_path(_read_series(robot.odometry), robot.origins)
+    return transform_path(read_series(robot.odometry), robot.origins)
 
 
-def read_localized_path(robot: RobotObservations) -> Path:
-    """Return the path of a robot by localization, in the frame of its poses; empty without localization."""
-    return _read_series(robot.poses)
-
-
-def read_ground_truth(robot: RobotObservations) -> Path:
-    """Return the true path of a robot; empty without ground truth."""
-    return _read_series(robot.ground_truth)
-
-
-def _read_series(series: Series) -> Path:
+def read_series(series: Series) -> Path:
+    """Return the path in odometry, ground truth or poses, in the frame that they have."""
     return Path(*series.columns()[:5])
 
 
@@ -105,7 +96,7 @@ def compute_odometry_errors(robot: RobotObservations) -> Optional[PoseErrors]:
 
     Without an origin, odometry is aligned with the ground truth at its first pose.
     """
-    return _compare(read_path(robot), read_ground_truth(robot), is_aligned=not robot.origins)
+    return _compare(read_path(robot), read_series(robot.ground_truth), is_aligned=not robot.origins)
 
 
 def compute_localization_errors(robot: RobotObservations) -> Optional[PoseErrors]:
@@ -113,7 +104,7 @@ def compute_localization_errors(robot: RobotObservations) -> Optional[PoseErrors
 
     Their frames count as one: the simulator's map is its world.
     """
-    return _compare(read_localized_path(robot), read_ground_truth(robot), is_aligned=False)
+    return _compare(read_series(robot.poses), read_series(robot.ground_truth), is_aligned=False)
 
 
 def _compare(path: Path, truth: Path, is_aligned: bool) -> Optional[PoseErrors]:

@@ -144,9 +144,9 @@ class Figures:
         for robot_id, robot in drawn.items():
             color = self._colors[robot_id]
             if _has_comparable_truth(robot):
-                true_path = analysis.read_ground_truth(robot)
+                true_path = analysis.read_series(robot.ground_truth)
                 axes.plot(true_path.x_m, true_path.y_m, color=color, **_TRUTH)
-            path = analysis.read_localized_path(robot) if len(robot.poses) else analysis.read_path(robot)
+            path = analysis.read_series(robot.poses) if len(robot.poses) else analysis.read_path(robot)
             if len(path.x_m):
                 axes.plot(path.x_m, path.y_m, color=color)
                 axes.plot(path.x_m[0], path.y_m[0], color=color, **_BEGIN)
