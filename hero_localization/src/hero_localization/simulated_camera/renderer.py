@@ -134,11 +134,9 @@ class CameraRenderer:
         fine_m = TEXEL_M / FINE
         place_m = (np.arange(FINE * count) - (FINE * count - 1) / 2.0) * fine_m
         across_m, down_m = np.meshgrid(place_m, place_m)
+        to_tag = _make_transform(tag.x_m, tag.y_m, tag.yaw_rad)
         if is_round:
-            cos, sin = math.cos(tag.yaw_rad), math.sin(tag.yaw_rad)
-            # The robot's center, seen from the tag: to the right and down in the print.
-            ahead_m = -(cos * tag.x_m + sin * tag.y_m)
-            left_m = sin * tag.x_m - cos * tag.y_m
+            ahead_m, left_m = to_tag[:2, 2]  # of the robot's center, seen from the tag
             cover = np.hypot(across_m + left_m, down_m + ahead_m) < BODY_RADIUS_M
         else:
             cover = np.maximum(np.abs(across_m), np.abs(down_m)) < edge_m
@@ -156,14 +154,10 @@ class CameraRenderer:
         if self.options.blur_px > 0.0:
             texture = cv2.GaussianBlur(texture, (0, 0), self.options.blur_px * pixel_m / fine_m)
         texture = cv2.resize(texture, (count, count), interpolation=cv2.INTER_AREA)
-        # The print's right is the robot's -y, its down is -x, both turned by the tag's yaw.
-        cos, sin = math.cos(tag.yaw_rad), math.sin(tag.yaw_rad)
-        turn = np.array(((cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)))
-        move = np.array(((1.0, 0.0, -tag.x_m), (0.0, 1.0, -tag.y_m), (0.0, 0.0, 1.0)))
-        # Texel centers lie at whole numbers.
+        # The print's right is the tag's -y, its down is -x. Texel centers lie at whole numbers.
         scale, center = 1.0 / TEXEL_M, (count - 1) / 2.0
         texel = np.array(((0.0, -scale, center), (-scale, 0.0, center), (0.0, 0.0, 1.0)))
-        return _Plate(tag, texture, texel @ turn @ move, reach_m)
+        return _Plate(tag, texture, texel @ to_tag, reach_m)
 
     def _draw_plate(self, image: np.ndarray, plate: _Plate, poses: np.ndarray) -> None:
         """Draw a plate at its robot's poses (M, 3) during one exposure."""
@@ -178,12 +172,8 @@ class CameraRenderer:
         rays = self._rays[top:bottom, left:right]
         plane = plane_homography(self.camera, tag.height_m)
         samples = []
-        for x_m, y_m, yaw_rad in poses:
-            cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
-            to_robot = np.array(
-                ((cos, sin, -cos * x_m - sin * y_m), (-sin, cos, sin * x_m - cos * y_m), (0.0, 0.0, 1.0))
-            )
-            texels = cv2.perspectiveTransform(rays, plate.to_texel @ to_robot @ plane)
+        for pose in poses:
+            texels = cv2.perspectiveTransform(rays, plate.to_texel @ _make_transform(*pose) @ plane)
             samples.append(cv2.remap(plate.texture, texels, None, cv2.INTER_LINEAR))
         shade, cover = cv2.split(sum(samples) * (1.0 / len(samples)))
         patch = image[top:bottom, left:right]
@@ -236,3 +226,9 @@ class CameraRenderer:
                 pose[2] + angular_rad_s * times_s,
             )
         )
+
+
+def _make_transform(x_m: float, y_m: float, yaw_rad: float) -> np.ndarray:
+    """Return what turns a place (x, y, 1; m) into that seen from a pose, (3, 3)."""
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    return np.array(((cos, sin, -cos * x_m - sin * y_m), (-sin, cos, sin * x_m - cos * y_m), (0.0, 0.0, 1.0)))
