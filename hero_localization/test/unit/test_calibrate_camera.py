@@ -30,7 +30,7 @@ def calibrate(tmp_path, monkeypatch):
     path = str(tmp_path / "camera.yaml")
     settings.update(path, {"mounts": {8: [0.003, 0.0, 5.0]}, "tag_robots": {12: 2}})
 
-    def watch(settings, pictures, program, robot_id, tag_id):
+    def watch(pictures, program, robot_id, tag_id):
         if robot_id not in FOUND:
             raise CalibrationError("tag %d is not in the image" % tag_id)
         return FOUND[robot_id]
@@ -39,7 +39,8 @@ def calibrate(tmp_path, monkeypatch):
 
     def run(robots):
         options = calibrate_camera.parse_options(["robots", "--robots", robots, "--file", path])
-        return calibrate_camera.calibrate_robot_tags(options, None, None), settings.load(path)
+        images = SimpleNamespace(settings=settings.load(path))
+        return calibrate_camera.calibrate_robot_tags(options, images, None), settings.load(path)
 
     return run
 
@@ -183,7 +184,8 @@ def images(monkeypatch):
     polls_s = []
     source = SimpleNamespace(problem="", warning="too dark", lens="its own", poll=polls_s.append, close=lambda: None)
     monkeypatch.setattr(calibrate_camera, "open_source", lambda *_: source)
-    found = calibrate_camera.Images(calibrate_camera.parse_options(["lens"]), SimpleNamespace(running=True), None)
+    program, options = SimpleNamespace(running=True), calibrate_camera.parse_options(["lens"])
+    found = calibrate_camera.Images(options, program, settings.Settings())
     found.polls_s = polls_s
     return found
 
@@ -198,7 +200,7 @@ def test_an_image_is_waited_for_for_ten_seconds(images, capsys):
     images._program.running = False
     with pytest.raises(ProgramError, match="the file is as it was"):
         images.take()
-    assert images.find_lens(settings.Settings()) == "its own"
+    assert images.lens == "its own"
     images.close()
 
 

@@ -138,8 +138,8 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
 class SteppedPictures:
     """Images of a scene for calibrate_camera; time passes while it waits for one."""
 
-    def __init__(self, scene, renderer):
-        self.scene, self.renderer = scene, renderer
+    def __init__(self, scene, renderer, path):
+        self.scene, self.renderer, self.settings = scene, renderer, settings.load(path)
         self.detector = create_detector(decimate=1.0)
 
     def poll(self):
@@ -148,7 +148,7 @@ class SteppedPictures:
 
     take = poll
 
-    def find_tags(self, settings, decimate, frame):
+    def find_tags(self, decimate, frame):
         return self.detector.detect(frame.gray)
 
 
@@ -177,7 +177,7 @@ def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeyp
     monkeypatch.setattr(calibrate_camera, "Robot", lambda robot_id: nullcontext(scene.swarm[robot_id]))
     program = SimpleNamespace(sleep=None)
     parsed = calibrate_camera.parse_options(["robots", "--robots", "0", "--file", path])
-    status = calibrate_camera.calibrate_robot_tags(parsed, SteppedPictures(scene, renderer), program)
+    status = calibrate_camera.calibrate_robot_tags(parsed, SteppedPictures(scene, renderer, path), program)
     text, is_wrong = capsys.readouterr().out, yaw_rad > 1.0
     assert status == int(is_wrong), text
     assert ("hero_0: the tag is on upside down" in text) == is_wrong, text

@@ -43,7 +43,6 @@ from ..calibration.lens_calibration import (
 from ..calibration.print_fit import refine_corners
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
 from ..camera.camera_model import Intrinsics
-from ..camera.device_controls import DeviceControls
 from ..camera.frame_source import Frame, open_source
 from ..errors import CalibrationError, DetectorError
 from ..tracking import settings as camera_file
@@ -75,11 +74,12 @@ LOOK_S = 3.0
 class Images:
     """The newest image of the camera, for a program that works on one after another."""
 
-    def __init__(self, options: argparse.Namespace, program: Program, controls: DeviceControls) -> None:
+    def __init__(self, options: argparse.Namespace, program: Program, settings: Settings) -> None:
         """Open the camera. Raises: FrameSourceError."""
         self._finder: Optional[DetectorProcess] = None
         self._program = program
-        self.source = open_source(options.image, options.device, options.size, options.rate, controls)
+        self.settings = settings
+        self.source = open_source(options.image, options.device, options.size, options.rate, settings.controls)
         self._name = options.device or options.image
 
     def poll(self) -> Optional[Frame]:
@@ -103,12 +103,12 @@ class Images:
         reason = self.source.problem or "is the camera's driver running?"
         raise CalibrationError("no image from %s for %g s: %s" % (self._name, FRAME_S, reason))
 
-    def find_tags(self, settings: Settings, decimate: float, frame: Frame) -> List[TagCorners]:
+    def find_tags(self, decimate: float, frame: Frame) -> List[TagCorners]:
         """Return the tags in an image; decimate of the first call counts.
 
         Raises: CalibrationError for another size than the lens has, DetectorError; ProgramError as poll().
         """
-        height_px, width_px = frame.gray.shape
+        settings, (height_px, width_px) = self.settings, frame.gray.shape
         if settings.lens is not None:
             settings.lens.check_size(height_px, width_px)
         if self._finder is None:
@@ -120,9 +120,10 @@ class Images:
             self._check_running()  # what ends this program may end the detector first
             raise
 
-    def find_lens(self, settings: Settings) -> Optional[Intrinsics]:
-        """Return the intrinsics in the file, else those of camera_info; None if neither is known."""
-        return settings.lens or self.source.lens
+    @property
+    def lens(self) -> Optional[Intrinsics]:
+        """The intrinsics in the file, else those of camera_info; None if neither is known."""
+        return self.settings.lens or self.source.lens
 
     def close(self) -> None:
         """Leave the camera, and end the search."""
@@ -186,12 +187,12 @@ def import_lens(options: argparse.Namespace) -> int:
 
 def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
     """Calibrate the camera pose (extrinsics). Return the exit code."""
-    settings = camera_file.load(options.file)
+    settings = images.settings
     frames: List[Sequence[TagCorners]] = []
     while len(frames) < ARENA_FRAMES:
         frame = images.take()
-        frames.append(images.find_tags(settings, 1.0, frame))
-    lens = images.find_lens(settings)
+        frames.append(images.find_tags(1.0, frame))
+    lens = images.lens
     if lens is None:
         raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
     lens.check_size(*frame.gray.shape)
@@ -213,9 +214,9 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
 
 def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: Program) -> int:
     """Turn and drive robots, one after another, and measure how their tags sit. Return the exit code."""
-    settings = camera_file.load(options.file)
+    layout = images.settings.layout
     robots: Sequence[int] = options.robots
-    tags = settings.layout.find_tags(robots)
+    tags = layout.find_tags(robots)
     results: Dict[int, RobotCalibration] = {}
     problems: List[str] = []
     for robot_id in robots:
@@ -225,7 +226,7 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
             problems.append(text % (robot_id, robot_id))
             continue
         try:
-            result = results[tag_id] = _watch_robot(settings, images, program, robot_id, tag_id)
+            result = results[tag_id] = _watch_robot(images, program, robot_id, tag_id)
         except (ProgramError, DetectorError):
             raise
         except HeroError as error:
@@ -246,23 +247,21 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
         problems += ["hero_%d: %s" % (robot_id, problem) for problem in result.problems]
     if not results:
         raise CalibrationError("; ".join(problems))
-    mounts = {**settings.layout.mounts, **{tag_id: result.mount for tag_id, result in results.items()}}
+    mounts = {**layout.mounts, **{tag_id: result.mount for tag_id, result in results.items()}}
     described = {tag_id: camera_file.describe_pose(mount) for tag_id, mount in mounts.items()}
     delay_s = float(np.median([result.delay_s for result in results.values()]))
     return _finish(options.file, {"mounts": described, "delay_s": round(delay_s, 4)}, problems)
 
 
-def _watch_robot(
-    settings: Settings, images: Images, program: Program, robot_id: int, tag_id: int
-) -> RobotCalibration:
+def _watch_robot(images: Images, program: Program, robot_id: int, tag_id: int) -> RobotCalibration:
     """Drive one robot, and return how its tag sits. Raises: CalibrationError if it cannot be seen; HeroError."""
-    camera = settings.camera
+    settings, camera = images.settings, images.settings.camera
     assert camera is not None
     odometry: List[Tuple[float, Pose]] = []
     seen: List[Tuple[float, Pose]] = []
 
     def watch(frame: Optional[Frame]) -> int:
-        found = images.find_tags(settings, settings.decimate, frame) if frame is not None else []
+        found = images.find_tags(settings.decimate, frame) if frame is not None else []
         tags = [tag for tag in found if tag.tag_id == tag_id]
         if frame is not None and len(tags) == 1:
             pose = fit_squares(camera, tags, settings.layout.height_m)[0].pose
@@ -353,7 +352,7 @@ def run(arguments: Sequence[str]) -> int:
     if options.part == "arena":
         import_optional("scipy.optimize", "python3-scipy")  # print_fit does, but after all images
     with Program("calibrate_camera", anonymous=True) as program:
-        images = Images(options, program, settings.controls)
+        images = Images(options, program, settings)
         try:
             if options.part == "lens":
                 return calibrate_lens_by_board(options, images, program)
