@@ -65,19 +65,6 @@ def test_robots_do_not_map_each_other():
     assert not swarm_map.grid.occupied.any()
 
 
-def test_changes_are_told_once_and_cover_what_changed():
-    swarm_map = make_map()
-    before, _ = swarm_map.take_change()
-    assert (before == -1).all()
-    swarm_map.grid.add_scan(Pose(0.2, -0.2, 0.0), [math.inf] * 8, np.empty((0, 2)))
-    after, (rows, columns) = swarm_map.take_change()
-    outside = np.ones_like(after, dtype=bool)
-    outside[rows, columns] = False
-    assert (after[outside] == -1).all() and (after >= 0).any()
-    assert 0 < rows.start < rows.stop < 60 and 50 < columns.start < columns.stop <= 100
-    assert swarm_map.take_change()[1] is None
-
-
 def test_a_saved_map_is_an_arena_of_the_simulator(tmp_path):
     grid = OccupancyGrid((-0.5, -0.4, 0.5, 0.6))
     grid.log_odds[:] = 0.0
@@ -121,14 +108,6 @@ def test_a_robot_that_others_pass_is_where_it_was_at_the_time_of_the_scan():
             swarm_map.add_ranges(0, 0.5, AHEAD)
         swarm_map.update()
         assert swarm_map.grid.occupied.any() == is_mapped
-
-
-def test_changes_are_told_to_their_last_row_and_column():
-    swarm_map = make_map()
-    swarm_map.take_change()
-    swarm_map.grid.log_odds[3:8, 20:31] = -1.0
-    percent, changed = swarm_map.take_change()
-    assert changed == (slice(3, 8), slice(20, 31)) and (percent[3:8, 20:31] == 27).all()
 
 
 def test_a_saved_map_is_as_map_server_reads_it(tmp_path):

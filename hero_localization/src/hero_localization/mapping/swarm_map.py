@@ -1,7 +1,7 @@
 """The map that a swarm makes: scans of all robots, each at the pose that its robot had then. Pure."""
 
 from collections import deque
-from typing import Deque, Dict, Optional, Sequence, Tuple
+from typing import Deque, Dict, Sequence, Tuple
 
 import numpy as np
 
@@ -34,7 +34,6 @@ class SwarmMap:
         """Fill grid."""
         self.grid = grid
         self._robots: Dict[int, _Robot] = {}
-        self._published = grid.to_percent()
 
     def add_pose(self, robot_id: int, stamp_s: float, pose: Pose) -> None:
         """Take a robot's pose in map."""
@@ -57,13 +56,3 @@ class SwarmMap:
                     self.grid.add_scan(pose, ranges_m, places_m)
                     count += 1
         return count
-
-    def take_change(self) -> Tuple[np.ndarray, Optional[Tuple[slice, slice]]]:
-        """Return the map in percent (see OccupancyGrid.to_percent), and the rows and columns that changed since."""
-        percent = self.grid.to_percent()
-        changed = np.nonzero(percent != self._published)
-        self._published = percent
-        if not len(changed[0]):
-            return percent, None
-        rows, columns = (slice(int(places.min()), int(places.max()) + 1) for places in changed)
-        return percent, (rows, columns)

@@ -14,7 +14,6 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import Point, PoseArray, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
-from map_msgs.msg import OccupancyGridUpdate
 from nav_msgs.msg import MapMetaData
 from nav_msgs.msg import OccupancyGrid as MapMessage
 from sensor_msgs.msg import LaserScan
@@ -49,7 +48,6 @@ class MapNode:
         self._steps = 0
         self._scans: Dict[int, rospy.Subscriber] = {}
         self._publisher = rospy.Publisher("/map", MapMessage, queue_size=1, latch=True)
-        self._updates = rospy.Publisher("/map_updates", OccupancyGridUpdate, queue_size=5)
         self._frontiers = rospy.Publisher("~frontiers", PoseArray, queue_size=1, latch=True)
         self._share = rospy.Publisher("~known_share", Float32, queue_size=1, latch=True)
         rospy.Subscriber(parameters["poses_topic"], RobotPoses, self._receive_poses, queue_size=10, tcp_nodelay=True)
@@ -89,7 +87,7 @@ class MapNode:
 
     def _publish(self) -> None:
         with self._lock:
-            percent, changed = self._map.take_change()
+            percent = self._grid.to_percent()
             frontiers_m, share = self._grid.find_frontiers(), self._grid.known_share
         stamp = rospy.get_rostime()
         message = MapMessage()
@@ -99,11 +97,6 @@ class MapNode:
         message.info = MapMetaData(stamp, self._grid.cell_m, columns, rows, origin)
         message.data = percent.ravel().tolist()
         self._publisher.publish(message)
-        if changed is not None and self._updates.get_num_connections():
-            part, (first_row, first_column) = percent[changed], (place.start for place in changed)
-            height, width = part.shape
-            update = OccupancyGridUpdate(message.header, first_column, first_row, width, height, part.ravel().tolist())
-            self._updates.publish(update)
         places = [PoseMessage(Point(*place_m, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0)) for place_m in frontiers_m]
         self._frontiers.publish(PoseArray(message.header, places))
         self._share.publish(Float32(share))

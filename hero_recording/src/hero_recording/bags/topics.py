@@ -39,7 +39,7 @@ SHARED_PATTERNS = (
     "/(.*/)?arena",
     "/localization/poses",
     "/track/(measured_poses|objects)",
-    "/map(_updates)?",
+    "/map",
 )
 """Topics of no single robot: frames, log lines, the robots of all drivers (docs/several_machines.md), walls,
 what hero_localization publishes of all robots."""
