@@ -1,6 +1,7 @@
 # CMake functions for the packages of the suite. They are here because every package can find hero_msgs.
 
 # hero_add_program(NAME [MODULE]): a program NAME for rosrun that calls main() of a module of the package (default: NAME).
+# What main() returns is the exit status; an error of ours becomes one line: see hero_node.command_line.
 # hero_add_node(NAME [MODULE]): one that takes ROS parameters only; --help prints the docstring of its module.
 # hero_add_script(FILE [ARGUMENT ...]): one that runs a script of plain rospy, as students write it; without arguments of
 # its own the script is a node. --help prints its docstring.
@@ -11,16 +12,17 @@
 function(hero_add_program name)
   set(module ${name} ${ARGN})
   list(GET module -1 module)
-  _hero_write_program(${name} "from ${PROJECT_NAME}.${module} import main" "sys.exit(main())")
+  _hero_write_program(${name} "from hero_node.command_line import run
+    from ${PROJECT_NAME}.${module} import main" "run(main)")
 endfunction()
 
 function(hero_add_node name)
   set(module ${name} ${ARGN})
   list(GET module -1 module)
-  _hero_write_program(${name} "from hero_node.command_line import check_node_arguments
+  _hero_write_program(${name} "from hero_node.command_line import check_node_arguments, run
     from ${PROJECT_NAME}.${module} import main" "\
 check_node_arguments('${PROJECT_NAME}', '${name}', sys.modules[main.__module__].__doc__)
-sys.exit(main())")
+run(main)")
 endfunction()
 
 function(hero_add_script file)

@@ -13,7 +13,6 @@ from typing import Sequence
 
 import rospy
 
-from hero_node import command_line
 from hero_node.parameters import robot_ids_option
 from hero_node.ros.program import Program
 
@@ -53,9 +52,9 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run with the arguments of the command line; return the exit code. Raises: CalibrationError, ProgramError."""
-    options = parse_options(arguments)
+def main() -> int:
+    """Calibrate; return the exit code. Raises: CalibrationError, ProgramError."""
+    options = parse_options(rospy.myargv(sys.argv)[1:])
     # Errors in files and folders are reported before waiting for robots.
     if options.restore:
         calibrations = load_calibrations(options.folder, options.files, options.robots)
@@ -78,8 +77,3 @@ def run(arguments: Sequence[str]) -> int:
 
         tape = ask if options.tape else None
         return Calibration(session, options.parts, options.folder, None if options.yes else ask, tape).run()
-
-
-def main() -> None:
-    """Run the program calibrate."""
-    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]))

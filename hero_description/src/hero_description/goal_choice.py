@@ -16,7 +16,6 @@ from geometry_msgs.msg import PointStamped, PoseStamped
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_node.command_line import run
 from hero_node.parameters import Parameter, parse_given_ids
 from hero_node.ros.private_parameters import read_parameters
 from hero_node.ros.program import Program
@@ -97,15 +96,10 @@ class GoalChoice:
         self._markers.publish(MarkerArray([disc]))
 
 
-def choose_robots() -> None:
+def main() -> None:
     """Run until the node is to end."""
     with Program("goal_choice") as program:
         robots = read_parameters({"robots": Parameter("0", parse_given_ids)})["robots"]
         GoalChoice(["hero_%d" % robot_id for robot_id in robots])
         while program.sleep(10.0):
             pass
-
-
-def main() -> None:
-    """Run the program goal_choice."""
-    run(choose_robots)

@@ -13,7 +13,6 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_node.command_line import run
 from hero_node.parameters import Parameter, parse_given_ids
 from hero_node.ros.private_parameters import read_parameters
 from hero_node.ros.program import Program
@@ -68,7 +67,7 @@ def make_identity(robot_id: int) -> List[Marker]:
     return [name, ring]
 
 
-def show_lights() -> None:
+def main() -> None:
     """Publish names and rings again and again, and a sphere for each color."""
     with Program("hero_lights") as program:
         robots = read_parameters({"robots": Parameter("0", parse_given_ids)})["robots"]
@@ -82,8 +81,3 @@ def show_lights() -> None:
         identities = MarkerArray([marker for robot_id in robots for marker in make_identity(robot_id)])
         for _ in program.rate(1.0 / REPEAT_S):
             publisher.publish(identities)
-
-
-def main() -> None:
-    """Run the program lights."""
-    run(show_lights)

@@ -13,7 +13,6 @@ from typing import Any, Sequence
 
 import rospy
 
-from hero_node.command_line import run
 from hero_node.errors import ProgramError
 from hero_node.parameters import Parameter, choice, flag, parse_given_ids
 from hero_node.ros.private_parameters import read_parameters
@@ -27,7 +26,7 @@ def _read_ids(name: str, value: Any) -> Sequence[int]:
     return parse_given_ids(name, value) if value not in ("", ()) else ()
 
 
-def start_rviz() -> None:
+def main() -> None:
     """Write the configuration and become RViz. Raises: ProgramError without RViz or a display."""
     rviz = shutil.which("rviz")
     if rviz is None:
@@ -53,8 +52,3 @@ def start_rviz() -> None:
         settings = str(parameters["fixed_frame"]), parameters["view"], parameters["picture"]
         file.write(make_config(names, *settings, hero_plus=plus_names))
     os.execv(rviz, [rviz, "-d", file.name, *sys.argv[1:]])
-
-
-def main() -> None:
-    """Run the program rviz."""
-    run(start_rviz)

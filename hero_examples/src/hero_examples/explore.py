@@ -6,7 +6,7 @@ import random
 import rospy
 from geometry_msgs.msg import PoseArray
 
-from hero_client import CommonFrame, Program, open_swarm, read_parameters, run
+from hero_client import CommonFrame, Program, open_swarm, read_parameters
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
 from hero_client.controllers.motion import State
@@ -77,7 +77,7 @@ def explore_together(explorers, frontiers, now_s):
         explorer.step(frontiers, taken, now_s)
 
 
-def explore():
+def main():
     with Program("explore") as program:
         parameters = read_parameters(
             {
@@ -107,7 +107,3 @@ def explore():
                 if parameters["once"] and program.now_s > busy_s + parameters["idle_s"]:
                     break
             swarm.led("off")
-
-
-def main():
-    run(explore)

@@ -2,7 +2,7 @@
 
 import rospy
 
-from hero_client import CommonFrame, Program, ProgramError, Swarm, read_parameters, run
+from hero_client import CommonFrame, Program, ProgramError, Swarm, read_parameters
 from hero_client.controllers.unicycle import FollowLaw, follow
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
 from hero_node.geometry import STOP
@@ -17,7 +17,7 @@ def step(swarm, common, law):
         robot.drive(*(follow(pose, leader_pose, law) if known else STOP))
 
 
-def follow_leader():
+def main():
     with Program("follow") as program:
         parameters = read_parameters(
             {
@@ -40,7 +40,3 @@ def follow_leader():
             for _ in program.rate(10):  # Hz
                 step(swarm, common, law)
                 swarm.report_missing(common.missing)
-
-
-def main():
-    run(follow_leader)

@@ -2,13 +2,13 @@
 
 import rospy
 
-from hero_client import GoToGoalServer, Program, ProgramError, open_swarm, read_parameters, run
+from hero_client import GoToGoalServer, Program, ProgramError, open_swarm, read_parameters
 from hero_client.controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
 from hero_client.controllers.motion import DEFAULT_TIMEOUT_S
 from hero_node.parameters import flag, number, parse_poses, robot_ids
 
 
-def serve_goals():
+def main():
     with Program("go_to_goal") as program:
         parameters = read_parameters(
             {
@@ -41,7 +41,3 @@ def serve_goals():
             for server in servers:
                 server.close()
             return 1 if once and not all(server.reached for server in servers) else 0
-
-
-def main():
-    run(serve_goals)

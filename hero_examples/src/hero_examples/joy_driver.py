@@ -11,7 +11,7 @@ def main() -> None:
         rospkg.RosPack().get_path("joy")
     except rospkg.ResourceNotFound:
         sys.exit(
-            "joy_driver: no joystick driver: the ROS package joy is not installed. ROS Noetic: sudo apt install"
+            "no joystick driver: the ROS package joy is not installed. ROS Noetic: sudo apt install"
             " ros-noetic-joy; elsewhere build it from ros-drivers/joystick_drivers, or start another node that"
             " publishes sensor_msgs/Joy on /joy and give joy_driver:=false"
         )

@@ -4,7 +4,7 @@ import colorsys
 
 import rospy
 
-from hero_client import Program, open_swarm, read_parameters, run
+from hero_client import Program, open_swarm, read_parameters
 from hero_node.parameters import choice, number, robot_ids
 
 
@@ -30,7 +30,7 @@ def step(swarm, pattern, phase, brightness=1.0):
         robot.led([part * brightness for part in color])
 
 
-def show_pattern():
+def main():
     with Program("led_show") as program:
         parameters = read_parameters(
             {
@@ -47,7 +47,3 @@ def show_pattern():
                 step(swarm, pattern, time_s / parameters["period_s"] % 1.0, parameters["brightness"])
                 swarm.report_missing()
             swarm.led("off")
-
-
-def main():
-    run(show_pattern)

@@ -4,7 +4,7 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 
-from hero_client import Program, ProgramError, open_swarm, read_parameters, run
+from hero_client import Program, ProgramError, open_swarm, read_parameters
 from hero_node.geometry import wrap_angle, yaw_of
 from hero_node.parameters import robot_ids, whole_number
 
@@ -43,7 +43,7 @@ def open_figure():
     return Figure(figsize=(10, 4))
 
 
-def measure_robots():
+def main():
     with Program("measure_delay") as program:
         parameters = read_parameters(
             {"robots": robot_ids("all"), "turns": whole_number(10, 1, 1000), "plot": "measure_delay.png"}
@@ -61,7 +61,3 @@ def measure_robots():
                     plot.boxplot([ms], positions=[robot.robot_id], whis=(1, 99), showfliers=False)
                     plot.set(title=title, xlabel="robot", ylabel="ms")
         figure.savefig(parameters["plot"])
-
-
-def main():
-    run(measure_robots)

@@ -5,7 +5,7 @@ import random
 
 import rospy
 
-from hero_client import Program, open_swarm, read_parameters, run
+from hero_client import Program, open_swarm, read_parameters
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
 from hero_node.geometry import STOP
@@ -37,7 +37,7 @@ class Walker:
         return missing
 
 
-def walk():
+def main():
     with Program("random_walk") as program:
         parameters = read_parameters(
             {
@@ -58,7 +58,3 @@ def walk():
                 swarm.report_missing(missing)
             swarm.led("off")
     rospy.loginfo("random walk ended, robots stopped")
-
-
-def main():
-    run(walk)

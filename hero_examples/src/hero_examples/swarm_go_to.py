@@ -2,7 +2,7 @@
 
 import rospy
 
-from hero_client import CommonFrame, Program, ProgramError, open_swarm, read_parameters, run
+from hero_client import CommonFrame, Program, ProgramError, open_swarm, read_parameters
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
 from hero_client.controllers.swarm_go_to import SwarmGoToController
@@ -39,7 +39,7 @@ class Formation:
             raise ProgramError("after %g s not in place: %s" % (self.timeout_s, ", ".join(late)))
 
 
-def form():
+def main():
     with Program("swarm_go_to") as program:
         parameters = read_parameters(
             {
@@ -72,7 +72,3 @@ def form():
                 if formation.done and parameters["once"]:
                     break
             return 1 if parameters["once"] and not formation.done else 0
-
-
-def main():
-    run(form)

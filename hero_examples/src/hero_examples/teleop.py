@@ -1,6 +1,6 @@
 """Drives robots with the keys of a terminal; the robot stops when no key comes."""
 
-from hero_client import Program, open_swarm, read_parameters, run
+from hero_client import Program, open_swarm, read_parameters
 from hero_client.apps.keyboard import Keyboard
 from hero_client.apps.keyboard_teleop import (
     MAX_ANGULAR_RAD_S,
@@ -12,7 +12,7 @@ from hero_client.values.robot_constants import MAX_LINEAR_M_S
 from hero_node.parameters import number, robot_ids
 
 
-def drive():
+def main():
     with Program("teleop") as program:
         parameters = read_parameters(
             {
@@ -23,7 +23,3 @@ def drive():
         )
         with Keyboard() as keyboard, open_swarm(program, parameters["robots"]) as swarm:
             KeyboardTeleop(swarm, parameters["linear_m_s"], parameters["angular_rad_s"]).run(program, keyboard)
-
-
-def main():
-    run(drive)

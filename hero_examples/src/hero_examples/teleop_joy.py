@@ -1,13 +1,13 @@
 """Drives robots with a joystick on /joy while the enable button is held; other buttons choose some, or stop all."""
 
-from hero_client import Program, ProgramError, open_swarm, read_parameters, run
+from hero_client import Program, ProgramError, open_swarm, read_parameters
 from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
 from hero_client.apps.robot_choice import ChoiceButtons
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_node.parameters import number, robot_ids, whole_number
 
 
-def drive():
+def main():
     with Program("teleop_joy") as program:
         parameters = read_parameters(
             {
@@ -33,7 +33,3 @@ def drive():
                 raise ProgramError("~stop_button is %d, the same as ~%s" % (button, name))
         with open_swarm(program, ids, odom=False, proximity=False) as swarm:
             JoystickTeleop(swarm, mapping, choice, frame).run(program)
-
-
-def main():
-    run(drive)

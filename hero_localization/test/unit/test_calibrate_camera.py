@@ -229,11 +229,12 @@ def test_what_a_part_needs_is_named(tmp_path, capsys):
 def test_the_arena_without_scipy_is_refused_before_a_camera_is_opened(tmp_path, monkeypatch):
     path = str(tmp_path / "camera.yaml")
     settings.update(path, {"references": {100 + index: [index, 0.0, 0.0] for index in range(4)}})
+    monkeypatch.setattr(sys, "argv", ["calibrate_camera", "arena", "--file", path])
     started = []
     monkeypatch.setattr(calibrate_camera, "Program", lambda *_, **__: started.append("node") or 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        calibrate_camera.run(["arena", "--file", path])
+        calibrate_camera.main()
     monkeypatch.setitem(sys.modules, "scipy.optimize", None)
     with pytest.raises(ProgramError, match=r"scipy.optimize is missing \(.*\); install it: apt install python3-scipy$"):
-        calibrate_camera.run(["arena", "--file", path])
+        calibrate_camera.main()
     assert started == ["node"]

@@ -11,12 +11,13 @@ pytest.importorskip("cv2")
 from hero_localization.errors import SettingsError
 from hero_localization.simulated_camera import camera_node
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
+from hero_node.command_line import run
 
 
 def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["simulated_camera", "--first-id", "200"])
     with pytest.raises(SystemExit) as end:
-        camera_node.main()
+        run(camera_node.main)
     assert end.value.code == 1
     assert capsys.readouterr().err == "simulated_camera: tags from 100 on are reference tags: take lower ids\n"
 
@@ -80,13 +81,13 @@ def test_the_board_is_shown_four_times_at_each_place():
 
 def test_references_are_printed_for_the_camera_file(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--arena", "empty"])
-    camera_node._run()
+    camera_node.main()
     assert capsys.readouterr().out.startswith("references: {100: [-1.120, -0.800, 0], 101: ")
     monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--first-id", "90", "--count", "10"])
-    camera_node._run()
+    camera_node.main()
     monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--first-id", "91", "--count", "10"])
     with pytest.raises(SettingsError, match="tags from 100 on"):
-        camera_node._run()
+        camera_node.main()
 
 
 def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):

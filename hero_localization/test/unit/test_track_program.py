@@ -25,7 +25,7 @@ def end_detector(monkeypatch):
         monkeypatch.setattr(track, "read_parameters", lambda declared: declared)
         monkeypatch.setattr(track, "TrackNode", lambda parameters: node)
         try:
-            track.track()
+            track.main()
         finally:
             assert closed
 

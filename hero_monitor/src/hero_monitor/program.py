@@ -10,7 +10,6 @@ from typing import Any, Dict, Set
 
 import rospy
 
-from hero_node.command_line import run
 from hero_node.errors import ProgramError
 from hero_node.file_limit import raise_file_limit
 from hero_node.optional import import_optional
@@ -193,13 +192,9 @@ class Monitor:
                     page.send(updates)
 
 
-def _main() -> None:
+def main() -> None:
+    """Run the node."""
     with Program("hero_monitor") as program:
         parameters = load_parameters()
         import_optional("tornado", "python3-tornado")
         Monitor(parameters, program).run()
-
-
-def main() -> None:
-    """Run the node."""
-    run(_main)

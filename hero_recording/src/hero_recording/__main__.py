@@ -3,6 +3,8 @@
 import sys
 from importlib import import_module
 
+from hero_node.command_line import run
+
 PROGRAMS = ("export", "plot")
 
 
@@ -11,7 +13,7 @@ def main() -> None:
     if len(sys.argv) < 2 or sys.argv[1] not in PROGRAMS:
         sys.exit("python3 -m hero_recording: the first argument must be one of: %s" % ", ".join(PROGRAMS))
     name = sys.argv.pop(1)
-    import_module("hero_recording." + name).main()
+    run(import_module("hero_recording." + name).main)
 
 
 if __name__ == "__main__":

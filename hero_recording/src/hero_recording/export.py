@@ -6,10 +6,8 @@ What is written is in OUT.part until it is complete.
 import argparse
 import os
 import shutil
-import sys
 from typing import Optional, Sequence, Set
 
-from hero_node import command_line
 from hero_node.parameters import robot_ids_option
 
 from .bags.bag_set import BagSet
@@ -27,7 +25,7 @@ OUT_SUFFIXES = {"mcap": ".mcap", "ros2": "_ros2"}
 """Added to the first bag's name; tables have no suffix."""
 
 
-def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="export", description="Export recordings to tables or other bags.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
@@ -73,8 +71,9 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
     return "%d robots, %d tables, %d rows" % (len(robots), len(files.rows), sum(files.rows.values()))
 
 
-def run(options: argparse.Namespace) -> None:
+def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Export. Raises: RecordingError."""
+    options = parse_options(arguments)
     bags = BagSet(options.bags)
     out = options.out or os.path.splitext(bags.paths[0])[0] + OUT_SUFFIXES.get(options.format, "")
     out = os.path.abspath(out)
@@ -93,8 +92,3 @@ def run(options: argparse.Namespace) -> None:
     finally:
         shutil.rmtree(part, ignore_errors=True)
     print("%s: %s" % (out, written))
-
-
-def main() -> None:
-    """Run the program export."""
-    command_line.run(lambda: run(parse_options(sys.argv[1:])))

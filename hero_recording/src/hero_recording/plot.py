@@ -2,12 +2,10 @@
 
 import argparse
 import os
-import sys
-from typing import Dict, List, Sequence
+from typing import Dict, List, Optional, Sequence
 
 import numpy as np
 
-from hero_node import command_line
 from hero_node.optional import import_optional
 from hero_node.parameters import robot_ids_option
 from hero_node.safe_file import replace_file
@@ -31,7 +29,7 @@ MIN_DISTANCE_M = 0.05
 """An error is not given as a share of less than this."""
 
 
-def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="plot", description="Plot recordings of robots.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
@@ -126,15 +124,11 @@ def _compute_rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def run(options: argparse.Namespace) -> None:
+def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Read, draw, print. Raises: RecordingError."""
+    options = parse_options(arguments)
     import_optional("matplotlib", "python3-matplotlib")
     bags = BagSet(options.bags)
     observations = observe(options, bags)
     print("\n".join(format_table(observations)))
     print("\n".join(draw(options, observations, bags)))
-
-
-def main() -> None:
-    """Run the program plot."""
-    command_line.run(lambda: run(parse_options(sys.argv[1:])))

@@ -246,17 +246,12 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def run(arguments: Sequence[str]) -> None:
-    """Run with the arguments of the command line. Raises: RecordingError, NodeError."""
-    options, ros_arguments = split_arguments(arguments)
+def main() -> None:
+    """Record, or repair recordings. Raises: RecordingError, NodeError."""
+    options, ros_arguments = split_arguments(sys.argv[1:])
     parsed = parse_options(read_launch_options(ros_arguments) + options)
     for path in parsed.repair or ():
         say(repair_bag(path))
     if not parsed.repair:
         check_master()
         Recording(parsed, ros_arguments).run()
-
-
-def main() -> None:
-    """Run the program record."""
-    command_line.run(lambda: run(sys.argv[1:]))

@@ -261,7 +261,7 @@ def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_
 
 
 def run_plot(capsys, *arguments):
-    plot.run(plot.parse_options([str(argument) for argument in arguments]))
+    plot.main([str(argument) for argument in arguments])
     return capsys.readouterr().out
 
 

@@ -22,7 +22,7 @@ def bag(tmp_path_factory):
 
 
 def run_export(capsys, *arguments):
-    export.run(export.parse_options([str(argument) for argument in arguments]))
+    export.main([str(argument) for argument in arguments])
     return capsys.readouterr().out
 
 

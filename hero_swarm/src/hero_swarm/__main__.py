@@ -3,6 +3,8 @@
 import sys
 from importlib import import_module
 
+from hero_node.command_line import run
+
 PROGRAMS = {"fit": "fit", "run": "run", "report": "experiments.report", "show": "show"}
 
 
@@ -15,7 +17,7 @@ def main() -> None:
         program = import_module("hero_swarm." + PROGRAMS[name])
     except ModuleNotFoundError as error:
         sys.exit("python3 -m hero_swarm %s: %s is missing; install python3-%s" % (name, error.name, error.name))
-    program.main(sys.argv[2:])
+    run(lambda: program.main(sys.argv[2:]))
 
 
 if __name__ == "__main__":

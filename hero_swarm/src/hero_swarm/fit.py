@@ -4,7 +4,6 @@ import argparse
 import sys
 from typing import Optional, Sequence
 
-from hero_node import command_line
 from hero_node.safe_file import write_file
 from hero_sim.world.arena_file import load_arena
 
@@ -23,8 +22,9 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def fit(options: argparse.Namespace) -> None:
+def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Fit each robot, print what was found, and write the file. Raises: ExperimentError."""
+    options = parse_options(arguments)
     from .ros.recording_reader import read_recordings  # --help needs no ROS
 
     arena = load_arena(options.arena) if options.arena else None
@@ -42,8 +42,3 @@ def fit(options: argparse.Namespace) -> None:
         raise ExperimentError("no robot could be fitted")
     write_file(options.out, ("\n".join(lines) + "\n").encode())
     print("written: %s" % options.out)
-
-
-def main(arguments: Optional[Sequence[str]] = None) -> None:
-    """Run the program."""
-    command_line.run(lambda: fit(parse_options(arguments)))

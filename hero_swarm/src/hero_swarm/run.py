@@ -2,22 +2,16 @@
 
 from typing import Optional, Sequence
 
-from hero_node import command_line
-
 from .experiments.runner import open_folder, parse_options, run_experiment
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
+    options = parse_options(arguments)
+    if options.robots is None:
+        print(run_experiment(options))
+        return
+    from .ros.robot_runs import run_on_robots  # the simulator needs no ROS
 
-    def run() -> None:
-        options = parse_options(arguments)
-        if options.robots is None:
-            print(run_experiment(options))
-            return
-        from .ros.robot_runs import run_on_robots  # the simulator needs no ROS
-
-        _, experiment, folder, runs = open_folder(options)
-        print(run_on_robots(experiment, folder, runs, options))
-
-    command_line.run(run)
+    _, experiment, folder, runs = open_folder(options)
+    print(run_on_robots(experiment, folder, runs, options))

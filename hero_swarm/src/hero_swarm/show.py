@@ -8,7 +8,6 @@ import sys
 from collections import deque
 from typing import Optional, Sequence
 
-from hero_node import command_line
 from hero_node.optional import import_optional
 from hero_node.parameters import within
 
@@ -41,8 +40,9 @@ def _choose_cell(experiment: Experiment, number: int) -> Cell:
     return experiment.cells[number - 1]
 
 
-def show_run(options: argparse.Namespace) -> None:
+def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Replay the run that options name. Raises: ExperimentError."""
+    options = parse_options(arguments)
     _, experiment, about = read_results(options.folder)
     cell = _choose_cell(experiment, options.cell)
     seed = experiment.seeds[0] if options.seed is None else options.seed
@@ -75,8 +75,3 @@ def show_run(options: argparse.Namespace) -> None:
         from .ros.replay import replay
 
         replay(trial, experiment.time_s, options.speed)
-
-
-def main(arguments: Optional[Sequence[str]] = None) -> None:
-    """Run the program."""
-    command_line.run(lambda: show_run(parse_options(arguments)))

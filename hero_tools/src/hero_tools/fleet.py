@@ -23,7 +23,6 @@ from hero_client.ros.drivers import Drivers
 from hero_client.ros.robot_listener import RobotListener, RobotTrack
 from hero_client.ros.stop_status import StopStatus, paint
 from hero_msgs.msg import Robot
-from hero_node import command_line
 from hero_node.ros.program import Program
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
@@ -249,8 +248,9 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def show(options: argparse.Namespace) -> int:
+def main() -> int:
     """Show the fleet until the end and return the exit code."""
+    options = parse_options(rospy.myargv()[1:])
     with Program("fleet", anonymous=True) as program:
         fleet = FleetProgram(program, options)
         try:
@@ -264,8 +264,3 @@ def show(options: argparse.Namespace) -> int:
         else:
             exit_code = fleet.run_screen(keyboard)
         return exit_code if program.end_signal is None else 128 + program.end_signal
-
-
-def main() -> None:
-    """Run the program fleet."""
-    command_line.run(lambda: show(parse_options(rospy.myargv()[1:])))

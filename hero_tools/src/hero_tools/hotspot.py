@@ -18,7 +18,6 @@ import subprocess
 import sys
 from typing import List, Optional, Sequence, Tuple
 
-from hero_node import command_line
 from hero_node.errors import HeroError
 
 CONNECTION = "hero_hotspot"
@@ -177,7 +176,7 @@ def remove() -> int:
     return 0
 
 
-def run(arguments: Sequence[str]) -> int:
+def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Do what the command line says; return the exit status. Raises: HotspotError."""
     parser = argparse.ArgumentParser(prog="hotspot", description="The access point that robots join.")
     commands = parser.add_subparsers(dest="command", metavar="create | status | remove", required=True)
@@ -193,8 +192,3 @@ def run(arguments: Sequence[str]) -> int:
     if options.command == "create":
         return create(options)
     return show_status() if options.command == "status" else remove()
-
-
-def main() -> None:
-    """Run the program hotspot."""
-    command_line.run(lambda: run(sys.argv[1:]))

@@ -250,7 +250,7 @@ def test_passwords_and_names_of_networks_end_at_their_limits(monkeypatch):
     def create(ssid, password, *options):
         monkeypatch.setattr(sys, "stdin", SimpleNamespace(readline=lambda: password + "\n", isatty=lambda: False))
         calls.clear()
-        hotspot.run(["create", "--ssid=" + ssid, "--password-stdin", *options])
+        hotspot.main(["create", "--ssid=" + ssid, "--password-stdin", *options])
         return calls
 
     assert len(create("x" * 32, "y" * 8)) == len(create("ä" * 16, "y" * 63)) == 3

@@ -10,6 +10,7 @@ import sys
 import pytest
 from scripted_nmcli import ScriptedNmcli
 
+from hero_node import command_line
 from hero_tools import hotspot
 
 PASSWORD = "correct horse battery"
@@ -32,7 +33,7 @@ def run(monkeypatch, capsys, *arguments, typed=PASSWORD + "\n"):
     monkeypatch.setattr(sys, "argv", ["hotspot", *arguments])
     monkeypatch.setattr(sys, "stdin", io.StringIO(typed) if typed else Terminal())
     with pytest.raises(SystemExit) as ended:
-        hotspot.main()
+        command_line.run(hotspot.main)
     captured = capsys.readouterr()
     return ended.value.code, captured.out, captured.err
 
@@ -189,4 +190,4 @@ def test_a_name_that_no_network_can_have_is_refused_in_one_line(nmcli, monkeypat
 def test_a_password_that_is_no_text_is_refused_in_one_line(nmcli, monkeypatch, capsys):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\xff\xfe secret\n"), encoding="utf-8"))
     with pytest.raises(hotspot.HotspotError, match="the password is not text"):
-        hotspot.run(["create", "--password-stdin"])
+        hotspot.main(["create", "--password-stdin"])

@@ -47,7 +47,7 @@ def look(*arguments, **options):
 run_nmcli, hotspot.run_nmcli = hotspot.run_nmcli, look
 sys.stdin = io.StringIO(sys.argv[1] + "\\n")
 try:
-    hotspot.run(["create", "--ssid", "my net's", "--password-stdin"])
+    hotspot.main(["create", "--ssid", "my net's", "--password-stdin"])
 except hotspot.HotspotError as error:
     print(error)
 assert os.listdir(os.environ["HOME"]) == [], "nmcli left something: " + str(os.listdir(os.environ["HOME"]))

@@ -18,7 +18,6 @@ from nav_msgs.msg import Odometry
 
 from hero_client import Program, ProgramError, Robot
 from hero_client.values.readings import is_plausible, read_pose
-from hero_node import command_line
 from hero_node.command_line import say
 from hero_node.errors import HeroError
 from hero_node.geometry import Pose
@@ -343,9 +342,9 @@ def _check_file(options: argparse.Namespace) -> Settings:
     return settings
 
 
-def run(arguments: Sequence[str]) -> int:
-    """Run with the arguments of the command line; return the exit code. Raises: LocalizationError, ProgramError."""
-    options = parse_options(arguments)
+def main() -> int:
+    """Calibrate; return the exit code. Raises: LocalizationError, ProgramError."""
+    options = parse_options(rospy.myargv(sys.argv)[1:])
     if options.part == "lens" and options.yaml:
         return import_lens(options)
     settings = _check_file(options)
@@ -361,8 +360,3 @@ def run(arguments: Sequence[str]) -> int:
             return calibrate_robot_tags(options, images, program)
         finally:
             images.close()
-
-
-def main() -> None:
-    """Run the program calibrate_camera."""
-    command_line.run(lambda: run(rospy.myargv(sys.argv)[1:]))

@@ -10,7 +10,7 @@ from typing import Any, Callable, Dict, List, Optional
 
 import rospy
 
-from hero_client import Program, ProgramError, read_parameters, run
+from hero_client import Program, ProgramError, read_parameters
 from hero_client.ros.drivers import share_drivers
 from hero_client.values.readings import is_plausible
 from hero_msgs.msg import RobotPose, RobotPoses
@@ -142,15 +142,10 @@ PARAMETERS = {
 }
 
 
-def localize() -> None:
+def main() -> None:
     """Localize robots until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("localization") as program:
         parameters = read_parameters(PARAMETERS)
         node = LocalizationNode(parameters)
         while program.running:
             node.step(1.0 / parameters["rate_hz"])
-
-
-def main() -> None:
-    """Run the program localize."""
-    run(localize)

@@ -20,7 +20,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from hero_client import Program, ProgramError, read_parameters, run
+from hero_client import Program, ProgramError, read_parameters
 from hero_client.values.readings import front_first, is_plausible, read_ranges
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
@@ -140,15 +140,10 @@ PARAMETERS = {
 }
 
 
-def map_arena() -> None:
+def main() -> None:
     """Map until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("map_arena") as program:
         parameters = read_parameters(PARAMETERS)
         node = MapNode(parameters)
         for _ in program.rate(STEP_HZ):
             node.step()
-
-
-def main() -> None:
-    """Run the program map_arena."""
-    run(map_arena)

@@ -12,7 +12,7 @@ from typing import Any, Dict, List, Optional, Tuple
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from hero_client import Program, read_parameters, run
+from hero_client import Program, read_parameters
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
 from hero_node.geometry import Pose
 from hero_node.parameters import number, words
@@ -173,7 +173,7 @@ PARAMETERS = {
 }
 
 
-def track() -> None:
+def main() -> None:
     """Track until the program is to end. Raises: ProgramError, LocalizationError."""
     with Program("track") as program:
         parameters = read_parameters(PARAMETERS)
@@ -186,8 +186,3 @@ def track() -> None:
                 raise
         finally:
             node.close()
-
-
-def main() -> None:
-    """Run the program track."""
-    run(track)

@@ -6,12 +6,10 @@ rosrun hero_localization print_tags --board
 
 import argparse
 import math
-import sys
-from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_node import command_line
 from hero_node.optional import import_optional
 from hero_node.parameters import given_ids_option
 from hero_node.safe_file import replace_file
@@ -48,7 +46,7 @@ class Sheet(NamedTuple):
     is_robot: bool
 
 
-def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="print_tags", description="Make a PDF with tags of true size.")
     text = "discs for robots, e.g. '0 1 2' or 0-9"
@@ -223,8 +221,9 @@ def _draw_square(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float)
     axes.text(x_mm - half_mm + 2.0, y_mm - half_mm + 1.0, text, ha="left", va="bottom", fontsize=6)
 
 
-def run(options: argparse.Namespace) -> None:
+def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Write the PDF and say what is in it. Raises: LocalizationError; ProgramError if a library is missing."""
+    options = parse_options(arguments)
     import_optional("matplotlib", "python3-matplotlib")
     import_optional("cv2", "python3-opencv")
     from matplotlib.backends.backend_pdf import PdfPages
@@ -256,8 +255,3 @@ def run(options: argparse.Namespace) -> None:
 
 def _count(count: int, thing: str) -> str:
     return "%d %s%s" % (count, thing, "" if count == 1 else "s")
-
-
-def main() -> None:
-    """Run the program print_tags."""
-    command_line.run(lambda: run(parse_options(sys.argv[1:])))

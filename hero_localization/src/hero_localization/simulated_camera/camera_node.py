@@ -18,7 +18,6 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
-from hero_node import command_line
 from hero_node.parameters import within
 from hero_node.ros.master import check_master
 from hero_sim.world.arena import Arena, build_default
@@ -255,7 +254,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _run() -> None:
+def main() -> None:
+    """Run the camera until ROS ends."""
     options = parse_options(rospy.myargv(sys.argv)[1:])
     first_reference = find_first_reference(options.family)
     if options.first_id + options.count > first_reference:
@@ -266,8 +266,3 @@ def _run() -> None:
     check_master()
     rospy.init_node(NODE)
     CameraNode(options).run()
-
-
-def main() -> None:
-    """Run the camera until ROS ends."""
-    command_line.run(_run)

@@ -6,7 +6,6 @@ from typing import Dict, Optional, Sequence
 
 import numpy as np
 
-from hero_node import command_line
 from hero_node.safe_file import write_file
 
 from .batch import METRICS_ENDING, SAMPLE_S, list_sources
@@ -60,4 +59,4 @@ def _read_over_time(folder: ResultsFolder, experiment: Experiment) -> Dict[str, 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    command_line.run(lambda: write_report(parse_options(arguments).folder))
+    write_report(parse_options(arguments).folder)

@@ -11,7 +11,7 @@ import rospy
 from std_msgs.msg import Float32
 from visualization_msgs.msg import MarkerArray
 
-from hero_client import Program, ProgramError, Swarm, read_parameters, run
+from hero_client import Program, ProgramError, Swarm, read_parameters
 from hero_client.swarm import open_swarm
 from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
@@ -140,7 +140,7 @@ PARAMETERS = {
 }
 
 
-def behavior() -> None:
+def main() -> None:
     """Run the behavior until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("behavior") as program:
         parameters = read_parameters(PARAMETERS)
@@ -155,8 +155,3 @@ def behavior() -> None:
                 if time_s >= end_s:
                     break
                 node.step()
-
-
-def main() -> None:
-    """Run the program behavior."""
-    run(behavior)

@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Sequence
 import numpy as np
 import rospy
 
-from hero_client import Program, read_parameters, run
+from hero_client import Program, read_parameters
 from hero_client.ros.drivers import share_drivers
 from hero_client.swarm import ready_ids
 from hero_client.values.sensing import Neighbors, list_neighbors, sense_neighbors
@@ -96,15 +96,10 @@ class NeighborsNode:
             self._source.warn(missing + "; who has no pose senses nothing")
 
 
-def neighbors() -> None:
+def main() -> None:
     """Publish neighbors until the program is to end. Raises: ProgramError for a wrong parameter."""
     with Program("neighbors") as program:
         parameters = read_parameters(PARAMETERS)
         node = NeighborsNode(parameters)
         for _ in program.rate(parameters["rate_hz"]):
             node.step()
-
-
-def main() -> None:
-    """Run the program neighbors."""
-    run(neighbors)

@@ -308,7 +308,7 @@ def test_a_wrong_option_is_refused_by_name(arguments, capsys):
 
 
 def replay(*arguments):
-    show.show_run(show.parse_options(list(map(str, arguments))))
+    show.main(list(map(str, arguments)))
 
 
 def test_a_run_is_replayed_as_a_video_that_ends_as_the_run_did(finished, tmp_path, capsys):
