@@ -4,7 +4,7 @@ The robots turn on the spot, once to each side: each wheel starts from rest in b
 PID, and its own search. The firmware has no service that tells the gains of a robot.
 """
 
-from typing import Dict, List, NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -151,9 +151,7 @@ class GainSearch:
         """Start; gains are scaled to the servo: a weak one needs longer pulses."""
         # A slope far from the nominal one is rather a wrong measurement than an unusual servo.
         self._scale = float(np.clip(NOMINAL_GAIN_M_S_US / servo_gain_m_s_us, 0.5, 2.0))
-        self._waiting: List[Gains] = [DEFAULT_GAINS]
-        self._waiting += [self._make(FIRST_PROPORTIONAL, integral) for integral in INTEGRALS]
-        self.tried: Dict[Gains, Response] = {}
+        self._tried: List[Tuple[Gains, Response]] = []
 
     def _make(self, proportional: float, integral: float) -> Gains:
         return (
@@ -169,15 +167,17 @@ class GainSearch:
 
     def next_gains(self) -> Gains:
         """Return the gains to try next. Raises: IndexError after count_rounds()."""
-        if len(self.tried) == 1 + len(INTEGRALS) and not self._waiting:
-            integral = self.best()[0][1] / self._scale
-            self._waiting = [self._make(proportional, integral) for proportional in PROPORTIONALS]
-        return self._waiting[0]
+        if not self._tried:
+            return DEFAULT_GAINS
+        number = len(self._tried) - 1
+        if number < len(INTEGRALS):
+            return self._make(FIRST_PROPORTIONAL, INTEGRALS[number])
+        return self._make(PROPORTIONALS[number - len(INTEGRALS)], self.best()[0][1] / self._scale)
 
     def receive(self, response: Response) -> None:
         """Store the response to next_gains()."""
-        self.tried[self._waiting.pop(0)] = response
+        self._tried.append((self.next_gains(), response))
 
     def best(self) -> Tuple[Gains, Response]:
         """Return the best gains so far, and the response to them."""
-        return min(self.tried.items(), key=lambda item: item[1].score)
+        return min(self._tried, key=lambda item: item[1].score)
