@@ -10,7 +10,7 @@ import rospy
 
 from hero_localization.camera import device_controls, frame_source
 from hero_localization.camera.device_controls import DeviceControls
-from hero_localization.camera.frame_source import DeviceSource, LiveSource
+from hero_localization.camera.frame_source import DeviceSource, FrameSource
 
 SIZE_PX = (64, 48)
 TIMEOUT_S = 30.0
@@ -78,7 +78,7 @@ def play(monkeypatch):
         monkeypatch.setattr(frame_source.cv2, "VideoCapture", recording)
         monkeypatch.setattr(frame_source.time, "monotonic", lambda: recording.now_s)
         monkeypatch.setattr(rospy, "get_time", lambda: BOOTED_S + recording.now_s)
-        monkeypatch.setattr(LiveSource, "_keep", lambda source, picture: recording.keep(source, picture))
+        monkeypatch.setattr(FrameSource, "_keep", lambda source, picture: recording.keep(source, picture))
         monkeypatch.setattr(frame_source, "MIN_BACKOFF_S", min_backoff_s)
         source = DeviceSource(path, SIZE_PX, 30.0, controls)
         try:

@@ -56,7 +56,7 @@ class Frame(NamedTuple):
 
 
 class FrameSource:
-    """Images of a camera.
+    """Images of a camera that come by themselves: only the newest counts, and only those that are polled are decoded.
 
     Attributes:
         lens: the intrinsics in camera_info; None without it.
@@ -69,20 +69,6 @@ class FrameSource:
         self.lens: Optional[Intrinsics] = None
         self.problem = self.warning = ""
         self.arrived_s = rospy.get_time()
-
-    def poll(self, timeout_s: float) -> Optional[Frame]:
-        """Return the next image; None if none comes in time or is usable."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """Leave the camera; safe twice. Topics end with the node."""
-
-
-class LiveSource(FrameSource):
-    """Images that come by themselves: only the newest counts, and only those that are polled are decoded."""
-
-    def __init__(self) -> None:
-        super().__init__()
         self._arrival = threading.Condition()
         self._newest: Any = None
 
@@ -104,8 +90,11 @@ class LiveSource(FrameSource):
     def _decode(self, received: Any) -> Optional[Frame]:
         raise NotImplementedError
 
+    def close(self) -> None:
+        """Leave the camera; safe twice. Topics end with the node."""
 
-class TopicSource(LiveSource):
+
+class TopicSource(FrameSource):
     """Subscription to the images and camera_info of a camera driver."""
 
     def __init__(self, topic: str) -> None:
@@ -156,7 +145,7 @@ class TopicSource(LiveSource):
         return gray
 
 
-class DeviceSource(LiveSource):
+class DeviceSource(FrameSource):
     """A V4L2 device such as /dev/video0, or the URL of a network camera; opened again whenever it ends."""
 
     def __init__(self, path: str, size_px: Tuple[int, int], rate_hz: float, controls: DeviceControls) -> None:
