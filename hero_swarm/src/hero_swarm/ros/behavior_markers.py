@@ -60,21 +60,19 @@ class BehaviorMarkers:
         marker = self._make_marker(name, Marker.LINE_LIST)
         marker.scale.x = 0.004
         sensor, reading = self._behavior.sensors()[name], getattr(sensed, name)
-        for row in sensed.is_known.nonzero()[0].tolist():
-            x_m, y_m, yaw_rad = poses[row].tolist()
-            if isinstance(sensor, (Binary, Sight)):
-                ends = [(BODY_RADIUS_M + min(sensor.range_m, BEAM_M), 0.0)]
-                color = _SEEN_COLOR if reading[row] else _FREE_COLOR
-            else:
-                columns = reading.seen[row].nonzero()[0]
-                ends = list(zip(reading.forward_m[row, columns], reading.left_m[row, columns]))
-                color = _FREE_COLOR
-            cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
-            for forward_m, left_m in ends:
-                marker.points.append(Point(x_m, y_m, 0.03))
-                end_x_m, end_y_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m
-                marker.points.append(Point(x_m + end_x_m, y_m + end_y_m, 0.03))
-                marker.colors += [color, color]
+        if isinstance(sensor, (Binary, Sight)):
+            rows = sensed.is_known.nonzero()[0]
+            forward_m, left_m, hits = BODY_RADIUS_M + min(sensor.range_m, BEAM_M), 0.0, reading[rows] != 0
+        else:
+            rows, columns = (reading.seen & sensed.is_known[:, None]).nonzero()
+            forward_m, left_m = reading.forward_m[rows, columns], reading.left_m[rows, columns]
+            hits = np.zeros(len(rows), dtype=bool)
+        x_m, y_m, yaw_rad = poses[rows].T
+        cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
+        ends = x_m + cosine * forward_m - sine * left_m, y_m + sine * forward_m + cosine * left_m
+        for x, y, end_x, end_y, is_hit in np.column_stack((x_m, y_m, *ends, hits)).tolist():
+            marker.points += [Point(x, y, 0.03), Point(end_x, end_y, 0.03)]
+            marker.colors += [_SEEN_COLOR if is_hit else _FREE_COLOR] * 2
         return marker
 
     def _draw_plot(self, corner_m: Tuple[float, float], now_s: float, value: float) -> List[Marker]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...metrics import UNITS
 from .figures import draw_over_time, draw_runs, to_svg
-from .summary import Report, format_interval
+from .summary import Report, Summary, format_comparison, format_interval
 
 OverTime = Tuple[np.ndarray, Mapping[int, np.ndarray]]
 """Times (T,) in s, and cell -> a metric of its runs (T, runs)."""
@@ -32,7 +32,8 @@ def draw_page(report: Report, over_time: Mapping[str, OverTime], text: str, abou
     parts += ['<p class="note">%s</p>' % html.escape(remark) for remark in report.remarks]
     parts.append("<p>Each point is a run; large points are medians, with 95 % intervals.</p>")
     for metric in experiment.metrics:
-        parts += _draw_metric(report, metric.name, UNITS.get(metric.source, "") if metric.bound is None else "s")
+        unit = UNITS.get(metric.source, "") if metric.bound is None else "s"
+        parts += _draw_metric(metric.name, unit, report.summaries[metric.name])
     if over_time:
         parts.append("<h2>Over time</h2><p>Median of each cell, and the middle half of its runs.</p>")
     for source, (times_s, values) in over_time.items():
@@ -46,12 +47,10 @@ def draw_page(report: Report, over_time: Mapping[str, OverTime], text: str, abou
     return head % (title, _STYLE) + "\n".join(parts) + "</body></html>\n"
 
 
-def _draw_metric(report: Report, metric: str, unit: str) -> List[str]:
-    summaries = [summary for summary in report.summaries if summary.metric == metric]
-    labels = [report.experiment.cells[summary.cell].label for summary in summaries]
-    values, intervals = [own.values for own in summaries], [own.interval for own in summaries]
-    counts = (str(len(runs)) for runs in values)
-    rows = list(zip(labels, counts, map(format_interval, intervals)))
+def _draw_metric(metric: str, unit: str, summaries: Sequence[Summary]) -> List[str]:
+    cells, values, intervals = zip(*summaries)
+    labels = [cell.label for cell in cells]
+    rows = [(cell.label, str(len(runs)), format_interval(interval)) for cell, runs, interval in summaries]
     heading, figure = "<h2>%s</h2>" % html.escape(metric), to_svg(draw_runs(unit, labels, values, intervals))
     return [heading, figure, _table(("cell", "runs", "median (95 % interval)"), rows)]
 
@@ -60,11 +59,7 @@ def _list_comparisons(report: Report) -> List[str]:
     if report.experiment.compare is None:
         return []
     names = ("cells", "pairs", "difference (95 % interval)", "corrected p", "Cliff's delta")
-    rows = []
-    for first, second, one in report.compared:
-        cells = "%s against %s" % tuple(report.experiment.cells[cell].label for cell in (second, first))
-        numbers = str(one.pairs), format_interval(one.difference), "%.2g" % one.p_value, "%+.2f" % one.delta
-        rows.append((cells, *numbers))
+    rows = [format_comparison(*comparison) for comparison in report.compared]
     text = "%s: runs of the same seed are paired; Wilcoxon's signed-rank test, corrected by Holm's method"
     heading = "<h2>Comparison</h2><p>%s</p>" % html.escape(text % report.experiment.compare.metric)
     return [heading, _table(names, rows)]

@@ -5,7 +5,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from ..errors import ExperimentError
-from ..experiment_file import Comparing, Experiment
+from ..experiment_file import Cell, Comparing, Experiment
 from ..results_folder import Run, format_csv
 from .statistics import FEW_SEEDS, Comparison, Interval, bootstrap_median, compare_pairs, correct_by_holm
 
@@ -17,8 +17,7 @@ class Summary(NamedTuple):
         values: of all runs that count, in the order of their seeds.
     """
 
-    metric: str
-    cell: int
+    cell: Cell
     values: Tuple[float, ...]
     interval: Interval
 
@@ -27,32 +26,33 @@ class Report(NamedTuple):
     """Summary of an experiment's runs.
 
     Attributes:
+        summaries: of all cells that have runs, by the name of the metric.
         compared: of each two cells that differ in one value only: the first, the second, and their comparison, of which
             the p-value is corrected for the number of comparisons.
         remarks: what a reader should know before believing it.
     """
 
     experiment: Experiment
-    summaries: List[Summary]
-    compared: List[Tuple[int, int, Comparison]]
+    summaries: Dict[str, List[Summary]]
+    compared: List[Tuple[Cell, Cell, Comparison]]
     remarks: List[str]
 
 
 def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
     """Return what runs say. Raises: ExperimentError without a run that counts."""
     counted = [run for run in runs if not run.remark]
-    summaries = []
-    for index, metric in enumerate(experiment.metrics):
+    if not counted:
+        raise ExperimentError("there is no run to report: compute them with run")
+    summaries: Dict[str, List[Summary]] = {metric.name: [] for metric in experiment.metrics}
+    for index, own in enumerate(summaries.values()):
         for cell in sorted({run.cell for run in counted}):
             values = tuple(run.values[index] for run in counted if run.cell == cell)
-            summaries.append(Summary(metric.name, cell, values, bootstrap_median(values)))
-    if not summaries:
-        raise ExperimentError("there is no run to report: compute them with run")
+            own.append(Summary(experiment.cells[cell], values, bootstrap_median(values)))
     compared = [] if experiment.compare is None else _compare(experiment, experiment.compare, counted)
     return Report(experiment, summaries, compared, _remark(experiment, runs))
 
 
-def _compare(experiment: Experiment, wanted: Comparing, runs: Sequence[Run]) -> List[Tuple[int, int, Comparison]]:
+def _compare(experiment: Experiment, wanted: Comparing, runs: Sequence[Run]) -> List[Tuple[Cell, Cell, Comparison]]:
     """Compare cells that differ in wanted.between only, each with the one of the first value."""
     index = [metric.name for metric in experiment.metrics].index(wanted.metric)
     values: List[Dict[Tuple[int, str], float]] = [{} for _ in experiment.cells]
@@ -68,7 +68,7 @@ def _compare(experiment: Experiment, wanted: Comparing, runs: Sequence[Run]) -> 
         shared = sorted(values[first].keys() & values[second].keys())
         if first != second and shared:
             samples = [[values[cell][key] for key in shared] for cell in (first, second)]
-            compared.append((first, second, compare_pairs(*samples)))
+            compared.append((experiment.cells[first], experiment.cells[second], compare_pairs(*samples)))
     corrected = correct_by_holm([one.p_value for _, _, one in compared])
     return [(first, second, one._replace(p_value=p)) for (first, second, one), p in zip(compared, corrected)]
 
@@ -96,20 +96,14 @@ def _remark(experiment: Experiment, runs: Sequence[Run]) -> List[str]:
 def describe(report: Report) -> str:
     """Return the report as text for a terminal."""
     lines = []
-    for metric in report.experiment.metrics:
-        lines.append(metric.name)
-        for summary in report.summaries:
-            if summary.metric == metric.name:
-                label = report.experiment.cells[summary.cell].label
-                lines.append(
-                    "  %-40s %s, %d runs" % (label, format_interval(summary.interval), len(summary.values))
-                )
-    for first, second, one in report.compared:
+    for metric, summaries in report.summaries.items():
+        lines.append(metric)
+        for cell, values, interval in summaries:
+            lines.append("  %-40s %s, %d runs" % (cell.label, format_interval(interval), len(values)))
+    for comparison in report.compared:
         assert report.experiment.compare is not None
-        text = "%s: %s against %s: difference %s, corrected p %.2g, Cliff's delta %+.2f"
-        labels = (report.experiment.cells[cell].label for cell in (second, first))
-        values = format_interval(one.difference), one.p_value, one.delta
-        lines.append(text % (report.experiment.compare.metric, *labels, *values))
+        text = "%s: %s, %s pairs: difference %s, corrected p %s, Cliff's delta %s"
+        lines.append(text % (report.experiment.compare.metric, *format_comparison(*comparison)))
     return "\n".join(lines + ["note: " + remark for remark in report.remarks])
 
 
@@ -118,11 +112,17 @@ def format_interval(interval: Interval) -> str:
     return "%.4g (%.4g to %.4g)" % interval
 
 
+def format_comparison(first: Cell, second: Cell, one: Comparison) -> Tuple[str, ...]:
+    """Return a comparison as texts: cells, pairs, difference, corrected p-value, and Cliff's delta."""
+    cells, difference = "%s against %s" % (second.label, first.label), format_interval(one.difference)
+    return cells, str(one.pairs), difference, "%.2g" % one.p_value, "%+.2f" % one.delta
+
+
 def format_summaries(report: Report) -> str:
     """Return medians and intervals as CSV."""
     names = list(report.experiment.cells[0].varied)
     lines: List[List[Any]] = [[*names, "metric", "runs", "median", "low", "high"]]
-    for summary in report.summaries:
-        varied = report.experiment.cells[summary.cell].varied.values()
-        lines.append([*varied, summary.metric, len(summary.values), *map(repr, summary.interval)])
+    for metric, summaries in report.summaries.items():
+        for cell, values, interval in summaries:
+            lines.append([*cell.varied.values(), metric, len(values), *map(repr, interval)])
     return format_csv(lines)
