@@ -40,23 +40,15 @@ class LiveView(ExitStack):
         port: on which it listens.
     """
 
-    def __init__(
-        self,
-        rows: RobotRows,
-        robot_ids: Sequence[int],
-        port: int = 8088,
-        speed: float = 1.0,
-        origins: Sequence[str] = (),
-    ) -> None:
+    def __init__(self, rows: RobotRows, robot_ids: Sequence[int], port: int = 8088, speed: float = 1.0) -> None:
         """Listen; robots are those of the first world.
 
-        port: 0 for any that is free. speed: simulated seconds per second. origins: of web pages that may connect.
+        port: 0 for any that is free. speed: simulated seconds per second.
         Raises: ProgramError if the port is taken.
         """
         super().__init__()
         self._rows = rows
         self._speed = speed
-        self._origins = list(origins)
         self._wanted: Set[str] = set()
         self._waiting: Deque[TopicMessage] = deque(maxlen=WAITING_MAX)
         self._latched: Dict[str, TopicMessage] = {}
@@ -100,7 +92,7 @@ class LiveView(ExitStack):
     def _serve(self, port: int, listening: "Future[int]") -> None:
         asyncio.set_event_loop(asyncio.new_event_loop())
         self._loop = tornado.ioloop.IOLoop.current()
-        endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), self._origins)
+        endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), [])
         server = Server(Access(None, ()), ClientLimits(CONNECTIONS_MAX), None, endpoint.route)
         try:
             listening.set_result(server.listen("127.0.0.1", port))

@@ -89,7 +89,6 @@ class PageState:
     def __init__(self) -> None:
         self.log = LogRing()
         self._texts: Dict[str, str] = {}
-        self._versions: Dict[str, int] = {}
 
     def put(self, name: str, value: Any) -> bool:
         """Replace a part; return whether it has changed."""
@@ -97,16 +96,16 @@ class PageState:
         if self._texts.get(name) == text:
             return False
         self._texts[name] = text
-        self._versions[name] = self._versions.get(name, 0) + 1
         return True
 
-    def take_updates(self, seen: Dict[str, int], names: Optional[Sequence[str]] = None) -> Optional[str]:
+    def take_updates(self, seen: Dict[str, Any], names: Optional[Sequence[str]] = None) -> Optional[str]:
         """Return what is new to a page as one JSON object, None without any; marks it as seen.
 
-        seen: version of each part that the page has; empty for a new page. names: of the parts; None: all.
+        seen: the parts that the page has, and of the log its last line; empty for a new page. names: of the parts;
+        None: all.
         """
-        versions = {**self._versions, "log": self.log.count}
-        new = [name for name in versions if versions[name] != seen.get(name, 0) and (names is None or name in names)]
-        texts = [self._texts[name] if name != "log" else self.log.encode_after(seen.get(name, 0)) for name in new]
-        seen.update((name, versions[name]) for name in new)
+        parts: Dict[str, Any] = {**self._texts, "log": self.log.count}
+        new = [name for name in parts if parts[name] != seen.get(name, 0) and (names is None or name in names)]
+        texts = [parts[name] if name != "log" else self.log.encode_after(seen.get(name, 0)) for name in new]
+        seen.update((name, parts[name]) for name in new)
         return "{%s}" % ",".join('"%s":%s' % part for part in zip(new, texts)) if new else None

@@ -213,7 +213,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     def open(self, *arguments: str, **others: str) -> None:
         """Register a page."""
         self.number = next(PageSocket.numbers)
-        self.seen: Dict[str, int] = {}
+        self.seen: Dict[str, Any] = {}
         self.ground_truth = self.picture = False
         self.visible = True
         self._sent_s = time.monotonic()
