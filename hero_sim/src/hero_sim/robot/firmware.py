@@ -326,14 +326,12 @@ class Firmware:
     def _find_due(self) -> int:
         due_ms = min(self._next_log_ms, self._next_spin_ms)
         if self.configured:
-            due_ms = min(due_ms, self.body.booted_ms + min(self.sensing.due_ms, self.sensing.distance_due_ms))
-            if self.motors.due_ms is not None:
-                due_ms = min(due_ms, self.body.booted_ms + self.motors.due_ms)
+            own_due_ms = min(self.sensing.due_ms, self.sensing.distance_due_ms, self.motors.due_ms)
+            due_ms = min(due_ms, self.body.booted_ms + own_due_ms)
         return min(due_ms, self._answers[0][0]) if self._answers else due_ms
 
     def _is_controller_due(self, millis: int) -> bool:
-        due_ms = self.motors.due_ms
-        return self.configured and due_ms is not None and millis >= due_ms
+        return self.configured and millis >= self.motors.due_ms
 
     def _run_configured(self, millis: int) -> None:
         """Run sensors and controllers."""

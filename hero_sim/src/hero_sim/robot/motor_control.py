@@ -5,10 +5,11 @@ MotorDriver.ino, by what they do, and measurements of the stock robot. The two c
 other: two that are commanded at once write pulses in turn, and a zero for one leaves the other driving.
 """
 
-import math
-from typing import Callable, List, Optional, Sequence, Tuple
+from typing import Callable, List, Sequence
 
 import numpy as np
+
+from hero_node.geometry import clamp
 
 from ..robot_constants import (
     COMMAND_GAP_MS,
@@ -23,6 +24,7 @@ from ..robot_constants import (
 )
 from ..world.body import Body
 from ..world.kinematics import split_to_wheels
+from .clock import NEVER_MS
 from .flash import Flash
 from .motor_pid import POSITION_GAINS, VELOCITY_GAINS, Gains, MotorPid
 from .servo_pins import ServoPins
@@ -65,7 +67,7 @@ class MotorDriver:
         self.held_us = 0
         self.centers_us = [int(pulse_us) if low_us < pulse_us < high_us else 1500 for pulse_us in centers_us]
         self.attached = False
-        self.stop_at_ms = 0
+        self.stop_at_ms = NEVER_MS
         self._pulses_us = (0, 0)
 
     def write(self, now_ms: int, left_us: int, right_us: int) -> None:
@@ -91,6 +93,7 @@ class MotorDriver:
     def stop(self) -> None:
         """Stop the pulses."""
         self.attached = False
+        self.stop_at_ms = NEVER_MS
         self.held_us += self._pins.detach()
         self._body.release()
 
@@ -122,10 +125,10 @@ class Controller:
         self._watchdog_ms = 0
         self._ran_ms = 0
 
-    def find_due(self, now_ms: int) -> Optional[int]:
-        """Return when the controller runs next, None if its watchdog forbids that."""
+    def find_due(self, now_ms: int) -> int:
+        """Return when the controller runs next, NEVER_MS if its watchdog forbids that."""
         due_ms = max(self._ran_ms + CONTROL_MS, now_ms)
-        return due_ms if due_ms - self._watchdog_ms < self._timeout_ms else None
+        return due_ms if due_ms - self._watchdog_ms < self._timeout_ms else NEVER_MS
 
     def set_gains(self, gains: Sequence[float]) -> None:
         """Set lkp lki lkd rkp rki rkd, in the flash too."""
@@ -167,7 +170,7 @@ class Controller:
 
     def is_due(self, now_ms: int) -> bool:
         """Return whether the controller runs at now_ms, which counts as a run."""
-        if now_ms - self._ran_ms < CONTROL_MS or now_ms - self._watchdog_ms >= self._timeout_ms:
+        if self.find_due(now_ms) > now_ms:
             return False
         self._ran_ms = now_ms
         return True
@@ -185,7 +188,7 @@ class MotorControl:
     Attributes:
         motors: what writes the pulses.
         velocity, position: the controllers, for their gains.
-        due_ms: when run() has something to do, None while nothing drives.
+        due_ms: when run() has something to do, NEVER_MS while nothing drives.
     """
 
     def __init__(
@@ -214,15 +217,10 @@ class MotorControl:
         self._start_ticks = [0, 0]
         self._tuning_start_ticks = [0, 0]
         self._relay = [1, 1]
-        self.due_ms: Optional[int] = None
         self._reschedule(0)
 
     def _reschedule(self, now_ms: int) -> None:
-        self.due_ms = self.motors.stop_at_ms if self.motors.attached else None
-        for controller in (self.velocity, self.position):
-            due_ms = controller.find_due(now_ms)
-            if due_ms is not None and (self.due_ms is None or due_ms < self.due_ms):
-                self.due_ms = due_ms
+        self.due_ms = min(self.motors.stop_at_ms, self.velocity.find_due(now_ms), self.position.find_due(now_ms))
 
     def receive_twist(self, controller: Controller, now_ms: int, linear_m_s: float, angular_rad_s: float) -> bool:
         """Receive a Twist for a controller; return whether it was a zero that was accepted.
@@ -231,7 +229,7 @@ class MotorControl:
         """
         if controller.is_too_early(now_ms):
             return False
-        targets = _limit_to_wheels(linear_m_s, angular_rad_s)
+        targets = split_to_wheels(clamp(linear_m_s, MAX_LINEAR_M_S), clamp(angular_rad_s, MAX_ANGULAR_RAD_S))
         if controller is self.position:
             self._start_ticks = self._count_ticks(now_ms)
             targets = (targets[0] / self._odometry.tick_m, targets[1] / self._odometry.tick_m)
@@ -275,7 +273,7 @@ class MotorControl:
                 self._tune(self.velocity, now_ms, self._odometry.filtered_m_s, _VELOCITY_TUNING_US)
             else:
                 self.velocity.run_pids(now_ms, self._odometry.filtered_m_s)
-        if self.motors.attached and now_ms >= self.motors.stop_at_ms:
+        if now_ms >= self.motors.stop_at_ms:
             self.motors.stop()
         self._reschedule(now_ms)
 
@@ -302,10 +300,3 @@ class MotorControl:
 
     def _count_ticks_since(self, now_ms: int, start_ticks: Sequence[int]) -> List[int]:
         return [now - start for now, start in zip(self._count_ticks(now_ms), start_ticks)]
-
-
-def _limit_to_wheels(linear_m_s: float, angular_rad_s: float) -> Tuple[float, float]:
-    """Return the wheels' speeds (m/s) for a Twist within the firmware's limits; both are 0 only for a zero Twist."""
-    linear_m_s = math.copysign(min(abs(linear_m_s), MAX_LINEAR_M_S), linear_m_s)
-    angular_rad_s = math.copysign(min(abs(angular_rad_s), MAX_ANGULAR_RAD_S), angular_rad_s)
-    return split_to_wheels(linear_m_s, angular_rad_s)

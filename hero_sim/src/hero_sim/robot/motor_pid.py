@@ -8,6 +8,8 @@ With a motor like that of the measured build, the distance of its wheels over 3 
 
 from typing import NamedTuple
 
+from hero_node.geometry import clamp
+
 SAMPLE_MS = 50
 
 
@@ -60,11 +62,8 @@ class MotorPid:
         self._computed_ms = now_ms
         sample_s = SAMPLE_MS / 1000.0
         error = target - measured
-        self._sum_us = self._limit(self._sum_us + self.gains.integral * sample_s * error)
+        self._sum_us = clamp(self._sum_us + self.gains.integral * sample_s * error, self._limit_us)
         damping_us = self.gains.derivative / sample_s * (measured - self._last_input)
         self._last_input = measured
         # The firmware truncates.
-        self.output_us = int(self._limit(self.gains.proportional * error + self._sum_us - damping_us))
-
-    def _limit(self, value_us: float) -> float:
-        return min(max(value_us, -self._limit_us), self._limit_us)
+        self.output_us = int(clamp(self.gains.proportional * error + self._sum_us - damping_us, self._limit_us))

@@ -81,14 +81,10 @@ class TickOdometryRows:
     def measure_velocities(self) -> np.ndarray:
         """Return linear m/s and angular rad/s over the last TWIST_WINDOW readings (2, R)."""
         if self._velocities is None:
-            self._velocities = self._compute_velocities()
+            oldest = (self._newest + 1) % TWIST_WINDOW
+            elapsed_ms = np.maximum(self._window_ms[self._newest] - self._window_ms[oldest], 1)
+            rolled_m = (self._window_ticks[self._newest] - self._window_ticks[oldest]) * self._tick_m
+            left_m_s, right_m_s = rolled_m / (elapsed_ms / 1000.0)
+            self._velocities = np.array(join_wheels(left_m_s, right_m_s, self._separation_m))
+            self._velocities[:, self._is_cleared] = 0.0
         return self._velocities
-
-    def _compute_velocities(self) -> np.ndarray:
-        oldest = (self._newest + 1) % TWIST_WINDOW
-        elapsed_ms = np.maximum(self._window_ms[self._newest] - self._window_ms[oldest], 1)
-        rolled_m = (self._window_ticks[self._newest] - self._window_ticks[oldest]) * self._tick_m
-        left_m_s, right_m_s = rolled_m / (elapsed_ms / 1000.0)
-        velocities = np.array(join_wheels(left_m_s, right_m_s, self._separation_m))
-        velocities[:, self._is_cleared] = 0.0
-        return velocities
