@@ -193,9 +193,18 @@ def test_the_ruler_has_a_mark_for_each_centimeter_above_its_line():
 def test_the_board_lies_in_the_middle_above_the_ruler():
     for paper_mm in print_tags.PAPERS_MM.values():
         (axes,) = print_tags.draw_board_page(paper_mm).axes
-        left_mm, right_mm, low_mm, high_mm = axes.images[0].get_extent()
+        black, white = axes.collections
+        (left_mm, low_mm), (right_mm, high_mm) = find_bounds(black)
         assert left_mm + right_mm == pytest.approx(paper_mm[0]) and low_mm == 28.0
         assert (right_mm - left_mm, high_mm - low_mm) == pytest.approx((175.0, 225.0)) and high_mm < paper_mm[1]
+        np.testing.assert_allclose(find_bounds(white), find_bounds(black))
+        assert not axes.images, "a PDF rounds their size to points"
+
+
+def find_bounds(collection):
+    """Return the lowest and highest x and y (2, 2) of rectangles."""
+    corners = np.vstack([path.vertices[:4] for path in collection.get_paths()])
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def test_sheets_fill_rows_from_the_upper_left_and_pages_in_turn():
@@ -237,9 +246,9 @@ def test_white_cells_lie_on_one_black_square(family, tag_id):
     for path in white.get_paths():
         low, high = path.vertices[:4].min(axis=0), path.vertices[:4].max(axis=0)
         left, right = np.rint((np.array((low[0], high[0])) - 66.0) / cell_mm).astype(int)
-        top = int(round((174.0 - high[1]) / cell_mm))
-        assert high - low == pytest.approx(((right - left) * cell_mm, cell_mm))
-        found[top, left:right] += 1
+        top, bottom = np.rint((174.0 - np.array((high[1], low[1]))) / cell_mm).astype(int)
+        assert high - low == pytest.approx(((right - left) * cell_mm, (bottom - top) * cell_mm))
+        found[top:bottom, left:right] += 1
     np.testing.assert_array_equal(found, cells > 0)
 
 

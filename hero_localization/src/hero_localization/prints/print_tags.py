@@ -26,6 +26,9 @@ ROBOT_DIAMETER_MM = 73.0
 """A disc that lies on the robot's top."""
 RULER_MM = 100.0
 MM_PER_INCH = 25.4
+SQUARE_PX = 300
+"""Of the board: so the cells of its markers are of whole pixels, too."""
+
 LINE = 0.4
 """Points."""
 
@@ -117,7 +120,8 @@ def draw_page(page: Sequence[Tuple[Sheet, float, float]], family: str, paper_mm:
     """Return a matplotlib figure of one page, in its true size."""
     figure, axes = _open_page(paper_mm)
     for sheet, x_mm, y_mm in page:
-        _draw_tag(axes, sheet, family, x_mm, y_mm)
+        left_mm, low_mm = x_mm - sheet.size_mm / 2.0, y_mm - sheet.size_mm / 2.0
+        _draw_print(axes, draw_tag(family, sheet.tag_id), left_mm, low_mm, sheet.size_mm, sheet.size_mm)
         (_draw_disc if sheet.is_robot else _draw_square)(axes, sheet, family, x_mm, y_mm)
     return figure
 
@@ -128,14 +132,8 @@ def draw_board_page(paper_mm: Tuple[float, float]) -> Any:
 
     height_mm, width_mm = 1e3 * SQUARE_M * COLUMNS, 1e3 * SQUARE_M * ROWS
     figure, axes = _open_page(paper_mm)
-    left_mm, bottom_mm = (paper_mm[0] - width_mm) / 2.0, EDGE_MM + FOOTER_MM
-    axes.imshow(
-        np.rot90(draw_board(120)),
-        cmap="gray",
-        aspect="auto",
-        extent=(left_mm, left_mm + width_mm, bottom_mm, bottom_mm + height_mm),
-        interpolation="none",
-    )
+    left_mm = (paper_mm[0] - width_mm) / 2.0
+    _draw_print(axes, np.rot90(draw_board(SQUARE_PX)), left_mm, EDGE_MM + FOOTER_MM, width_mm, height_mm)
     return figure
 
 
@@ -164,22 +162,24 @@ def _open_page(paper_mm: Tuple[float, float]) -> Tuple[Any, Any]:
     return figure, axes
 
 
-def _draw_tag(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float) -> None:
+def _draw_print(
+    axes: Any, image: np.ndarray, left_mm: float, low_mm: float, width_mm: float, height_mm: float
+) -> None:
+    """Draw an image (H, W) of black and white as rectangles: a PDF rounds the size of an image to points."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Rectangle
 
-    cells = draw_tag(family, sheet.tag_id)
-    cell_mm, half_mm = sheet.size_mm / len(cells), sheet.size_mm / 2.0
-    left_mm, top_mm = x_mm - half_mm, y_mm + half_mm
-    black = Rectangle((left_mm, y_mm - half_mm), sheet.size_mm, sheet.size_mm)
+    rows, columns = image.shape
+    black = Rectangle((left_mm, low_mm), width_mm, height_mm)
     axes.add_collection(PatchCollection([black], facecolor="black", edgecolor="none"))
     # White runs over black: between black neighbors no viewer draws a line.
     white = []
-    for row, values in enumerate(cells):
-        edges = np.flatnonzero(np.diff(np.pad(values > 0, 1, mode="constant").astype(int)))
+    tops = [0, *(np.flatnonzero((image[1:] != image[:-1]).any(axis=1)) + 1).tolist(), rows]
+    for top, bottom in zip(tops, tops[1:]):
+        edges = np.flatnonzero(np.diff(np.pad(image[top] > 0, 1, mode="constant").astype(int)))
         for start, end in edges.reshape(-1, 2).tolist():
-            corner = (left_mm + start * cell_mm, top_mm - (row + 1) * cell_mm)
-            white.append(Rectangle(corner, (end - start) * cell_mm, cell_mm))
+            corner = (left_mm + start * width_mm / columns, low_mm + (rows - bottom) * height_mm / rows)
+            white.append(Rectangle(corner, (end - start) * width_mm / columns, (bottom - top) * height_mm / rows))
     axes.add_collection(PatchCollection(white, facecolor="white", edgecolor="none", zorder=2))
 
 
