@@ -25,7 +25,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Fit each robot, print what was found, and write the file. Raises: ExperimentError."""
     options = parse_options(arguments)
-    from .ros.recording_reader import read_recordings  # --help needs no ROS
+    from .recording_reader import read_recordings  # imports rosbag, where there is ROS, which takes long
 
     arena = load_arena(options.arena) if options.arena else None
     lines = ["# slip cannot be told from smaller wheels: it is the usual one, and wheels are fitted with it"]

@@ -62,8 +62,9 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         write_video(trial, experiment.time_s, options.speed, options.video)
         print(options.video)
     elif options.bag:
-        recording = import_optional("hero_recording.step_recorder", "hero-swarm[bags]")
-        with recording.StepRecorder(trial.rows, robot_ids, options.bag):
+        from hero_recording.step_recorder import StepRecorder
+
+        with StepRecorder(trial.rows, robot_ids, options.bag):
             deque(trial.run(experiment.time_s), maxlen=0)
         print(options.bag)
     elif options.foxglove is not None:

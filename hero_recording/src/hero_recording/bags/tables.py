@@ -21,10 +21,14 @@ BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "l
 """Of /hero_N/proximity by index: counter-clockwise from the rear."""
 
 
-def _read_stamp(content: Any) -> float:
-    stamp = content.header.stamp
+def to_seconds(stamp: Any) -> float:
+    """Return a stamp of a message in s."""
     # rosbags decodes what was recorded under ROS 1 with the names of ROS 2.
     return stamp.sec + stamp.nanosec / 1e9 if hasattr(stamp, "nanosec") else float(stamp.to_sec())
+
+
+def _read_stamp(content: Any) -> float:
+    return to_seconds(content.header.stamp)
 
 
 def _range_reader(index: int) -> Callable[[Any], Any]:
