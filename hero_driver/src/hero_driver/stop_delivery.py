@@ -24,7 +24,7 @@ from .commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
 from .corrections.message_layouts import MD5SUMS
 from .peer import Peer, PeerOwner
 from .ros.message_types import apply_aliases
-from .ros.robot_commands import NO_LIGHT
+from .ros.robot_commands import LIGHT_SUFFIX, NO_LIGHT
 from .rosserial.errors import RosserialError
 from .rosserial.session import Topic
 from .transport.event_loop import CallLater
@@ -33,7 +33,6 @@ BURST_LIGHTS = 62
 """Light commands in front of the zeros that end a self-tuning: 1488 bytes. Measured: 40 of 40 tunings ended."""
 
 LIGHT_TYPE, LIGHT_MD5 = "std_msgs/ColorRGBA", "a29a96539573343b1310c73607334b00"
-LIGHT_SUFFIX = "/led"
 
 MOTION_AFTER_S = 0.1
 """Motion goes out so long after a stop. A program's zero overtakes its own last commands, which come on connections of
