@@ -67,8 +67,10 @@ class Calibration:
         if MOTORS in parts or VELOCITY in parts:
             place_robots(session, at_wall=False, ask=self._ask)
         if MOTORS in parts and session.active:
-            motors = calibrate_motors(session)
-            self._store(MOTORS, motors)
+            try:
+                calibrate_motors(session, motors)
+            finally:
+                self._store(MOTORS, motors)
         if VELOCITY in parts and session.active:
             self._store(VELOCITY, calibrate_velocity(session, motors))
         if WHEELS in parts and session.active:

@@ -1,7 +1,7 @@
 """The procedures on simulated robots in virtual time, judged by the robots' known errors and by ground truth."""
 
-
 import re
+from functools import partial
 
 import numpy as np
 import pytest
@@ -298,6 +298,17 @@ class TestCalibration:
         assert "ended early" in capsys.readouterr().out
         session.sleep(0.5)
         assert is_moving(session) == [False] * 2
+
+    @pytest.mark.slow
+    def test_what_is_in_a_robot_is_saved_if_the_end_comes_while_others_try_again(self, tmp_path):
+        session = make_session(count=2)
+        far = session.probes[1]
+        for time_s, is_lost in ((5.0, True), (32.0, False)):
+            session.events[time_s] = partial(setattr, far, "is_lost", is_lost)
+        session.end_s = 60.0
+        assert self.run(session, tmp_path, "motors") == 130
+        assert self.load(tmp_path, 0)["motor_centers_us"] == session.probes[0].written["motor_centers_us"]
+        assert not far.written and not (tmp_path / "hero_1.yaml").exists()
 
     def test_nothing_is_saved_if_the_end_comes_before_a_result(self, tmp_path):
         session = make_session(count=2)

@@ -1,6 +1,6 @@
 """Procedure motors: sweeps the servo pulses of all robots, and writes the centers of their servos."""
 
-from typing import Dict, List, NamedTuple, Sequence
+from typing import Dict, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -45,8 +45,8 @@ def evaluate_sweep(pulses_us: List[int], speeds_m_s: np.ndarray) -> MotorResult:
     return MotorResult(pulses_us, speeds_m_s, zones)
 
 
-def calibrate_motors(session: Session) -> Dict[int, MotorResult]:
-    """Calibrate all active robots; return the results by robot."""
+def calibrate_motors(session: Session, results: Optional[Dict[int, MotorResult]] = None) -> Dict[int, MotorResult]:
+    """Calibrate all active robots; return the results by robot, in results: see Session.repeat()."""
     say("motors: pulses are swept up and down, about 40 s")
     pulses_us = dead_zone.list_pulses()
 
@@ -66,4 +66,4 @@ def calibrate_motors(session: Session) -> Dict[int, MotorResult]:
         probe.write("motor_centers_us", result.to_file()["motor_centers_us"])
         return result
 
-    return session.repeat("motors", TRIES, sweep, evaluate)
+    return session.repeat("motors", TRIES, sweep, evaluate, results)

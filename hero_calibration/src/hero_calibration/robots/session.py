@@ -91,13 +91,15 @@ class Session(Clock):
         tries: int,
         move: Callable[[Sequence[Probe]], M],
         evaluate: Callable[[Probe, M, bool], T],
+        results: Optional[Dict[int, T]] = None,
     ) -> Dict[int, T]:
         """Move robots and evaluate their data; those whose data is unusable try again, and fail in the end.
 
         Wi-Fi stalls for a second now and then, and delays readings and commands. evaluate receives what move returned,
-        and whether this is the last try. Return the results by robot.
+        and whether this is the last try. Return the results by robot, in results (None: new): there they are also if
+        the program is ended meanwhile.
         """
-        results: Dict[int, T] = {}
+        results = {} if results is None else results
         waiting = self.active
         for left in reversed(range(tries)):
             moved = move(waiting)
