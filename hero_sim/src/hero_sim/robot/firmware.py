@@ -51,11 +51,6 @@ TIME_REQUEST_MS = 2500
 ANSWER_MS = (42, 75)
 """From the arrival of a service call to its answer (measured)."""
 
-_PHASE_OFF = "off"
-_PHASE_BOOT = "boot"  # until the first attempt to connect has ended
-_PHASE_SETUP = "setup"  # setup(), connected or not, with the lights of welcome
-_PHASE_LOOP = "loop"
-
 _TIME_REQUEST = packets.encode_packet(packets.ID_TIME, bytes(8))
 
 
@@ -103,7 +98,7 @@ class Firmware:
         self._has_imu_hat = has_imu_hat
         self._servo_timing = servo_timing
         self._report = report
-        self._phase = _PHASE_OFF
+        self._phase: Optional[Callable[[int], None]] = None  # what runs next; None: off
         self._setup: List[Tuple[int, Callable[[int], None]]] = []
         self._reset_memory()
 
@@ -143,12 +138,12 @@ class Firmware:
             self.name = "hero_%d" % robot_id
         self.switch_off()
         self.body.booted_ms = now_ms
-        self._phase = _PHASE_BOOT
+        self._phase = self._connect_first
         self.due_ms = now_ms + BOOT_MS
 
     def switch_off(self) -> None:
         """Cut the power; the caller cuts the radio's connection."""
-        self._phase = _PHASE_OFF
+        self._phase = None
         self.body.release()
         self._reset_memory()
         self.due_ms = NEVER_MS
@@ -156,7 +151,7 @@ class Firmware:
     @property
     def is_on(self) -> bool:
         """Whether the robot has power."""
-        return self._phase != _PHASE_OFF
+        return self._phase is not None
 
     def freeze(self, now_ms: int, for_ms: int) -> None:
         """Block the program for for_ms: nothing is read, sent or watched, the motors keep their pulses."""
@@ -177,7 +172,7 @@ class Firmware:
 
     def _end_connecting(self, now_ms: int) -> None:
         self.wants_connection = False
-        if self._phase == _PHASE_BOOT:
+        if self._phase == self._connect_first:
             self._begin_setup(now_ms)
         elif self._blocked_until_ms is not None:
             self._unblock(now_ms)
@@ -199,7 +194,7 @@ class Firmware:
 
     def block_writing(self, now_ms: int) -> None:
         """The radio accepts no more bytes: the whole loop blocks until it does, or 5 s."""
-        if self._blocked_until_ms is None and self._phase == _PHASE_LOOP:
+        if self._blocked_until_ms is None and self._phase == self._run_loop:
             self.freeze(now_ms, CONNECT_TIMEOUT_MS)
 
     def unblock_writing(self, now_ms: int) -> None:
@@ -229,7 +224,7 @@ class Firmware:
 
     def run(self, now_ms: int) -> None:
         """Do everything that is due at now_ms, and set due_ms."""
-        if self._phase == _PHASE_OFF:
+        if self._phase is None:
             self.due_ms = NEVER_MS
             return
         if self._blocked_until_ms is not None:
@@ -238,12 +233,7 @@ class Firmware:
                 return
             self._blocked_until_ms = None
             self.wants_connection = False
-        if self._phase == _PHASE_BOOT:
-            self._connect_first(now_ms)
-        elif self._phase == _PHASE_SETUP:
-            self._run_setup(now_ms)
-        else:
-            self._run_loop(now_ms)
+        self._phase(now_ms)
 
     def _connect_first(self, now_ms: int) -> None:
         timeout_at_ms = self.body.booted_ms + BOOT_MS + CONNECT_TIMEOUT_MS
@@ -257,7 +247,7 @@ class Firmware:
 
     def _begin_setup(self, now_ms: int) -> None:
         """Go on with setup() after the attempt to connect (ROSHandle.ino:92-94, firmware.ino:114-140)."""
-        self._phase = _PHASE_SETUP
+        self._phase = self._run_setup
         self.log("\x1b[94m[/%s] %s | IP: %s \x1b[0m" % (self.name, self.model.versions, self._address))
         # The first spin comes before anything is advertised; a request that is in by then meets no topics.
         first_spin_ms = now_ms + int(self.rng.randint(0, 3))
@@ -291,7 +281,7 @@ class Firmware:
             self.log("\x1b[91m[%s] IMU is not working or not connected! Error: 1\x1b[0m" % self.name)
 
     def _enter_loop(self, now_ms: int) -> None:
-        self._phase = _PHASE_LOOP
+        self._phase = self._run_loop
         self._next_spin_ms = self._next_log_ms = now_ms
         self.sensing.begin(self.to_millis(now_ms))
         self._run_loop(now_ms)

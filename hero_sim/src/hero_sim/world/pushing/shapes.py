@@ -200,10 +200,7 @@ def touch_walls(
         if away_x * away_x + away_y * away_y > reach_m * reach_m:
             continue
         if isinstance(body.shape, Disc):
-            distance_m = math.sqrt(away_x * away_x + away_y * away_y) or 1e-9
-            contacts.append(
-                Contact(*near_m, away_x / distance_m, away_y / distance_m, body.shape.radius_m - distance_m)
-            )
+            contacts.append(touch_circle(*near_m, 0.0, body))
         else:
             contacts += _touch_wall(body, start_m, end_m, margin_m)
     return [contact for contact in contacts if contact.depth_m > -margin_m]
