@@ -47,6 +47,7 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
     Raises: OptionError for an arena in which the robots find no place.
     """
     seeds, world = draw_seeds(options), build_world(options)
+    boot_rng = np.random.RandomState(seeds["boot"])
     models = parse_models(options.model, options.first_id, options.count)
     infrared = SharedReadings(world)
     robots: List[Firmware] = []
@@ -55,9 +56,8 @@ def build_swarm(options: argparse.Namespace, addresses: List[str], report: Repor
         robot_id, rng = options.first_id + index, np.random.RandomState(seed)
         timing = draw_servo_timing(options, robot_id)
         robots.append(Firmware(robot_id, body, flash, rng, address, options.imu_hat, timing, report, model))
-    swarm = Swarm(world, robots)
-    swarm.switch_on(np.random.RandomState(seeds["boot"]), BOOT_SPREAD_MS)
-    return swarm
+        robots[index].switch_on(world.time_ms + int(boot_rng.randint(BOOT_SPREAD_MS)))
+    return Swarm(world, robots)
 
 
 def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simulator, FaultInjector]:

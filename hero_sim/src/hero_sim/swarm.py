@@ -7,8 +7,6 @@ reports their connections; the same calls with the same seed give the same run.
 import heapq
 from typing import Callable, List, Optional, Tuple
 
-import numpy as np
-
 from .robot.firmware import Firmware
 from .world.world import STEP_MS, World
 
@@ -23,17 +21,13 @@ class Swarm:
     """
 
     def __init__(self, world: World, robots: List[Firmware]) -> None:
-        """Join robots, which are switched off, with their world."""
+        """Join robots with their world."""
         self.world = world
         self.robots = robots
         self.now_ms = world.time_ms
         self.after_step: Optional[Callable[[int], None]] = None
         self._queue: List[Tuple[int, int]] = []
-
-    def switch_on(self, rng: np.random.RandomState, spread_ms: int) -> None:
-        """Boot all robots, each at its own moment within spread_ms."""
-        for index, robot in enumerate(self.robots):
-            robot.switch_on(self.now_ms + int(rng.randint(0, max(spread_ms, 1))))
+        for index in range(len(robots)):
             self.reschedule(index)
 
     def reschedule(self, index: int) -> None:
