@@ -89,7 +89,7 @@ class PageRequests:
         return ""
 
     def _carry_out(self, page: Union["PageSocket", "Client"], request: Request) -> None:
-        """Raises: RefusedError or FormationError."""
+        """Carry out a request, if it may be made now. Raises: RefusedError or FormationError."""
         self._check(request["do"], request.get("robots", ()))
         getattr(self, "_do_" + request["do"])(page, request)
 

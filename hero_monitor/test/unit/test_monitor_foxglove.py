@@ -219,6 +219,14 @@ def test_messages_of_clients_are_passed_on_and_a_refusal_is_said_once():
     assert len(heard) == 4 and "not advertised" in reader.find("status")[-1]["message"]
 
 
+def test_a_bug_in_what_takes_messages_is_no_mistake_of_the_client():
+    reader = Reader(Hub(make_publisher(lambda *message: 1 + "")))
+    channel = {"id": 7, "topic": "/hero_0/cmd_vel", "schemaName": "geometry_msgs/Twist", "encoding": "ros1"}
+    reader.send(op="advertise", channels=[channel])
+    with pytest.raises(TypeError):
+        reader.hub.receive(reader.client, struct.pack("<BI", 1, 7) + b"twist")
+
+
 TWIST = "geometry_msgs/Twist"
 DRIVE_FAST = {"do": "drive", "robots": ["hero_3"], "linear": 0.2, "angular": 8.0}
 

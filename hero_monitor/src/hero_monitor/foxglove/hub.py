@@ -155,13 +155,13 @@ class Hub:
 
     def receive(self, client: Client, message: Union[str, bytes]) -> None:
         """Carry out a client's request, or tell it why not."""
-        try:
-            if isinstance(message, bytes):
-                refusal = self._pass_on(client, *read_message(message))
-            else:
+        if isinstance(message, bytes):
+            refusal = self._pass_on(client, message)
+        else:
+            try:
                 refusal = self._carry_out(client, json.loads(message))
-        except (ValueError, TypeError, KeyError, RecursionError) as error:
-            refusal = "invalid request: %s" % type(error).__name__
+            except (ValueError, TypeError, KeyError, RecursionError) as error:
+                refusal = "invalid request: %s" % type(error).__name__
         if refusal:
             client.send_text(make_status(WARNING, refusal))
 
@@ -195,8 +195,9 @@ class Hub:
             return "this server does not know %s" % shorten(op)
         return ""
 
-    def _pass_on(self, client: Client, channel_id: int, content: bytes) -> str:
+    def _pass_on(self, client: Client, frame: bytes) -> str:
         """Pass a message on; return why not, said once."""
+        channel_id, content = read_message(frame)
         channel = client.published.get(channel_id)
         if self._publisher is None:
             refusal = NO_PUBLISHING

@@ -74,7 +74,7 @@ def encode_message(subscription: int, time_ns: int, content: bytes) -> bytes:
 
 
 def read_message(frame: bytes) -> Tuple[int, bytes]:
-    """Return the channel and the content of a message of a client. Raises: ValueError."""
+    """Return the channel and the content of a message of a client; channel -1 for what is no message."""
     if len(frame) < _CLIENT_HEADER.size or frame[0] != MESSAGE_DATA:
-        raise ValueError("no message")
+        return -1, b""
     return _CLIENT_HEADER.unpack_from(frame)[1], frame[_CLIENT_HEADER.size :]
