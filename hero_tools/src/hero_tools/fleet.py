@@ -20,7 +20,7 @@ import rospy
 
 from hero_client.apps.keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard, NoTerminalError
 from hero_client.ros.drivers import Drivers
-from hero_client.ros.robot_listener import RobotListener, RobotTrack
+from hero_client.ros.robot_listener import RobotListener, RobotTrack, follow
 from hero_client.ros.stop_status import StopStatus, paint
 from hero_msgs.msg import Robot
 from hero_node.ros.program import Program
@@ -73,18 +73,10 @@ class FleetListener:
             return []
         self.heard, self.listening, self.stopped = True, report.listening, report.stopped
         present = {robot.namespace for robot in report.robots if robot.namespace and robot.state != Robot.REFUSED}
-        for namespace in present - self._asked:
-            self._worker.submit(self._open_listener, namespace)
-        for namespace in self._asked - present:
-            self._worker.submit(self._close_listener, namespace)
-        self._asked = present
+        if present != self._asked:
+            self._asked = present
+            self._worker.submit(follow, self._listeners, present, RobotListener)
         return [self._make_row(robot, now_s) for robot in report.robots]
-
-    def _open_listener(self, namespace: str) -> None:
-        self._listeners[namespace] = RobotListener(namespace)
-
-    def _close_listener(self, namespace: str) -> None:
-        self._listeners.pop(namespace).close()
 
     def _make_row(self, robot: Robot, now_s: float) -> RobotRow:
         # Topics under the name of a robot that was refused are those of another robot.

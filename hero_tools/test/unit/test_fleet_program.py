@@ -37,7 +37,7 @@ class World:
         monkeypatch.setattr(module, "Drivers", lambda: self)
         monkeypatch.setattr(module, "RobotListener", self.listen)
         monkeypatch.setattr(
-            module, "ThreadPoolExecutor", lambda *given: SimpleNamespace(submit=lambda call, name: call(name))
+            module, "ThreadPoolExecutor", lambda *given: SimpleNamespace(submit=lambda call, *given: call(*given))
         )
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
         monkeypatch.setattr(module.shutil, "get_terminal_size", lambda: SimpleNamespace(columns=100, lines=8))

@@ -4,7 +4,7 @@ Unlike Robot it decodes messages only when asked: a swarm sends far more of them
 """
 
 from collections import deque
-from typing import Any, Deque, Optional, Sequence, Tuple
+from typing import Any, Callable, Deque, Dict, Optional, Sequence, Set, Tuple
 
 import genpy
 import rospy
@@ -116,3 +116,11 @@ class RobotListener:
         """Unsubscribe."""
         self._odometry.close()
         self._proximity.close()
+
+
+def follow(sources: Dict[str, Any], wanted: Set[str], open_source: Callable[[str], Any]) -> None:
+    """Open the sources that are wanted and close the others, one by one: other threads read them meanwhile."""
+    for name in sorted(wanted - set(sources)):
+        sources[name] = open_source(name)
+    for name in set(sources) - wanted:
+        sources.pop(name).close()

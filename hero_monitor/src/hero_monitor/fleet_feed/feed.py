@@ -21,7 +21,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_client.ros.drivers import Drivers
-from hero_client.ros.robot_listener import NewestMessage
+from hero_client.ros.robot_listener import NewestMessage, follow
 from hero_client.ros.stop_status import StopStatus
 from hero_client.values.readings import finite, is_plausible, read_pose
 from hero_client.values.robot_states import STATES, STOP_STATES
@@ -329,14 +329,6 @@ class FleetFeed:
             label = LABEL.match(line.msg) if line.name in drivers else None
             robot = label.group(1) if label and label.group(1) in self.robots else ""
             log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
-
-
-def follow(sources: Dict[str, Any], wanted: Set[str], open_source: Callable[[str], Any]) -> None:
-    """Open the sources that are wanted and close the others, one by one: other threads read them meanwhile."""
-    for name in sorted(wanted - set(sources)):
-        sources[name] = open_source(name)
-    for name in set(sources) - wanted:
-        sources.pop(name).close()
 
 
 def describe_stop_of_others(stopped: bool, moving: Sequence[str]) -> Optional[StopStatus]:
