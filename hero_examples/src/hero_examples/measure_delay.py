@@ -4,8 +4,9 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 
-from hero_client import Program, ProgramError, open_swarm, read_parameters
+from hero_client import Program, open_swarm, read_parameters
 from hero_node.geometry import wrap_angle, yaw_of
+from hero_node.optional import import_optional
 from hero_node.parameters import robot_ids, whole_number
 
 
@@ -35,20 +36,12 @@ def measure(program, robot, turns):
     return {"message delay": delays_ms, "command to motion": motions_ms}
 
 
-def open_figure():
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise ProgramError("plots need matplotlib: sudo apt install python3-matplotlib") from None
-    return Figure(figsize=(10, 4))
-
-
 def main():
     with Program("measure_delay") as program:
         parameters = read_parameters(
             {"robots": robot_ids("all"), "turns": whole_number(10, 1, 1000), "plot": "measure_delay.png"}
         )
-        figure = open_figure()
+        figure = import_optional("matplotlib.figure", "python3-matplotlib").Figure(figsize=(10, 4))
         plots = figure.subplots(1, 2)
         figure.savefig(parameters["plot"])  # a path that cannot be written is an error now
         with open_swarm(program, parameters["robots"], proximity=False) as swarm:

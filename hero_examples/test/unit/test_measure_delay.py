@@ -1,5 +1,6 @@
 """measure_delay with a robot in virtual time whose delays are known."""
 
+import contextlib
 import math
 import sys
 from types import SimpleNamespace
@@ -83,5 +84,7 @@ def test_a_robot_that_does_not_move_is_given_two_seconds(monkeypatch):
 
 def test_without_matplotlib_the_remedy_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    monkeypatch.setattr(measure_delay, "Program", lambda name: contextlib.nullcontext())
+    monkeypatch.setattr(measure_delay, "read_parameters", lambda declared: {})
     with pytest.raises(ProgramError, match="apt install python3-matplotlib"):
-        measure_delay.open_figure()
+        measure_delay.main()

@@ -23,6 +23,7 @@ from hero_client.ros.drivers import Drivers
 from hero_client.ros.robot_listener import RobotListener, RobotTrack, follow
 from hero_client.ros.stop_status import StopStatus, paint
 from hero_msgs.msg import Robot
+from hero_node.parameters import within
 from hero_node.ros.program import Program
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
@@ -225,19 +226,14 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument(
         "--json", action="store_true", help="print JSON, one line each time, instead of a table"
     )
-    parser.add_argument("--seconds", type=float, metavar="S", help="quit after S seconds")
+    parser.add_argument("--seconds", type=within(0.0, MAX_OPTION), metavar="S", help="quit after S seconds")
     parser.add_argument(
         "--expect",
-        type=int,
+        type=within(0, MAX_OPTION, int),
         metavar="N",
         help="at the end list each of hero_0 to hero_(N-1) that did not join or move, and exit with 1",
     )
-    options = parser.parse_args(arguments)
-    for name, lowest in (("seconds", 0.0), ("expect", 0)):
-        value = getattr(options, name)
-        if value is not None and not lowest <= value <= MAX_OPTION:
-            parser.exit(2, "fleet: --%s %s: must be from %g to %g\n" % (name, value, lowest, MAX_OPTION))
-    return options
+    return parser.parse_args(arguments)
 
 
 def main() -> int:
