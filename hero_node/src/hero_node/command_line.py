@@ -11,7 +11,8 @@ import os
 import signal
 import sys
 from contextlib import suppress
-from typing import IO, Callable, NoReturn, Optional, Sequence, Tuple, Type
+from importlib import import_module
+from typing import IO, Callable, Mapping, NoReturn, Optional, Sequence, Tuple, Type
 
 from .errors import HeroError
 from .texts import make_printable
@@ -66,6 +67,19 @@ def call(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> int:
             lost = _report(error)
             status = status or lost
     return status
+
+
+def run_named(package: str, programs: Mapping[str, str]) -> NoReturn:
+    """Run the program that the first argument names: python3 -m PACKAGE NAME ...; programs: their modules by name."""
+    command = "python3 -m " + package
+    if len(sys.argv) < 2 or sys.argv[1] not in programs:
+        sys.exit("%s: the first argument must be one of: %s" % (command, ", ".join(programs)))
+    name = sys.argv.pop(1)
+    try:
+        program = import_module("%s.%s" % (package, programs[name]))
+    except ModuleNotFoundError as error:
+        sys.exit("%s %s: %s is missing; install python3-%s" % (command, name, error.name, error.name))
+    run(program.main)
 
 
 def check_node_arguments(

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import types
 
 import pytest
 
@@ -162,3 +163,26 @@ def test_arguments_that_a_node_does_not_know_end_it(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         command_line.check_node_arguments("hero_x", "node", None, ["word"])
     assert "README" not in capsys.readouterr().out
+
+
+def test_the_first_argument_names_the_program_of_a_package(monkeypatch):
+    ran, modules = [], {"hero_x.fit": types.SimpleNamespace(main=lambda: ran.append(sys.argv))}
+    monkeypatch.setattr(command_line, "import_module", modules.get)
+    monkeypatch.setattr(sys, "argv", ["__main__.py", "calibrate", "a.bag", "b.bag"])
+    with pytest.raises(SystemExit) as end:
+        command_line.run_named("hero_x", {"calibrate": "fit", "show": "show"})
+    assert ran == [["__main__.py", "a.bag", "b.bag"]] and end.value.code == 0
+    for words in ([], ["fit"]):
+        monkeypatch.setattr(sys, "argv", ["__main__.py", *words])
+        with pytest.raises(SystemExit, match="^python3 -m hero_x: the first argument must be one of: calibrate, show$"):
+            command_line.run_named("hero_x", {"calibrate": "fit", "show": "show"})
+
+
+def test_a_library_that_a_program_of_a_package_lacks_is_named(monkeypatch):
+    def fail(module):
+        raise ModuleNotFoundError("no", name="scipy")
+
+    monkeypatch.setattr(command_line, "import_module", fail)
+    monkeypatch.setattr(sys, "argv", ["__main__.py", "fit"])
+    with pytest.raises(SystemExit, match="^python3 -m hero_x fit: scipy is missing; install python3-scipy$"):
+        command_line.run_named("hero_x", {"fit": "fit"})

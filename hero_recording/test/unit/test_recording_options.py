@@ -1,11 +1,10 @@
 """Options of record that are wrong: each is refused by name."""
 
 import sys
-from types import SimpleNamespace
 
 import pytest
 
-from hero_recording import __main__, record
+from hero_recording import record
 
 
 @pytest.mark.parametrize(
@@ -59,19 +58,3 @@ def test_an_unknown_private_parameter_is_refused_by_name(capsys, monkeypatch):
         record.main()
     assert caught.value.code == 2
     assert "unrecognized arguments: --foldr=/tmp" in capsys.readouterr().err
-
-
-def test_without_ros_the_first_argument_names_the_program(monkeypatch):
-    ran = []
-    main = {name: lambda name=name: ran.append((name, sys.argv[1:])) for name in ("export", "plot")}
-    monkeypatch.setattr(
-        __main__, "import_module", lambda name: SimpleNamespace(main=main[name.replace("hero_recording.", "")])
-    )
-    monkeypatch.setattr(sys, "argv", ["__main__.py", "plot", "a.bag", "b.bag"])
-    with pytest.raises(SystemExit):
-        __main__.main()
-    assert ran == [("plot", ["a.bag", "b.bag"])]
-    for words in ([], ["record"]):
-        monkeypatch.setattr(sys, "argv", ["__main__.py", *words])
-        with pytest.raises(SystemExit, match="the first argument must be one of: export, plot"):
-            __main__.main()
