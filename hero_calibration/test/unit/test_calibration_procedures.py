@@ -300,7 +300,7 @@ class TestCalibration:
         assert is_moving(session) == [False] * 2
 
     @pytest.mark.slow
-    def test_what_is_in_a_robot_is_saved_if_the_end_comes_while_others_try_again(self, tmp_path):
+    def test_what_a_robot_was_given_is_saved_if_others_still_try_at_the_end(self, tmp_path):
         session = make_session(count=2)
         far = session.probes[1]
         for time_s, is_lost in ((5.0, True), (32.0, False)):
