@@ -40,10 +40,18 @@ class LiveView(ExitStack):
         port: on which it listens.
     """
 
-    def __init__(self, rows: RobotRows, robot_ids: Sequence[int], port: int = 8088, speed: float = 1.0) -> None:
+    def __init__(
+        self,
+        rows: RobotRows,
+        robot_ids: Sequence[int],
+        port: int = 8088,
+        speed: float = 1.0,
+        origins: Sequence[str] = (),
+    ) -> None:
         """Listen; robots are those of the first world.
 
-        port: 0 for any that is free. speed: simulated seconds per second.
+        port: 0 for any that is free. speed: simulated seconds per second. origins: of other servers whose pages may
+        connect, such as https://app.foxglove.dev.
         Raises: ProgramError if the port is taken.
         """
         super().__init__()
@@ -57,7 +65,7 @@ class LiveView(ExitStack):
         self._loop: Any = None
         self._start_s = _monotonic() - rows.now_ms / 1000.0 / speed
         listening: Future[int] = Future()
-        thread = threading.Thread(target=self._serve, args=(port, listening), name="live view", daemon=True)
+        thread = threading.Thread(target=self._serve, args=(port, origins, listening), name="live view", daemon=True)
         thread.start()
         try:
             self.port = listening.result()
@@ -89,10 +97,10 @@ class LiveView(ExitStack):
         elif topic in self._wanted:
             self._waiting.append(message)
 
-    def _serve(self, port: int, listening: "Future[int]") -> None:
+    def _serve(self, port: int, origins: Sequence[str], listening: "Future[int]") -> None:
         asyncio.set_event_loop(asyncio.new_event_loop())
         self._loop = tornado.ioloop.IOLoop.current()
-        endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), [])
+        endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), origins)
         server = Server(Access(None, ()), ClientLimits(CONNECTIONS_MAX), None, endpoint.route)
         try:
             listening.set_result(server.listen("127.0.0.1", port))

@@ -43,7 +43,7 @@ def swarm():
 @pytest.fixture()
 def stepped(swarm):
     """A view of robots that are stepped without a pause."""
-    view = LiveView(swarm.rows, range(2), port=0, speed=1e6)
+    view = LiveView(swarm.rows, range(2), port=0, speed=1e6, origins=["https://viewer.example"])
     is_ending = threading.Event()
 
     def step():
@@ -68,15 +68,15 @@ def test_a_client_gets_the_robots_and_what_was_published_before_it_came(stepped)
         assert b"hero_1/odom" in messages[0] and b"walls" in messages[1] and b"hero_1/base_link" in messages[2]
 
 
-def test_pages_of_other_servers_are_refused(stepped):
-    url = "ws://127.0.0.1:%d/foxglove" % stepped.port
-    request = tornado.httpclient.HTTPRequest(url, headers={"Origin": "https://elsewhere.example"})
+def test_pages_of_other_servers_are_refused_but_those_that_were_named(stepped):
+    async def connect(origin):
+        url = "ws://127.0.0.1:%d/foxglove" % stepped.port
+        request = tornado.httpclient.HTTPRequest(url, headers={"Origin": origin})
+        (await tornado.websocket.websocket_connect(request, subprotocols=[SUBPROTOCOL])).close()
 
-    async def connect():
-        await tornado.websocket.websocket_connect(request, subprotocols=[SUBPROTOCOL])
-
+    asyncio.run(connect("https://viewer.example"))
     with pytest.raises(tornado.httpclient.HTTPClientError, match="403"):
-        asyncio.run(connect())
+        asyncio.run(connect("https://elsewhere.example"))
 
 
 def test_time_is_slowed_to_real_time_until_the_view_is_closed(swarm, monkeypatch):

@@ -1,7 +1,7 @@
 """The WebSocket /foxglove: one connection per client, with the access rules of the page."""
 
 import contextlib
-from typing import Any, Awaitable, Callable, Dict, FrozenSet, List, NamedTuple, Optional, Set, Union
+from typing import Any, Awaitable, Callable, Dict, FrozenSet, List, NamedTuple, Optional, Sequence, Set, Union
 
 import tornado.ioloop
 import tornado.iostream
@@ -102,7 +102,7 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 class FoxgloveEndpoint:
     """All clients; topics are looked up and subscribed to only while there is one."""
 
-    def __init__(self, source: TopicSource, origins: List[str], publisher: Optional[Publisher] = None) -> None:
+    def __init__(self, source: TopicSource, origins: Sequence[str], publisher: Optional[Publisher] = None) -> None:
         """origins: of other servers whose pages may connect; publisher: takes messages, None: clients only read."""
         self.hub = Hub(publisher)
         self._source = source
