@@ -15,8 +15,9 @@ from .link.wifi import PROFILES, Radio
 from .robot.models import build_body, parse_models
 from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import MAX_ID
-from .world.arena import Arena, MovableObject, build_default, place_robots
+from .world.arena import Arena, build_default, place_robots
 from .world.arena_file import load_arena
+from .world.pushing.pushed_body import PushedBody
 from .world.robot_errors import RobotErrors, draw_errors, read_known, set_known
 from .world.world import World
 
@@ -122,7 +123,7 @@ def place_worlds(
     poses: np.ndarray,
     seeds: Sequence[int],
     errors: float,
-    objects: Optional[Sequence[Sequence[MovableObject]]] = None,
+    objects: Optional[Sequence[Sequence[PushedBody]]] = None,
     known: Sequence[str] = (),
 ) -> World:
     """Return one world of robots at poses (W, N, 3) for each seed; errors: 0 for robots as on the drawing, 1 usual.

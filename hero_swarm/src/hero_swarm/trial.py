@@ -16,7 +16,8 @@ from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.geometry import Pose
 from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.arena import Arena, MovableObject, measure_clearance
+from hero_sim.world.arena import Arena, measure_clearance
+from hero_sim.world.pushing.pushed_body import PushedBody
 
 from .behavior import PULSES, Behavior, Random, decide, derive_seed, sense
 from .wheel_pulses import find_pulses, list_dead_zones
@@ -47,24 +48,24 @@ def scatter(robots: int, width_m: float, height_m: float, seed: int, gap_m: floa
     raise ValueError("%d robots find no place in %g m x %g m" % (robots, width_m, height_m))
 
 
-def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[MovableObject]:
+def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedBody]:
     """Return the arena's objects at places drawn from seed: inside its bounds, clear of all else and of robots (N, 3).
 
     Raises: ValueError if they find no place.
     """
     random = np.random.RandomState(derive_seed(seed, "objects"))
     low_m, high_m = arena.bounds_m[:2], arena.bounds_m[2:]
-    placed: List[MovableObject] = []
+    placed: List[PushedBody] = []
     taken = [(x_m, y_m, BODY_RADIUS_M) for x_m, y_m in robots[:, :2].tolist()]
     for thing in arena.objects:
-        reach_m = thing.shape.reach_m
+        reach_m = thing.body.shape.reach_m
         for _ in range(_MAX_TRIES):
             x_share, y_share, turn = random.random_sample(3)
             x_m, y_m = (low_m + (high_m - low_m) * (x_share, y_share)).tolist()
             free = measure_clearance(np.array([[x_m, y_m]]), arena)[0] > reach_m
             if free and all(math.hypot(x_m - x, y_m - y) > reach_m + radius_m for x, y, radius_m in taken):
                 taken.append((x_m, y_m, reach_m))
-                placed.append(thing._replace(pose=Pose(x_m, y_m, math.pi * (2.0 * turn - 1.0))))
+                placed.append(thing.put(Pose(x_m, y_m, math.pi * (2.0 * turn - 1.0))))
                 break
         else:
             raise ValueError("%d objects find no place in arena %s" % (len(arena.objects), arena.name))
@@ -92,7 +93,7 @@ class Trial:
         delay_s: float = 0.0,
         filter_commands: Any = None,
         starts: Optional[np.ndarray] = None,
-        objects: Optional[Sequence[Sequence[MovableObject]]] = None,
+        objects: Optional[Sequence[Sequence[PushedBody]]] = None,
         known_errors: Sequence[str] = (),
     ) -> None:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
@@ -116,7 +117,7 @@ class Trial:
         self._filter = filter_commands
         self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, starts)])
         objects = [arena.objects] if objects is None else objects
-        self._radii_m = np.array([thing.shape.reach_m for thing in objects[0]])
+        self._radii_m = np.array([thing.body.shape.reach_m for thing in objects[0]])
         self._all = np.arange(starts.shape[0] * robots)
 
     @property

@@ -13,29 +13,12 @@ from hero_node.geometry import Pose
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .pushing.pushed_body import PushedBody
-from .pushing.shapes import Shape, touch_circle
+from .pushing.shapes import touch_circle
 
 START_GAP_M = 0.05
 """Free space kept around a robot that is placed at random."""
 
 _MAX_TRIES = 2000
-
-
-class MovableObject(NamedTuple):
-    """A thing that robots can push, as it is at the start: its shape, and its center and heading in the world.
-
-    Attributes:
-        friction: coefficient between it and the floor.
-    """
-
-    shape: Shape
-    pose: Pose
-    mass_kg: float
-    friction: float
-
-    def put_down(self) -> PushedBody:
-        """Return it as a body of one world."""
-        return PushedBody(self.shape, self.pose, self.mass_kg, self.friction)
 
 
 class Arena(NamedTuple):
@@ -48,7 +31,7 @@ class Arena(NamedTuple):
         starts: free poses of the first robots; the others are placed at random.
         bounds_m: x min, y min, x max, y max of the area in which robots are placed, shape (4,).
         polygons_m: the corners of each solid polygon, whose edges are among the segments.
-        objects: what robots can push, where it is at the start.
+        objects: what robots can push, where it is at the start; each world moves copies.
     """
 
     name: str
@@ -57,7 +40,7 @@ class Arena(NamedTuple):
     starts: Tuple[Pose, ...]
     bounds_m: np.ndarray
     polygons_m: Tuple[np.ndarray, ...] = ()
-    objects: Tuple[MovableObject, ...] = ()
+    objects: Tuple[PushedBody, ...] = ()
 
 
 def square_length(ways_m: np.ndarray) -> np.ndarray:
@@ -196,7 +179,7 @@ def is_free(
     """Return whether a robot with radius_m fits at pose, beside robots with other_radius_m at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
         return False
-    if any(touch_circle(*pose[:2], radius_m, thing.put_down().body).depth_m > 0.0 for thing in arena.objects):
+    if any(touch_circle(*pose[:2], radius_m, thing.body).depth_m > 0.0 for thing in arena.objects):
         return False
     if not len(poses):
         return True

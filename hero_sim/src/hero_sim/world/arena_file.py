@@ -16,8 +16,9 @@ from hero_node.yaml_text import parse_yaml, read_text
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
-from .arena import Arena, MovableObject, is_free, outline
+from .arena import Arena, is_free, outline
 from .map_file import build_map_arena
+from .pushing.pushed_body import PushedBody
 from .pushing.shapes import Disc, Polygon, Shape
 
 SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
@@ -97,7 +98,7 @@ def _build_arena(content: Any, file_name: str) -> Arena:
     return arena._replace(starts=tuple(starts))
 
 
-def _read_object(item: Any) -> MovableObject:
+def _read_object(item: Any) -> PushedBody:
     """Return what robots can push. Raises: ValueError."""
     known = isinstance(item, dict) and set(item) <= set(_OBJECT_KEYS)
     if not known or ("circle_m" in item) == ("polygon_m" in item):
@@ -113,9 +114,7 @@ def _read_object(item: Any) -> MovableObject:
         corners_m = _read_rows("polygon_m", item["polygon_m"], 2, least=3).tolist()
         shape = Polygon([(x_m, y_m) for x_m, y_m in corners_m])
         center = Pose(corners_m[0][0] - shape.corners_m[0][0], corners_m[0][1] - shape.corners_m[0][1], 0.0)
-    thing = MovableObject(shape, center, float(mass_kg), float(friction))
-    thing.put_down()  # raises for what can be no body
-    return thing
+    return PushedBody(shape, center, float(mass_kg), float(friction))
 
 
 def _read_bounds(content: Dict[str, Any], segments_m: np.ndarray) -> np.ndarray:

@@ -12,10 +12,11 @@ from typing import Any, Iterable, Iterator, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from .arena import Arena, MovableObject, Segments
+from .arena import Arena, Segments
 from .contacts import Contacts
 from .kinematics import find_heading, follow_arcs, join_wheels
 from .noise import draw_normal
+from .pushing.pushed_body import PushedBody
 from .pushing.pushing import Place, Pushing
 from .pushing.shapes import Body, list_outlines
 from .range_sensors import (
@@ -96,7 +97,7 @@ class World:
         poses: np.ndarray,
         rngs: Sequence[np.random.RandomState],
         errors: RobotErrors,
-        objects: Optional[Sequence[Sequence[MovableObject]]] = None,
+        objects: Optional[Sequence[Sequence[PushedBody]]] = None,
     ) -> None:
         """Place robots at poses (R, 3); slip, ripple and sensor noise of each world are drawn from one of rngs.
 
@@ -122,7 +123,7 @@ class World:
         self._contacts = Contacts(arena, self.worlds, radii_m)
         obstacles = arena.segments_m.tolist(), arena.circles_m.tolist()
         self._pushing = [
-            Pushing([thing.put_down() for thing in things], *obstacles, radii_m=own_m)
+            Pushing([thing.put(thing.pose) for thing in things], *obstacles, radii_m=own_m)
             for things, own_m in zip(objects, radii_m.reshape(self.worlds, -1).tolist())
             if things
         ]

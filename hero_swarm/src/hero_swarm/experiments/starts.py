@@ -7,7 +7,8 @@ import numpy as np
 
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.errors import OptionError
-from hero_sim.world.arena import Arena, MovableObject, place_robots
+from hero_sim.world.arena import Arena, place_robots
+from hero_sim.world.pushing.pushed_body import PushedBody
 
 from ..behavior import derive_seed
 from ..trial import scatter, scatter_objects
@@ -30,7 +31,7 @@ def place_all(start: Start, arena: Arena, robots: int, seeds: Sequence[int]) -> 
 
 def place_objects(
     where: str, arena: Arena, starts: np.ndarray, seeds: Sequence[int]
-) -> Optional[List[List[MovableObject]]]:
+) -> Optional[List[List[PushedBody]]]:
     """Return the objects of one world for each seed, with robots at starts (W, N, 3); None: as they are in the arena.
 
     Raises: ExperimentError if they find no place.

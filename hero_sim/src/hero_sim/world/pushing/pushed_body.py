@@ -5,6 +5,7 @@ and Papadopoulos 1991; Lynch and Mason 1996): a force f through its center and a
 (vx, vy, w) ~ (fx, fy, m / c^2), with c the friction radius of its shape.
 """
 
+import copy
 import math
 from typing import Tuple
 
@@ -39,12 +40,17 @@ class PushedBody:
         self.friction_n = mass_kg * friction * GRAVITY_M_S2
         self._shape = shape
         self.radius_m2 = shape.friction_radius_m * shape.friction_radius_m
-        self._heading = (math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
-        self._set(pose)
+        self._set(pose, math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
 
-    def _set(self, pose: Pose) -> None:
-        self.pose = pose
-        self.body: Body = place(self._shape, pose.x_m, pose.y_m, *self._heading)
+    def _set(self, pose: Pose, cosine: float, sine: float) -> None:
+        self.pose, self._heading = pose, (cosine, sine)
+        self.body: Body = place(self._shape, pose.x_m, pose.y_m, cosine, sine)
+
+    def put(self, pose: Pose) -> "PushedBody":
+        """Return a copy at pose."""
+        body = copy.copy(self)
+        body._set(pose, math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
+        return body
 
     def measure_work(self, motion: Motion) -> float:
         """Return the work (J) against the floor's friction of a motion."""
@@ -63,5 +69,5 @@ class PushedBody:
         turn_cosine, turn_sine = (1.0 - half * half) * scale, 2.0 * half * scale
         cosine, sine = cosine * turn_cosine - sine * turn_sine, cosine * turn_sine + sine * turn_cosine
         length = math.sqrt(cosine * cosine + sine * sine)
-        self._heading = cosine / length, sine / length
-        self._set(Pose(self.pose.x_m + x_m, self.pose.y_m + y_m, self.pose.yaw_rad + rotation_rad))
+        pose = Pose(self.pose.x_m + x_m, self.pose.y_m + y_m, self.pose.yaw_rad + rotation_rad)
+        self._set(pose, cosine / length, sine / length)
