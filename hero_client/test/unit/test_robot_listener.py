@@ -4,7 +4,9 @@ import math
 from types import SimpleNamespace
 
 import pytest
+from nav_msgs.msg import Odometry
 
+from hero_client.ros import robot_listener
 from hero_client.ros.robot_listener import RateMeter, RobotTrack
 from hero_client.values.readings import read_ranges
 from hero_node.geometry import Pose
@@ -55,14 +57,23 @@ def test_distances_add_up_from_the_first_pose_on():
     assert track.turned_rad == pytest.approx(math.tau - 6.0), "the short way round"
 
 
-@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])
-def test_an_implausible_pose_is_none_and_adds_no_distance(number):
+def test_a_pose_that_is_not_known_adds_no_distance():
     track = RobotTrack()
-    for pose in (Pose(0.0, 0.0, 0.0), Pose(number, 0.0, 0.0), Pose(0.0, number, 0.0), Pose(0.0, 0.0, number)):
-        track.receive_pose(pose)
-        assert track.distance_m == 0.0
-    track.receive_pose(Pose(math.nan, 0.0, 0.0))
-    assert track.pose is None
+    for x_m, is_known in ((0.0, True), (1.0, True), (2.0, False), (5.0, True), (5.5, True)):
+        track.receive_pose(Pose(x_m, 0.0, 0.0) if is_known else None)
+        assert (track.pose is not None) == is_known
+    assert track.distance_m == 1.5 and track.turned_rad == 0.0
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])
+def test_a_listener_takes_no_implausible_pose(number, monkeypatch):
+    silent = SimpleNamespace(count=1, take=lambda: None)
+    monkeypatch.setattr(robot_listener, "NewestMessage", lambda topic, kind: SimpleNamespace(**vars(silent)))
+    listener, odometry = robot_listener.RobotListener("/hero_0"), Odometry()
+    odometry.pose.pose.position.x = number
+    listener._odometry.take = lambda: odometry
+    listener.read_newest()
+    assert listener.track.pose is None
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])

@@ -19,6 +19,7 @@ ALL_ROBOTS = "all"
 MAX_ROBOTS_IN_RANGE = 1000
 
 MAX_COORDINATE_M = 1e6
+"""Of goals; the driver accepts poses within the same limit. Beyond it, sums lose precision."""
 
 
 class Parameter(NamedTuple):

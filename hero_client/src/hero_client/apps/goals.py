@@ -13,6 +13,7 @@ from typing import Any, Callable, NamedTuple, Tuple
 
 from hero_node.errors import HeroError
 from hero_node.geometry import yaw_of
+from hero_node.parameters import MAX_COORDINATE_M
 
 from ..controllers.go_to_goal import Goal, GoToGoalController
 from ..controllers.motion import State
@@ -22,9 +23,6 @@ FEEDBACK_PERIOD_S = 0.5
 
 MAX_QUEUED_GOALS = 100
 """More goals at once are rejected."""
-
-MAX_COORDINATE_M = 1e6
-"""The driver accepts poses within the same limit. Beyond it, sums lose precision."""
 
 MAX_QUATERNION_ENTRY = 1e3
 """A unit quaternion has no entry beyond 1."""

@@ -13,7 +13,7 @@ from sensor_msgs.msg import LaserScan
 
 from hero_node.geometry import Pose, measure_distance, wrap_angle
 
-from ..values.readings import Obstacle, find_nearest, is_plausible, read_pose, read_ranges
+from ..values.readings import Obstacle, find_nearest, read_pose, read_ranges
 
 RATE_WINDOW_S = 3.0
 """Long enough that 5 Hz reads steadily, short enough to see a robot fall silent."""
@@ -77,11 +77,8 @@ class RobotTrack:
         self.nearest: Optional[Obstacle] = None
 
     def receive_pose(self, pose: Optional[Pose]) -> None:
-        """Take the newest pose and add to distance_m and turned_rad; an implausible pose counts as None."""
-        if pose is None or not is_plausible(pose):
-            self.pose = None
-            return
-        if self.pose is not None:
+        """Take the newest pose, None for an implausible one, and add to distance_m and turned_rad."""
+        if pose is not None and self.pose is not None:
             self.distance_m += measure_distance(self.pose, pose)
             self.turned_rad += abs(wrap_angle(pose.yaw_rad - self.pose.yaw_rad))
         self.pose = pose
