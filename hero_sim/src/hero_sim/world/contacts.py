@@ -31,13 +31,13 @@ def _warm_start(
     x: Any, y: Any, firsts: Any, seconds: Any, touching: Any, wanted: Any, pushes: Any,
     rows: Any, start_x: Any, start_y: Any, along_x: Any, along_y: Any, length2: Any,
     free: Any, wall_wanted: Any, wall_pushes: Any,
-) -> Tuple[bool, bool, float, float]:  # fmt: skip
+) -> Tuple[bool, bool, float]:  # fmt: skip
     """Find the contacts that matter in this step, and move robots as they were pushed in the last one, in place.
 
     Arguments are those of _relax(). Returns whether bodies touch, whether a robot is at two obstacles, and how far all
-    may move until two robots, and until a robot and an obstacle could touch. A loop for compile_loops().
+    may move until something could touch. A loop for compile_loops().
     """
-    touches, has_corner, gap, wall_gap = False, False, math.inf, math.inf
+    touches, has_corner, gap = False, False, math.inf
     first_x, first_y, second_x, second_y = [0.0] * len(x), [0.0] * len(x), [0.0] * len(x), [0.0] * len(x)
     for k in range(len(firsts)):
         a, b, push = firsts[k], seconds[k], pushes[k]
@@ -63,8 +63,8 @@ def _warm_start(
         away_x, away_y = to_x - along * along_x[k], to_y - along * along_y[k]
         distance = math.sqrt(away_x * away_x + away_y * away_y)
         between = distance - free[k]
-        if between < wall_gap:
-            wall_gap = between
+        if between < gap:
+            gap = between
         wall_wanted[k] = 0.0
         if between < _SHIFT_M or push != 0.0:
             wall_wanted[k] = free[k]
@@ -75,12 +75,12 @@ def _warm_start(
             share = push / max(distance, _TOUCH_M)
             wall_x[a] += away_x * share
             wall_y[a] += away_y * share
-    touches = touches or min(gap, wall_gap) < -_TOUCH_M
+    touches = touches or gap < -_TOUCH_M
     if touches:
         for a in range(len(x)):
             x[a] = x[a] + first_x[a] + second_x[a] + wall_x[a]
             y[a] = y[a] + first_y[a] + second_y[a] + wall_y[a]
-    return touches, has_corner, gap, wall_gap
+    return touches, has_corner, gap
 
 
 def _relax(
@@ -168,16 +168,14 @@ class Contacts:
         self.separate(np.zeros((2, rows)))
         nothing = self._hold(nothing_m)
         self._solve(nothing, nothing, _SETTLED_M, self._no_pair_ends, nothing)
-        # How far all may still move until the lists are incomplete, and until two robots, and until a
-        # robot and an obstacle could touch.
-        self._reach_m = self._robots_gap_m = self._walls_gap_m = -np.inf
+        # How far all may still move until the lists are incomplete, and until something could touch.
+        self._reach_m = self._gap_m = -np.inf
 
     def could_touch(self, moved_m: float) -> bool:
         """Note how far the fastest has moved; return whether bodies could have come to touch something."""
         self._reach_m -= moved_m
-        self._robots_gap_m -= moved_m
-        self._walls_gap_m -= moved_m
-        return self._robots_gap_m <= 0.0 or self._walls_gap_m <= 0.0
+        self._gap_m -= moved_m
+        return self._gap_m <= 0.0
 
     def separate(self, positions_m: np.ndarray) -> None:
         """Push bodies out of walls, obstacles and each other, in place."""
@@ -185,12 +183,11 @@ class Contacts:
             self._list_neighbors(positions_m)
         before_m = positions_m.take(self._rows, axis=1)
         x, y = map(self._hold, before_m.copy())
-        touches, has_corner, robots_gap_m, walls_gap_m = self._warm_start(
+        touches, has_corner, gap_m = self._warm_start(
             x, y, *self._robots, self._touching_m, self._wanted_m, self._pushes_m,
             *self._walls, self._free_near_m, self._wall_wanted_m, self._wall_pushes_m,
         )  # fmt: skip
-        self._robots_gap_m = min(robots_gap_m, self._reach_m)
-        self._walls_gap_m = min(walls_gap_m, self._reach_m)
+        self._gap_m = min(gap_m, self._reach_m)
         if not touches:
             return
         self._solve(x, y, _SETTLED_M, self._pair_ends, self._wall_pushes_m)
@@ -201,10 +198,8 @@ class Contacts:
         positions_m[:, self._rows] = places_m
         self.could_touch(float(np.abs(places_m - before_m).max()) * math.sqrt(2.0))
         # Those that press on each other are looked at in each step.
-        if np.count_nonzero(self._pushes_m):
-            self._robots_gap_m = 0.0
-        if np.count_nonzero(self._wall_pushes_m):
-            self._walls_gap_m = 0.0
+        if np.count_nonzero(self._pushes_m) or np.count_nonzero(self._wall_pushes_m):
+            self._gap_m = 0.0
 
     def _solve(self, x: Any, y: Any, settled_m: float, pair_ends: Any, wall_pushes_m: Any) -> None:
         pairs = (*self._robots, self._wanted_m, self._pushes_m, pair_ends)
