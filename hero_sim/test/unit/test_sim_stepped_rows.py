@@ -30,7 +30,7 @@ from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.robot.sensing import DISTANCE_MS, Sensing
 from hero_sim.robot.servo_pins import CORE_2, ServoPins
 from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.stepped.rules.proximity import correct_ranges, measure_ranges
+from hero_sim.stepped.rules.proximity import correct_ranges
 from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.world import STEP_MS
 
@@ -245,7 +245,7 @@ def test_robot_rows_do_what_the_scalar_robots_and_the_driver_do(seed):
 def test_ranges_of_all_counts_are_those_of_the_driver():
     for constant in (np.nan, 0.5, 0.423, 0.05):
         counts = np.arange(1024.0).reshape(-1, 8)
-        ranges_m = measure_ranges(counts, np.full(8, constant))
+        ranges_m = convert_to_ranges(counts, np.full(8, constant)).astype(np.float32).astype(float)
         seen = []
         for row in convert_to_ranges(counts, np.full(8, constant)).tolist():
             seen.append(read_proximity(encode_laser("hero_0", 0, (0, 0), row, [0.0] * 8)))

@@ -21,7 +21,7 @@ from ..robot.firmware import SPIN_MS
 from ..robot.models import HERO, RobotModel
 from ..robot.motor_control import CONTROL_MS
 from ..robot.motor_pid import POSITION_GAINS, VELOCITY_GAINS
-from ..robot.ranges import calibrate
+from ..robot.ranges import calibrate, convert_to_ranges
 from ..robot.sensing import CYCLE_MS, DISTANCE_MS, LASER_GATE_MS, LASER_READ_MS
 from ..robot_constants import (
     LED_WATCHDOG_MS,
@@ -35,7 +35,7 @@ from ..robot_constants import (
 from ..world.kinematics import split_to_wheels
 from ..world.world import STEP_MS, View, World
 from .rules.command_shaper import CommandShaper, Rows, Values
-from .rules.proximity import correct_ranges, measure_ranges
+from .rules.proximity import correct_ranges
 from .rules.radio_rows import RadioRows
 from .rules.readings import DISTANCE, SCAN, WHEELS, Readings
 from .rules.servo_pulses import ServoPulses
@@ -297,7 +297,8 @@ class RobotRows:
         if self._view is not None:
             measured = self._measured
             measured.counts[:] = self.world.read_infrared(self._rows, self._view)
-            measured.ranges_m[:] = measure_ranges(measured.counts, self._calibration_counts_m2)
+            # Messages hold single precision.
+            measured.ranges_m[:] = convert_to_ranges(measured.counts, self._calibration_counts_m2).astype(np.float32)
             measured.proximity_m[:] = correct_ranges(measured.ranges_m)
             self._view = None
         return self._received

@@ -1,4 +1,4 @@
-"""Infrared readings of all robots as ranges: as the firmware sends them, and as the driver corrects them.
+"""Ranges of all robots' infrared sensors as the driver corrects them.
 
 Pure: numpy only; the corrections of make_proximity() in hero_driver's corrections/message_layouts.py.
 """
@@ -8,15 +8,9 @@ import numpy as np
 from hero_driver.corrections.message_layouts import CLAMP_TOLERANCE_M
 from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M
 
-from ...robot.ranges import convert_to_ranges
 from ...world.range_sensors import BEAMS
 
 _FRONT_FIRST = np.roll(np.arange(BEAMS), BEAMS // 2)
-
-
-def measure_ranges(counts: np.ndarray, calibration_counts_m2: np.ndarray) -> np.ndarray:
-    """Return the ranges (R, 8) in /laser, m from the robot's center, rear first."""
-    return convert_to_ranges(counts, calibration_counts_m2).astype(np.float32).astype(float)
 
 
 def correct_ranges(ranges_m: np.ndarray) -> np.ndarray:
