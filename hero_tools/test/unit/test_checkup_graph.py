@@ -91,46 +91,37 @@ def make_report(*states, stopped=False, listening="10.42.0.1:11411"):
 
 
 def test_robots_that_cannot_be_driven_are_told_with_their_remedy():
-    text, lines = describe_report("/lab/robots", make_report(Robot.READY, Robot.AWAY, stopped=True))
-    assert text == "/lab/robots: 1 of 2 robots ready, the driver listens on 10.42.0.1:11411, firmware v3.8"
+    text, lines = describe_report("/lab", make_report(Robot.READY, Robot.AWAY, stopped=True))
+    assert text == "/lab: 1 of 2 robots ready, the driver listens on 10.42.0.1:11411, firmware v3.8"
     assert lines == ["all robots are stopped; release them: rosservice call /lab/stop false", "/hero_1 at a is AWAY"]
-    assert describe_report("/d/robots", make_report(Robot.READY))[1] == []
+    assert describe_report("/d", make_report(Robot.READY))[1] == []
     for listening, remedy in (
         ("127.0.0.1:11411", "host:=0.0.0.0"),
         ("10.42.0.1:11411", "robots must be on"),
         ("", "robots must be on"),
     ):
-        (line,) = describe_report("/d/robots", make_report(listening=listening))[1]
+        (line,) = describe_report("/d", make_report(listening=listening))[1]
         assert remedy in line
 
 
 @pytest.fixture(name="node")
 def make_node(monkeypatch):
-    made = SimpleNamespace(now_s=100.0, connects_s=0.0, subscribers=["/rosout"], reports_s=0.0, listed=["/a/robots"])
+    made = SimpleNamespace(now_s=100.0, connects_s=0.0, subscribers=["/rosout"], reports={}, silent=[])
     time = SimpleNamespace(
         monotonic=lambda: made.now_s, sleep=lambda duration_s: setattr(made, "now_s", made.now_s + duration_s)
     )
     monkeypatch.setattr(points, "time", time)
-    published = [["/x", "std_msgs/String"]]
-    monkeypatch.setattr(
-        graph,
-        "ask_master",
-        lambda call, *given: (
-            [*published, *([name, RobotArray._type] for name in made.listed)]
-            if call == "getPublishedTopics"
-            else ([], [["/rosout", made.subscribers]], [])
-        ),
-    )
+    monkeypatch.setattr(graph, "ask_master", lambda call: ([], [["/rosout", made.subscribers]], []))
+
+    class ScriptedDrivers:
+        is_settled = property(lambda self: not made.silent)
+        find_silent, read_each = (lambda self: made.silent), (lambda self: made.reports)
+
+    monkeypatch.setattr(graph, "Drivers", ScriptedDrivers)
     publisher = SimpleNamespace(get_num_connections=lambda: int(made.now_s >= 100.0 + made.connects_s))
     monkeypatch.setattr(graph.rospy, "init_node", lambda *given, **options: None)
     monkeypatch.setattr(graph.rospy, "get_name", lambda: "/hero_check")
     monkeypatch.setattr(graph.rospy, "Publisher", lambda *given, **options: publisher)
-    made.receive = {}
-
-    def subscribe(topic, kind, receive, callback_args, queue_size):
-        made.receive[topic] = lambda report: receive(report, callback_args)
-
-    monkeypatch.setattr(graph.rospy, "Subscriber", subscribe)
     made.own = OwnNode()
     return made
 
@@ -152,22 +143,16 @@ def test_the_way_back_is_tried_and_a_firewall_suspected(node):
 
 
 def test_every_driver_that_is_listed_has_to_report(node):
-    node.listed = []
     node.own.start()
     assert (node.own.check_robots().state, node.own.check_robots().text) == (WARN, "no driver runs")
-    node.listed = ["/b/robots", "/a/robots"]
-    node.own.start()
-    node.receive["/a/robots"](make_report(Robot.READY))
-    node.now_s = 100.0
+    node.reports, node.silent = {"/a": make_report(Robot.READY)}, ["/b"]
     finding = node.own.check_robots()
-    assert finding.state == FAIL and finding.text == "nothing arrives on /b/robots although it is listed"
+    assert finding.state == FAIL and finding.text == "no report comes from /b, which the ROS master lists"
     assert node.now_s == pytest.approx(100.0 + REPORT_TIMEOUT_S, abs=0.03)
-    node.receive["/b/robots"](make_report(Robot.READY))
+    node.reports, node.silent = {"/b": make_report(Robot.READY), "/a": make_report(Robot.READY)}, []
     finding = node.own.check_robots()
-    assert (
-        finding.state == OK and finding.text.startswith("/a/robots: 1 of 1") and "; /b/robots: 1 of 1" in finding.text
-    )
-    node.receive["/b/robots"](make_report(*[Robot.AWAY] * (LINES_MAX + 5)))
+    assert finding.state == OK and finding.text.startswith("/a: 1 of 1") and "; /b: 1 of 1" in finding.text
+    node.reports["/b"] = make_report(*[Robot.AWAY] * (LINES_MAX + 5))
     assert node.own.check_robots().state == WARN and len(node.own.check_robots().remedy) == LINES_MAX
 
 

@@ -253,7 +253,8 @@ class Drivers:
         limit_s = max((link.arrival_s for link in links), default=0.0) - FORGET_S
         return [link for link in links if link.arrival_s > limit_s]
 
-    def _read_fresh(self) -> Dict[str, RobotArray]:
+    def read_each(self) -> Dict[str, RobotArray]:
+        """Return the newest report of each driver by its name, without those silent for longer than the others."""
         newest = {link.driver: link.newest() for link in self._find_fresh()}
         return {driver: report for driver, report in newest.items() if report is not None}
 
@@ -262,7 +263,7 @@ class Drivers:
 
         It says stopped only if every driver says so, and none is silent.
         """
-        reports = self._read_fresh()
+        reports = self.read_each()
         if not reports:
             return None
         merged = merge(list(reports.values()))
@@ -297,7 +298,7 @@ class Drivers:
         """Return the driver of a robot; the usual one if none has it."""
         having = [
             (PREFERENCE.index(robot.state), driver)
-            for driver, report in self._read_fresh().items()
+            for driver, report in self.read_each().items()
             for robot in report.robots
             if robot.namespace == namespace and robot.state in PREFERENCE
         ]
@@ -305,7 +306,7 @@ class Drivers:
 
     def is_stopped(self, driver: str) -> bool:
         """Return whether a driver has stopped all its robots."""
-        report = self._read_fresh().get(driver)
+        report = self.read_each().get(driver)
         return report is not None and bool(report.stopped)
 
     def is_robot_stopped(self, namespace: str) -> bool:

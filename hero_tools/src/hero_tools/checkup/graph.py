@@ -6,13 +6,14 @@ The return path is tried: the node rosout runs beside the master and must connec
 import contextlib
 import os
 import urllib.parse
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import rosgraph
 import rosgraph.roslogging
 import rospy
 from rosgraph_msgs.msg import Log
 
+from hero_client.ros.drivers import Drivers
 from hero_client.values.robot_states import STATES
 from hero_msgs.msg import Robot, RobotArray
 from hero_node.errors import NodeError
@@ -100,12 +101,10 @@ def check_master(own: Sequence[Address]) -> Finding:
 
 
 class OwnNode:
-    """This program as a node: a publisher on /rosout, and the newest report of every driver."""
+    """This program as a node: a publisher on /rosout, and the drivers; both from start() on."""
 
-    def __init__(self) -> None:
-        self._publisher: Any = None
-        self._topics: List[str] = []
-        self._reports: Dict[str, RobotArray] = {}
+    _publisher: rospy.Publisher
+    _drivers: Drivers
 
     def start(self) -> Finding:
         """Start the node, and listen to the drivers; the other points need it."""
@@ -114,15 +113,8 @@ class OwnNode:
         except rosgraph.roslogging.LoggingException as error:
             return fail(str(error), "export ROS_LOG_DIR=/a/directory/of/yours")
         self._publisher = rospy.Publisher("/rosout", Log, queue_size=1)
-        self._topics = sorted(
-            topic for topic, kind in ask_master("getPublishedTopics", "/") if kind == RobotArray._type
-        )
-        for topic in self._topics:
-            rospy.Subscriber(topic, RobotArray, self._receive, callback_args=topic, queue_size=1)
+        self._drivers = Drivers()
         return ok("started as " + rospy.get_name())
-
-    def _receive(self, report: RobotArray, topic: str) -> None:
-        self._reports[topic] = report
 
     def check_return_path(self) -> Finding:
         """Check whether rosout, which runs beside the master, connects to this node."""
@@ -139,31 +131,31 @@ class OwnNode:
 
     def check_robots(self) -> Finding:
         """Print which robots the drivers report."""
-        wait_until(lambda: len(self._reports) == len(self._topics), REPORT_TIMEOUT_S)
-        silent = [topic for topic in self._topics if topic not in self._reports]
+        wait_until(lambda: self._drivers.is_settled, REPORT_TIMEOUT_S)
+        silent = self._drivers.find_silent()
         if silent:
-            text = "nothing arrives on %s although it is listed" % ", ".join(silent)
+            text = "no report comes from %s, which the ROS master lists" % ", ".join(silent)
             return fail(text, CLEAN_UP, "points own_name and return_path say more")
-        if not self._topics:
+        reports = self._drivers.read_each()
+        if not reports:
             return warn("no driver runs", "roslaunch hero_bringup hero_bringup.launch")
-        described = [describe_report(topic, self._reports[topic]) for topic in self._topics]
+        described = [describe_report(driver, report) for driver, report in sorted(reports.items())]
         text = "; ".join(text for text, _ in described)
         remedies = [line for _, lines in described for line in lines]
         return warn(text, *remedies[:LINES_MAX]) if remedies else ok(text)
 
 
-def describe_report(topic: str, report: RobotArray) -> Tuple[str, List[str]]:
+def describe_report(driver: str, report: RobotArray) -> Tuple[str, List[str]]:
     """Return one line on a driver's robots, and a line for each that cannot be driven."""
     ready = [robot for robot in report.robots if robot.state == Robot.READY]
-    text = "%s: %d of %d robots ready" % (topic, len(ready), len(report.robots))
+    text = "%s: %d of %d robots ready" % (driver, len(ready), len(report.robots))
     text += ", the driver listens on %s" % (report.listening or "no port")
     versions = sorted({robot.firmware for robot in ready if robot.firmware})
     if versions:
         text += ", firmware " + ", ".join(versions)
     lines = []
     if report.stopped:
-        service = topic.replace("/robots", "/stop")
-        lines.append("all robots are stopped; release them: rosservice call %s false" % service)
+        lines.append("all robots are stopped; release them: rosservice call %s/stop false" % driver)
     for robot in report.robots:
         if robot.state != Robot.READY:
             error = ": " + robot.last_error if robot.last_error else ""
