@@ -115,7 +115,7 @@ class _Server:
 
 
 def measure(python: List[str], robots: int, seconds: float) -> Measurement:
-    """Run so many robots of the simulator that a Python finds for so long behind a server of ours."""
+    """Measure the simulator that a Python interpreter finds, with robots connected to a server of this process."""
     server = _Server()
     command = [*python, "-m", "hero_sim", "--count", str(robots), "--port", str(server.port)]
     process = start([*command, "--quiet"], None)

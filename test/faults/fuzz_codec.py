@@ -1,4 +1,4 @@
-"""Coverage-guided fuzzing of codec, session and cleaning, with atheris; options as libFuzzer's.
+"""Coverage-guided fuzzing of codec, session and corrections, with atheris; options as libFuzzer's.
 
 fuzz_codec.py [-max_total_time=60] [CORPUS_DIR]
 """

@@ -40,7 +40,7 @@ class Monitor:
     """Pages, the fleet that they show, and what they may do with it."""
 
     def __init__(self, parameters: Parameters, program: Program) -> None:
-        # Here, so that a machine without tornado gets a line that says what to do: see _main().
+        # Here, so that a machine without tornado gets a line that says what to do: see main().
         import tornado.ioloop
 
         from .foxglove.endpoint import FoxgloveEndpoint, TopicSource

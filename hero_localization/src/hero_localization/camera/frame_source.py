@@ -56,7 +56,7 @@ class Frame(NamedTuple):
 
 
 class FrameSource:
-    """Images of a camera that come by themselves: only the newest counts, and only those that are polled are decoded.
+    """Live images of a camera: only the newest is kept, and only images that are polled are decoded.
 
     Attributes:
         lens: the intrinsics in camera_info; None without it.
@@ -73,7 +73,7 @@ class FrameSource:
         self._newest: Any = None
 
     def _keep(self, received: Any) -> None:
-        """Put an image that arrived on another thread in the place of what was not polled yet."""
+        """Keep an image that arrived on another thread, instead of one that was not polled yet."""
         self.arrived_s = rospy.get_time()
         with self._arrival:
             self._newest = received
@@ -91,7 +91,7 @@ class FrameSource:
         raise NotImplementedError
 
     def close(self) -> None:
-        """Leave the camera; safe twice. Topics end with the node."""
+        """Close the camera; may be called twice. Topics end with the node."""
 
 
 class TopicSource(FrameSource):

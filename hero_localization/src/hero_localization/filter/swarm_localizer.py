@@ -34,7 +34,7 @@ AHEAD_S = 0.2
 """A simulated clock may go in steps of 0.1 s."""
 
 LOSS_LINES, LOSS_PERIOD_S = 4, 10.0
-"""So many lines at once, and one in each such time, on robots lost or found: a busy computer loses all at once."""
+"""Burst and period of log lines on robots lost or found: a busy computer loses all robots at once."""
 
 PUBLISH_RATE_HZ = 25.0
 """Default publish rate of localize."""

@@ -27,7 +27,7 @@ ROBOT_DIAMETER_MM = 73.0
 RULER_MM = 100.0
 MM_PER_INCH = 25.4
 SQUARE_PX = 300
-"""Of the board: so the cells of its markers are of whole pixels, too."""
+"""Side of a square of the board; the cells of its markers are whole pixels, too."""
 
 LINE = 0.4
 """Points."""

@@ -229,6 +229,6 @@ class CameraRenderer:
 
 
 def _make_transform(x_m: float, y_m: float, yaw_rad: float) -> np.ndarray:
-    """Return what turns a place (x, y, 1; m) into that seen from a pose, (3, 3)."""
+    """Return the matrix (3, 3) that transforms a point (x, y, 1; m) into the frame of a pose."""
     cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
     return np.array(((cos, sin, -cos * x_m - sin * y_m), (-sin, cos, sin * x_m - cos * y_m), (0.0, 0.0, 1.0)))

@@ -1,4 +1,4 @@
-// Buttons that are held by finger, mouse or keyboard; one that acts after a while, which no tap does by mistake.
+// Buttons that are held by finger, mouse or keyboard; HoldButton acts only after a while: never on a tap.
 
 const STEP_MS = 50;
 const GAP_MS = 400; // the page was suspended: the hold does not count

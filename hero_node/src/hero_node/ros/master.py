@@ -23,7 +23,7 @@ SUCCESS = 1
 
 
 CALL_ERRORS = (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError)
-"""Of calls to what is no master or node, or to none; two of them for an address that a node gave as its own."""
+"""Raised by calls to anything but a master or node; two of them by an address that a node registered as its own."""
 
 
 class MasterRefusalError(NodeError):

@@ -15,7 +15,7 @@ class Reader(ExitStack):
     unindexed = ("ReaderError", "AnyReaderError")
 
     def __init__(self, path: str, skip_index: bool = False) -> None:
-        """Open the file, with its index in any case. Raises: ProgramError without rosbags; whatever it raises."""
+        """Open the file; the index is always read. Raises: ProgramError without rosbags; whatever rosbags raises."""
         super().__init__()
         del skip_index
         self._bag: Any = import_optional("rosbags.highlevel", "rosbags").AnyReader([Path(path)])

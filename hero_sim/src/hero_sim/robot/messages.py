@@ -61,7 +61,7 @@ _LINEAR_COVARIANCE = (
 
 
 def encode_text(value: str) -> bytes:
-    """Return a string as it lies in a message."""
+    """Return a string field of a message."""
     data = value.encode()
     return LENGTH_FORM.pack(len(data)) + data
 

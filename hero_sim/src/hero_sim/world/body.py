@@ -19,7 +19,7 @@ class SharedReadings:
     Those that are due in the same physics step are computed together: five cost hardly more than one.
 
     Attributes:
-        due_ms: when each robot is expected to read its sensors (R,); one that reads at another time pays for it alone.
+        due_ms: when each robot is expected to read its sensors (R,); one that reads at another time is computed alone.
     """
 
     def __init__(self, world: World) -> None:

@@ -44,7 +44,7 @@ _SCAN_ROWS = 200
 _REST_M_S = 1e-6
 
 _PASSES = 4
-"""In which robots leave objects and each other: between an object and other robots one has no better place."""
+"""Passes that separate robots from objects and each other; one wedged between them may still overlap."""
 
 Rows = Union[int, slice, np.ndarray]  # the number of one row, or several of them
 
@@ -188,7 +188,7 @@ class World:
         drawn = [draw_normal(rng, (_BLOCK_STEPS, 4, self._robots)) for rng in self._rngs]
         noise = np.concatenate(drawn, axis=2)
         self._ripples_m_s = noise[:, :2] * self.errors.ripple_m_s.T
-        # Way of a wheel's body over the ground for each m/s.
+        # Distance of a wheel's body over the ground for each m/s.
         self._ground_s = (1.0 - np.abs(noise[:, 2:]) * self.errors.slip.T) * (self.errors.wheel_scale.T * _STEP_S)
         self._block_step = self._body_step = 0
         self._speeds[np.abs(self._speeds) < _REST_M_S] = 0.0

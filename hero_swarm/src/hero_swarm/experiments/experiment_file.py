@@ -128,7 +128,7 @@ class Experiment(NamedTuple):
         until: a run ends when this holds.
         record_hz: of trajectories; 0: none.
         places: name of a key, parameter or varied value -> file and line, for errors.
-        folder: to which paths are relative.
+        folder: base of relative paths.
     """
 
     behavior: str
@@ -172,7 +172,7 @@ class Experiment(NamedTuple):
 def parse_experiment(text: str, file: str, folder: Optional[str] = None) -> Experiment:
     """Return the experiment in text, the contents of file.
 
-    folder: to which paths are relative; None: that of file. Behavior and parameters are checked when they are loaded.
+    folder: base of relative paths; None: that of file. Behavior and parameters are checked when they are loaded.
     Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
     """
     root = read_entries(text, file).mapping(_KEYS, _REQUIRED)

@@ -33,7 +33,7 @@ _BATCHES_PER_WORKER = 2
 DASK = "dask:"
 
 FOLDER = "experiment_folder"
-"""In about.json: that of the experiment's file, to which its paths are relative, from the folder of results."""
+"""Key in about.json: folder of the experiment's file, base of its paths, relative to the results folder."""
 
 Task = Tuple[str, str, int, Tuple[int, ...], str]
 """Arguments of compute_batch()."""

@@ -45,7 +45,7 @@ UNITS = {"consensus_error": "m", "dispersion": "m", "hull_area": "m^2", "nearest
 """Of those that have one."""
 
 FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area", "object_distance")
-"""Those that get better by falling: a bound without <= or >= is reached from above; the others rise to it."""
+"""Metrics for which less is better: a bound without <= or >= is an upper one; it is a lower one for all others."""
 
 
 def time_until(times_s: np.ndarray, values: np.ndarray, limit: float, falls: bool = True) -> np.ndarray:

@@ -59,7 +59,7 @@ class _Axis:
         self.give_m = sum((1.0 + arm_m / body.radius_m2 * arm_m) / body.friction_n for _, _, body, arm_m in self._ends)
 
     def measure_motion(self, motions: Motions) -> float:
-        """Return how far the second body's point has moved along the axis, seen from the first one's."""
+        """Return how far the second body's point has moved along the axis relative to the first one's."""
         moved_m = 0.0
         for index, sign, _, arm_m in self._ends:
             if index in motions:
