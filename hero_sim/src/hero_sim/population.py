@@ -17,7 +17,7 @@ from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import MAX_ID
 from .world.arena import Arena, build_default, place_robots
 from .world.arena_file import load_arena
-from .world.pushing.pushed_body import PushedBody
+from .world.pushing.shapes import PushedBody
 from .world.robot_errors import RobotErrors, draw_errors, read_known, set_known
 from .world.world import World
 

@@ -7,7 +7,7 @@ from hero_node.geometry import Pose
 
 from .robot_constants import BODY_RADIUS_M
 from .world.arena import Arena
-from .world.pushing.shapes import Body, list_outlines
+from .world.pushing.shapes import PushedBody, list_outlines
 from .world.world import World
 
 FRAME = "world"
@@ -61,7 +61,7 @@ def draw_robots(world: World, names: Sequence[str], lights: Sequence[Sequence[fl
     return shapes
 
 
-def draw_objects(bodies: Sequence[Body]) -> List[Shape]:
+def draw_objects(bodies: Sequence[PushedBody]) -> List[Shape]:
     """Return discs, and the edges of polygons, where they are."""
     edges_m, discs_m = list_outlines(bodies)
     discs = [_draw_circle("objects", *item, _OBJECT_COLOR) for item in enumerate(discs_m)]

@@ -11,11 +11,11 @@ from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 from hero_sim.world.pushing import pushing as pushing_module
-from hero_sim.world.pushing.pushed_body import PushedBody
 from hero_sim.world.pushing.pushing import MAX_PUSH_N, Pushing
 from hero_sim.world.pushing.shapes import (
     Disc,
     Polygon,
+    PushedBody,
     find_contacts,
     list_outlines,
     touch_circle,
@@ -180,14 +180,14 @@ def test_in_a_pile_nothing_overlaps_or_outruns_its_pushers(seed):
         moved_m = [math.hypot(b.pose.x_m - a.x_m, b.pose.y_m - a.y_m) for a, b in zip(before, bodies)]
         assert max(moved_m) <= 2.0 * STEP_M, seed
         for k, body in enumerate(bodies):
-            touching = touch_walls(body.body, walls, 0.0)
+            touching = touch_walls(body, walls, 0.0)
             touching += [
-                contact for other in bodies[:k] for contact in find_contacts(other.body, body.body, 0.0)
+                contact for other in bodies[:k] for contact in find_contacts(other, body, 0.0)
             ]
             touching += [
                 contact
                 for p in places_m
-                for contact in [touch_circle(*p, BODY_RADIUS_M, body.body)]
+                for contact in [touch_circle(*p, BODY_RADIUS_M, body)]
                 if contact.depth_m > 0
             ]
             worst_m = max([worst_m, *(contact.depth_m for contact in touching)])
@@ -269,7 +269,7 @@ SHAPES = [Disc(0.07), BOX, TRIANGLE, HEXAGON]
 
 
 def put(shape, x_m=0.0, y_m=0.0, yaw_rad=0.0):
-    return place(shape, x_m, y_m, yaw_rad).body
+    return place(shape, x_m, y_m, yaw_rad)
 
 
 def draw_places(count, seed=5):
@@ -447,7 +447,7 @@ def test_a_wide_robot_pushes_with_its_own_radius():
 
 def test_outlines_are_the_edges_and_discs_where_they_are():
     disc, box = place(Disc(0.05), 0.4, 0.1), place(BOX, 0.0, 0.0, math.pi / 2.0)
-    edges_m, discs_m = list_outlines([disc.body, box.body])
+    edges_m, discs_m = list_outlines([disc, box])
     assert discs_m == [(0.4, 0.1, 0.05)]
     corners_m = [(0.1, -0.15), (0.1, 0.15), (-0.1, 0.15), (-0.1, -0.15)]
     assert edges_m == [pytest.approx((*a, *b)) for a, b in zip(corners_m, [*corners_m[1:], corners_m[0]])]
@@ -468,6 +468,6 @@ def test_a_body_keeps_its_shape_however_often_it_turns(rotation_rad):
         body.move((0.001, -0.002, rotation_rad))
     assert body.pose == pytest.approx((0.5, -1.0, 500 * rotation_rad))
     expected = put(BOX, 0.5, -1.0, 500 * rotation_rad)
-    for corner_m, expected_m in zip(body.body.corners_m, expected.corners_m):
+    for corner_m, expected_m in zip(body.corners_m, expected.corners_m):
         assert corner_m == pytest.approx(expected_m, abs=0.02 if abs(rotation_rad) > 0.1 else 1e-6)
-    assert max(math.hypot(x_m - 0.5, y_m + 1.0) for x_m, y_m in body.body.corners_m) == pytest.approx(BOX.reach_m)
+    assert max(math.hypot(x_m - 0.5, y_m + 1.0) for x_m, y_m in body.corners_m) == pytest.approx(BOX.reach_m)

@@ -136,7 +136,7 @@ def test_a_place_is_free_with_room_for_both_bodies_and_beside_objects():
     arena = arena._replace(segments_m=np.array([(0.0, -1.0, 0.0, 1.0)]), circles_m=np.array([(2.0, 0.0, 0.3)]))
     thing = arena.objects[0]
     arena = arena._replace(polygons_m=(), objects=(thing.put(Pose(4.0, 0.0, 0.0)),))
-    reach_m = thing.body.shape.reach_m
+    reach_m = thing.shape.reach_m
     for x_m, radius_m, is_free in (
         (0.051, 0.05, True), (0.049, 0.05, False), (-0.051, 0.05, True),
         (1.649, 0.05, True), (1.651, 0.05, False),
@@ -191,10 +191,9 @@ def test_viewers_draw_robots_as_they_are_with_heading_name_and_light():
 
 def test_viewers_draw_objects_by_their_edges_and_rims():
     things = load_arena("discs").objects[:1] + load_arena("box").objects[:1]
-    bodies = [thing.body for thing in things]
-    disc, *edges = scene.draw_objects(bodies)
+    disc, *edges = scene.draw_objects(things)
     assert disc.kind == scene.CYLINDER and disc.pose[:2] == things[0].pose[:2]
-    assert disc.size_m[:2] == pytest.approx((2.0 * things[0].body.shape.radius_m,) * 2)
-    assert [shape.number for shape in edges] == list(range(1, len(bodies[1].corners_m) + 1))
+    assert disc.size_m[:2] == pytest.approx((2.0 * things[0].shape.radius_m,) * 2)
+    assert [shape.number for shape in edges] == list(range(1, len(things[1].corners_m) + 1))
     middle_m = np.mean([edge.pose[:2] for edge in edges], axis=0)
     assert middle_m == pytest.approx(things[1].pose[:2], abs=1e-6)

@@ -17,7 +17,7 @@ from hero_node.geometry import Pose
 from hero_sim.population import place_worlds
 from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena, measure_clearance
-from hero_sim.world.pushing.pushed_body import PushedBody
+from hero_sim.world.pushing.shapes import PushedBody
 
 from .behavior import PULSES, Behavior, Random, decide, derive_seed, sense
 from .wheel_pulses import find_pulses, list_dead_zones
@@ -58,7 +58,7 @@ def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedB
     placed: List[PushedBody] = []
     taken = [(x_m, y_m, BODY_RADIUS_M) for x_m, y_m in robots[:, :2].tolist()]
     for thing in arena.objects:
-        reach_m = thing.body.shape.reach_m
+        reach_m = thing.shape.reach_m
         for _ in range(_MAX_TRIES):
             x_share, y_share, turn = random.random_sample(3)
             x_m, y_m = (low_m + (high_m - low_m) * (x_share, y_share)).tolist()
@@ -117,7 +117,7 @@ class Trial:
         self._filter = filter_commands
         self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, starts)])
         objects = [arena.objects] if objects is None else objects
-        self._radii_m = np.array([thing.body.shape.reach_m for thing in objects[0]])
+        self._radii_m = np.array([thing.shape.reach_m for thing in objects[0]])
         self._all = np.arange(starts.shape[0] * robots)
 
     @property

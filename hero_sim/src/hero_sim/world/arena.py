@@ -12,8 +12,7 @@ from hero_node.geometry import Pose
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
-from .pushing.pushed_body import PushedBody
-from .pushing.shapes import touch_circle
+from .pushing.shapes import PushedBody, touch_circle
 
 START_GAP_M = 0.05
 """Free space kept around a robot that is placed at random."""
@@ -179,7 +178,7 @@ def is_free(
     """Return whether a robot with radius_m fits at pose, beside robots with other_radius_m at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:
         return False
-    if any(touch_circle(*pose[:2], radius_m, thing.body).depth_m > 0.0 for thing in arena.objects):
+    if any(touch_circle(*pose[:2], radius_m, thing).depth_m > 0.0 for thing in arena.objects):
         return False
     if not len(poses):
         return True

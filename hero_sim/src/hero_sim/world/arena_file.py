@@ -18,8 +18,7 @@ from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .arena import Arena, is_free, outline
 from .map_file import build_map_arena
-from .pushing.pushed_body import PushedBody
-from .pushing.shapes import Disc, Polygon, Shape
+from .pushing.shapes import Disc, Polygon, PushedBody, Shape
 
 SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
 """Arenas that come with the simulator; --arena takes these names too."""

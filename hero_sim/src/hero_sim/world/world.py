@@ -7,6 +7,7 @@ only operations that IEEE 754 defines to the last bit, and random numbers are ro
 which the differences between mathematical libraries vanish.
 """
 
+import copy
 import math
 from typing import Any, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
 
@@ -16,9 +17,8 @@ from .arena import Arena, Segments
 from .contacts import Contacts
 from .kinematics import find_heading, follow_arcs, join_wheels
 from .noise import draw_normal
-from .pushing.pushed_body import PushedBody
 from .pushing.pushing import Place, Pushing
-from .pushing.shapes import Body, list_outlines
+from .pushing.shapes import PushedBody, list_outlines
 from .range_sensors import (
     BEAMS,
     DISTANCE_NOISE_M,
@@ -254,7 +254,7 @@ class World:
 
     def _list_obstacles(self, pushing: Pushing) -> Obstacles:
         """Return the walls and the circles of a world, with its objects where they are now."""
-        edges_m, discs_m = list_outlines([pushed.body for pushed in pushing.bodies])
+        edges_m, discs_m = list_outlines(pushing.bodies)
         walls_m = np.vstack((self.arena.segments_m, np.reshape(edges_m, (-1, 4))))
         return Segments.from_ends(walls_m), np.vstack((self.arena.circles_m, np.reshape(discs_m, (-1, 3))))
 
@@ -265,10 +265,10 @@ class World:
         worlds = [[pushed.pose for pushed in pushing.bodies] for pushing in self._pushing]
         return np.array(worlds, dtype=float).reshape(self.worlds, -1, 3) if worlds else np.empty((self.worlds, 0, 3))
 
-    def list_objects(self) -> List[Body]:
-        """Return the objects of the first world, where they are at time_ms."""
+    def list_objects(self) -> List[PushedBody]:
+        """Return copies of the objects of the first world, where they are at time_ms."""
         self._move_bodies()
-        return [pushed.body for pushing in self._pushing[:1] for pushed in pushing.bodies]
+        return [copy.copy(pushed) for pushing in self._pushing[:1] for pushed in pushing.bodies]
 
     def read_infrared(self, which: np.ndarray, view: Optional[View] = None) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).

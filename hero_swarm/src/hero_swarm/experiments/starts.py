@@ -8,7 +8,7 @@ import numpy as np
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena, place_robots
-from hero_sim.world.pushing.pushed_body import PushedBody
+from hero_sim.world.pushing.shapes import PushedBody
 
 from ..behavior import derive_seed
 from ..trial import scatter, scatter_objects

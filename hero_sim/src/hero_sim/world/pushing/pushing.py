@@ -10,8 +10,7 @@ import math
 from typing import Dict, List, Optional, Sequence, Tuple
 
 from ...robot_constants import BODY_RADIUS_M
-from .pushed_body import Motion, PushedBody
-from .shapes import Contact, find_contacts, touch_circle, touch_walls
+from .shapes import Contact, Motion, PushedBody, find_contacts, touch_circle, touch_walls
 
 MAX_PUSH_N = 0.77
 """Traction of a robot: 0.156 kg at an assumed friction of 0.5 with the floor."""
@@ -53,7 +52,7 @@ class _Axis:
         self.x, self.y = x, y
         # Last: the moment arm (m) of the pressure about the body's center.
         self._ends = [
-            (index, sign, body, (contact.x_m - body.pose.x_m) * y - (contact.y_m - body.pose.y_m) * x)
+            (index, sign, body, (contact.x_m - body.x_m) * y - (contact.y_m - body.y_m) * x)
             for index, sign, body in ends
         ]
         self.give_m = sum((1.0 + arm_m / body.radius_m2 * arm_m) / body.friction_n for _, _, body, arm_m in self._ends)
@@ -160,11 +159,10 @@ class Pushing:
         pushes = []
         for robot, (place_m, old_m, radius_m) in enumerate(zip(after_m, before_m, self._radii_m)):
             for index, pushed in enumerate(self.bodies):
-                body = pushed.body
-                reach_m = radius_m + body.shape.reach_m
-                away_x, away_y = body.x_m - place_m[0], body.y_m - place_m[1]
+                reach_m = radius_m + pushed.shape.reach_m
+                away_x, away_y = pushed.x_m - place_m[0], pushed.y_m - place_m[1]
                 if away_x * away_x + away_y * away_y < reach_m * reach_m:
-                    contact = touch_circle(place_m[0], place_m[1], radius_m, body)
+                    contact = touch_circle(place_m[0], place_m[1], radius_m, pushed)
                     if contact.depth_m > 0.0:
                         moved_m = (place_m[0] - old_m[0], place_m[1] - old_m[1])
                         pushes.append(_Touch(contact, [(index, 1.0, pushed)], robot, moved_m))
@@ -176,14 +174,14 @@ class Pushing:
         for second, pushed in enumerate(self.bodies):
             for first in range(second):
                 pusher = self.bodies[first]
-                reach_m = pusher.body.shape.reach_m + pushed.body.shape.reach_m + MARGIN_M
-                away_x, away_y = pushed.body.x_m - pusher.body.x_m, pushed.body.y_m - pusher.body.y_m
+                reach_m = pusher.shape.reach_m + pushed.shape.reach_m + MARGIN_M
+                away_x, away_y = pushed.x_m - pusher.x_m, pushed.y_m - pusher.y_m
                 if away_x * away_x + away_y * away_y < reach_m * reach_m:
                     ends = [(second, 1.0, pushed), (first, -1.0, pusher)]
-                    contacts = find_contacts(pusher.body, pushed.body, MARGIN_M)
+                    contacts = find_contacts(pusher, pushed, MARGIN_M)
                     touches += [_Touch(contact, ends) for contact in contacts]
-            contacts = touch_walls(pushed.body, self._walls_m, MARGIN_M)
-            obstacles = (touch_circle(*circle_m, pushed.body) for circle_m in self._circles_m)
+            contacts = touch_walls(pushed, self._walls_m, MARGIN_M)
+            obstacles = (touch_circle(*circle_m, pushed) for circle_m in self._circles_m)
             contacts += [contact for contact in obstacles if contact.depth_m > -MARGIN_M]
             touches += [_Touch(contact, [(second, 1.0, pushed)]) for contact in contacts]
         return touches
@@ -203,11 +201,11 @@ class Pushing:
 
     def _leave(self, place_m: Place, radius_m: float) -> Place:
         for pushed in self.bodies:
-            reach_m = radius_m + pushed.body.shape.reach_m
-            away_x, away_y = pushed.body.x_m - place_m[0], pushed.body.y_m - place_m[1]
+            reach_m = radius_m + pushed.shape.reach_m
+            away_x, away_y = pushed.x_m - place_m[0], pushed.y_m - place_m[1]
             if away_x * away_x + away_y * away_y >= reach_m * reach_m:
                 continue
-            contact = touch_circle(place_m[0], place_m[1], radius_m, pushed.body)
+            contact = touch_circle(place_m[0], place_m[1], radius_m, pushed)
             if contact.depth_m > 0.0:
                 place_m = (
                     place_m[0] - contact.normal_x * contact.depth_m,

@@ -1,12 +1,20 @@
-"""Discs and convex polygons that lie on the floor, and where they touch robots, walls and each other.
+"""Discs and convex polygons that can be pushed over the floor, and where they touch robots, walls and each other.
 
-Pure: floats, and only + - * / and roots, so that a world gives the same bytes on every machine.
+Pure: floats, and of what moves only + - * / and roots, so that a world gives the same bytes on every machine.
 """
 
+import copy
 import math
 from typing import List, NamedTuple, Sequence, Tuple, Union
 
+from hero_node.geometry import Pose
+
+GRAVITY_M_S2 = 9.81
+
 Point = Tuple[float, float]
+
+Motion = Tuple[float, float, float]
+"""x m, y m, rotation rad."""
 
 
 class Contact(NamedTuple):
@@ -105,30 +113,73 @@ def _find_friction_radius(corners_m: Sequence[Point]) -> float:
     return float("%.7g" % (moment / area_m2))
 
 
-class Body(NamedTuple):
-    """A shape at a pose: its corners (none for a disc) and center in the frame world."""
+class PushedBody:
+    """One body on the floor, which moves only while it is pushed.
 
-    shape: Shape
-    x_m: float
-    y_m: float
-    corners_m: Sequence[Point]
+    Its friction with the floor is an ellipsoid limit surface (Goyal, Ruina and Papadopoulos 1991; Lynch and Mason
+    1996): a force f through its center and a moment m about it turn into the twist (vx, vy, w) ~ (fx, fy, m / c^2),
+    with c the friction radius of its shape.
+
+    Attributes:
+        pose: of its center, frame world; x_m, y_m: its place.
+        corners_m: frame world; none of a disc.
+        friction_n: the force through its center that just moves it.
+        radius_m2: the square of c.
+    """
+
+    def __init__(self, shape: Shape, pose: Pose, mass_kg: float, friction: float) -> None:
+        """Put it down; friction is the coefficient between it and the floor.
+
+        Raises: ValueError for a number that is not more than 0.
+        """
+        for name, value in (("mass_kg", mass_kg), ("friction", friction)):
+            if not 0.0 < value < math.inf:
+                raise ValueError("%s must be more than 0, not %g" % (name, value))
+        self.friction_n = mass_kg * friction * GRAVITY_M_S2
+        self.shape = shape
+        self.radius_m2 = shape.friction_radius_m * shape.friction_radius_m
+        self._set(pose, math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
+
+    def _set(self, pose: Pose, cosine: float, sine: float) -> None:
+        x_m, y_m, _ = pose
+        self.pose, self.x_m, self.y_m, self._heading = pose, x_m, y_m, (cosine, sine)
+        corners = self.shape.corners_m if isinstance(self.shape, Polygon) else ()
+        self.corners_m = [(x_m + cosine * x - sine * y, y_m + sine * x + cosine * y) for x, y in corners]
+
+    def put(self, pose: Pose) -> "PushedBody":
+        """Return a copy at pose."""
+        body = copy.copy(self)
+        body._set(pose, math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
+        return body
+
+    def measure_work(self, motion: Motion) -> float:
+        """Return the work (J) against the floor's friction of a motion."""
+        x_m, y_m, rotation_rad = motion
+        return self.friction_n * math.sqrt(
+            x_m * x_m + y_m * y_m + self.radius_m2 * rotation_rad * rotation_rad
+        )
+
+    def move(self, motion: Motion) -> None:
+        """Move by less than half a radian."""
+        x_m, y_m, rotation_rad = motion
+        cosine, sine = self._heading
+        # The half-angle form keeps the heading's length to the second order; the rest is divided out.
+        half = rotation_rad * (0.5 + rotation_rad * rotation_rad / 24.0)
+        scale = 1.0 / (1.0 + half * half)
+        turn_cosine, turn_sine = (1.0 - half * half) * scale, 2.0 * half * scale
+        cosine, sine = cosine * turn_cosine - sine * turn_sine, cosine * turn_sine + sine * turn_cosine
+        length = math.sqrt(cosine * cosine + sine * sine)
+        pose = Pose(self.pose.x_m + x_m, self.pose.y_m + y_m, self.pose.yaw_rad + rotation_rad)
+        self._set(pose, cosine / length, sine / length)
 
 
-def place(shape: Shape, x_m: float, y_m: float, cosine: float, sine: float) -> Body:
-    """Return shape with its center at a place, turned to a heading."""
-    corners = shape.corners_m if isinstance(shape, Polygon) else ()
-    return Body(
-        shape, x_m, y_m, [(x_m + cosine * x - sine * y, y_m + sine * x + cosine * y) for x, y in corners]
-    )
-
-
-def list_outlines(bodies: Sequence[Body]) -> Tuple[Sequence[Tuple[float, ...]], Sequence[Tuple[float, ...]]]:
+def list_outlines(bodies: Sequence[PushedBody]) -> Tuple[Sequence[Tuple[float, ...]], Sequence[Tuple[float, ...]]]:
     """Return the edges of polygons, x1 y1 x2 y2, and the discs, x y radius."""
     edges_m = [start_m + end_m for body in bodies for start_m, end_m in _list_edges(body.corners_m)]
     return edges_m, [(body.x_m, body.y_m, body.shape.reach_m) for body in bodies if not body.corners_m]
 
 
-def touch_circle(x_m: float, y_m: float, radius_m: float, body: Body) -> Contact:
+def touch_circle(x_m: float, y_m: float, radius_m: float, body: PushedBody) -> Contact:
     """Return where a circle, the first body, is nearest to body, the second."""
     if isinstance(body.shape, Disc):
         away_x, away_y = body.x_m - x_m, body.y_m - y_m
@@ -174,7 +225,7 @@ def _find_edge(point_m: Point, corners_m: Sequence[Point]) -> Contact:
     return best
 
 
-def find_contacts(first: Body, second: Body, margin_m: float) -> List[Contact]:
+def find_contacts(first: PushedBody, second: PushedBody, margin_m: float) -> List[Contact]:
     """Return where first touches second, or is nearer than margin_m."""
     if isinstance(first.shape, Disc):
         contacts = [touch_circle(first.x_m, first.y_m, first.shape.radius_m, second)]
@@ -188,7 +239,7 @@ def find_contacts(first: Body, second: Body, margin_m: float) -> List[Contact]:
 
 
 def touch_walls(
-    body: Body, walls_m: Sequence[Tuple[float, float, float, float]], margin_m: float
+    body: PushedBody, walls_m: Sequence[Tuple[float, float, float, float]], margin_m: float
 ) -> List[Contact]:
     """Return where walls x1 y1 x2 y2, the first body, touch body, or are nearer than margin_m."""
     contacts: List[Contact] = []
@@ -206,7 +257,7 @@ def touch_walls(
     return [contact for contact in contacts if contact.depth_m > -margin_m]
 
 
-def _touch_wall(body: Body, start_m: Point, end_m: Point, margin_m: float) -> List[Contact]:
+def _touch_wall(body: PushedBody, start_m: Point, end_m: Point, margin_m: float) -> List[Contact]:
     """Return where a wall is near the corners of a polygon, and where its ends are near the polygon's edges."""
     along_x, along_y = end_m[0] - start_m[0], end_m[1] - start_m[1]
     length_m = math.sqrt(along_x * along_x + along_y * along_y)
