@@ -11,7 +11,7 @@ from hero_calibration import store
 from hero_calibration.calibration import Calibration
 from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.models import infrared_model
-from hero_calibration.models.step_response import ANGULAR_RAD_S, STEP_M_S
+from hero_calibration.models.step_response import ANGULAR_RAD_S, STEP_M_S, GainSearch
 from hero_calibration.procedures.infrared import calibrate_infrared
 from hero_calibration.procedures.motors import MotorResult, calibrate_motors
 from hero_calibration.procedures.placement import place_robots
@@ -201,6 +201,27 @@ class TestDisturbances:
         session.sleep(0.5)
         assert is_moving(session) == [False] * 4
         assert session.now_s < session.end_s + 1.0
+
+
+def test_no_robot_keeps_gains_that_were_only_tried(monkeypatch):
+    searches = []
+
+    def search(*arguments):
+        searches.append(GainSearch(*arguments))
+        return searches[-1]
+
+    search.count_rounds = GainSearch.count_rounds
+    monkeypatch.setattr("hero_calibration.procedures.velocity.GainSearch", search)
+    session = make_session(count=2)
+    # The second robot fails in the third test, and the program ends in the fourth.
+    session.events[14.0] = partial(setattr, session.probes[1], "failure", "velocity: lost")
+    session.end_s = 18.0
+    with pytest.raises(EndedError):
+        place_and(velocity_alone, session)
+    for probe, left, right in zip(session.probes, searches[::2], searches[1::2]):
+        best = [*left.best()[0], *right.best()[0]]
+        assert probe.written["velocity_gains"] == best != [*left.next_gains(), *right.next_gains()]
+    assert session.probes[1].failure == "velocity: lost"
 
 
 class TestFaults:

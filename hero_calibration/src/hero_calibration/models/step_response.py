@@ -178,6 +178,11 @@ class GainSearch:
         """Store the response to next_gains()."""
         self._tried.append((self.next_gains(), response))
 
+    @property
+    def has_best(self) -> bool:
+        """Whether a response was received."""
+        return bool(self._tried)
+
     def best(self) -> Tuple[Gains, Response]:
         """Return the best gains so far, and the response to them."""
         return min(self._tried, key=lambda item: item[1].score)

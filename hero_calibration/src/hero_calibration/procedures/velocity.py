@@ -74,7 +74,7 @@ def calibrate_velocity(session: Session, motors: Dict[int, MotorResult]) -> Dict
     """Calibrate all active robots, with the slopes of their servos if motors has them; return the results by robot."""
     say("velocity: gains are tried, about a minute")
     searches: Dict[int, List[GainSearch]] = {}
-    for probe in session.active:
+    for probe in session.probes:
         found = motors.get(probe.robot_id)
         slopes = [zone.gain_m_s_us for zone in found.zones] if found else [NOMINAL_GAIN_M_S_US] * 2
         searches[probe.robot_id] = [GainSearch(slope) for slope in slopes]
@@ -86,13 +86,17 @@ def calibrate_velocity(session: Session, motors: Dict[int, MotorResult]) -> Dict
         write_gains(probe, [search.best()[0] for search in searches[probe.robot_id]])
 
     before = _test(session)
-    for number in range(1, GainSearch.count_rounds() + 1):
-        say("velocity: gains %d of %d" % (number, GainSearch.count_rounds()))
-        session.for_each("velocity", write_next)
-        for robot_id, responses in _test(session).items():
-            for search, response in zip(searches[robot_id], responses):
-                search.receive(response)
-    session.for_each("velocity", write_best)
+    try:
+        for number in range(1, GainSearch.count_rounds() + 1):
+            say("velocity: gains %d of %d" % (number, GainSearch.count_rounds()))
+            session.for_each("velocity", write_next)
+            for robot_id, responses in _test(session).items():
+                for search, response in zip(searches[robot_id], responses):
+                    search.receive(response)
+    finally:
+        # Robots keep gains in their flash: none may be left with some that were only tried, whatever ends the tests.
+        tested = [probe for probe in session.probes if any(search.has_best for search in searches[probe.robot_id])]
+        session.for_each("velocity", write_best, tested)
     return {
         robot_id: VelocityResult(before[robot_id], after, [search.best()[0] for search in searches[robot_id]])
         for robot_id, after in _test(session).items()

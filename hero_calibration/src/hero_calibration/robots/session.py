@@ -67,7 +67,7 @@ class Session(Clock):
     ) -> Dict[int, T]:
         """Do work for robots (None: all active) side by side; return the results by robot.
 
-        A CalibrationError fails that robot alone.
+        A CalibrationError fails that robot alone, which is stopped; one that has failed keeps its first reason.
         """
         probes = self.active if probes is None else probes
         results: Dict[int, T] = {}
@@ -76,13 +76,12 @@ class Session(Clock):
             try:
                 results[probe.robot_id] = work(probe)
             except CalibrationError as error:
-                probe.failure = "%s: %s" % (step, error)
+                probe.stop()
+                if probe.failure is None:
+                    probe.failure = "%s: %s" % (step, error)
+                    say("%s failed: %s" % (probe.name, probe.failure))
 
         self.map(work_on, probes)
-        for probe in probes:
-            if probe.failure is not None:
-                probe.stop()
-                say("%s failed: %s" % (probe.name, probe.failure))
         return results
 
     def repeat(
