@@ -130,15 +130,11 @@ def simulate(
         simulator.link.close_all()
 
 
-def _report(text: str) -> None:
-    print("hero_sim: " + text, flush=True)
-
-
 def main(arguments: Optional[Sequence[str]] = None) -> int:
     """Run the simulator; return the exit status."""
     return call(lambda: _run(parse_options(build_parser(), arguments)))
 
 
 def _run(options: argparse.Namespace) -> None:
-    with simulate(options, _report) as (simulator, _):
+    with simulate(options, lambda text: print("hero_sim: " + text, flush=True)) as (simulator, _):
         simulator.run(options.seconds)
