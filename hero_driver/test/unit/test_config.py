@@ -97,7 +97,7 @@ def test_the_limits_of_a_number_are_allowed_and_what_lies_beyond_is_not(name):
     for value in (low - 1, high + 1, -math.inf, math.inf, math.nan):
         text = refuse(name, value)
         assert repr(value) in text
-        assert "from %g to %g" % (low, high) in text
+        assert "from %.15g to %.15g" % (low, high) in text
 
 
 @pytest.mark.parametrize("name", NUMBERS)

@@ -119,7 +119,7 @@ def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> D
 
 
 def _describe_limits(kind: str, low: float, high: float, unit: str) -> str:
-    return "%s from %g to %g%s" % (kind, low, high, " " + unit if unit else "")
+    return "%s from %.15g to %.15g%s" % (kind, low, high, " " + unit if unit else "")
 
 
 def make_error(name: str, value: Any, allowed: str) -> ProgramError:
@@ -188,7 +188,7 @@ def within(low: float, high: float, kind: Type[Any] = float) -> Callable[[str], 
         except ValueError:
             value = math.nan
         if not low <= value <= high:
-            text = "%s must be a %snumber from %g to %g" % (text, "whole " if kind is int else "", low, high)
+            text = "%s must be a %snumber from %.15g to %.15g" % (text, "whole " if kind is int else "", low, high)
             raise argparse.ArgumentTypeError(text)
         return value
 

@@ -103,7 +103,7 @@ class FleetTest(unittest.TestCase):
     def test_a_wrong_option_is_refused_with_what_is_allowed(self):
         code, _, errors = run_fleet("--seconds", "-1")
         self.assertEqual(code, 2)
-        self.assertIn("argument --seconds: -1 must be a number from 0 to 1e+06", errors.splitlines()[-1])
+        self.assertIn("argument --seconds: -1 must be a number from 0 to 1000000", errors.splitlines()[-1])
 
     def assert_one_line(self, text, part):
         self.assertIn(part, text)
