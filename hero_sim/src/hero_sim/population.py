@@ -126,7 +126,7 @@ def place_worlds(
     objects: Optional[Sequence[Sequence[PushedBody]]] = None,
     known: Sequence[str] = (),
 ) -> World:
-    """Return one world of robots at poses (W, N, 3) for each seed; errors: 0 for robots as on the drawing, 1 usual.
+    """Return one world of robots at poses (W, N, 3) for each seed; errors: 0 for nominal robots, 1 for usual ones.
 
     objects: of each world; None: those of the arena. known: errors of robots 0 to N - 1 of each world: see set_known().
     Raises: OptionError for an error that cannot be set.

@@ -98,7 +98,7 @@ class Trial:
     ) -> None:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
-        errors: 0 for robots as on the drawing, 1 for usual ones. delay_s: age of the poses that robots sense each
+        errors: 0 for nominal robots, 1 for usual ones. delay_s: age of the poses that robots sense each
         other by. filter_commands: called with poses (W, N, 3), linear and angular speeds (W, N), returns speeds.
         objects: of each world; None: those of the arena, where it has them. known_errors: of robots 0 to N - 1, as
         hero_sim --error takes them.

@@ -135,7 +135,7 @@ def test_infrared_sensors_that_saw_too_little_are_named(monkeypatch):
     monkeypatch.setattr(infrared_fit, "_list_readings", lambda *_: [column[readings[0] != 3] for column in readings])
     fit = fit_infrared([recording], WALLS, 2.0 / 3.0)
     assert "alpha3_counts_m2" not in fit.values and len(fit.values) == 8
-    assert describe_fit(Fit(fit.values, 0.0, 0.03, 0.01, fit), 4)[-2].endswith("as on the drawing: 3")
+    assert describe_fit(Fit(fit.values, 0.0, 0.03, 0.01, fit), 4)[-2].endswith("are nominal: 3")
 
 
 def test_infrared_sensors_cannot_be_fitted_where_they_saw_too_little():

@@ -27,7 +27,7 @@ SILENCE_S = 0.5
 """Without a message for this time the robot stops: joy_node repeats held axes by autorepeat_rate of the launch file."""
 
 DRAIN_S = 0.3
-"""So long after a pause of the program what comes on /joy may be what waited meanwhile."""
+"""Time after a pause of the program in which messages on /joy may be old ones that waited."""
 
 PRESSES_MAX = 100
 """Messages between two steps whose buttons count."""

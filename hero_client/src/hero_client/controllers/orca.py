@@ -37,7 +37,7 @@ class AvoidanceLaw(NamedTuple):
     horizon_s: float = 3.0
     """Robots are kept apart for this time into the future."""
     neighbors: int = 6
-    """So many of the nearest robots are looked at: more do not fit around one."""
+    """Number of nearest robots that count: more do not fit around one."""
     max_linear_m_s: float = 0.08
     max_angular_rad_s: float = 2.5
     sense_m: float = 0.10

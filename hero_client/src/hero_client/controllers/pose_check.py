@@ -23,13 +23,13 @@ WRONG_HEADING_RAD = math.pi / 4.0
 """Controllers reach goals with smaller errors; a robot that slides along a wall by MIN_SHARE is off by this at most."""
 
 WRONG_DRIVES = 2
-"""So many drives in a row: one may be a correction of the pose."""
+"""Number of drives in a row: a single one may be a correction of the pose."""
 
 JUMP_M = 0.1
 """In one step of 0.1 s a robot drives 0.02 m at most."""
 
 JUMPS, JUMP_WINDOW_S = 3, 10.0
-"""So many jumps within this time: a robot that is moved by hand, or found again, jumps once."""
+"""Number of jumps within this time: a robot that is moved by hand, or found again, jumps once."""
 
 
 class PoseCheck:

@@ -22,7 +22,7 @@ RIVAL_SILENCE_S = 0.5
 """A program that commands regularly, and did so within this time or SILENT_PERIODS, drives the robot at this moment."""
 
 ZERO_SHOWS_S = 0.5
-"""So long after a zero the wheels of an ordinary robot rest, and at least so many of its readings show that:"""
+"""Time after a zero in which the wheels of an ordinary robot come to rest, and readings that show it at least:"""
 
 STILL_READINGS = 2
 

@@ -17,7 +17,7 @@ INTERVAL_S = 0.025
 they come within 50 ms of the last one that it took, do no harm."""
 
 STOPS_UNREAD = 6
-"""So many are sent to a robot that gives no readings of its wheels."""
+"""Number of stops sent to a robot that gives no readings of its wheels."""
 
 MOVING_READINGS = 29
 """Wheels that still turn after so many (1 s) are reported; wheels that turned though stopped are at rest again after as

@@ -1,1 +1,1 @@
-"""Intrinsics and extrinsics of a camera, and how tags sit on robots."""
+"""Intrinsics and extrinsics of a camera, and poses of tags on robots."""

@@ -35,7 +35,7 @@ PLAUSIBLE_AGE_S = 5.0
 
 
 MAX_FAILURES, HANG_S = 4, 1.0
-"""So many reads in a row that give no whole image, or one that takes so long, end a camera; a cable damages some."""
+"""Reads in a row without a whole image, or time of one read, that end a camera; a cable damages some images."""
 
 MIN_BACKOFF_S, MAX_BACKOFF_S = 0.5, 8.0
 """Between two attempts to open a camera that ended."""

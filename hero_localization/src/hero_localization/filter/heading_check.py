@@ -13,7 +13,7 @@ MIN_SHARE = 0.5
 """A robot that came less far than this share of what odometry counted was blocked, and shows no direction."""
 
 DRIVES = 3
-"""So many drives are averaged."""
+"""Number of drives that are averaged."""
 
 
 class HeadingCheck:

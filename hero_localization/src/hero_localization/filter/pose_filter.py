@@ -63,7 +63,7 @@ freedom, one of 1,000 true ones."""
 
 MOVED_POSES = 4
 MOVED_S = 0.1
-"""So many outliers in a row, over so long, that agree with each other: the robot was moved by hand (kidnapped)."""
+"""Outliers in a row, and time between first and last, that agree with each other: the robot was kidnapped."""
 
 MIN_MOVED_M, MIN_MOVED_RAD = 0.01, 0.1
 """No hand moves a robot by less: stamps of a busy computer are so far off while the robot drives."""

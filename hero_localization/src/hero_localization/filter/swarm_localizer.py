@@ -19,7 +19,7 @@ LOST_S = 1.0
 """A robot whose pose was not measured for so long is lost: its pose follows its odometry alone."""
 
 DISAGREEING_POSES, DISAGREEING_S = 2, 0.1
-"""So many outliers in a row, so long after the last pose that was used: the robot is not where its odometry tells."""
+"""Outliers in a row, and time since the last pose that was used: the robot is not where odometry has it."""
 
 ANNOUNCED_STEP_M = 0.02
 """A correction that moves a robot by more than this is said."""

@@ -24,7 +24,7 @@ from .outputs import Outputs
 
 DIAGNOSTICS_PERIOD_S = 1.0
 UNKNOWN_S = 3.0
-"""So long after it was seen, the tag of an unknown robot is named."""
+"""Time for which the tag of an unknown robot is named after it was seen."""
 
 MAX_SD = 1e3
 """Of a position (m) or heading (rad); a larger one is none."""

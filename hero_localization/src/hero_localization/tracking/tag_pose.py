@@ -89,9 +89,9 @@ class Sightings(NamedTuple):
         robots: by number.
         objects: by name.
         references: by tag id.
-        unknown: ids of tags that stand for nothing.
-        doubled: ids of tags that are there more than once, and that count nowhere.
-        misshapen: measured by printed size of those that are too large or too small, by id; they count nowhere.
+        unknown: ids of tags without a meaning.
+        doubled: ids of tags that appear more than once; ignored.
+        misshapen: measured by printed size of those that are too large or too small, by id; ignored.
     """
 
     robots: Dict[int, TagPose]

@@ -20,14 +20,14 @@ FINE_BELOW_PX, FINEST_BELOW_PX = 36.0, 20.0
 the second."""
 
 FINE_S = 2.0
-"""So long coarser detectors do not look for a tag that only a finer one found."""
+"""Time for which coarser detectors skip a tag that only a finer one found."""
 
 SWEEP_S = 2.0
 """Time in which the whole image is searched."""
 
 NEARBY_S = 3.0
 NEARBY_EXPECTED_S = 1.0
-"""So long a lost tag is searched around its place; if its robot's odometry tells where it is, one that is carried."""
+"""Time for which a lost tag is searched nearby; the second where odometry gives its place: moved by hand."""
 
 NEARBY_SIDES_S, MAX_NEARBY_SIDES = 24.0, 12.0
 """Largest distance that a tag has moved, in its sides: 1 m/s by hand at first, 0.24 m/s by itself for 2 s."""

@@ -25,7 +25,7 @@ MOVED_S = 0.5
 """A camera that shakes is no camera that moved."""
 
 MIN_REFERENCES = 2
-"""So many reference tags in one image tell whether the camera moved."""
+"""Reference tags in one image that are needed to tell whether the camera moved."""
 
 EXPECTED_FRAMES, MAX_MISSED_SHARE = 60, 0.2
 """A tag that is missed in a larger share of so many images in which it is expected is named."""

@@ -84,7 +84,7 @@ class RobotErrors(NamedTuple):
 
 
 def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> RobotErrors:
-    """Return usual differences: one robot drawn from each of rngs; with scale 0 all are as on the drawing.
+    """Return usual differences: one robot drawn from each of rngs; with scale 0 all are nominal.
 
     Sources: odometry off by 1.4 to 3.0 % of the path and alpha from 0.39 to 0.44 are published; that servos of
     one kind differ by some per cent and some microseconds is an assumption.

@@ -85,7 +85,7 @@ class World:
         arena: walls and obstacles of each world.
         worlds: how many there are.
         time_ms: end of the last step.
-        errors: how each robot differs from the drawing; constant.
+        errors: differences of each robot from the nominal one; constant.
         commands_m_s: the servos' commands (R, 2), as the wheel speeds they stand for, left and right.
         servo_gains_m_s_us: of the servos (R, 2), with their directions; constant.
         speeds_m_s, travels_m: of the wheels (R, 2).

@@ -27,7 +27,7 @@ MIN_TURN_RAD = 6.0
 def follow_body(wheels_m: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Return poses (K, 3) from 0, 0, 0 for what the ticks of both wheels say (K, 2).
 
-    body: travel by travel of the ticks, left and right, and distance between the wheels by that on the drawing (3,).
+    body: travel by travel of the ticks, left and right, and distance between the wheels by the nominal one (3,).
     """
     return follow_wheels(wheels_m * body[:2], WHEEL_SEPARATION_M * body[2])
 

@@ -36,7 +36,7 @@ class InfraredFit(NamedTuple):
 
     Attributes:
         values: by key, as --error takes them.
-        before_counts, after_counts: median error of held-out signals, of a robot as on the drawing and of this one.
+        before_counts, after_counts: median error of held-out signals, of a nominal robot and of this one.
     """
 
     values: Dict[str, float]

@@ -38,7 +38,7 @@ _PHASES_S = np.arange(0.0, SPIN_MS, 8.0) / 1000.0
 
 
 def fit_motors(recordings: List[Recording]) -> List[Motors]:
-    """Return the motors of one robot in each of its recordings; those on the drawing without servo pulses."""
+    """Return the motors of one robot in each of its recordings; nominal ones without servo pulses."""
     if not any((recording.commands[:, 1] == PULSES).any() for recording in recordings):
         return [Motors({}) for _ in recordings]
     values, steps, least, most = np.array(list(_PARAMETERS.values())).T

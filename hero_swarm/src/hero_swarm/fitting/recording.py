@@ -19,7 +19,7 @@ class Recording(NamedTuple):
 
     Attributes:
         commands: time, kind, linear m/s and angular rad/s or left and right servo pulse us (C, 4).
-        odometry: time, x m, y m, yaw rad, by the ticks of wheels as on the drawing (T, 4).
+        odometry: time, x m, y m, yaw rad, by the ticks of nominal wheels (T, 4).
         poses: time, x m, y m, yaw rad in a fixed frame (P, 4).
         scans: time, and the signals of the eight infrared sensors in counts, rear first (S, 9).
         others: poses of the other robots.

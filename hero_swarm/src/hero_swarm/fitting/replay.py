@@ -20,7 +20,7 @@ class Motors(NamedTuple):
     """Motors of one robot, and when commands reach them.
 
     Attributes:
-        values: by key, as --error takes them; others are as on the drawing.
+        values: by key, as --error takes them; others are nominal.
         delay_s: how much later than in the simulator commands work.
         phase_s: simulated time at which the recording's commands begin, which is a time in the cycle in which the
             firmware reads commands.
@@ -60,7 +60,7 @@ def replay_commands(recording: Recording, motors: Sequence[Motors]) -> np.ndarra
 
 
 def build_errors(motors: Sequence[Motors]) -> RobotErrors:
-    """Return robots as on the drawing, without chance, but for the motors' values."""
+    """Return nominal robots, but for the motors' values."""
     errors = draw_errors((np.random.RandomState(0) for _ in motors), 0.0)
     for row, own in enumerate(motors):
         for key, value in own.values.items():

@@ -33,7 +33,7 @@ class Fit(NamedTuple):
     Attributes:
         values: by key, as --error takes them.
         delay_s: how much later than in the simulator commands work.
-        before_m, after_m: median error at the ends of held-out paths, of a robot as on the drawing and of this one.
+        before_m, after_m: median error at the ends of held-out paths, of a nominal robot and of this one.
         infrared: None without an arena.
     """
 
@@ -71,7 +71,7 @@ def describe_fit(fit: Fit, robot_id: int) -> List[str]:
     """Return the lines of a robot in an error file: what was found as a remark, and its differences."""
     values = ",".join("%s=%.5g" % item for item in fit.values.items())
     ends = "held-out paths of %g s end %.1f mm off, before the fit %.1f mm"
-    motors = "no servo pulses were recorded, so motors are as on the drawing"
+    motors = "no servo pulses were recorded, so motors are nominal"
     if "lag_s" in fit.values:
         motors = "commands work %.0f ms later than in the simulator" % (1e3 * fit.delay_s)
     remarks = [ends % (PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m), motors]
@@ -80,5 +80,5 @@ def describe_fit(fit: Fit, robot_id: int) -> List[str]:
         remarks.append("held-out infrared signals are %.1f counts off, before the fit %.1f" % errors_counts)
         unseen = [str(beam) for beam in range(BEAMS) if "alpha%d_counts_m2" % beam not in fit.values]
         if unseen:
-            remarks.append("infrared sensors that saw too little are as on the drawing: %s" % ", ".join(unseen))
+            remarks.append("infrared sensors that saw too little are nominal: %s" % ", ".join(unseen))
     return ["# hero_%d: %s" % (robot_id, remark) for remark in remarks] + ["robot=%d,%s" % (robot_id, values)]

@@ -43,7 +43,7 @@ class Episode:
         neighbors: int = 5,
         range_m: float = 1.0,
     ) -> None:
-        """Place robots by seed; errors: 0 for robots as on the drawing, 1 for usual ones.
+        """Place robots by seed; errors: 0 for nominal robots, 1 for usual ones.
 
         metric: rewards are by how much it gets better in a step; None: no rewards. range_m: of neighbors, of
         which the nearest ones are observed.
