@@ -188,7 +188,7 @@ def measure_steps(robots: int, simulated_s: float = 20.0) -> float:
 
 
 def measure_physics(robots: int, worlds: int, simulated_s: float = 10.0) -> float:
-    """Return how many seconds of worlds with so many driven robots each are simulated in a second of CPU."""
+    """Return how many seconds of worlds with this many driven robots each are simulated in a second of CPU."""
     world = build_world(build_parser().parse_args(["--count", str(robots)]), worlds)
     world.commands_m_s[:] = split_to_wheels(*_SPEEDS)
     everybody = np.arange(robots * worlds)

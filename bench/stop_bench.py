@@ -38,7 +38,7 @@ ENDS = ("program", "dead", "silent")
 """Of the program that commands the robots: Ctrl-C, at which it sends zeros, SIGKILL, SIGSTOP."""
 
 GONE_AFTER_S = {"dead": 0.25, "silent": 0.5}
-"""The driver takes a program for gone after so long (orphan_stop_s, silent_stop_s): times and paths count from then."""
+"""The driver takes a program for gone after this time (orphan_stop_s, silent_stop_s), at which measurements begin."""
 
 RESTARTED = ("program", "dead")
 METHODS = (*REQUESTS, "zero", *ENDS)
@@ -49,8 +49,8 @@ DEAD_ZONE_US = 15
 REST_GOAL_S, PATH_GOAL_M, GAP_GOAL_S = 0.5, 0.04, 0.5
 WATCH_S, LIMIT_S = 1.5, 8.0
 REGULAR_S = 2.0
-"""For so long a program has commanded before it ends, also after a pause: regularly, and beyond the overshoot of the
-position controller's first second."""
+"""Time for which a program commands before it ends, also after a pause: longer than the overshoot of the position
+controller's first second."""
 
 POLL_S = 0.1
 STALL_S = 0.1
@@ -145,7 +145,7 @@ class StopSuite(RunningSuite):
         super().__init__(0, "config:=%s" % config)
 
     def add_robots(self, robots_each):
-        """Start so many robots of each center and core."""
+        """Start this many robots of each center and core."""
         offs_us = CENTERS_OFF_US * robots_each
         self.cells = [(off_us, core) for core in CORES for off_us in offs_us]  # of each robot
         self._swarms = [self._start_swarm(core, index, offs_us) for index, core in enumerate(CORES)]

@@ -35,8 +35,8 @@ BURST_LIGHTS = 62
 LIGHT_TYPE, LIGHT_MD5 = "std_msgs/ColorRGBA", "a29a96539573343b1310c73607334b00"
 
 MOTION_AFTER_S = 0.1
-"""Motion goes out so long after a stop. A program's zero overtakes its own last commands, which come on connections of
-their own; the zero with which it makes sure follows after 0.05 to 0.06 s, and finds them waiting still."""
+"""Motion goes out this long after a stop. A program's zero overtakes its own last commands, which come on other
+connections; the zero with which it makes sure follows after 0.05 to 0.06 s, and finds them waiting still."""
 
 POLL_S = 0.02
 REST_POLL_S = 0.1

@@ -37,10 +37,10 @@ The watchdog is 0 at boot and after a zero: in its first 3 s of uptime a robot's
 """
 
 MOTOR_WATCHDOG_MS = 1000
-"""The motors keep their pulse for so long after the last write (MotorDriver.ino:111)."""
+"""The motors keep their pulse for this long after the last write (MotorDriver.ino:111)."""
 
 LED_WATCHDOG_MS = 15000
-"""The light goes out so long after the last command (LEDStatus.ino:76)."""
+"""The light goes out this long after the last command (LEDStatus.ino:76)."""
 
 CONNECT_TIMEOUT_MS = 5000
 """WiFiClient's limit for a connect or a write, which block the firmware's loop."""

@@ -60,7 +60,7 @@ class Simulator(LinkHandler):
         self._full: Set[int] = set()
 
     def run(self, seconds: Optional[float] = None) -> None:
-        """Run until stopping is set, or for so many simulated seconds."""
+        """Run until stopping is set, or for this many simulated seconds."""
         end_ms = None if seconds is None else self.swarm.now_ms + int(seconds * 1000)
         self._anchor_clock()
         while not self.stopping and (end_ms is None or self.swarm.now_ms < end_ms):

@@ -56,11 +56,11 @@ class Random:
         return np.concatenate([getattr(stream, name)(shape) for stream in self._streams])
 
     def random(self, columns: Optional[int] = None) -> np.ndarray:
-        """Return numbers from 0 to 1: one for each robot (R,), or so many (R, columns)."""
+        """Return numbers from 0 to 1: one for each robot (R,), or several (R, columns)."""
         return self._draw("random_sample", columns)
 
     def normal(self, columns: Optional[int] = None) -> np.ndarray:
-        """Return standard normal numbers: one for each robot (R,), or so many (R, columns)."""
+        """Return standard normal numbers: one for each robot (R,), or several (R, columns)."""
         return self._draw("standard_normal", columns)
 
 

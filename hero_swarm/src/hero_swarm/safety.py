@@ -29,10 +29,10 @@ class SafetyFilter:
 
     Attributes:
         mode: off, fence, or fence and robots.
-        lookahead_m: the steered point lies so far in front of the axle.
+        lookahead_m: the steered point lies this far in front of the axle.
         margin_m: free space kept around each body.
         gain_1_s: closing speed allowed for each meter that is left.
-        neighbors: so many of the nearest robots are looked at: more do not fit around one.
+        neighbors: this many of the nearest robots are looked at: more do not fit around one.
         sidestep: share of what is taken from a velocity that goes to its right, so that robots that meet pass.
         max_speed_m_s, max_angular_rad_s: limits of the commands.
         radii_m: of the robots' bodies (N,), or one for all.

@@ -151,7 +151,7 @@ class Trial:
         return rows.now_ms / 1000.0
 
     def run(self, time_s: float, every_s: float = 1.0) -> Iterator[Tuple[float, np.ndarray]]:
-        """Yield the time (s) and the poses (W, N, 3) every so often, for so long."""
+        """Yield the time (s) and the poses (W, N, 3) every so often, for this long."""
         now_s = due_s = 0.0
         while now_s < time_s - 1e-9:
             if now_s >= due_s - 1e-9:

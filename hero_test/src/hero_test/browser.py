@@ -5,7 +5,7 @@ import shutil
 MISSING = [name for name in ("chromedriver", "chromium") if shutil.which(name) is None]
 
 SCRIPT_TIMEOUT_S = 300.0
-"""Only a test that fails waits so long; a busy machine needs its time."""
+"""Only a test that fails waits this long; a busy machine needs its time."""
 
 
 def open_browser(width, height):

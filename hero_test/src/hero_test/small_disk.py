@@ -30,7 +30,7 @@ class SmallDisk:
         self.path = "/proc/%d/root%s" % (self._holder.pid, folder)
 
     def take(self, size):
-        """Take so many bytes, or all that are left."""
+        """Take this many bytes, or all that are left."""
         with open(os.path.join(self.path, "filler"), "wb", buffering=0) as filler:
             filler.write(bytes(size))  # as many as there is room for
 

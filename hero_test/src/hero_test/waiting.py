@@ -3,7 +3,7 @@
 import time
 
 TIMEOUT_S = 60.0
-"""Only a test that fails waits so long; a busy machine needs its time."""
+"""Only a test that fails waits this long; a busy machine needs its time."""
 
 MAX_PAUSE_S = 0.05
 

@@ -25,7 +25,7 @@ SETTLE_S = 0.2
 """Delay of a command to the robot (up to 51 ms and the network) and the lag of its servos."""
 
 LATE_S = 0.03
-"""Readings this long after the end of a step still belong to it: the next command takes so long."""
+"""Readings this long after the end of a step still belong to it: the next command is as late."""
 
 SILENCE_S = 0.25
 """Commands sent during a silence this long came as late, or were dropped: a robot that reads many commands at once

@@ -169,7 +169,7 @@ class GoalQueue(ABC):
     def drive_to_next(self, wait: Callable[[float], object]) -> bool:
         """Drive to the next goal until it is reached, fails or is given up; return whether there was one.
 
-        wait: waits for so many seconds, or less if put(), cancel() or give_up() were called.
+        wait: waits for this many seconds, or less if put(), cancel() or give_up() were called.
         """
         if self._is_closed or self._requests.empty():
             return False

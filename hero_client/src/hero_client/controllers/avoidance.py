@@ -130,7 +130,7 @@ INFLUENCE_M = 0.18
 """Obstacles nearer than this push."""
 
 BODY_M, PUSH = 0.05, 1.5
-"""At this range one beam pushes so many times as hard as the goal pulls."""
+"""At this range one beam pushes this many times as hard as the goal pulls."""
 
 SWIRL = 1.2
 """Share of the push that acts sideways, so that the robot slides along a wall and does not stop before it."""

@@ -17,10 +17,10 @@ from .unicycle import GoToLaw, go_to_point, go_to_pose
 DEFAULT_TOLERANCE_M = 0.01
 
 FREE_S = 1.5
-"""After so long without an obstacle the next one may be passed on the other side."""
+"""After this long without an obstacle the next one may be passed on the other side."""
 
 PROGRESS_S = 30.0
-"""After so long without coming nearer, a robot that goes around obstacles is in a dead end."""
+"""After this long without coming nearer, a robot that goes around obstacles is in a dead end."""
 
 PROGRESS_M = 0.01
 """Nearer by more than this counts as nearer."""

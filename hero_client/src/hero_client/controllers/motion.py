@@ -20,13 +20,13 @@ from .pose_check import PoseCheck
 DEFAULT_TIMEOUT_S = 120.0
 
 SETTLE_S = 0.5
-"""A robot stopped for so long at its goal has reached it; it needs about 0.15 s to come to rest."""
+"""A robot stopped for this long at its goal has reached it; it needs about 0.15 s to come to rest."""
 
 AIM_SHARE = 0.7
 """The robot stops at this share of the tolerance, to be within it after coming to rest."""
 
 SILENT_STEPS = 20
-"""After so many steps without a pose, 2 s, the motion has failed: the robot has disconnected. Steps, not seconds: a
+"""After this many steps without a pose, 2 s, the motion has failed: the robot has disconnected. Steps, not seconds: a
 program that was suspended has not received poses either."""
 
 MAX_STEP_S = 0.2
@@ -42,14 +42,14 @@ BLOCKED_M_S = 0.01
 """A robot that may not drive faster than this towards an obstacle is blocked by it."""
 
 BLOCKED_S = 2.0
-"""After so long behind an obstacle the motion has failed; one that drives on, such as a robot, is waited for."""
+"""After this long behind an obstacle the motion has failed; one that drives on, such as a robot, is waited for."""
 
 STALL_S = 5.0
-"""After so long without motion of the wheels although they were told to move, the motion has failed. The slowest
+"""After this long without motion of the wheels although they were told to move, the motion has failed. The slowest
 command moves wheels after up to 3 s, when the robot's own controller has overcome friction."""
 
 FROZEN_S = 3.0
-"""After so long with wheels that turn and a pose that stays the same, the motion has failed."""
+"""After this long with wheels that turn and a pose that stays the same, the motion has failed."""
 
 SILENCE_S = 0.4
 """The driver may have stopped a robot whose program took longer for a step; its wheels then start anew."""

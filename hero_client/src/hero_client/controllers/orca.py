@@ -31,7 +31,7 @@ class AvoidanceLaw(NamedTuple):
 
     body_m: float = BODY_RADIUS_M
     lookahead_m: float = 0.03
-    """The point that is steered lies so far in front of the axle; small: quick turns, large: wide berth."""
+    """The point that is steered lies this far in front of the axle; small: quick turns, large: wide berth."""
     margin_m: float = 0.012
     """Added to the radius for late and wrong odometry and for wheels that lag."""
     horizon_s: float = 3.0

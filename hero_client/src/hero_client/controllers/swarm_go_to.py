@@ -21,10 +21,10 @@ NUDGE_RAD = 0.05
 """Largest random turn of the wanted velocity: breaks the symmetry in which all robots wait."""
 
 PATIENCE_S = 4.0
-"""A robot without progress for so long is in a jam: it moves aside, to a random side and angle."""
+"""A robot without progress for this long is in a jam: it moves aside, to a random side and angle."""
 
 ASIDE_S = 2.0
-"""For so long, then it tries again."""
+"""For this long, then it tries again."""
 
 PROGRESS_M = 0.01
 """Nearer by more than this counts as nearer."""

@@ -123,7 +123,7 @@ class Group(Clock):
     def wait_until_ready(self: Self, timeout_s: float = 10.0, sleep: Optional[Sleep] = None) -> Self:
         """Wait until every robot takes commands and sends what was subscribed to; return this object itself.
 
-        sleep: waits so many seconds and returns whether to continue, such as Program.sleep.
+        sleep: waits this many seconds and returns whether to continue, such as Program.sleep.
 
         Raises: RobotNotReadyError after timeout_s, with the robots that are not and what is missing.
         """

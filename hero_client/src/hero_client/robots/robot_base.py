@@ -31,7 +31,7 @@ NEXT_ODOM_S = 5.0
 STOPPED_WARNING_PERIOD_S = 5.0
 
 COMMAND_S = 2.0
-"""For so long a robot obeys a command that no other follows."""
+"""A robot obeys a command that no other follows for this long."""
 
 OnStep = Callable[[GoToGoalController], None]
 

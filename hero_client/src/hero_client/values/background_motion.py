@@ -8,7 +8,7 @@ SEND_TIME_S = 0.1
 """rospy sends on threads of its own and does not say when it has; this is many times what a send takes."""
 
 Sleep = Callable[[float], bool]
-"""Waits for so many seconds and returns whether to continue; Clock.sleep is one."""
+"""Waits for this many seconds and returns whether to continue; Clock.sleep is one."""
 
 Steps = Generator[float, bool, None]
 """Does a step, yields the seconds until the next one, and is sent whether to continue."""

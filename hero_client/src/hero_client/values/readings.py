@@ -13,7 +13,7 @@ FRESH_S = 1.0
 recording of real robots the longest one lasted 0.15 to 1.3 s."""
 
 MAX_POSITION_M = 1000.0
-"""No robot drives so far; a position or range beyond is invalid."""
+"""No robot drives this far; a position or range beyond is invalid."""
 
 MAX_RANGES = 64
 """A robot has eight sensors; a scan with more ranges than this is invalid."""

@@ -20,8 +20,8 @@ STOPS_UNREAD = 6
 """Number of stops sent to a robot that gives no readings of its wheels."""
 
 MOVING_READINGS = 29
-"""Wheels that still turn after so many (1 s) are reported; wheels that turned though stopped are at rest again after as
-many without a turn: slow creep shows."""
+"""Wheels that still turn after this many (1 s) are reported; wheels that turned though stopped are at rest again after
+as many without a turn: slow creep shows."""
 
 UNREAD_AFTER_S = 1.0
 SILENT_AFTER_S = 2.0
@@ -125,7 +125,7 @@ class StopProgress:
         self._next_s = now_s + interval_s
 
     def _has_passed(self, mark: Optional[_Mark], readings: int, now_s: float) -> bool:
-        """Return whether so many readings came since mark, and the time that they take has passed."""
+        """Return whether this many readings came since mark, and the time that they take has passed."""
         return (
             mark is not None
             and self._wheels.readings - mark.readings >= readings

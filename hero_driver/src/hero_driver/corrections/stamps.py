@@ -51,7 +51,7 @@ class StampFilter:
                 self.corrected += 1
         if last_ns is not None and result_ns <= last_ns:
             if last_ns - arrival_ns > self._max_future_ns + STEP_SLACK_NS:
-                # No stamp that was let through lies so far ahead of its arrival: ROS time itself went back
+                # No stamp that was let through lies this far ahead of its arrival: ROS time itself went back
                 # (the clock was set, or a bag or simulation began anew).
                 self.last_ns.clear()
             else:

@@ -22,7 +22,7 @@ RESET_TICKS = 5
 """A robot that has just booted is at rest: its counters are this close to zero (3 mm) when it sends again."""
 
 MIN_GAP_S = 0.2
-"""Ticks of so long are believed however close two stamps are: the robot's clock may be set back between them."""
+"""Ticks over this time are believed however close two stamps are: the robot's clock may be set back between them."""
 
 MAX_GAP_S = 10.0
 """Ticks of a pause without readings are believed as if the pause had at most this length."""

@@ -17,7 +17,7 @@ QUEUE_LENGTH = 200
 """Two seconds of messages for a listener that is slow."""
 
 TRANSFORMS_MAX = 500
-"""A message holds at most so many: 50 kB, about 3 s of one robot, 30 ms of a hundred."""
+"""A message holds at most this many transforms: 50 kB, about 3 s of one robot, 30 ms of a hundred."""
 
 
 class TransformPublisher:

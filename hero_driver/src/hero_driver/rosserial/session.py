@@ -29,7 +29,7 @@ REPEAT_INTERVAL_S = 0.5
 """Between two requests for topics when a peer proves that it runs but declared nothing."""
 
 UNCONFIGURED_S = 3.0
-"""A robot that logs but sent neither data nor a time request for so long has lost its configuration (no answer
+"""A robot that logs but sent neither data nor a time request for this long has lost its configuration (no answer
 for 11 s, node_handle.h:193); it asks for the time every 2.55 s otherwise. Only a new request restores it."""
 
 UNDECLARED_REPEATS = 5

@@ -15,7 +15,7 @@ BACKOFF_MAX_S = 10.0
 CONNECT_TIMEOUT_S = 5.0
 
 STABLE_S = 3.0
-"""A connection that lasted so long is dialled again quickly; one that hangs up at once is not."""
+"""A connection that lasted this long is dialled again quickly; one that hangs up at once is not."""
 
 
 HandOver = Callable[[socket.socket, Address, Callable[[], None]], None]

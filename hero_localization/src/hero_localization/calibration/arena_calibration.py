@@ -25,7 +25,7 @@ WORST_RESIDUAL_M = 0.006
 
 WRONG_PLACE_M = 0.004
 WRONG_SHARE = 3.0
-"""A tag is wrong that lies so far from where all others put it, and so many times as far as these disagree."""
+"""A tag is wrong that lies this far from where all others put it, and this many times as far as these disagree."""
 
 AMBIGUOUS_M2 = 2e-6
 """Two tags may both be the wrong one if, without either, the others' squared residuals sum up to less than this apart:

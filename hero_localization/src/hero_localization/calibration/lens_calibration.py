@@ -20,7 +20,7 @@ MIN_CORNERS = 12
 
 GOOD_RMS_PX = 0.5
 OUTLIER = 3.0
-"""An image whose error is so many times the median is left out: blurred, or a bent board."""
+"""An image whose error is this many times the median is left out: blurred, or a bent board."""
 
 GOOD_FOCAL_ERROR = 0.003
 """Of the focal length, standard deviation. The arena's calibration takes most of it up, by the camera's height."""

@@ -45,7 +45,7 @@ class RobotCalibration(NamedTuple):
 
     Attributes:
         mount: pose of the tag in base_link; yaw of its print's upper edge.
-        delay_s: the poses were true so long before their stamps.
+        delay_s: the poses were true this long before their stamps.
         delay_error_s: standard deviation of the delay.
         rms_m: how far the poses lie from those of the drive with such a tag.
         problems: what speaks against using it; empty: it is good.

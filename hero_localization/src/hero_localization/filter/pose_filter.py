@@ -41,14 +41,14 @@ UNTOLD_M_S, UNTOLD_RAD_S = 0.2, 2.0
 SYSTEMATIC = np.array((SYSTEMATIC_M**2, SYSTEMATIC_M**2, SYSTEMATIC_RAD**2))
 
 WAIT_S = 0.25
-"""A measured pose waits so long for odometry; readings come every 0.034 s."""
+"""A measured pose waits this long for odometry; readings come every 0.034 s."""
 
 IDLE_VARIANCE_M2_S = 1e-8
 IDLE_VARIANCE_RAD2_S = 1e-7
 """A robot at rest is pushed now and then: 0.1 mm and 0.02 degrees after one second."""
 
 SLIP_M, SLIP_RAD = 0.06, 0.6
-"""At most so much of what odometry counted since the last measured pose may be slip; what exceeds that was a jump."""
+"""At most this much of what odometry counted since the last measured pose may be slip; what exceeds that was a jump."""
 
 BLOCKED_S = (0.09, 0.5)
 BLOCKED_SHARE, MIN_SLIP_M = 0.4, 0.005
@@ -66,7 +66,7 @@ MOVED_S = 0.1
 """Outliers in a row, and time between first and last, that agree with each other: the robot was kidnapped."""
 
 MIN_MOVED_M, MIN_MOVED_RAD = 0.01, 0.1
-"""No hand moves a robot by less: stamps of a busy computer are so far off while the robot drives."""
+"""No hand moves a robot by less: stamps of a busy computer are this far off while the robot drives."""
 
 REPLAYED_S = 1.0
 """Poses that arrive later than this after a newer one are left out."""

@@ -16,7 +16,7 @@ from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Outcome, PoseFilter, StampedPose
 
 LOST_S = 1.0
-"""A robot whose pose was not measured for so long is lost: its pose follows its odometry alone."""
+"""A robot whose pose was not measured for this long is lost: its pose follows its odometry alone."""
 
 DISAGREEING_POSES, DISAGREEING_S = 2, 0.1
 """Outliers in a row, and time since the last pose that was used: the robot is not where odometry has it."""

@@ -63,7 +63,7 @@ ARENA_FRAMES = 30
 FRAME_S = 10.0
 WAIT_S = 0.1
 HINT_S = 10.0
-"""After so long without the board in an image, what may be wrong is said."""
+"""After this long without the board in an image, possible causes are printed."""
 
 READY_S = 10.0
 LOOK_S = 3.0

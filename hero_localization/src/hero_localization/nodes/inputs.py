@@ -27,7 +27,7 @@ MIN_UPRIGHT = 0.7
 """Of the robot's axis, the part that points up: 45 degrees."""
 
 RISE_M, STILL_M = 0.15, 0.02
-"""A robot that comes so far up or down, but not even the second along y, drives where y points up."""
+"""A robot that comes this far up or down, but not even the second along y, drives where y points up."""
 
 POSE_TYPES = {kind._md5sum: kind for kind in (PoseStamped, PoseWithCovarianceStamped, Odometry)}
 """Types of measured poses, by md5; of an Odometry the pose counts."""

@@ -46,7 +46,7 @@ PLACE_ERROR_M = 0.001
 """Standard deviations of what people glue on robots by eye, and lay out by tape."""
 
 BOARD_PICTURES = 4
-"""The board is held for so many images at each place."""
+"""The board is held for this many images at each place."""
 
 MISSED_S = 0.1
 """An image that this machine is so late for is dropped, as a camera does whose program is too slow."""

@@ -15,7 +15,7 @@ from .view import CameraOptions, PrintedTag, tag_corners
 
 REFERENCES = 4
 FIRST_REFERENCE_ID = 100
-"""Of families that have so many tags; otherwise the last ones are reference tags."""
+"""Of families that have this many tags; otherwise the last ones are reference tags."""
 
 REFERENCE_GAP_M = 0.12
 """Between the arena's bounds and the centers of the reference tags beside it."""

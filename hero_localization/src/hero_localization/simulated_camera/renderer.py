@@ -25,7 +25,7 @@ BLACK, WHITE = 25.0, 225.0
 WALL_HEIGHT_M = 0.05
 TEXEL_M = 0.0005
 FINE = 2
-"""Prints are drawn so many times finer than they are kept: blurred, they need no more."""
+"""Prints are drawn this many times finer than they are kept: blurred, they need no more."""
 NOISE_FIELDS = 4
 _SHIFT = 4
 """Bits of a pixel's fraction when polygons are drawn."""

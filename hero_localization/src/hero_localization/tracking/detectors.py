@@ -49,7 +49,7 @@ class AprilTagDetector(TagDetector):
     """
 
     def __init__(self, family: str, decimate: float, enlarge: int = 0) -> None:
-        """enlarge: sharpen images first, so many times enlarged; 0: take them as they are."""
+        """enlarge: sharpen images first, this many times enlarged; 0: take them as they are."""
         try:
             from apriltag import apriltag
         except ImportError:
@@ -134,7 +134,7 @@ DEFAULT_BACKEND = "apriltag" if find_spec("apriltag") else "aruco"
 def create_detector(backend: str = DEFAULT_BACKEND, family: str = "36h11", decimate: float = 2.0) -> TagDetector:
     """Return one of BACKENDS for one of FAMILIES.
 
-    decimate: apriltag looks for squares in an image so many times smaller; corners are refined in the whole one.
+    decimate: apriltag looks for squares in an image this many times smaller; corners are refined in the whole one.
 
     Raises: DetectorError if it is not installed.
     """

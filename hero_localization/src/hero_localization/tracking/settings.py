@@ -37,7 +37,7 @@ class Settings(NamedTuple):
     lens: Optional[Intrinsics] = None
     camera: Optional[Camera] = None
     delay_s: float = 0.0
-    """Images were taken so long before their stamps."""
+    """Images were taken this long before their stamps."""
     seen_references: Mapping[int, Pose] = {}
     """Poses of the reference tags in the calibration of the arena."""
     controls: DeviceControls = DeviceControls()

@@ -46,7 +46,7 @@ MAX_STEP_S = 0.2
 """A longer gap between frames counts as this long, or all tiles would be searched at once."""
 
 KEPT_S = 1.0
-"""A lost tag is looked for near the place where it was for so long; where it is expected, for ever."""
+"""A lost tag is searched near its last place for this long; where it is expected, for ever."""
 
 TILE_PX = (480, 360)
 OVERLAP_PX = 96

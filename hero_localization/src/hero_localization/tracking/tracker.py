@@ -16,7 +16,7 @@ from .tag_pose import Sightings, find_smallest_side, locate
 RATE_FRAMES = 30
 
 KEPT_S = 2.0
-"""A problem of a tag is named for so long after it was last seen."""
+"""A problem of a tag is named for this long after it was last seen."""
 
 MOVED_M = 0.005
 """A camera turned by a tenth of a degree shifts everything by 4 mm."""
@@ -28,7 +28,7 @@ MIN_REFERENCES = 2
 """Reference tags in one image that are needed to tell whether the camera moved."""
 
 EXPECTED_FRAMES, MAX_MISSED_SHARE = 60, 0.2
-"""A tag that is missed in a larger share of so many images in which it is expected is named."""
+"""A tag that is missed in a larger share of this many images in which it is expected is named."""
 
 MISSING_S = 5.0
 """A hand that covers a reference tag goes away sooner."""

@@ -29,7 +29,7 @@ KEPT_S = 5.0
 """Of each robot's poses."""
 
 AHEAD_S = 0.1
-"""A robot's newest pose shows where it was so long after it."""
+"""A robot's newest pose shows where it was this long after it."""
 
 
 class CameraPicture:

@@ -12,7 +12,7 @@ from hero_node.geometry import Pose
 from .page_state import encode_color, encode_pose, shorten
 
 SILENT_S = 2.0
-"""Behaviors draw about eight times a second; one that is silent for so long has ended."""
+"""Behaviors draw about eight times a second; one that is silent for this long has ended."""
 
 MARKERS_MAX = 20
 POINTS_MAX = 2000

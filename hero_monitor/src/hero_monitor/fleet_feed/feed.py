@@ -52,7 +52,7 @@ GROUND_TRUTH_TOPICS = {"/hero_sim/markers"}
 PICTURE_TOPICS = {"/track/picture/compressed", "/track/picture/outline"}
 
 REPLAY_KEPT_S = 3.0
-"""Robots of a replay disappear so long after its last message."""
+"""Robots of a replay disappear this long after its last message."""
 
 MARKERS_MAX = 2000
 """Of the arena, or of ground truth."""

@@ -36,7 +36,7 @@ class LocalizationWatch:
         self._is_known = self._had_tracked = self._has_tracked = False
 
     def receive(self, tracked: int, now_s: float) -> None:
-        """Take a report with so many robots that a camera measures."""
+        """Take a report with this many robots that a camera measures."""
         self._heard_s, self._is_known = now_s, True
         self._has_tracked = tracked > 0
         self._had_tracked = self._had_tracked or self._has_tracked

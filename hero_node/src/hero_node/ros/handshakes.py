@@ -28,7 +28,7 @@ Serve = Callable[[socket.socket, Any, bytes], None]
 
 
 class ConnectionLimit:
-    """At most so many connections at a time; for calls from any thread."""
+    """At most this many connections at a time; for calls from any thread."""
 
     def __init__(self, most: int) -> None:
         self._most = most

@@ -21,7 +21,7 @@ _MAX_UNSENT = 1 << 20
 """Bytes kept for a driver that does not read; the robot is blocked long before, so more would be a bug of ours."""
 
 _MAX_ABANDONED = 200
-"""Connections of robots that lost their power; after so many later ones the driver has given up the first one."""
+"""Connections of robots that lost their power; after this many later ones the driver has given up the first one."""
 
 # Like the ESP8266, whose own send buffer is two segments: a server that does not read is noticed soon.
 _SEND_BUFFER_LENGTH = 16384
@@ -125,7 +125,7 @@ class TcpLink:
         sock = socket.socket(self._family, socket.SOCK_STREAM)
         try:
             sock.setblocking(False)
-            # Linux then takes about so many unread bytes, as the robot does.
+            # Linux then takes about this many unread bytes, as the robot does.
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_WINDOW_LENGTH)
             if own_address.startswith("127."):
                 sock.bind((own_address, 0))

@@ -13,7 +13,7 @@ CORE_2, CORE_3 = "core2", "core3"
 PERIOD_US = 20000
 
 _RIGHT_AFTER_US = 250
-"""The right servo is attached, and begins its periods, so long after the left one: half of what a cmd_motor takes."""
+"""The right servo is attached, and begins its periods, this long after the left one: half of what a cmd_motor takes."""
 
 
 class ServoPins:

@@ -29,7 +29,7 @@ def _compile(loop: Loop) -> Optional[Loop]:
 
 
 def compile_loops(rows: int, *loops: Loop) -> Tuple[Hold, Sequence[Loop]]:
-    """Return loops, whose arguments are numbers and arrays with one axis, for so many rows, and what holds the arrays.
+    """Return loops, whose arguments are numbers and arrays with one axis, for this many rows; and hold().
 
     hold(array) is what the loops read and change: the array, or a list, whose single reads are several times faster.
     """

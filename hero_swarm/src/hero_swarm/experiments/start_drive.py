@@ -14,7 +14,7 @@ PERIOD_S = 0.05
 """Time between two steps."""
 
 _REST_STEPS = 10
-"""Motors follow late: robots have arrived when all were there for so many steps."""
+"""Motors follow late: robots have arrived when all were there for this many steps."""
 
 
 class StartDrive:

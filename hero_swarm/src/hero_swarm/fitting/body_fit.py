@@ -18,7 +18,7 @@ from .recording import Recording, measure_wheels
 STRETCH_S = 8.0
 POSE_PERIOD_S = 0.1
 HEADING_M = 0.1
-"""An error of one radian counts as one of so many meters."""
+"""An error of one radian counts as one of this many meters."""
 
 MIN_TURN_RAD = 6.0
 """Less turning tells too little of the distance between the wheels."""

@@ -28,7 +28,7 @@ _MAX_GAP_S = 0.5
 
 _MIN_READINGS = 20
 _FAR_SDS = 1.5
-"""Readings farther off, at edges of walls and of bodies, count as if they were so far off (P. Huber)."""
+"""Readings farther off, at edges of walls and of bodies, count as if they were this far off (P. Huber)."""
 
 
 class InfraredFit(NamedTuple):

@@ -21,7 +21,7 @@ _OWN = 14
 
 
 def count_observations(neighbors: int) -> int:
-    """Return how many numbers a robot with so many neighbors observes."""
+    """Return how many numbers a robot with this many neighbors observes."""
     return _OWN + 2 * neighbors
 
 

@@ -24,7 +24,7 @@ def dispersion(places_m: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=None)
 def ideal_dispersion(robots: int, radius_m: float = BODY_RADIUS_M) -> float:
-    """Return the least dispersion (m) of so many discs: the densest packing, around the best of its centers."""
+    """Return the least dispersion (m) of this many discs: the densest packing, around the best of its centers."""
     reach = math.ceil(math.sqrt(robots)) + 2
     rows, columns = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1), indexing="ij")
     lattice = np.column_stack(((columns + rows / 2.0).ravel(), (rows * math.sqrt(0.75)).ravel()))

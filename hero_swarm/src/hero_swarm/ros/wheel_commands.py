@@ -35,7 +35,7 @@ class WheelCommands:
     def __init__(self, swarm: Swarm, drive: str, folder: str, simulated: int = 0) -> None:
         """Take the dead zones from folder if drive is "pulses". Raises: ProgramError for an unusable file.
 
-        simulated: so many robots are those of a simulator with seed 0; their motors are as if calibrated.
+        simulated: this many robots are those of a simulator with seed 0; their motors are as if calibrated.
         """
         self._swarm = swarm
         self._publishers: List[rospy.Publisher] = []

@@ -20,7 +20,7 @@ Values = Any  # a number for all these rows, or one for each: a sequence or an a
 INTERVAL_MS = round(COMMAND_INTERVAL_S * 1000)
 
 MAX_AGE_MS = 2000
-"""Motion that could not be sent for so long is dropped: the driver's command_max_age_s, unless it was set."""
+"""Motion that could not be sent for this long is dropped: the driver's command_max_age_s, unless it was set."""
 
 
 class Sent(NamedTuple):
