@@ -68,7 +68,7 @@ class RunningSuite:
         return self.start_program("hero_examples", name, *arguments, **options)
 
     def close(self):
-        """End everything, the last first; safe twice."""
+        """End everything, the last first; may be called twice."""
         while self.processes:
             stop(self.processes.pop())
 

@@ -88,7 +88,7 @@ FORMER_STOP = "stopped"
 def read_config(given: Mapping[str, Any]) -> DriverConfig:
     """Return the checked configuration in the given parameters (names without "~").
 
-    Raises: ProgramError, also for a calibration file that is none of calibrate's.
+    Raises: ProgramError, also for a calibration file that calibrate did not write.
     """
     given = {name: value for name, value in given.items() if name != FORMER_STOP}
     config = DriverConfig(**check_parameters(PARAMETERS, given))

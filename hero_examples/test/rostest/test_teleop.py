@@ -87,7 +87,7 @@ class Terminal:
         self.hang_up()
 
     def hang_up(self):
-        """Close the terminal as a terminal window does; safe twice."""
+        """Close the terminal as a terminal window does; may be called twice."""
         for fd in self.open_fds:
             os.close(fd)
         self.open_fds = []

@@ -55,7 +55,8 @@ def test_a_restart_goes_on_where_the_robot_stood_with_its_lengths():
     assert middle.pose == pytest.approx((1.025, 2.0, 0.1))
     assert middle[1:4] == pytest.approx((0.025, 0.1, 0.1)), "lengths of path and turns, and heading"
     assert history.find(0.25)[1:4] == pytest.approx((0.065, 0.25, 0.15))
-    assert [history.find(stamp_s).untold_s for stamp_s in (0.1, 0.15, 0.2, 0.3)] == pytest.approx((0.0, 0.05, 0.1, 0.1))
+    unobserved_s = [history.find(stamp_s).unobserved_s for stamp_s in (0.1, 0.15, 0.2, 0.3)]
+    assert unobserved_s == pytest.approx((0.0, 0.05, 0.1, 0.1))
     assert history.find(9.0) == found and history.find(-0.01) is None
 
 
@@ -72,7 +73,7 @@ def test_a_restart_goes_on_where_the_robot_stood_with_its_lengths():
 )
 def test_odometry_back_at_zero_after_a_pause_shows_a_restart(elapsed_s, before, after, is_restart):
     history = make_history((0.0, *before), (elapsed_s, *after))
-    assert history.jumps == is_restart and history.find(elapsed_s).untold_s == is_restart * elapsed_s
+    assert history.jumps == is_restart and history.find(elapsed_s).unobserved_s == is_restart * elapsed_s
 
 
 def test_odometry_is_kept_for_a_time_and_old_readings_are_left_out():

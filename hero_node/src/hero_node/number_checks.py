@@ -1,4 +1,4 @@
-"""Checks of numbers from files, parameters and pages: True and False (ints of Python) and NaN are none. Pure."""
+"""Checks of numbers from files, parameters and pages: True and False (ints of Python) and NaN are refused. Pure."""
 
 import math
 import sys

@@ -39,7 +39,7 @@ def parse_yaml(text: str, loader: Type[Any] = yaml.SafeLoader) -> Any:
         return yaml.load(text, loader)  # noqa: S506 - callers give SafeLoader, or one that is stricter
     except RecursionError:
         raise YamlError("lists or tables within each other, deeper than can be read") from None
-    except Exception as error:  # noqa: BLE001 - PyYAML raises many kinds at dates and numbers that are none
+    except Exception as error:  # noqa: BLE001 - PyYAML raises many kinds at invalid dates and numbers
         raise YamlError(one_line(error)) from None
 
 

@@ -18,7 +18,7 @@ PLACES, COMMANDS = ("odometry", "ground_truth"), {"velocity_command": VELOCITY, 
 _LASER = re.compile(r"/hero_(\d+)/laser")
 
 MAX_SPEED_M_S = 1.0
-"""Faster odometry was set, or its robot started anew."""
+"""Faster odometry was set, or its robot restarted."""
 
 Rows = List[Tuple[float, ...]]
 
@@ -86,7 +86,7 @@ def _align(robot_id: int, tables: Sequence[Rows]) -> Recording:
     commands, odometry, poses, scans, *others = (_shift(rows, start_s) for rows in tables)
     steps = np.diff(odometry, axis=0)
     if (np.hypot(steps[:, 1], steps[:, 2]) > MAX_SPEED_M_S * np.maximum(steps[:, 0], 0.02)).any():
-        text = "hero_%d: its odometry jumps: it was set, or the robot started anew; record again"
+        text = "hero_%d: its odometry jumps: it was set, or the robot restarted; record again"
         raise ExperimentError(text % robot_id)
     return Recording(commands, odometry, poses, scans, tuple(others))
 

@@ -37,7 +37,7 @@ STRAIGHT_SD = (0.002, math.inf, math.inf)
 """Errors of a measured x, y (m) and yaw (rad); inf: not measured."""
 
 MAX_CHANGE = 0.1
-"""Wheels that differ from the nominal ones by a larger share are none: the robot slipped, or was moved by hand."""
+"""Wheels that differ more from the nominal ones are implausible: the robot slipped, or was moved by hand."""
 
 DIAMETER_M = TICK_M * 288.0 / math.pi
 NOMINAL_M = np.array((DIAMETER_M, DIAMETER_M, WHEEL_SEPARATION_M))

@@ -472,12 +472,12 @@ class BaseRobot(Group):
     # ------------------------------------------------------------------ end
 
     def close(self) -> None:
-        """Stop the robot, if it was driven from here, and leave its topics; safe twice."""
+        """Stop the robot, if it was driven from here, and leave its topics; may be called twice."""
         self._leave()
         self.leave_topics()
 
     def leave_topics(self) -> None:
-        """Receive nothing more, without stopping the robot; safe twice."""
+        """Receive nothing more, without stopping the robot; may be called twice."""
         self._link.close()
 
     def __repr__(self) -> str:

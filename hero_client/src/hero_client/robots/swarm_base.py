@@ -232,7 +232,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         """Tell users; level is "info" or "warn"."""
 
     def close(self) -> None:
-        """Stop all robots that were driven from here, and leave their topics; safe twice."""
+        """Stop all robots that were driven from here, and leave their topics; may be called twice."""
         self._leave()
         for robot in self.robots:
             robot.leave_topics()

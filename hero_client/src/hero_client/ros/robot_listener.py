@@ -45,7 +45,7 @@ class NewestMessage:
             return None
 
     def close(self) -> None:
-        """Unsubscribe; safe twice."""
+        """Unsubscribe; may be called twice."""
         self._subscriber.unregister()
 
 

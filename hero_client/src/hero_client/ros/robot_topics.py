@@ -68,7 +68,7 @@ class NewestMessages:
         return next((topic for topic in topics if topic in self._subscribers and self.age_s(topic) > limit_s), None)
 
     def close(self) -> None:
-        """Unsubscribe; safe twice."""
+        """Unsubscribe; may be called twice."""
         for subscriber in self._subscribers.values():
             subscriber.unregister()
         self._subscribers = {}

@@ -97,4 +97,4 @@ class RobotLink(Protocol):
         """Warn users of what ends nothing."""
 
     def close(self) -> None:
-        """Leave the robot; safe twice."""
+        """Leave the robot; may be called twice."""

@@ -55,7 +55,7 @@ class CallQueue:
                     self._on_error(error)
 
     def close(self, drain: bool = False) -> None:
-        """Refuse new calls, and forget those that wait unless they are to be drained; safe twice."""
+        """Refuse new calls, and forget those that wait unless they are to be drained; may be called twice."""
         with self._lock:
             self._closed = True
             if not drain:

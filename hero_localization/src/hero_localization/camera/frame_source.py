@@ -281,7 +281,7 @@ def _check_path(path: str) -> None:
 def open_source(image: str, device: str, size_px: str, rate_hz: float, controls: DeviceControls) -> FrameSource:
     """Return the source of images: the device or video if one is named, else the topic image.
 
-    Raises: FrameSourceError for a device or video that cannot be opened, or a size that is none.
+    Raises: FrameSourceError for a device or video that cannot be opened, or an invalid size.
     """
     if not device:
         return TopicSource(rospy.resolve_name(image))

@@ -41,7 +41,7 @@ class Odometry(NamedTuple):
     """Length of the path, and of all turns, since the first reading."""
     heading_rad: float = 0.0
     """Turns to the left less turns to the right since then: not wrapped."""
-    untold_s: float = 0.0
+    unobserved_s: float = 0.0
     """Total time of the jumps since then, in which the robot drove an unknown path."""
 
 
@@ -70,14 +70,14 @@ class OdometryHistory:
         """Add a reading of /hero_N/odom; one that is not newer than the last is left out."""
         if stamp_s <= self.newest_s:
             return
-        pose, distance_m, turned_rad, heading_rad, untold_s = transform_pose(self._offset, raw), 0.0, 0.0, 0.0, 0.0
+        pose, distance_m, turned_rad, heading_rad, unobserved_s = transform_pose(self._offset, raw), 0.0, 0.0, 0.0, 0.0
         if self._readings.newest is not None:
-            last, distance_m, turned_rad, heading_rad, untold_s = self._readings.newest
+            last, distance_m, turned_rad, heading_rad, unobserved_s = self._readings.newest
             step_m, step_rad = measure_distance(last, pose), wrap_angle(pose.yaw_rad - last.yaw_rad)
             elapsed_s = stamp_s - self.newest_s
             if _is_jump(step_m, step_rad, 0.0 if elapsed_s > RESTART_S and _is_origin(raw) else elapsed_s):
                 self.jumps += 1
-                untold_s += elapsed_s
+                unobserved_s += elapsed_s
                 self._offset = find_frame(last, raw)
                 pose, step_rad = last, 0.0
             counted_m = measure_distance(self._counted, pose)
@@ -88,7 +88,7 @@ class OdometryHistory:
         else:
             self._counted = pose
         self.raw_pose = raw
-        self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad, untold_s))
+        self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad, unobserved_s))
 
     def find(self, stamp_s: float) -> Optional[Odometry]:
         """Return the odometry at stamp_s, interpolated between two readings; after the newest, that one.

@@ -35,7 +35,7 @@ YAW_VARIANCE_RAD2_RAD = 2e-4
 SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
 """Of measured poses (standard deviations in x, y, and of yaw), what stays however many are joined: calibration."""
 
-UNTOLD_M_S, UNTOLD_RAD_S = 0.2, 2.0
+UNOBSERVED_M_S, UNOBSERVED_RAD_S = 0.2, 2.0
 """Assumed maximum speed while odometry is missing."""
 
 SYSTEMATIC = np.array((SYSTEMATIC_M**2, SYSTEMATIC_M**2, SYSTEMATIC_RAD**2))
@@ -142,7 +142,7 @@ class PoseFilter:
     def add_measurement(self, measurement: StampedPose) -> Outcome:
         """Correct the estimate by a measured pose, which may be older than others that were used.
 
-        Raises: ValueError for numbers that are not finite, or a covariance that is none.
+        Raises: ValueError for numbers that are not finite, or an invalid covariance.
         """
         _check(measurement)
         ahead_s = measurement.stamp_s - self.odometry.newest_s
@@ -213,8 +213,8 @@ class PoseFilter:
     def _find_motion(self, step: _Step) -> _Step:
         odometry, newest = self.odometry.find(step.estimate.stamp_s), self._get_odometry(self.odometry.newest_s)
         if odometry is None:  # in a long pause: where the robot drove since then is unknown
-            untold_s = newest.untold_s - (self.odometry.newest_s - step.estimate.stamp_s)
-            odometry = newest._replace(untold_s=untold_s)
+            unobserved_s = newest.unobserved_s - (self.odometry.newest_s - step.estimate.stamp_s)
+            odometry = newest._replace(unobserved_s=unobserved_s)
         return step._replace(odometry=odometry)
 
     def _start(self, measurement: StampedPose) -> None:
@@ -253,14 +253,14 @@ class PoseFilter:
         moved_x_m, moved_y_m = pose.x_m - start.pose.x_m, pose.y_m - start.pose.y_m
         driven_m, turned_rad = end.distance_m - step.odometry.distance_m, end.turned_rad - step.odometry.turned_rad
         elapsed_s = stamp_s - start.stamp_s
-        untold_s = end.untold_s - step.odometry.untold_s
-        untold_s += max(0.0, stamp_s - max(start.stamp_s, self.odometry.newest_s))
+        unobserved_s = end.unobserved_s - step.odometry.unobserved_s
+        unobserved_s += max(0.0, stamp_s - max(start.stamp_s, self.odometry.newest_s))
         # A wrong heading at the start leads to a wrong place at the end.
         jacobian = np.array(((1.0, 0.0, -moved_y_m), (0.0, 1.0, moved_x_m), (0.0, 0.0, 1.0)))
         place_m2 = (DISTANCE_SCALE_SD * driven_m) ** 2 + DISTANCE_VARIANCE_M2_M * driven_m
-        place_m2 += IDLE_VARIANCE_M2_S * elapsed_s + (UNTOLD_M_S * untold_s) ** 2
+        place_m2 += IDLE_VARIANCE_M2_S * elapsed_s + (UNOBSERVED_M_S * unobserved_s) ** 2
         yaw_rad2 = YAW_VARIANCE_RAD2_M * driven_m + YAW_VARIANCE_RAD2_RAD * turned_rad
-        yaw_rad2 += IDLE_VARIANCE_RAD2_S * elapsed_s + (UNTOLD_RAD_S * untold_s) ** 2
+        yaw_rad2 += IDLE_VARIANCE_RAD2_S * elapsed_s + (UNOBSERVED_RAD_S * unobserved_s) ** 2
         # One that grows evenly along the path leads half as far astray.
         drift_rad2 = (YAW_SCALE_SD_RAD_M * driven_m) ** 2
         drift_rad2 += (TURN_SCALE_SD * (end.heading_rad - step.odometry.heading_rad)) ** 2

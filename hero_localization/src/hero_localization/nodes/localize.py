@@ -27,7 +27,7 @@ UNKNOWN_S = 3.0
 """Time for which the tag of an unknown robot is named after it was seen."""
 
 MAX_SD = 1e3
-"""Of a position (m) or heading (rad); a larger one is none."""
+"""Of a position (m) or heading (rad); a larger one is invalid."""
 
 
 class LocalizationNode:

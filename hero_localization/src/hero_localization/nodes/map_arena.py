@@ -39,7 +39,7 @@ class MapNode:
     """The map, its inputs and outputs."""
 
     def __init__(self, parameters: Dict[str, Any]) -> None:
-        """Begin an empty map. Raises: ProgramError for bounds that are none, or a file that does not end in .yaml."""
+        """Begin an empty map. Raises: ProgramError for invalid bounds, or a file that does not end in .yaml."""
         self._grid = _make_grid(parameters["bounds_m"], parameters["cell_m"])
         self._map = SwarmMap(self._grid)
         self._lock = threading.Lock()  # inputs come on threads of rospy

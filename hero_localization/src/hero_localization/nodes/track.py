@@ -152,7 +152,7 @@ class TrackNode:
         return warnings + [tuple(problem) for problem in self._tracker.list_problems()]
 
     def close(self) -> None:
-        """End the detector and leave the camera; safe twice."""
+        """End the detector and leave the camera; may be called twice."""
         self._source.close()
         if self._process is not None:
             self._process.close()

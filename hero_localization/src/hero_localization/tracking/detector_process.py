@@ -93,7 +93,7 @@ class DetectorProcess:
         raise DetectorError("the detector's process did not answer for %.0f s: start again" % ANSWER_S)
 
     def close(self) -> None:
-        """End the process; safe twice."""
+        """End the process; may be called twice."""
         if self._connection is None:
             return
         self._connection.close()

@@ -25,7 +25,7 @@ SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
 """Errors that remain after calibration: intrinsics, extrinsics, tag on the robot."""
 
 MAX_SIZE_ERROR = 0.15
-"""A tag that measures more than this share more or less than its print is none, or a print of another size."""
+"""A tag whose size is off by a larger share is a false detection, or a print of another size."""
 
 
 class TagLayout(NamedTuple):

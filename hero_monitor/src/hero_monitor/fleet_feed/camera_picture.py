@@ -45,7 +45,7 @@ class CameraPicture:
         self._histories: Dict[str, StampedHistory[Pose]] = {}
 
     def receive(self, picture: Any, now_s: float) -> None:
-        """Take a sensor_msgs/CompressedImage, unless it comes too soon, or is none that a browser can show."""
+        """Take a sensor_msgs/CompressedImage, unless it comes too soon, or no browser can show it."""
         if now_s < self._received_s + PERIOD_S:
             return
         data = bytes(picture.data)

@@ -119,7 +119,7 @@ class FoxgloveEndpoint:
             self._tick.start()
 
     def remove(self, socket: FoxgloveSocket) -> None:
-        """Serve a client no longer; safe twice."""
+        """Serve a client no longer; may be called twice."""
         self._sockets.discard(socket)
         self.hub.remove(socket.client)
 

@@ -125,7 +125,7 @@ class Hub:
             self._publisher.open_client(client.number)
 
     def remove(self, client: Client) -> None:
-        """Forget a client; safe twice."""
+        """Forget a client; may be called twice."""
         if client in self.clients and self._publisher is not None:
             self._publisher.close_client(client.number)
         self.clients.discard(client)

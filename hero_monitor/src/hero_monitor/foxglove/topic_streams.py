@@ -85,7 +85,7 @@ class Stream:
         return messages
 
     def close(self) -> None:
-        """Disconnect; safe twice."""
+        """Disconnect; may be called twice."""
         self.is_open = False
         self._socket.close()
 

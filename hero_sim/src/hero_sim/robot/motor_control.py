@@ -141,7 +141,7 @@ class Controller:
         return now_ms - self._watchdog_ms < COMMAND_GAP_MS
 
     def command(self, now_ms: int, targets: Sequence[float]) -> None:
-        """Set targets for the wheels; a wheel that has to reverse starts its PID anew."""
+        """Set targets for the wheels; a wheel that has to reverse restarts its PID."""
         for pid, target, last in zip(self.pids, targets, self.targets):
             if target * last < 0.0:
                 pid.reset()

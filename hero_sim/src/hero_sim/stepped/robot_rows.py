@@ -178,7 +178,7 @@ class RobotRows:
 
     @property
     def odometry(self) -> np.ndarray:
-        """x m, y m, yaw rad in hero_N/odom (R, 3), as the driver computes it from ticks. Ask anew after advance()."""
+        """x m, y m, yaw rad in hero_N/odom (R, 3), as the driver computes it from ticks. Read again after advance()."""
         return self._odometry.poses.T if self._is_ideal else self._received.odometry
 
     @property
@@ -190,13 +190,13 @@ class RobotRows:
     def proximity_m(self) -> np.ndarray:
         """Ranges from the robot's center (R, 8), front first, counter-clockwise.
 
-        inf nothing in range, 0 too close, nan not calibrated. Ask anew after advance().
+        inf nothing in range, 0 too close, nan not calibrated. Read again after advance().
         """
         return self._read_scan().proximity_m
 
     @property
     def distance_m(self) -> np.ndarray:
-        """The distance ahead of the robot's center by HeRo+'s sensor (R,), nan without. Ask anew after advance()."""
+        """The distance ahead of the robot's center by HeRo+'s sensor (R,), nan without. Read again after advance()."""
         return self._read_distance().distance_m
 
     @property

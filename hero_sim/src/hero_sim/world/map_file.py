@@ -16,7 +16,7 @@ _MAX_CELLS = 4_000_000
 def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Arena:
     """Return the arena of a map's YAML content, whose values are texts, and its picture (rows, columns), 0..255.
 
-    Raises: ValueError for values that are none, a turned map, or one without a free cell.
+    Raises: ValueError for invalid values, a turned map, or one without a free cell.
     """
     cell_m = _read_number(content, "resolution", 0.05)
     free_share = _read_number(content, "free_thresh", 0.196)

@@ -145,7 +145,7 @@ class World:
 
     @property
     def poses(self) -> np.ndarray:
-        """True poses at time_ms (R, 3), read only: x m, y m, theta rad, frame world. Ask anew after each step."""
+        """True poses at time_ms (R, 3), read only: x m, y m, theta rad, frame world. Read again after each step."""
         self._move_bodies()
         return self._shown_poses
 

@@ -94,5 +94,5 @@ class BehaviorMarkers:
         text.text = "%s %.2f (%.2f to %.2f in %.0f s)" % (self._behavior.metric, value, least, most, PLOT_S)
         text.scale.z, text.color = 0.045, _PLOT_COLOR
         text.pose.position = Point(left_m + width_m / 2.0, low_m + height_m + 0.03, 0.1)
-        # A line of one point is none that RViz draws.
+        # RViz draws no line of one point.
         return [axes, text, *([line] if len(line.points) > 1 else [])]

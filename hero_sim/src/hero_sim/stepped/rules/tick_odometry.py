@@ -38,7 +38,7 @@ class TickOdometryRows:
 
     @property
     def poses(self) -> np.ndarray:
-        """x m, y m, yaw rad from -pi to pi in hero_N/odom (3, R). Ask anew after each reading."""
+        """x m, y m, yaw rad from -pi to pi in hero_N/odom (3, R). Read again after each reading."""
         if self._moved_ticks:
             self._move()
         return self._poses

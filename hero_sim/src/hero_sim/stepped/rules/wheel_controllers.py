@@ -62,7 +62,7 @@ class WheelControllers:
     def command(self, now_ms: int, rows: np.ndarray, targets: np.ndarray) -> np.ndarray:
         """Set the targets (2, K) of the robots at rows (K,), each named once; return those that zeros have stopped.
 
-        A wheel that has to reverse starts its PID anew.
+        A wheel that has to reverse restarts its PID.
         """
         moves = np.logical_or(*targets)
         stopped, rows, targets = rows[~moves], rows[moves], targets[:, moves]

@@ -81,7 +81,7 @@ def _list_edges(corners_m: Sequence[Point]) -> List[Tuple[Point, Point]]:
 
 
 def _find_center(corners_m: Sequence[Point]) -> Point:
-    """Return the center of area of a convex polygon. Raises: ValueError if it is none."""
+    """Return the center of area of a convex polygon. Raises: ValueError if it is not one."""
     edges = _list_edges(corners_m)
     turns = [
         (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
