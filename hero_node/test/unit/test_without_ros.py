@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-import hero_node
-
-FOLDER = Path(hero_node.__file__).parent
+FOLDER = Path(__file__).resolve().parents[2] / "src" / "hero_node"
 WITHOUT_ROS = sorted(path.stem for path in FOLDER.glob("*.py") if path.stem != "__init__")
 ROS_IS_MISSING = "import sys; sys.modules.update(dict.fromkeys(('rospy', 'rosgraph', 'genpy', 'roslib')))\n"
 
