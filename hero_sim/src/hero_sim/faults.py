@@ -88,9 +88,9 @@ KINDS: Dict[str, Kind] = {
         -1.0,
     ),
     "zero-topics": Kind("restarts and answers the first request without declaring anything", _declare_nothing),
-    "frozen": Kind("its program blocks for so long; connection and servo pulses stay", _freeze, "for", 5.0),
-    "stall": Kind("its radio carries nothing for so long, then everything at once", _stall, "for", 2.0),
-    "garbage": Kind("sends the start of a packet and so many random bytes", _send_garbage, "bytes", 200.0),
+    "frozen": Kind("its program blocks for this time; connection and servo pulses stay", _freeze, "for", 5.0),
+    "stall": Kind("its radio carries nothing for this time, then everything at once", _stall, "for", 2.0),
+    "garbage": Kind("sends the start of a packet and this many random bytes", _send_garbage, "bytes", 200.0),
     "clock-jump": Kind("its clock is wrong by so much until the next time answer", _jump_clock, "by", 60.0),
     "slow-service": Kind("answers service calls so much later, from now on", _slow_services, "by", 5.0),
 }

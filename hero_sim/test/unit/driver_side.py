@@ -93,7 +93,7 @@ class DriverSide:
         assert all(robot.configured and not robot.motors.motors.attached for robot in self.swarm.robots)
 
     def drive(self, index, linear_m_s, turn_rad_s, ms, topic_id=VELOCITY):
-        """Repeat a Twist every 100 ms for so long."""
+        """Repeat a Twist every 100 ms for this long."""
         for _ in range(ms // 100):
             self.send_twist(index, linear_m_s, turn_rad_s, topic_id)
             self.run(100)

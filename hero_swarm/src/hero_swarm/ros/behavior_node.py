@@ -136,7 +136,7 @@ PARAMETERS = {
     "calibration_folder": words("~/hero_calibration", "of `calibrate`; behaviors with drive = pulses need its files"),
     "simulated": whole_number(0, 0, 1000, "", "robots of a simulator with seed 0, whose motors count as calibrated"),
     "seed": whole_number(0, 0, 2**31 - 1, "", "of the behavior's random numbers"),
-    "time_s": number(0.0, 0.0, 1e6, "s", "stop after so long; 0 runs until Ctrl-C"),
+    "time_s": number(0.0, 0.0, 1e6, "s", "stop after this time; 0 runs until Ctrl-C"),
 }
 
 
