@@ -62,16 +62,14 @@ class Monitor:
         from hero_monitor.control.commander import Commander
 
         rospy.init_node("monitor", anonymous=True, disable_signals=True)
-        self.namespace = "/hero_%d" % number
+        self.robot = "hero_%d" % number
         self.commander = Commander(Drivers(), Background())
 
     def drive(self):
-        from hero_monitor.control.dead_man import DriveCommand
-
-        self.commander.drive(1, DriveCommand(self.namespace, SPEED_M_S, 0.0))
+        self.commander.drive(1, self.robot, SPEED_M_S, 0.0)
 
     def stop(self):
-        self.commander.dead_man.stop(self.namespace)
+        self.commander.dead_man.stop(self.robot)
         self.commander.step()
 
 
