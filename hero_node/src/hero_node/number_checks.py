@@ -22,7 +22,10 @@ def is_whole_number(value: Any, low: float = -LARGEST, high: float = LARGEST) ->
 def is_finite(value: object) -> bool:
     """Return whether value, which may be of numpy, is a number and neither infinite nor NaN."""
     # float first: asking an abstract class takes longer, and stepped robots are sent thousands of speeds per second.
-    return isinstance(value, (float, Real)) and math.isfinite(value)
+    try:
+        return isinstance(value, (float, Real)) and math.isfinite(value)
+    except OverflowError:  # an int that no float can be
+        return False
 
 
 def check_finite(what: str, *values: object) -> None:
