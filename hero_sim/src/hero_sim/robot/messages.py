@@ -102,10 +102,10 @@ class CycleMessages:
         payloads = [("odom", odom), *(("tf", transform) for transform in transforms), ("encoder", encoder)]
         self._data = bytearray()
         self._sums: List[Tuple[int, int]] = []  # first byte that is summed, and the checksum's place behind the last
-        starts, ends = [], []
+        sent_ids, starts, ends = model.sent_ids, [], []
         for topic, payload in payloads:
             start = len(self._data)
-            self._data += packets.encode_packet(model.sent_ids[topic], payload)
+            self._data += packets.encode_packet(sent_ids[topic], payload)
             starts.append(start + packets.HEADER_LENGTH)
             ends.append(len(self._data) - 1)
             self._sums.append((start + _SUMMED_OFFSET, ends[-1]))
