@@ -1,5 +1,6 @@
 """Reads log lines of robots (versions, uptime, self-tuning) and relays them to /rosout. On the event loop's thread."""
 
+import math
 from typing import Callable
 
 from .fleet import log_lines
@@ -15,9 +16,6 @@ LINES_PER_S = 100
 
 EARLY_LINES_MAX = 10
 """Lines that are kept until a robot has said who it is."""
-
-REBOOT_SLACK_S = 2.0
-"""Delays of the network move the time of boot as seen from here by less than this."""
 
 
 class RobotLog:
@@ -40,6 +38,8 @@ class RobotLog:
         record = peer.record
         if line.boot is not None:
             record.firmware, record.hardware, record.config = line.boot
+            if record.heard_uptime_s > 0.0:
+                record.heard_uptime_s = math.inf
         if line.tunes is not None:
             peer.bridge.commands.note_tuning(line.tunes)
             if line.tunes and not peer.bridge.commands.was_told_to_tune and peer.stop is None:
@@ -58,16 +58,15 @@ class RobotLog:
         self._log.log(level, "%s: %s" % (peer.label, line.text))
 
     def _receive_uptime(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
-        booted_s = now_s - uptime_s
-        if record.booted_s is not None and booted_s - record.booted_s > REBOOT_SLACK_S:
+        # By its own clock: a line may be late by any time, as after a stall of the network or a pause of the driver.
+        has_rebooted = uptime_s < record.heard_uptime_s
+        record.heard_uptime_s = uptime_s
+        if has_rebooted:
             text = "%s rebooted %.1f s ago" % (peer.label, uptime_s)
             self._log.log_throttled("warn", "rebooted " + peer.label, text, host=peer.link.address.host)
             if peer.bridge is not None and peer.boot is None:
                 peer.bridge.corrections.note_reboot()
-        # Delays of the network only make a boot look later, so the earliest is the best.
-        if (
-            record.booted_s is None
-            or booted_s < record.booted_s
-            or booted_s - record.booted_s > REBOOT_SLACK_S
-        ):
+        # Delays only make a boot look later, so the earliest is the best.
+        booted_s = now_s - uptime_s
+        if has_rebooted or record.booted_s is None or booted_s < record.booted_s:
             record.booted_s = booted_s

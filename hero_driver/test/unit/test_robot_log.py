@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_driver.robot_log import LINES_PER_S, REBOOT_SLACK_S, RobotLog
+from hero_driver.robot_log import LINES_PER_S, RobotLog
 from hero_driver.ros.log_relay import LogRelay
 from hero_driver.rosserial.payloads import LOG_INFO, Log
 
@@ -24,7 +24,7 @@ def make_peer():
         label="hero_1",
         link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
         bridge=SimpleNamespace(corrections=SimpleNamespace(note_reboot=lambda: None), commands=SimpleNamespace()),
-        record=SimpleNamespace(booted_s=None, dropped_messages=0),
+        record=SimpleNamespace(booted_s=None, heard_uptime_s=0.0, dropped_messages=0),
         refused=False,
         boot=None,
         log_window_s=0.0,
@@ -67,18 +67,41 @@ def test_a_robot_that_tunes_itself_without_being_told_to_is_stopped(lines, was_t
     assert stopped == [peer] * stops
 
 
-def test_a_message_that_is_late_is_no_reboot_and_changes_no_boot_time(lines):
+@pytest.mark.parametrize("late_s", [1.5, 3.0, 60.0])
+def test_a_line_that_is_late_is_no_reboot_and_changes_no_boot_time(lines, late_s):
     robot_log, peer = RobotLog(LogRelay(), None), make_peer()
     reboots = []
     peer.bridge.corrections.note_reboot = lambda: reboots.append(peer.record.booted_s)
-    for late_s in (0.5, 0.0, REBOOT_SLACK_S - 0.1, 0.2):
-        say_uptime(robot_log, peer, 60000, NOW_S + late_s)
-        say_uptime(robot_log, peer, 61000, NOW_S + 1.0 + late_s)
+    for second in range(0, 200, 2):
+        uptime_ms, now_s = 60000 + 1000 * second, NOW_S + second
+        say_uptime(robot_log, peer, uptime_ms, now_s)
+        say_uptime(robot_log, peer, uptime_ms + 1000, now_s + 1.0 + late_s * (second % 10 == 0))
     assert peer.record.booted_s == NOW_S - 60.0
-    assert not reboots
-    say_uptime(robot_log, peer, 60000, NOW_S + REBOOT_SLACK_S + 0.1)
+    assert not reboots and not [text for level, text in lines if level == "warn"]
+
+
+def test_a_reboot_counts_once_however_late_the_lines_after_it_are(lines):
+    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    reboots = []
+    peer.bridge.corrections.note_reboot = lambda: reboots.append(peer.record.booted_s)
+    say_uptime(robot_log, peer, 60000)
+    for uptime_ms, late_s in ((2000, 0.5), (3000, 4.0), (4000, 3.0), (5000, 0.0)):
+        say_uptime(robot_log, peer, uptime_ms, NOW_S + 10.0 + uptime_ms / 1000.0 + late_s)
     assert len(reboots) == 1
-    assert peer.record.booted_s == pytest.approx(NOW_S - 60.0 + REBOOT_SLACK_S + 0.1)
+    assert [text for level, text in lines if level == "warn"] == ["hero_1 rebooted 2.0 s ago"]
+    assert peer.record.booted_s == NOW_S + 10.0
+
+
+@pytest.mark.parametrize("boots", [1, 3])
+def test_a_boot_line_tells_of_a_reboot_after_which_the_uptime_is_longer(lines, boots):
+    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    peer.bridge.corrections.note_reboot = lambda: pytest.fail("a new connection has told the corrections")
+    for first_s in range(0, 100 * boots, 100):
+        robot_log.receive(peer, Log(LOG_INFO, "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 1"), NOW_S)
+        for uptime_s in (2 + first_s // 100, 3 + first_s // 100):
+            say_uptime(robot_log, peer, 1000 * uptime_s, NOW_S + first_s + uptime_s)
+    assert len([text for _, text in lines if "rebooted" in text]) == min(boots - 1, 1), "the same line is throttled"
+    assert peer.record.booted_s == NOW_S + 100 * (boots - 1)
 
 
 def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):

@@ -59,6 +59,7 @@ class RobotRecord:
     hardware: str = ""
     config: str = ""
     booted_s: Optional[float] = None
+    heard_uptime_s: float = 0.0  # as the robot said it last; infinite from its boot line to the next
     last_error: str = ""
     dropped_messages: int = 0
     bad_packets: int = 0  # of earlier connections
