@@ -1,4 +1,6 @@
-"""Files that survive a power cut, a full disk and other writers. Imports nothing of ours, and no ROS.
+"""Files that survive a power cut, a full disk and other writers; files that users name, whatever they are.
+
+Imports nothing of ours, and no ROS.
 
 A file is replaced as a whole (rename(2)): whatever happens, its path holds the old content or the new one.
 """
@@ -12,6 +14,9 @@ import time
 from contextlib import contextmanager, suppress
 from typing import IO, Iterator
 
+MAX_FILE_BYTES = 2**26
+"""Files that people write or draw, such as images of maps, are smaller."""
+
 LOCK_TIMEOUT_S = 10.0
 """Writers hold a lock for milliseconds; one that is suspended meanwhile must not block the others for ever."""
 
@@ -19,6 +24,26 @@ RETRY_S = 0.02
 
 NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOTSUP)
 """flock(2) of a folder on file systems without such locks, such as NFS: files are replaced as a whole there, too."""
+
+
+def read_file(path: str) -> bytes:
+    """Return the content of a file that a user names: opening a pipe would wait for its writer, a device has no end.
+
+    Raises: OSError, also for what is no regular file, or has more than MAX_FILE_BYTES.
+    """
+    if "\0" in path:
+        raise OSError(errno.EINVAL, "its name holds a NUL character", path)
+    # With O_NONBLOCK opening a pipe does not wait; regular files are read as without.
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
+        status = os.fstat(file.fileno())
+        if stat.S_ISDIR(status.st_mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "it is a pipe, device or socket, not a file", path)
+        content = file.read(MAX_FILE_BYTES + 1)
+    if len(content) > MAX_FILE_BYTES:
+        raise OSError(errno.EFBIG, "it has more than %d bytes" % MAX_FILE_BYTES, path)
+    return content
 
 
 @contextmanager

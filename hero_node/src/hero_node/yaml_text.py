@@ -7,6 +7,7 @@ from typing import Any, Callable, Dict, Type, TypeVar
 import yaml
 
 from .errors import ProgramError
+from .safe_file import read_file
 from .texts import one_line
 
 T = TypeVar("T")
@@ -20,10 +21,14 @@ class YamlError(ValueError):
 
 
 def read_text(path: str) -> str:
-    """Return the text of a file. Raises: OSError. YamlError if it is no UTF-8, or too long."""
+    """Return the text of a file. Raises: OSError as read_file(). YamlError if it is no UTF-8, or too long."""
+    return decode_text(read_file(path))
+
+
+def decode_text(content: bytes) -> str:
+    """Return the text that a file holds. Raises: YamlError if it is no UTF-8, or too long."""
     try:
-        with open(path, encoding="utf-8") as file:
-            text = file.read(MAX_CHARACTERS + 1)
+        text = content.decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise YamlError(one_line(error)) from None
     if len(text) > MAX_CHARACTERS:

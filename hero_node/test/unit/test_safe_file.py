@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from hero_node import safe_file
-from hero_node.safe_file import lock_file, replace_file, write_file
+from hero_node.safe_file import lock_file, read_file, replace_file, write_file
 
 
 def fail_to_sync(fd):
@@ -112,3 +112,19 @@ def test_a_file_system_without_locks_is_no_obstacle(tmp_path, monkeypatch):
     with lock_file(str(tmp_path / "a.yaml")):
         write_file(str(tmp_path / "a.yaml"), b"new")
     assert (tmp_path / "a.yaml").read_bytes() == b"new"
+
+
+def test_a_file_is_read_whole_and_what_is_none_is_refused_at_once(tmp_path, monkeypatch):
+    path, pipe = tmp_path / "a.yaml", tmp_path / "pipe"
+    path.write_bytes(b"1234\xff")
+    assert read_file(str(path)) == b"1234\xff"
+    os.mkfifo(str(pipe))
+    for name, words in (
+        (str(pipe), "pipe, device or socket"), ("/dev/zero", "pipe, device or socket"),
+        (str(tmp_path), "Is a directory"), ("a\0b", "NUL character"), (str(tmp_path / "none"), "No such file"),
+    ):  # fmt: skip
+        with pytest.raises(OSError, match=words):
+            read_file(name)
+    monkeypatch.setattr(safe_file, "MAX_FILE_BYTES", 4)
+    with pytest.raises(OSError, match="more than 4 bytes"):
+        read_file(str(path))

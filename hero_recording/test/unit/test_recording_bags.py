@@ -62,7 +62,9 @@ def test_a_file_that_is_no_bag_is_refused_with_the_reason(tmp_path):
     (tmp_path / "text.bag").write_text("not a bag\n")
     (tmp_path / "nothing.bag").write_text("")
     (tmp_path / "half.bag.active").write_text("")
+    os.mkfifo(str(tmp_path / "pipe.bag"))
     for path, words in (
+        (tmp_path / "pipe.bag", "is a pipe, device or socket; name a bag"),
         (tmp_path / "text.bag", "no bag"),
         (tmp_path / "nothing.bag", "no bag"),
         (tmp_path / "missing.bag", "No such file"),

@@ -1,4 +1,5 @@
 import math
+import os
 
 import numpy as np
 import pytest
@@ -197,3 +198,15 @@ def test_viewers_draw_objects_by_their_edges_and_rims():
     assert [shape.number for shape in edges] == list(range(1, len(things[1].corners_m) + 1))
     middle_m = np.mean([edge.pose[:2] for edge in edges], axis=0)
     assert middle_m == pytest.approx(things[1].pose[:2], abs=1e-6)
+
+
+def test_a_pipe_as_arena_is_refused_at_once(tmp_path):
+    os.mkfifo(str(tmp_path / "arena.yaml"))
+    with pytest.raises(OptionError, match=r"arena\.yaml cannot be read: it is a pipe, device or socket"):
+        load_arena(str(tmp_path / "arena.yaml"))
+
+
+def test_more_starts_than_robots_can_be_are_refused(tmp_path):
+    rows = ", ".join("[%d, %d, 0]" % (number % 100, number // 100) for number in range(1001))
+    with pytest.raises(OptionError, match="starts_m_deg has 1001 starts, more than 1000"):
+        load_arena(write(tmp_path, "bounds_m: [-1, -1, 101, 101]\nstarts_m_deg: [%s]\n" % rows))

@@ -1,6 +1,7 @@
 """Reads bags for the fit: odometry, commands and poses of each robot."""
 
 import re
+import sys
 from typing import Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
@@ -19,6 +20,12 @@ _LASER = re.compile(r"/hero_(\d+)/laser")
 
 MAX_SPEED_M_S = 1.0
 """Faster odometry was set, or its robot restarted."""
+
+MAX_CLOCK_ERROR_S = 10.0
+"""Stamps that lie farther outside of a recording are wrong: a clock was set, or a message damaged."""
+
+MAX_RECORDING_S = 3600.0
+"""A minute tells enough; the fit takes memory and time for all of it."""
 
 Rows = List[Tuple[float, ...]]
 
@@ -46,13 +53,23 @@ def read_recordings(paths: Sequence[str]) -> Dict[int, List[Recording]]:
 
 
 def _read_tables(path: str) -> Dict[Tuple[int, str], Rows]:
+    """Return the rows of each robot and kind whose stamps lie within the recording; note others on stderr."""
     tables: Dict[Tuple[int, str], Rows] = {}
+    bag = BagSet([path])
+    if bag.end_s - bag.start_s > MAX_RECORDING_S:
+        text = "%s: it lasts %.0f s, but the fit takes at most %.0f s: record less, or keep the PC's clock as it is"
+        raise ExperimentError(text % (path, bag.end_s - bag.start_s, MAX_RECORDING_S))
+    wrong: Dict[Tuple[int, str], Rows] = {}
 
     def receive(message: Message) -> None:
         for robot_id, kind, row in _list_rows(message):
-            tables.setdefault((robot_id, kind), []).append(row)
+            is_within = bag.start_s - MAX_CLOCK_ERROR_S <= row[0] <= bag.end_s + MAX_CLOCK_ERROR_S
+            (tables if is_within else wrong).setdefault((robot_id, kind), []).append(row)
 
-    BagSet([path]).read(_is_wanted, receive)
+    bag.read(_is_wanted, receive)
+    for (robot_id, kind), rows in sorted(wrong.items()):
+        text = "%s: hero_%d: left out %d of %s with stamps outside of the recording, such as %+.0f s from its start"
+        print(text % (path, robot_id, len(rows), kind, rows[0][0] - bag.start_s), file=sys.stderr)
     return tables
 
 

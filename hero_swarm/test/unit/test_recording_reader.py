@@ -82,3 +82,17 @@ def test_recordings_that_cannot_be_used_are_refused_in_one_line(tmp_path):
     for name in ("c.bag", "none.bag"):
         with pytest.raises(RecordingError, match=name):
             read_recordings([str(tmp_path / name)])
+
+
+@pytest.mark.parametrize("ahead_s", [86_400.0, 4_294_967_295.0 - START_S, -500.0])
+def test_stamps_outside_of_the_recording_are_left_out_and_named(ahead_s, tmp_path, capsys):
+    messages = make_messages(7)
+    messages.append(("/hero_7/odom", make_odometry(ahead_s, 0.02), 0.2))
+    (recording,) = read_recordings(write(tmp_path / "a.bag", *messages))[7]
+    assert recording.time_s == pytest.approx(0.1)
+    assert "hero_7: left out 1 of odometry with stamps outside of the recording" in capsys.readouterr().err
+
+
+def test_a_recording_of_more_than_an_hour_is_refused(tmp_path):
+    with pytest.raises(ExperimentError, match="it lasts 3601 s, but the fit takes at most 3600 s"):
+        read_recordings(write(tmp_path / "a.bag", *make_messages(7), ("/hero_7/odom", make_odometry(0.0, 0.0), 3601.0)))

@@ -81,6 +81,8 @@ def open_bag(path: str, skip_index: bool = False) -> Reader:
         raise RecordingError("%s is still being written; %s" % (path, repair))
     if os.path.isdir(path):
         raise RecordingError("%s is a folder; name the bags in it: %s" % (path, os.path.join(path, "*.bag")))
+    if os.path.exists(path) and not os.path.isfile(path):  # opening a pipe would wait for its writer
+        raise RecordingError("%s is a pipe, device or socket; name a bag" % path)
     try:
         with explain_bag_errors("%s cannot be read" % path):
             return Reader(path, skip_index)

@@ -8,7 +8,7 @@ import os
 from typing import Optional, Sequence
 
 from hero_node.number_checks import is_number
-from hero_node.safe_file import write_file
+from hero_node.safe_file import read_file, write_file
 
 from ..errors import CommandError, OptionError
 from ..robot_constants import MAX_PARAMETER
@@ -54,8 +54,7 @@ class Flash:
         if not os.access(folder, os.W_OK):
             raise OptionError("--flash-dir %s is not writable; choose another" % folder)
         try:
-            with open(path, encoding="utf-8") as file:
-                content = json.load(file)
+            content = json.loads(read_file(path))
         except FileNotFoundError:
             return
         except (OSError, RecursionError, ValueError) as error:

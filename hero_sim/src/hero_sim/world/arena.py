@@ -4,7 +4,7 @@ Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m;
 """
 
 import math
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -173,7 +173,11 @@ def _draw_place(
 
 
 def is_free(
-    pose: Pose, poses: Sequence[Pose], arena: Arena, radius_m: float, other_radius_m: float = BODY_RADIUS_M
+    pose: Pose,
+    poses: Union[Sequence[Pose], np.ndarray],
+    arena: Arena,
+    radius_m: float,
+    other_radius_m: float = BODY_RADIUS_M,
 ) -> bool:
     """Return whether a robot with radius_m fits at pose, beside robots with other_radius_m at poses."""
     if measure_clearance(np.array([pose[:2]]), arena)[0] < radius_m:

@@ -3,16 +3,18 @@
 The README has the format.
 """
 
+import io
 import math
 import os
-from typing import Any, Dict, List
+from typing import Any, Callable, Dict, List
 
 import numpy as np
 import yaml
 
 from hero_node.geometry import Pose
+from hero_node.safe_file import read_file
 from hero_node.texts import shorten
-from hero_node.yaml_text import parse_yaml, read_text
+from hero_node.yaml_text import decode_text, parse_yaml
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
@@ -24,12 +26,13 @@ SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
 """Arenas that come with the simulator; --arena takes these names too."""
 
 _MAX_COORDINATE_M = 1000.0
+_MAX_STARTS = 1000
 _KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "objects", "starts_m_deg")
 _OBJECT_KEYS = ("circle_m", "polygon_m", "mass_kg", "friction")
 
 
-def load_arena(name: str) -> Arena:
-    """Return the arena of a shipped name or of the file at that path.
+def load_arena(name: str, read: Callable[[str], bytes] = read_file) -> Arena:
+    """Return the arena of a shipped name or of the file at that path; read: how all its files are read.
 
     Raises: OptionError with file and reason.
     """
@@ -38,9 +41,9 @@ def load_arena(name: str) -> Arena:
         path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "arenas", name + ".yaml")
     try:
         # Numbers stay texts: what YAML takes for dates, booleans or objects has no meaning here.
-        content = parse_yaml(read_text(path), yaml.BaseLoader)
+        content = parse_yaml(decode_text(read(path)), yaml.BaseLoader)
         if isinstance(content, dict) and "image" in content:
-            return _build_from_map(content, path)
+            return _build_from_map(content, path, read)
         return _build_arena(content, os.path.basename(path))
     except OSError as error:
         text = "arena %s cannot be read: %s; shipped are %s"
@@ -49,7 +52,7 @@ def load_arena(name: str) -> Arena:
         raise OptionError("arena %s: %s" % (path, error)) from error
 
 
-def _build_from_map(content: Dict[str, Any], path: str) -> Arena:
+def _build_from_map(content: Dict[str, Any], path: str, read: Callable[[str], bytes]) -> Arena:
     """Return the arena of a map of map_server. Raises: ValueError."""
     try:
         from PIL import Image, UnidentifiedImageError
@@ -57,10 +60,11 @@ def _build_from_map(content: Dict[str, Any], path: str) -> Arena:
         raise ValueError("pictures of maps need python3-pil: install it") from None
     picture = os.path.join(os.path.dirname(path), str(content["image"]))
     try:
-        with Image.open(picture) as image:
+        with Image.open(io.BytesIO(read(picture))) as image:
             gray = np.asarray(image.convert("L"), dtype=float)
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-        raise ValueError("its picture %s cannot be read: %s" % (picture, error)) from error
+        reason = getattr(error, "strerror", None) or error
+        raise ValueError("its picture %s cannot be read: %s" % (picture, reason)) from error
     return build_map_arena(os.path.basename(path), content, gray)
 
 
@@ -85,16 +89,17 @@ def _build_arena(content: Any, file_name: str) -> Arena:
     bounds_m = _read_bounds(content, segments_m)
     objects = tuple(_read_object(item) for item in _list_items(content, "objects"))
     arena = Arena(name, segments_m, circles_m, (), bounds_m, tuple(polygons_m), objects)
-    starts: List[Pose] = []
-    for x_m, y_m, heading_deg in _read_rows("starts_m_deg", _list_items(content, "starts_m_deg"), 3).tolist():
-        start = Pose(x_m, y_m, math.radians(heading_deg))
-        if not is_free(start, starts, arena, BODY_RADIUS_M):
+    rows = _read_rows("starts_m_deg", _list_items(content, "starts_m_deg"), 3)
+    if len(rows) > _MAX_STARTS:  # each is compared with all before it
+        raise ValueError("starts_m_deg has %d starts, more than %d" % (len(rows), _MAX_STARTS))
+    for row, (x_m, y_m, _) in enumerate(rows.tolist()):
+        if not is_free(Pose(x_m, y_m, 0.0), rows[:row], arena, BODY_RADIUS_M):
             raise ValueError(
                 "the start at (%g, %g) touches a wall, an obstacle or another start; robots need %.3f m"
                 " around their center" % (x_m, y_m, BODY_RADIUS_M)
             )
-        starts.append(start)
-    return arena._replace(starts=tuple(starts))
+    starts = tuple(Pose(x_m, y_m, math.radians(heading_deg)) for x_m, y_m, heading_deg in rows.tolist())
+    return arena._replace(starts=starts)
 
 
 def _read_object(item: Any) -> PushedBody:

@@ -4,9 +4,11 @@
 calibration is in its flash, not here.
 """
 
-from typing import Collection, Dict, Iterable, List, NamedTuple
+from typing import Callable, Collection, Dict, Iterable, List, NamedTuple
 
 import numpy as np
+
+from hero_node.safe_file import read_file
 
 from ..errors import OptionError
 from ..key_values import parse_values
@@ -122,14 +124,14 @@ def set_known(errors: RobotErrors, first_id: int, text: str) -> None:
         getattr(errors, KINDS[key].array)[rows, KINDS[key].columns] = values[key]
 
 
-def read_known(path: str, ids: Collection[int]) -> List[str]:
+def read_known(path: str, ids: Collection[int], read: Callable[[str], bytes] = read_file) -> List[str]:
     """Return the lines of an error file, each a text for set_known(), that are of all robots or of these ids.
 
-    Empty lines and those that begin with # are remarks. Raises: OptionError if the file cannot be read.
+    read: how the file is read. Empty lines and those that begin with # are remarks.
+    Raises: OptionError if the file cannot be read.
     """
     try:
-        with open(path, encoding="utf-8") as file:
-            lines = [line.strip() for line in file]
+        lines = [line.strip() for line in read(path).decode("utf-8").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
         raise OptionError("errors %s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)) from error
     own = {"robot=%d" % robot_id for robot_id in ids}
