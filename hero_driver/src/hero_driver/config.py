@@ -70,7 +70,7 @@ class DriverConfig(CommandSettings, CorrectionSettings, SessionLimits, Admission
             "as_before",
             ("as_before", "always", "never"),
             "whether robots are stopped when the driver starts;"
-            " as_before: if they were when a driver of this name ended",
+            " as_before: if they were when a driver of this name and master ended",
         )
     )
     transform_period_s: float = declare(

@@ -29,7 +29,6 @@ from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
 from .config import FORMER_STOP, DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
-from .kept_stop import KeptStop
 from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, tell_of_lost_log_lines
 from .ros.rospy_internals import (
@@ -39,6 +38,7 @@ from .ros.rospy_internals import (
 )
 from .ros.worker import Worker
 from .stop_interface import StopInterface
+from .stop_store import StopStore
 from .transport.event_loop import EventLoop, NoAnswerError
 from .transport.link import HostNotFoundError
 
@@ -92,8 +92,8 @@ class DriverNode:
         )
         self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
         self._crash: Optional[BaseException] = None
-        self._kept = KeptStop(rospy.get_name())
-        self._stop_interface = StopInterface(self._loop, self._gateway, self._kept, self._log)
+        self._stop_store = StopStore(rospy.get_name(), read_master_uri())
+        self._stop_interface = StopInterface(self._loop, self._gateway, self._stop_store, self._log)
         self._is_closed = threading.Event()
 
     def open(self) -> None:
@@ -103,7 +103,7 @@ class DriverNode:
         except OSError as error:
             raise ProgramError(_explain_bind_error(self._config, error)) from error
         self._gateway.open()
-        since = self._kept.read_since() if self._config.start_stopped == "as_before" else ""
+        since = self._stop_store.read_since() if self._config.start_stopped == "as_before" else ""
         self._stop_interface.open(bool(since) or self._config.start_stopped == "always", since)
         self._thread.start()
         threading.Thread(target=self._watch_master, name="master watch", daemon=True).start()

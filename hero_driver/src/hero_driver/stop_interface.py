@@ -1,9 +1,10 @@
 """The emergency stop in ROS: the service ~stop, the topic ~stop_request, and the stop kept over restarts.
 
 Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow, and ask
-until ~robots says that the robots are stopped. Whether they are is kept in a file (kept_stop).
+until ~robots says that the robots are stopped. Whether they are is kept on disk (stop_store).
 """
 
+import queue
 import weakref
 from typing import Any, Callable, FrozenSet, List, Optional, Protocol, Tuple
 
@@ -12,14 +13,17 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolResponse
 
 from .commands.stop_progress import StopState
-from .kept_stop import KeptStop
 from .ros.log_relay import LogRelay
 from .ros.rospy_internals import find_connection, is_latched_before, list_publishers
 from .ros.worker import Worker
+from .stop_store import StopStore
 from .transport.event_loop import EventLoop, NoAnswerError
 
 ANSWER_WAIT_S = 0.5
 """The thread of the sockets answers within milliseconds; a service call must not hang where it does not."""
+
+KEEP_WAIT_S = 1.0
+"""Likewise the disk: writing took 0.3 to 45 ms; one that hangs (a network's, a failing card) is told of."""
 
 
 Stops = List[Tuple[str, Optional[StopState]]]
@@ -41,21 +45,23 @@ class StoppableFleet(Protocol):
 class StopInterface:
     """The stop of all robots, as ROS sees it."""
 
-    def __init__(self, loop: EventLoop, fleet: StoppableFleet, kept: KeptStop, log: LogRelay) -> None:
+    def __init__(self, loop: EventLoop, fleet: StoppableFleet, store: StopStore, log: LogRelay) -> None:
         self._loop = loop
         self._fleet = fleet
-        self._kept = kept
+        self._store = store
         self._log = log
         self._request_topic = rospy.resolve_name("~stop_request")
         self._earlier: Optional[FrozenSet[str]] = frozenset()  # publishers that were there before
         self._heard: weakref.WeakSet[Any] = weakref.WeakSet()  # connections that have brought a request
         self._publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
-        self._keeper = Worker("stop keeper", 100, self._report_not_kept)
+        self._stopped = False
+        self._keeper = Worker("stop keeper", 100, self._report_bug)
 
     def open(self, stopped: bool, since: str) -> None:
         """Serve; begin as stopped says. The loop does not run yet. since: since when they are, if that was kept."""
         self._fleet.set_stopped(stopped)
-        self._keep(stopped)
+        self._stopped = stopped
+        self._keeper.submit(self._keep)
         if stopped:
             begin = "since " + since if since else "from the start (~start_stopped)"
             text = "all robots are stopped %s; this releases them: rosservice call %s false"
@@ -65,8 +71,29 @@ class StopInterface:
         rospy.Subscriber("~stop_request", Bool, self._take_request, queue_size=10, tcp_nodelay=True)
         rospy.Service("~stop", SetBool, self._serve)
 
-    def _keep(self, stopped: bool) -> None:
-        self._keeper.submit(lambda: self._kept.write(stopped))
+    def _keep(self) -> str:
+        """Write to disk whether robots are stopped now; return what is lost if that fails (on the keeper's thread)."""
+        stopped = self._stopped
+        try:
+            self._store.write(stopped)
+        except OSError as error:
+            lost = "the stop will not survive" if stopped else "whether robots are stopped may not survive"
+            reason = "%s cannot be written (%s)" % (self._store.path, error.strerror)
+            text = "%s a restart of the driver: %s" % (lost, reason)
+            self._log.log_throttled("warn", text, text + "; make it writable, or set ROS_HOME to another folder")
+            return text
+        return ""
+
+    def _await_kept(self) -> str:
+        """Return when it is on the disk whether robots are stopped; if it is not, what is lost."""
+        outcomes: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._keeper.submit(lambda: outcomes.put(self._keep()))
+        try:
+            return outcomes.get(timeout=KEEP_WAIT_S)
+        except queue.Empty:
+            text = "not yet written to %s, which hangs: a restart of the driver may lose it" % self._store.path
+            self._log.log_throttled("warn", text, text)
+            return text
 
     def close(self) -> None:
         """Keep nothing any more once what was asked for is kept; safe to call twice."""
@@ -83,7 +110,8 @@ class StopInterface:
             stops = self._loop.ask(set_and_answer, ANSWER_WAIT_S)
         except NoAnswerError:
             return SetBoolResponse(False, "NOT STOPPED: the driver hangs" if stopped else "the driver hangs")
-        return SetBoolResponse(True, describe_stop(stops) if stopped else "robots may move")
+        parts = [describe_stop(stops) if stopped else "robots may move", self._await_kept()]
+        return SetBoolResponse(True, "; ".join(filter(None, parts)))
 
     def _take_request(self, message: Bool) -> None:
         stopped = bool(message.data)
@@ -104,14 +132,14 @@ class StopInterface:
             return
         self._fleet.set_stopped(stopped)
         if changed:
+            self._stopped = stopped
             # Published and written elsewhere: both may block.
-            self._keep(stopped)
+            self._keeper.submit(self._keep)
             self._keeper.submit(lambda: self._publisher.publish(Bool(stopped)))
             self._log.log("warn", "stopping all robots" if stopped else "robots may move")
 
-    def _report_not_kept(self, error: BaseException) -> None:
-        text = "whether robots are stopped cannot be kept in %s (%s): a driver that is started again begins without it"
-        self._log.log("warn", text % (self._kept.path, error))
+    def _report_bug(self, error: BaseException) -> None:
+        self._log.log("error", "~stopped was not published: %s: %s" % (type(error).__name__, error))
 
 
 def describe_stop(stops: Stops) -> str:

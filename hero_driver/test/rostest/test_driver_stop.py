@@ -2,6 +2,7 @@
 """Stops that the robot's wheels confirm: robots that tune themselves, that stall, that return, and new drivers."""
 
 import math
+import os
 import signal
 import subprocess
 import sys
@@ -255,6 +256,25 @@ class TestDriverStop(OwnDriverCase):
         self.assertTrue(all(velocity.is_zero for velocity in robot.velocities))
         self.call_stop(second, False)
         self.drive(robot)
+
+    def test_a_stop_that_was_answered_survives_the_drivers_sudden_death(self):
+        first = self.start()
+        self.call_stop(first, True)
+        first.process.kill()
+        first.wait_end()
+        second = DriverProcess(name=first.node[1:])
+        self.addCleanup(second.__exit__)
+        second.wait_line("all robots are stopped since 20")
+
+    def test_the_answer_to_a_stop_says_if_it_cannot_be_kept(self):
+        # rospy does not start without a folder for its log.
+        log_folder = os.environ.get("ROS_LOG_DIR", os.environ["ROS_HOME"])
+        driver = DriverProcess(environment={"ROS_HOME": __file__, "ROS_LOG_DIR": log_folder})
+        self.addCleanup(driver.__exit__)
+        for _ in range(2):
+            self.assertIn("the stop will not survive a restart of the driver", self.call_stop(driver, True))
+        driver.wait_line("the stop will not survive a restart of the driver.*set ROS_HOME")
+        wait_for(lambda: driver.fleet.newest is not None and driver.fleet.newest.stopped, "the report")
 
     def test_start_stopped_says_otherwise(self):
         driver = self.start(start_stopped="always")

@@ -1,0 +1,66 @@
+"""Whether robots are stopped, on disk, for a driver that is started again under the same name and ROS master.
+
+An empty file says it by its name: NAME.released becomes NAME.stopped and back. Renaming needs no space on the disk, so
+a disk that has filled up since the driver's start loses no stop. When they were stopped is the file's time.
+"""
+
+import os
+import platform
+import time
+import urllib.parse
+
+import rospkg
+
+FOLDER = "hero_driver"  # in ROS_HOME
+TIME_FORMAT = "%Y-%m-%d %H:%M:%S"
+UNKNOWN_TIME = "an unknown time"
+
+
+class StopStore:
+    """The file of one driver. Its methods may block."""
+
+    def __init__(self, node: str, master_uri: str) -> None:
+        """Take the driver's name in ROS, in which a point cannot occur, and the address of its master."""
+        name = "%s.%s" % (node.strip("/").replace("/", "."), _name_master(master_uri))
+        self._folder = os.path.join(rospkg.get_ros_home(), FOLDER)
+        self._released_path = os.path.join(self._folder, name + ".released")
+        self.path = os.path.join(self._folder, name + ".stopped")
+
+    def read_since(self) -> str:
+        """Return since when robots are stopped, empty if they are not."""
+        try:
+            stopped_s = os.stat(self.path).st_mtime
+            return time.strftime(TIME_FORMAT, time.localtime(stopped_s))
+        except (FileNotFoundError, NotADirectoryError):
+            return ""
+        except (OSError, OverflowError, ValueError):
+            # It cannot be ruled out that they are.
+            return UNKNOWN_TIME
+
+    def write(self, stopped: bool) -> None:
+        """Keep stopped, and return when it is on the disk; the time of a stop that is kept already stays.
+
+        Raises: OSError where it cannot be kept.
+        """
+        old, new = (self._released_path, self.path) if stopped else (self.path, self._released_path)
+        os.makedirs(self._folder, exist_ok=True)
+        try:
+            os.utime(old)
+            os.rename(old, new)
+        except FileNotFoundError:
+            with open(new, "ab"):
+                pass
+        folder = os.open(self._folder, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _name_master(uri: str) -> str:
+    """Return host and port of a ROS master; this PC is always called localhost."""
+    parts = urllib.parse.urlsplit(uri)
+    host = parts.hostname or ""
+    if host in ("::1", platform.node().lower()) or host.startswith("127."):
+        host = "localhost"
+    return "%s_%s" % (host, parts.port)
