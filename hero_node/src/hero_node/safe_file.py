@@ -17,6 +17,9 @@ from typing import IO, Iterator
 MAX_FILE_BYTES = 2**26
 """Files that people write or draw, such as images of maps, are smaller."""
 
+NEW_ENDING = ".new"
+"""Of files that replace others once they are whole; what a killed program left behind ends so, too."""
+
 LOCK_TIMEOUT_S = 10.0
 """Writers hold a lock for milliseconds; one that is suspended meanwhile must not block the others for ever."""
 
@@ -76,6 +79,34 @@ def lock_file(path: str) -> Iterator[None]:
 
 
 @contextmanager
+def hold_file(path: str, is_shared: bool = False) -> Iterator[bool]:
+    """Hold the file at path, which is made if it is missing, for this program alone, or with others that share it.
+
+    True: no other program holds it, on NFS none of any host; False: the file system has no locks.
+    Raises: BlockingIOError, at once, if another program holds it. OSError.
+    """
+    with open(path, "ab") as file:  # NFS locks only files that are open for writing
+        is_held = True
+        try:
+            fcntl.flock(file, (fcntl.LOCK_SH if is_shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
+            is_held = False
+        yield is_held
+
+
+@contextmanager
+def name_file(path: str) -> Iterator[None]:
+    """Name the file in an OSError that does not, as that of a full disk."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or path
+        raise
+
+
+@contextmanager
 def replace_file(path: str) -> Iterator[IO[bytes]]:
     """Give a new file to write, which replaces the one at path at the end of the context, unless that raises.
 
@@ -90,9 +121,9 @@ def replace_file(path: str) -> Iterator[IO[bytes]]:
         with open(path, "wb") as device:
             yield device
         return
-    new = "%s.%s.new" % (path, secrets.token_hex(4))
+    new = make_new_name(path)
     try:
-        with open(new, "xb") as file:
+        with name_file(path), open(new, "xb") as file:
             if old is not None:
                 with suppress(PermissionError):
                     os.chmod(file.fileno(), stat.S_IMODE(old.st_mode))
@@ -109,6 +140,11 @@ def replace_file(path: str) -> Iterator[IO[bytes]]:
         os.fsync(folder)  # the name itself
     finally:
         os.close(folder)
+
+
+def make_new_name(path: str) -> str:
+    """Return a name beside path, for what will replace it, that no other writer takes."""
+    return "%s.%s%s" % (path, secrets.token_hex(4), NEW_ENDING)
 
 
 def write_file(path: str, content: bytes) -> None:

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from hero_node import safe_file
-from hero_node.safe_file import lock_file, read_file, replace_file, write_file
+from hero_node.safe_file import hold_file, lock_file, read_file, replace_file, write_file
 
 
 def fail_to_sync(fd):
@@ -128,3 +128,21 @@ def test_a_file_is_read_whole_and_what_is_none_is_refused_at_once(tmp_path, monk
     monkeypatch.setattr(safe_file, "MAX_FILE_BYTES", 4)
     with pytest.raises(OSError, match="more than 4 bytes"):
         read_file(str(path))
+
+
+def test_a_full_disk_is_named_with_the_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "fsync", fail_to_sync)
+    with pytest.raises(OSError, match="No space left on device: '%s/a'" % tmp_path):
+        write_file(str(tmp_path / "a"), b"new")
+
+
+def test_where_a_file_system_has_no_locks_programs_are_told(tmp_path, monkeypatch):
+    with hold_file(str(tmp_path / "lock")) as is_held:
+        assert is_held
+
+    def fail(*arguments):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(safe_file.fcntl, "flock", fail)
+    with hold_file(str(tmp_path / "lock")) as is_held:
+        assert not is_held

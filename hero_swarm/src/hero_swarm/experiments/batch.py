@@ -4,16 +4,17 @@ the results.
 Metrics are taken once per second of simulated time. A run has the same values alone and in any batch.
 """
 
+import io
 import math
 import os
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
 from hero_node.errors import HeroError
-from hero_node.safe_file import replace_file
+from hero_node.safe_file import make_new_name, name_file, write_file
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena
 from hero_sim.world.robot_errors import read_known
@@ -117,8 +118,10 @@ def compute_batch(
     experiment = parse_experiment(text, "the experiment", folder)
     cell = experiment.cells[cell_index]
     trial = build_trial(experiment, cell, seeds)
-    with report_place("%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1])):
-        series, ends = _run(experiment, trial, stem)
+    place = report_place("%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1]))
+    with _record_poses(experiment, trial, stem + POSES_ENDING) as poses, place:
+        series, ends = _run(experiment, trial, poses)
+    _write_metrics(stem + METRICS_ENDING, series, ends)
     runs = [
         Run(cell_index, seed, take_values(experiment, series[: ends[world] + 1, world]))
         for world, seed in enumerate(seeds)
@@ -142,19 +145,41 @@ def measure(experiment: Experiment, *state: Any) -> Tuple[np.ndarray, np.ndarray
     return sample, holds
 
 
-def _run(experiment: Experiment, trial: Trial, stem: str) -> Tuple[np.ndarray, List[int]]:
-    """Run a trial; return the samples (T, W, metrics) and the last sample of each world."""
-    worlds, robots, _ = trial.poses.shape
+@contextmanager
+def _record_poses(experiment: Experiment, trial: Trial, path: str) -> Iterator[Any]:
+    """Give an array (T, W, N, 3) on the disk, as it may be more than fits into memory; None if nothing is recorded.
+
+    The file takes its name at the end of the context, unless that raises. Raises: OSError if the disk is full.
+    """
+    if not experiment.record_hz:
+        yield None
+        return
+    new = make_new_name(path)
+    shape = (math.floor(experiment.time_s * experiment.record_hz + 1e-9) + 1, *trial.poses.shape)
+    try:
+        with name_file(path):
+            poses: Any = np.lib.format.open_memmap(new, "w+", np.float32, shape)  # type: ignore[no-untyped-call]
+            with open(new, "r+b") as file:  # else a full disk would kill this process when it writes into the array
+                os.posix_fallocate(file.fileno(), 0, os.fstat(file.fileno()).st_size)
+        yield poses
+        poses.flush()
+        os.replace(new, path)
+    finally:
+        with suppress(FileNotFoundError):
+            os.remove(new)
+
+
+def _run(experiment: Experiment, trial: Trial, poses: Any) -> Tuple[np.ndarray, List[int]]:
+    """Run a trial; return the samples (T, W, metrics) and the last sample of each world.
+
+    poses: array of _record_poses() that is filled.
+    """
+    worlds = len(trial.poses)
     samples = math.floor(experiment.time_s / SAMPLE_S + 1e-9) + 1
     series = np.full((samples, worlds, len(list_sources(experiment))), np.nan)
     ends = np.full(worlds, samples - 1)
     running = np.ones(worlds, dtype=bool)
-    recorded, poses_path = 0, stem + POSES_ENDING
-    poses: Any = None  # on the disk: they may be more than fits into memory
-    if experiment.record_hz:
-        shape = (math.floor(experiment.time_s * experiment.record_hz + 1e-9) + 1, worlds, robots, 3)
-        poses = np.lib.format.open_memmap(poses_path + ".part", "w+", np.float32, shape)  # type: ignore[no-untyped-call]
-    now_s = 0.0
+    now_s, recorded = 0.0, 0
     while True:
         if poses is not None and now_s >= recorded / experiment.record_hz - 1e-6:
             poses[recorded] = np.where(running[:, None, None], trial.poses, np.nan)
@@ -169,12 +194,15 @@ def _run(experiment: Experiment, trial: Trial, stem: str) -> Tuple[np.ndarray, L
         now_s = trial.step()
     if poses is not None:
         poses[recorded:] = np.nan
-        poses.flush()
-        os.replace(poses_path + ".part", poses_path)
-    with_ends = np.where(np.arange(samples)[:, None, None] <= ends[:, None], series, np.nan)
-    with replace_file(stem + METRICS_ENDING) as file:
-        np.save(file, with_ends.astype(np.float32))
     return series, ends.tolist()
+
+
+def _write_metrics(path: str, series: np.ndarray, ends: List[int]) -> None:
+    """Write the samples (T, W, metrics) of each world up to its last one."""
+    is_sample = np.arange(len(series))[:, None] <= np.array(ends)
+    content = io.BytesIO()  # to a file, numpy does not say that the disk is full
+    np.save(content, np.where(is_sample[..., None], series, np.nan).astype(np.float32))
+    write_file(path, content.getvalue())
 
 
 def take_values(experiment: Experiment, series: np.ndarray) -> Tuple[float, ...]:

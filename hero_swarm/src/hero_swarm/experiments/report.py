@@ -28,7 +28,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
 def write_report(path: str) -> None:
     """Write table, summary and page of the results in a folder, and print them. Raises: ExperimentError."""
     text, experiment, about = read_results(path)
-    folder = ResultsFolder(path, experiment, None)
+    folder = ResultsFolder(path, experiment, about["code"])
     runs = folder.read_runs()
     folder.write_table(runs)
     kinds = [kind for kind in (SIMULATED, REAL) if any(run.kind == kind for run in runs)] or [SIMULATED]

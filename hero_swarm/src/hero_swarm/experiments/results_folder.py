@@ -4,25 +4,31 @@
     about.json         versions, commit, machine
     batches/*.jsonl    the runs of each finished batch, named by the digest of its cell, its seeds and the code
     series/*.npy       metrics over time of each batch, and poses if they are recorded
+    set_aside/N/       batches that --fresh does not delete: damaged ones, and trials on robots
+    *.lock             held while a program adds runs of this kind
     times.csv          wall time of each batch: the only file that depends on the machine
     runs.csv           all runs, sorted; the same bytes however they were computed
 
-A batch is written to a temporary file, which is renamed when the disk has it. Knows neither processes nor robots.
+A batch is written to a temporary file, which is renamed when the disk has it; no two writers' files have one name.
+A folder is ours by its about.json; of others nothing is written, and in ours no file of another name is touched.
+Knows neither processes nor robots.
 """
 
 import csv
 import hashlib
 import io
+import itertools
 import json
 import math
 import os
-import shutil
-from contextlib import suppress
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Set, Tuple
+import re
+from contextlib import ExitStack, contextmanager, suppress
+from typing import Any, Callable, Dict, Iterable, Iterator, List, NamedTuple, Sequence, Set, Tuple
 
 import numpy as np
 
-from hero_node.safe_file import write_file
+from hero_node.safe_file import hold_file, name_file, read_file, write_file
+from hero_node.texts import one_line
 
 from .errors import ExperimentError
 from .experiment_file import Cell, Experiment
@@ -35,6 +41,11 @@ REAL = "real"
 
 OTHER_CELL = -1
 """Cell of a run of another experiment."""
+
+ABOUT, EXPERIMENT, LOCK_ENDING = "about.json", "experiment.yaml", ".lock"
+
+_BATCH_NAME = re.compile(r"[0-9a-f]{24}\.jsonl")
+_SERIES_NAME = re.compile(r"[0-9a-f]{24}\.(metrics|poses)\.npy(\.part|\.[0-9a-f]{8}\.new)?")
 
 RunKey = Tuple[int, int]
 """Index of the cell, and seed."""
@@ -60,46 +71,109 @@ class Run(NamedTuple):
 class ResultsFolder:
     """The results of one experiment."""
 
-    def __init__(self, path: str, experiment: Experiment, code: Optional[str]) -> None:
-        """Use the folder path; code: digest of what computes the runs, None: only to read. Nothing is read or
-        written yet."""
+    def __init__(self, path: str, experiment: Experiment, code: str) -> None:
+        """Use the folder path; code: digest of what computes the runs. Nothing is read or written yet."""
         self.path = path
         self._experiment = experiment
         self._code = code
         self._cells = [_digest_cell(experiment, cell) for cell in experiment.cells]
-        self._batches = os.path.join(path, "batches")
+        self._indices = {digest: index for index, digest in enumerate(self._cells)}
+        self._batches, self._series = os.path.join(path, "batches"), os.path.join(path, "series")
 
-    def begin(self, text: str, about: Dict[str, str], fresh: bool, kind: str = SIMULATED) -> List[Run]:
-        """Create the folder, or continue with it; return the runs that it holds already.
+    @contextmanager
+    def hold(self, kind: str = SIMULATED, is_shared: bool = False) -> Iterator[None]:
+        """Keep other programs from adding runs of this kind, unless they share the folder as this one does.
 
-        text: of the experiment's file; fresh: delete the earlier runs of this kind, and all of other experiments.
+        The folder is made if it is missing. Raises: ExperimentError if it is not ours, or another program holds it.
+        """
+        self._make()
+        with ExitStack() as stack:
+            try:
+                is_held = stack.enter_context(hold_file(os.path.join(self.path, kind + LOCK_ENDING), is_shared))
+            except BlockingIOError:
+                text = "%s: another run is adding to it; wait for its end, or share the work: --part 1/2 and --part 2/2"
+                raise ExperimentError(text % self.path) from None
+            if is_held and not is_shared and kind == SIMULATED:
+                self._remove_series(lambda name: not name.endswith(".npy"))  # left behind by a killed program
+            yield
+
+    def begin(self, text: str, about: Dict[str, str]) -> List[Run]:
+        """Begin, or continue, and return the runs that the folder holds already; text: of the experiment's file.
+
         Raises: ExperimentError if it holds runs of another experiment or of other code, or something else.
         """
-        if os.path.isdir(self.path) and os.listdir(self.path) and not os.path.isdir(self._batches):
-            raise ExperimentError(
-                "%s: holds files, but no results of an experiment; choose another --out" % self.path
-            )
-        os.makedirs(self._batches, exist_ok=True)
-        if fresh:
-            self._delete(kind)
+        self._make()
+        has_begun = os.path.exists(os.path.join(self.path, ABOUT))
+        if not has_begun:
+            self._write_about(about)
+        for folder in (self._batches, self._series):
+            os.makedirs(folder, exist_ok=True)
         runs = self.read_runs()
-        write_file(os.path.join(self.path, "experiment.yaml"), text.encode())
-        if fresh or not runs:
-            about_text = json.dumps({"code": self._code, **about}, indent=2) + "\n"
-            write_file(os.path.join(self.path, "about.json"), about_text.encode())
+        write_file(os.path.join(self.path, EXPERIMENT), text.encode())
+        if has_begun and not any(run.kind == SIMULATED for run in runs):
+            self._write_about(about)
         return runs
 
-    def _delete(self, kind: str) -> None:
-        """Delete the runs of a kind, and all of other experiments: trials on robots outlive changes of the code."""
-        for name in os.listdir(self._batches):
+    def _make(self) -> None:
+        """Make the folder, unless it is there and ours. Raises: ExperimentError."""
+        if "\0" in self.path:
+            raise ExperimentError("--out %r: a name cannot hold a NUL character" % self.path)
+        names = _list_names(self.path)
+        # A program that was killed while it began has left these.
+        begun = [name for name in names if name.endswith(LOCK_ENDING) or name.startswith(ABOUT)]
+        if ABOUT in names:
+            read_about(self.path)
+        elif len(begun) < len(names):
+            text = "%s: holds files, but no results of an experiment (%s); choose another --out"
+            raise ExperimentError(text % (self.path, ABOUT))
+        os.makedirs(self.path, exist_ok=True)
+
+    def _write_about(self, about: Dict[str, str]) -> None:
+        text = json.dumps({"code": self._code, **about}, indent=2) + "\n"
+        write_file(os.path.join(self.path, ABOUT), text.encode())
+
+    def clear(self, kind: str) -> str:
+        """Start over with the runs of a kind: delete simulated ones, and set aside all that cannot be computed again,
+        those of robots, and what is damaged; return the folder of these, empty without any.
+
+        Raises: ExperimentError if the folder is not ours.
+        """
+        self._make()
+        aside = []
+        for name in self._list_batches():
             _, runs = self._read_batch(name)
-            if not runs or runs[0].kind == kind or runs[0].cell == OTHER_CELL:
-                os.remove(os.path.join(self._batches, name))
+            if runs and runs[0].kind == SIMULATED:
+                if kind == SIMULATED or runs[0].cell == OTHER_CELL:
+                    os.remove(os.path.join(self._batches, name))
+            elif not runs or kind == REAL or runs[0].cell == OTHER_CELL:
+                aside.append(name)
         if kind == SIMULATED:
-            shutil.rmtree(os.path.join(self.path, "series"), ignore_errors=True)
+            self._remove_series(lambda name: True)
         for name in ("runs.csv", "times.csv"):
             with suppress(FileNotFoundError):
                 os.remove(os.path.join(self.path, name))
+        return self._set_aside(aside)
+
+    def _remove_series(self, is_wanted: Callable[[str], bool]) -> None:
+        """Remove our files of the folder series whose names are wanted."""
+        for name in _list_names(self._series):
+            if _SERIES_NAME.fullmatch(name) and is_wanted(name):
+                with suppress(FileNotFoundError):
+                    os.remove(os.path.join(self._series, name))
+
+    def _set_aside(self, names: Sequence[str]) -> str:
+        """Move batches to a new folder below set_aside, and return it; empty without any."""
+        if not names:
+            return ""
+        folders = (os.path.join(self.path, "set_aside", str(number)) for number in itertools.count(1))
+        folder = next(folder for folder in folders if not os.path.exists(folder))
+        os.makedirs(folder)
+        for name in names:
+            os.replace(os.path.join(self._batches, name), os.path.join(folder, name))
+        return folder
+
+    def _list_batches(self) -> List[str]:
+        return [name for name in _list_names(self._batches) if _BATCH_NAME.fullmatch(name)]
 
     def read_runs(self) -> List[Run]:
         """Return the runs of all finished batches, sorted.
@@ -107,8 +181,8 @@ class ResultsFolder:
         Raises: ExperimentError for a batch of another experiment or of other code.
         """
         found: Dict[Tuple[int, int, str], Run] = {}
-        for name in sorted(os.listdir(self._batches)):
-            for _, run in self._list_runs(name) if name.endswith(".jsonl") else ():
+        for name in self._list_batches():
+            for _, run in self._list_runs(name):
                 key = (run.cell, run.seed, run.kind)
                 if key not in found or not run.remark:  # a trial on robots that counts replaces one that does not
                     found[key] = run
@@ -120,7 +194,7 @@ class ResultsFolder:
             with open(os.path.join(self._batches, name), encoding="utf-8") as file:
                 header, *lines = map(json.loads, file)
             digest, code, kind = header["cell"], header["code"], header["kind"]
-            cell = self._cells.index(digest) if digest in self._cells else OTHER_CELL
+            cell = self._indices.get(digest, OTHER_CELL)
             runs = [
                 Run(cell, int(line["seed"]), tuple(map(float, line["values"])), kind, line["remark"]) for line in lines
             ]
@@ -131,8 +205,9 @@ class ResultsFolder:
     def _list_runs(self, name: str) -> List[Tuple[int, Run]]:
         """Return the runs of a batch that the experiment has, with their places in it. Raises: ExperimentError."""
         code, runs = self._read_batch(name)
-        path, remedy = os.path.join(self._batches, name), "start over with --fresh, or choose another --out"
-        if any(run.kind == SIMULATED for run in runs) and self._code not in (None, code):
+        path = os.path.join(self._batches, name)
+        remedy = "start over with --fresh, which sets trials on robots aside, or choose another --out"
+        if any(run.kind == SIMULATED for run in runs) and self._code != code:
             raise ExperimentError("%s: computed by other code (%s, now %s); %s" % (path, code, self._code, remedy))
         if any(run.cell == OTHER_CELL for run in runs):
             raise ExperimentError("%s: of an experiment with other parameters; %s" % (path, remedy))
@@ -141,13 +216,14 @@ class ResultsFolder:
 
     def write_batch(self, runs: Sequence[Run]) -> None:
         """Keep the runs of one cell: once this returns they survive any end of the program."""
-        assert self._code is not None
         digest, kind = self._cells[runs[0].cell], runs[0].kind
         seeds = [run.seed for run in runs]
         lines: List[Dict[str, Any]] = [{"cell": digest, "code": self._code, "kind": kind}]
         lines += [{"seed": run.seed, "values": list(map(_encode, run.values)), "remark": run.remark} for run in runs]
         name = self._name_batch(digest, seeds, self._code, kind)
         content = "".join(json.dumps(line) + "\n" for line in lines)
+        if kind == REAL and os.path.exists(os.path.join(self._batches, name)):
+            self._set_aside([name])  # damaged, or a trial that does not count
         write_file(os.path.join(self._batches, name), content.encode())
 
     def _name_batch(self, cell: str, seeds: Sequence[int], code: str, kind: str) -> str:
@@ -156,19 +232,15 @@ class ResultsFolder:
 
     def name_series(self, cell: int, seeds: Sequence[int]) -> str:
         """Return the path, without its ending, for what a batch records over time."""
-        folder = os.path.join(self.path, "series")
-        os.makedirs(folder, exist_ok=True)
-        assert self._code is not None
-        return os.path.join(
-            folder, self._name_batch(self._cells[cell], seeds, self._code, SIMULATED)[: -len(".jsonl")]
-        )
+        name = self._name_batch(self._cells[cell], seeds, self._code, SIMULATED)
+        return os.path.join(self._series, name[: -len(".jsonl")])
 
     def read_series(self, cell: int, ending: str) -> Dict[int, np.ndarray]:
         """Return what the runs of a cell recorded over time, by seed, from the files that end so; arrays (T, ...)."""
         series: Dict[int, np.ndarray] = {}
-        for name in sorted(os.listdir(self._batches)):
-            path = os.path.join(self.path, "series", name[: -len(".jsonl")] + ending)
-            if name.endswith(".jsonl") and os.path.isfile(path):
+        for name in self._list_batches():
+            path = os.path.join(self._series, name[: -len(".jsonl")] + ending)
+            if os.path.isfile(path):
                 recorded = np.load(path, mmap_mode="r")
                 own = [(place, run.seed) for place, run in self._list_runs(name) if run.cell == cell]
                 series.update({seed: recorded[:, place] for place, seed in own})
@@ -177,7 +249,7 @@ class ResultsFolder:
     def note_time(self, cell: int, seeds: Sequence[int], wall_s: float) -> None:
         """Append how long a batch took."""
         path = os.path.join(self.path, "times.csv")
-        with open(path, "a", encoding="utf-8") as file:
+        with name_file(path), open(path, "a", encoding="utf-8") as file:
             if file.tell() == 0:
                 file.write("cell,first_seed,runs,wall_s\n")
             file.write("%d,%d,%d,%.3f\n" % (cell, seeds[0], len(seeds), wall_s))
@@ -193,6 +265,25 @@ class ResultsFolder:
         path = os.path.join(self.path, "runs.csv")
         write_file(path, format_table(self._experiment, runs).encode())
         return path
+
+
+def _list_names(folder: str) -> List[str]:
+    """Return what a folder holds, sorted; nothing if it is missing."""
+    return sorted(os.listdir(folder)) if os.path.isdir(folder) else []
+
+
+def read_about(path: str) -> Dict[str, str]:
+    """Return what the about.json of a folder says of its results. Raises: ExperimentError if it is none of ours."""
+    file = os.path.join(path, ABOUT)
+    try:
+        about = json.loads(read_file(file))
+    except (OSError, RecursionError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or one_line(error)
+        raise ExperimentError("%s: no folder with results of run: %s: %s" % (path, ABOUT, reason)) from error
+    is_ours = isinstance(about, dict) and "code" in about and all(isinstance(value, str) for value in about.values())
+    if not is_ours:
+        raise ExperimentError("%s: no folder with results of run: %s is not written by run" % (path, ABOUT))
+    return about
 
 
 def _digest_cell(experiment: Experiment, cell: Cell) -> str:

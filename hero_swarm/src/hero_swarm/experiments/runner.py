@@ -2,12 +2,12 @@
 
 import argparse
 import functools
-import json
 import math
 import os
 import sys
 import time
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple
 
 from tqdm import tqdm
@@ -20,7 +20,7 @@ from .batch import compute_batch, load_checked
 from .code_version import describe_machine, hash_code
 from .errors import ExperimentError
 from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
-from .results_folder import REAL, SIMULATED, ResultsFolder, Run, RunKey
+from .results_folder import REAL, SIMULATED, ResultsFolder, Run, RunKey, read_about
 
 MAX_BATCH = 1000
 
@@ -83,7 +83,9 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
         help="of `calibrate`: robots whose motors are calibrated are driven by pulses, if the behavior wants it",
     )
     parser.add_argument(
-        "--fresh", action="store_true", help="delete earlier runs in the folder; with --robots trials on robots instead"
+        "--fresh",
+        action="store_true",
+        help="delete earlier simulated runs in the folder; with --robots set trials on robots aside instead",
     )
     return parser.parse_args(arguments)
 
@@ -110,8 +112,7 @@ def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
     file = os.path.join(path, "experiment.yaml")
     if not os.path.isfile(file):
         raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % path)
-    with open(os.path.join(path, "about.json"), encoding="utf-8") as about_file:
-        about = json.load(about_file)
+    about = read_about(path)
     # Results of older versions have paths relative to the working directory.
     return (*read_experiment(file, os.path.join(path, about[FOLDER]) if FOLDER in about else ""), about)
 
@@ -160,18 +161,24 @@ def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterato
             bar.update(len(task[3]))
 
 
-def open_folder(options: argparse.Namespace) -> Tuple[str, Experiment, ResultsFolder, List[Run]]:
-    """Return text and content of the experiment's file, the folder of its results, created if missing, and its runs.
+@contextmanager
+def open_folder(options: argparse.Namespace) -> Iterator[Tuple[str, Experiment, ResultsFolder, List[Run]]]:
+    """Give text and content of the experiment's file, the folder of its results, created if missing, and its runs.
 
-    Raises: ExperimentError.
+    Other programs cannot add runs of the same kind meanwhile, unless both compute parts. Raises: ExperimentError.
     """
     text, experiment = read_experiment(options.file)
     load_checked(experiment)
-    path = options.out or os.path.splitext(options.file)[0]
+    path, kind = options.out or os.path.splitext(options.file)[0], SIMULATED if options.robots is None else REAL
     folder = ResultsFolder(path, experiment, hash_code(experiment.behavior_source))
     about = {**describe_machine(), FOLDER: os.path.relpath(experiment.folder or ".", path)}
-    runs = folder.begin(text, about, options.fresh, SIMULATED if options.robots is None else REAL)
-    return text, experiment, folder, runs
+    if options.fresh:
+        with folder.hold(kind):
+            aside = folder.clear(kind)
+        if aside:
+            print("%s: set aside: damaged batches, and trials on robots that do not count now" % aside, file=sys.stderr)
+    with folder.hold(kind, is_shared=options.part[1] > 1):
+        yield text, experiment, folder, folder.begin(text, about)
 
 
 def run_experiment(options: argparse.Namespace) -> str:
@@ -179,7 +186,13 @@ def run_experiment(options: argparse.Namespace) -> str:
 
     Raises: ExperimentError.
     """
-    text, experiment, folder, runs = open_folder(options)
+    with open_folder(options) as (text, experiment, folder, runs):
+        return _run_missing(options, text, experiment, folder, runs)
+
+
+def _run_missing(
+    options: argparse.Namespace, text: str, experiment: Experiment, folder: ResultsFolder, runs: List[Run]
+) -> str:
     part, parts = options.part
     # Whatever is there already, the parts share out all runs in the same way.
     own = set(folder.list_missing(())[part - 1 :: parts])

@@ -1,6 +1,7 @@
 """Runs of one cell in this process: what columns take of the samples, where a run ends, and what is recorded."""
 
 import math
+import os
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hero_swarm.experiments import runner
 from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING, compute_batch, take_values
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_test.small_disk import SmallDisk
 
 FILE = """\
 behavior: aggregation
@@ -117,3 +119,27 @@ def test_options_of_run_have_their_limits(capsys):
         with pytest.raises(SystemExit) as end:
             parse(["e.yaml", *words.split()])
         assert end.value.code == 2 and words.split()[0] in capsys.readouterr().err
+
+
+def test_two_programs_that_record_one_batch_leave_it_whole(tmp_path, monkeypatch):
+    stem, measured = str(tmp_path / "a"), metrics.METRICS["dispersion"]
+
+    def measure_beside_another(*state):
+        monkeypatch.setitem(metrics.METRICS, "dispersion", measured)
+        compute_batch(FILE, "", 0, [11], stem)
+        return measured(*state)
+
+    monkeypatch.setitem(metrics.METRICS, "dispersion", measure_beside_another)
+    compute_batch(FILE, "", 0, [11], stem)
+    assert np.load(stem + POSES_ENDING).any(axis=(1, 2, 3)).all()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a" + METRICS_ENDING, "a" + POSES_ENDING]
+
+
+def test_poses_for_which_a_disk_has_no_room_are_named_and_leave_nothing(tmp_path):
+    disk = SmallDisk(tmp_path, "64k")
+    try:
+        with pytest.raises(OSError, match="No space left on device: '.*a%s'" % POSES_ENDING):
+            compute_batch(FILE.replace("time_s: 4", "time_s: 4000"), "", 0, [11], os.path.join(disk.path, "a"))
+        assert os.listdir(disk.path) == []
+    finally:
+        disk.close()

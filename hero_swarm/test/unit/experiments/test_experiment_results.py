@@ -4,6 +4,7 @@ import json
 import math
 import os
 import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +16,7 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.statistics import correct_by_holm
 from hero_swarm.experiments.reporting.summary import build_report
-from hero_swarm.experiments.results_folder import REAL, ResultsFolder, Run
+from hero_swarm.experiments.results_folder import REAL, SIMULATED, ResultsFolder, Run
 
 FILE = """\
 behavior: a.B
@@ -39,7 +40,9 @@ RUNS = [make_run(cell, seed) for cell in (0, 1) for seed in range(5, 9)]
 
 def open_folder(path, text=FILE, code="c0de", fresh=False):
     folder = ResultsFolder(str(path), parse(text), code)
-    return folder, folder.begin(text, {"numpy": "1"}, fresh)
+    if fresh:
+        folder.clear(SIMULATED)
+    return folder, folder.begin(text, {"numpy": "1"})
 
 
 def batches_of(path):
@@ -130,12 +133,32 @@ def test_runs_of_other_code_or_parameters_are_refused_until_fresh(changed, words
     assert runs == [] and not batches_of(tmp_path)
 
 
-def test_a_folder_with_other_files_is_not_touched(tmp_path):
-    (tmp_path / "thesis.tex").write_text("x")
-    for fresh in (False, True):
-        with pytest.raises(ExperimentError, match="no results of an experiment"):
-            open_folder(tmp_path, fresh=fresh)
-    assert os.listdir(str(tmp_path)) == ["thesis.tex"]
+@pytest.mark.parametrize("name", ["thesis.tex", "experiment.yaml", "batches", "about.json"])
+def test_a_folder_that_is_none_of_ours_is_refused_and_not_touched(name, tmp_path):
+    folder = tmp_path / "data"
+    (folder / "batches").mkdir(parents=True)
+    (folder / name).touch()
+    for act in (lambda own: own.clear(SIMULATED), lambda own: own.begin(FILE, {}), lambda own: enter(own.hold())):
+        with pytest.raises(ExperimentError, match="data: (holds files, but|no folder with) .*results"):
+            act(ResultsFolder(str(folder), parse(), "c0de"))
+    assert {entry.name for entry in folder.iterdir()} == {"batches", name} and not os.listdir(str(folder / "batches"))
+
+
+def enter(context):
+    with context:
+        pass
+
+
+def test_fresh_touches_no_file_of_another_name(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    folder.write_batch(RUNS[:3])
+    own = folder.name_series(0, [5, 6, 7])
+    kept = [tmp_path / "batches" / "my_thesis.csv", tmp_path / "series" / "my.npy", tmp_path / "notes.txt"]
+    gone = [Path(own + ".metrics.npy"), Path(own + ".poses.npy"), Path(own + ".poses.npy.0a1b2c3d.new")]
+    for path in kept + gone:
+        path.write_text("mine")
+    folder.clear(SIMULATED)
+    assert all(path.read_text() == "mine" for path in kept) and not any(path.exists() for path in gone)
 
 
 def test_runs_on_robots_stay_marked_and_beside_simulated_ones(tmp_path):
@@ -150,18 +173,73 @@ def test_runs_on_robots_stay_marked_and_beside_simulated_ones(tmp_path):
         assert "2,5,real,1.0,2.0,hero_2 lost its pose" in file.read()
 
 
-def test_fresh_deletes_simulated_runs_or_trials_on_robots(tmp_path):
+def test_trials_on_robots_are_never_deleted(tmp_path):
     folder, _ = open_folder(tmp_path)
-    real = Run(0, 6, (1.0, 2.0), REAL)
+    real, text = Run(0, 6, (1.0, 2.0), REAL), FILE.replace("time_s: 10", "time_s: 11")
     for runs in (RUNS[:1], [real]):
         folder.write_batch(runs)
-    _, runs = open_folder(tmp_path, code="0ther", fresh=True)
-    assert runs == [real], "trials on robots outlive a change of the code"
-    folder, _ = open_folder(tmp_path, code="0ther")
+    folder, runs = open_folder(tmp_path, code="0ther", fresh=True)
+    assert runs == [real], "they outlive a change of the code"
     folder.write_batch(RUNS[:1])
-    assert folder.begin(FILE, {}, fresh=True, kind=REAL) == RUNS[:1]
-    folder.write_batch([real])
-    assert open_folder(tmp_path, FILE.replace("time_s: 10", "time_s: 11"), fresh=True)[1] == []
+    ((trial, content),) = [(path, path.read_text()) for path in batches_of(tmp_path) if REAL in path.read_text()]
+    assert folder.clear(REAL) == str(tmp_path / "set_aside" / "1")
+    assert folder.read_runs() == RUNS[:1] and (tmp_path / "set_aside" / "1" / trial.name).read_text() == content
+    trial.write_text(content)
+    assert open_folder(tmp_path, text, "0ther", fresh=True)[1] == [], "of an experiment with other parameters"
+    assert (tmp_path / "set_aside" / "2" / trial.name).read_text() == content and not batches_of(tmp_path)
+
+
+def test_a_damaged_batch_is_set_aside_by_fresh_and_by_a_trial_of_its_name(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    folder.write_batch([Run(0, 6, (1.0, 2.0), REAL)])
+    (batch,) = batches_of(tmp_path)
+    for number, act in enumerate((folder.clear, lambda kind: folder.write_batch([Run(0, 6, (3.0, 2.0), REAL)])), 1):
+        batch.write_text("damaged")
+        act(SIMULATED)
+        assert (tmp_path / "set_aside" / str(number) / batch.name).read_text() == "damaged"
+    assert folder.read_runs() == [Run(0, 6, (3.0, 2.0), REAL)]
+
+
+def test_of_two_programs_the_second_is_refused_unless_both_compute_parts(tmp_path):
+    first, second = (ResultsFolder(str(tmp_path / "e"), parse(), "c0de") for _ in range(2))
+    with first.hold():
+        for is_shared in (False, True):
+            with pytest.raises(ExperimentError, match=r"e: another run is adding to it; .* --part 1/2 and --part 2/2$"):
+                enter(second.hold(is_shared=is_shared))
+        enter(second.hold(REAL))
+    with first.hold(is_shared=True):
+        enter(second.hold(is_shared=True))
+        with pytest.raises(ExperimentError, match="another run"):
+            enter(second.hold())
+    enter(second.hold())
+
+
+def test_what_a_killed_program_left_of_poses_goes_with_the_next_one_alone(tmp_path):
+    folder, _ = open_folder(tmp_path)
+    left, other = Path(folder.name_series(0, [5]) + ".poses.npy.0a1b2c3d.new"), tmp_path / "series" / "mine.new"
+    for path in (left, other):
+        path.write_text("")
+    enter(folder.hold(is_shared=True))
+    assert left.exists(), "another part may be writing it"
+    enter(folder.hold())
+    assert not left.exists() and other.exists()
+
+
+@pytest.mark.parametrize("content", ["", "{", "[" * 100_000, "[]", "{}", '{"code": 1}'])
+def test_a_damaged_about_json_is_one_line_that_names_the_folder(content, tmp_path):
+    open_folder(tmp_path / "e")
+    (tmp_path / "e" / "about.json").write_text(content)
+    for act in (lambda: report.write_report(str(tmp_path / "e")), lambda: open_folder(tmp_path / "e")):
+        with pytest.raises(ExperimentError, match="e: no folder with results of run: about.json") as caught:
+            act()
+        assert "\n" not in str(caught.value)
+
+
+def test_a_report_never_mixes_runs_of_two_codes(tmp_path):
+    open_folder(tmp_path)[0].write_batch(RUNS[:1])
+    ResultsFolder(str(tmp_path), parse(), "0ther").write_batch(RUNS[1:2])
+    with pytest.raises(ExperimentError, match="computed by other code"):
+        report.write_report(str(tmp_path))
 
 
 def test_a_trial_that_counts_replaces_one_that_does_not(tmp_path):
