@@ -34,8 +34,8 @@ def draw_robot(name: str, results: Sequence[object]) -> Figure:
 
 
 def _draw_motors(axes: Axes, result: MotorResult) -> None:
-    for speeds, zone, (wheel, color) in zip(result.speeds_m_s, result.zones, _WHEELS):
-        axes.plot(result.pulses_us, speeds, ".-", color=color, linewidth=0.8, markersize=4, label=wheel)
+    for pulses, speeds, zone, (wheel, color) in zip(result.pulses_us, result.speeds_m_s, result.zones, _WHEELS):
+        axes.plot(pulses, speeds, ".-", color=color, linewidth=0.8, markersize=4, label=wheel)
         axes.axvspan(zone.low_us, zone.high_us, color=color, alpha=0.12)
         axes.axvline(zone.center_us, color=color, linewidth=1.2, label="center %.0f us" % zone.center_us)
     axes.axvline(NOMINAL_CENTER_US, color=_GRAY, linestyle=":", label="nominal %d us" % NOMINAL_CENTER_US)

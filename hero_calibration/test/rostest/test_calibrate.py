@@ -128,7 +128,7 @@ class CalibrateTest(unittest.TestCase):
             self.assertGreater(right, 0)
             self.assertNotEqual(self.probes[1].pose.yaw_rad, yaw_rad)
         # The servos are mounted as mirror images.
-        left, right = self.turn_wheels(lambda probe: probe.set_pulses(1400))
+        left, right = self.turn_wheels(lambda probe: probe.set_pulses(1400, 1400))
         self.assertGreater(left, 0)
         self.assertLess(right, 0)
         self.assertAlmostEqual(self.probes[1].read_wheels().step_s, 0.034, delta=0.01)

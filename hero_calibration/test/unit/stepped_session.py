@@ -26,8 +26,8 @@ class StepProbe(Probe):
     def turn(self, angle_rad):
         self.send(self.robots.send_position, 0.0, angle_rad)
 
-    def set_pulses(self, pulse_us):
-        self.send(self.robots.send_pulses, pulse_us, pulse_us)
+    def set_pulses(self, left_us, right_us):
+        self.send(self.robots.send_pulses, left_us, right_us)
 
     def stop(self):
         self.drive(0.0)

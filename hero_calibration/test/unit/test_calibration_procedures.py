@@ -155,7 +155,7 @@ class TestWifi:
 
     @pytest.mark.slow
     def test_on_a_bad_network_robots_are_calibrated_well_or_fail_with_a_reason(self):
-        session = make_session(count=6, wifi="bad")
+        session = make_session(count=6, seed=1, wifi="bad")
         motors = place_and(calibrate_motors, session)
         velocity = calibrate_velocity(session, motors)
         check_accuracy(session, motors)
@@ -236,8 +236,28 @@ class TestFaults:
         assert is_moving(session) == [False] * 4
 
     @pytest.mark.slow
+    def test_robots_keep_to_their_room_whatever_their_centers(self):
+        corners = [(1450, 1550), (1550, 1450), (1450, 1450), (1550, 1550), (1525, 1450), (1500, 1550)]
+        known = ["robot=%d,left_center_us=%d,right_center_us=%d" % (row, *us) for row, us in enumerate(corners)]
+        session = make_session(count=6, known=known)
+        robots, far_m = session.robots, []
+        start_m = robots.world.poses[:, :2].copy()
+        robots.on_cycle.append(lambda rows: far_m.append(np.hypot(*(robots.world.poses[:, :2] - start_m).T).max()))
+        check_accuracy(session, place_and(calibrate_motors, session))
+        assert not any(probe.failure for probe in session.probes) and max(far_m) < 0.13
+
+    def test_a_robot_that_drives_away_is_stopped_and_named(self):
+        session = make_session(count=2)
+        session.robots.world.servo_gains_m_s_us[1, 0] *= -1.0
+        start_m = session.robots.world.poses[:, :2].copy()
+        assert list(place_and(calibrate_motors, session)) == [0]
+        assert re.match("motors: moved 1[567] cm instead of turning on the spot", session.probes[1].failure)
+        moved_m = np.hypot(*(session.robots.world.poses[:, :2] - start_m).T)
+        assert moved_m[1] < 0.2 and not is_moving(session)[1] and "motor_centers_us" not in session.probes[1].written
+
+    @pytest.mark.slow
     def test_a_center_outside_the_sweep_is_refused(self):
-        session = make_session(count=2, known=["robot=1,left_center_us=1650"])
+        session = make_session(count=2, known=["robot=1,left_center_us=1650,right_center_us=1650"])
         assert list(place_and(calibrate_motors, session)) == [0]
         assert "the left wheel does not stop between" in session.probes[1].failure
 

@@ -40,8 +40,8 @@ class FakeProbe(Probe):
     def turn(self, angle_rad):
         self.sent.append(("turn", angle_rad))
 
-    def set_pulses(self, pulse_us):
-        self.sent.append(("pulses", pulse_us))
+    def set_pulses(self, left_us, right_us):
+        self.sent.append(("pulses", left_us, right_us))
 
     def stop(self):
         self.sent.append("stop")
@@ -255,7 +255,7 @@ def test_dead_zones_have_their_widths_and_sweeps_their_pulses():
 
 def test_files_hold_rounded_numbers_in_the_order_that_they_say():
     zones = [dead_zone.DeadZone(1470.4, 1530.3, 1e-3), dead_zone.DeadZone(1480.0, 1541.2, 1e-3)]
-    motors = MotorResult([1500], np.zeros((2, 1)), zones)
+    motors = MotorResult(np.full((2, 1), 1500), np.zeros((2, 1)), zones)
     assert motors.to_file() == {"motor_centers_us": [1500, 1511], "dead_zones_us": [1470, 1530, 1480, 1541]}
     assert motors.describe() == "centers 1500 and 1511 us"
     slow, quick = Response(0.3, 0.2, 0.8, ()), Response(0.1, 0.0, 0.2, ())
@@ -373,7 +373,7 @@ def list_lines(axes):
 
 def test_a_figure_shows_each_result_before_and_after():
     zones = [dead_zone.DeadZone(1470.0, 1530.0, 1e-3), dead_zone.DeadZone(1480.0, 1542.0, 1e-3)]
-    motors = MotorResult([1400, 1500, 1600], np.array([(0.1, 0.0, -0.1), (-0.1, 0.0, 0.2)]), zones)
+    motors = MotorResult(np.tile([1400, 1500, 1600], (2, 1)), np.array([(0.1, 0.0, -0.1), (-0.1, 0.0, 0.2)]), zones)
     curve = (np.array([0.0, 1.0]), np.array([0.0, 0.08]))
     slow, quick = Response(0.3, 0.2, 0.8, (curve, curve)), Response(0.124, 0.0, 0.2, (curve,))
     velocity = VelocityResult([slow, slow], [quick, quick], [(1.0, 2.0, 0.1)] * 2)

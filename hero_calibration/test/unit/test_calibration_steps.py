@@ -171,15 +171,23 @@ def test_infrared_says_how_long_it_takes(monkeypatch, capsys):
 
 def test_pulses_are_swept_up_and_down_at_their_times(monkeypatch):
     session, measured = FakeSession(2), []
-    monkeypatch.setattr(dead_zone, "measure_sweep", lambda readings, starts_s: measured.append(list(starts_s)))
+
+    def measure(readings, starts_s):
+        measured.append(list(starts_s))
+        return np.array([(-0.1, 0.1), (-0.13, 0.07)])  # wheels whose centers are at 1500 and about 1529 us
+
+    monkeypatch.setattr(dead_zone, "measure_sweep", measure)
     result = SimpleNamespace(to_file=lambda: {"motor_centers_us": [1500, 1510]})
     monkeypatch.setattr(motors, "evaluate_sweep", lambda pulses_us, speeds_m_s: result)
     monkeypatch.setattr(type(session.probes[0]), "read_wheels", lambda probe: None)
     assert motors.calibrate_motors(session) == {0: result, 1: result}
     for probe in session.probes:
-        assert [value for name, value in filter(lambda one: one[0] == "pulses", probe.sent)] == dead_zone.list_pulses()
+        sent = [tuple(values) for name, *values in filter(lambda one: one[0] == "pulses", probe.sent)]
+        assert sent[:2] == [(1380, 1380), (1620, 1620)]
+        assert sent[2:] == [(us, us + 28) for us in dead_zone.list_pulses()]
         assert ("motor_centers_us", [1500, 1510]) in probe.sent
-    assert np.diff(measured[0]) == pytest.approx(np.full(81, 0.45), abs=0.01) and len(measured) == 2
+    assert list(map(len, measured)) == [2, 2, 82, 82]
+    assert np.diff(measured[2]) == pytest.approx(np.full(81, 0.45), abs=0.01)
 
 
 def test_a_velocity_test_turns_to_each_side_for_its_time(monkeypatch):
@@ -233,8 +241,8 @@ def test_a_probe_hears_its_topics_and_commands_its_controllers(monkeypatch):
     assert [(topic, twist.linear.x, twist.angular.z) for topic, twist in sent] == [
         (velocity, 0.1, 1.5), (velocity, 0.0, 2.0), (position, 0.0, -0.7), (velocity, 0.0, 0.0), (position, 0.0, 0.0),
     ]  # fmt: skip
-    probe.set_pulses(1400)
-    assert sent[-1][0] == "cmd_motor" and {getattr(sent[-1][1], name) for name in sent[-1][1].__slots__} == {1400}
+    probe.set_pulses(1400, 1600)
+    assert sent[-1][0] == "cmd_motor" and sent[-1][1] == ros_probe.Motor(1400, 1600)
 
 
 def test_a_side_of_a_square_ends_on_time_and_needs_two_readings():

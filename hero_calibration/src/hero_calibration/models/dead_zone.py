@@ -17,6 +17,15 @@ NOMINAL_CENTER_US = 1500
 REACH_US = 120
 """Extent of the sweep to either side: enough for a center that is off by 60 us, and a dead zone of 40 us."""
 
+AIM_PULSES_US = (NOMINAL_CENTER_US - REACH_US, NOMINAL_CENTER_US + REACH_US)
+"""Sent before a sweep, to know about where the centers are."""
+
+AIM_DEAD_ZONE_US = 25.0
+"""Usual half of a dead zone, for the estimate of a center before the sweep."""
+
+MAX_AIM_US = 60.0
+"""Of an estimated center: a servo that is further off is refused."""
+
 STEP_US = 6
 PULSE_S = 0.45
 """Duration of each step; the robot holds a pulse for 1 s."""
@@ -69,10 +78,23 @@ class DeadZone(NamedTuple):
         return (self.low_us + self.high_us) / 2.0
 
 
-def list_pulses() -> List[int]:
+def list_pulses(center_us: int = NOMINAL_CENTER_US) -> List[int]:
     """Return the pulses of a sweep (us): first rising, then the same falling."""
-    rising = list(range(NOMINAL_CENTER_US - REACH_US, NOMINAL_CENTER_US + REACH_US + 1, STEP_US))
+    rising = list(range(center_us - REACH_US, center_us + REACH_US + 1, STEP_US))
     return rising + rising[::-1]
+
+
+def aim(speeds_m_s: np.ndarray) -> int:
+    """Return a center (us) to sweep around, good to some 10 us, from the speeds at AIM_PULSES_US.
+
+    With the same pulses for both wheels, a robot whose centers are off in opposite directions drives while it hardly
+    turns; with pulses equally far from the centers it turns on the spot.
+    """
+    low_m_s, high_m_s = speeds_m_s.tolist()
+    if not abs(high_m_s - low_m_s) > 2.0 * REST_M_S:
+        return NOMINAL_CENTER_US  # the sweep will tell what is wrong with the wheel
+    off_us = -(low_m_s + high_m_s) / (high_m_s - low_m_s) * (REACH_US - AIM_DEAD_ZONE_US)
+    return NOMINAL_CENTER_US + round(min(max(off_us, -MAX_AIM_US), MAX_AIM_US))
 
 
 def measure_sweep(readings: Readings, start_times_s: Sequence[float]) -> np.ndarray:

@@ -12,7 +12,10 @@ from ..robots.session import Session
 READY_TIMEOUT_S = 10.0
 SCANS_TO_CHECK = 5
 
-ROOM = "Place the robots on the floor with 20 cm of room around each: they will turn on the spot."
+ROOM = (
+    "Place the robots on the floor with 20 cm of room around each, 40 cm between robots: they will turn on the spot, "
+    "move up to 13 cm meanwhile, and be stopped if they move more than 15 cm."
+)
 WALL = (
     "Place each robot with its front facing a flat white wall, 10 cm between wall and body, 40 cm between "
     "robots: they will turn on the spot, twice."

@@ -142,8 +142,8 @@ class Probe(ABC):
         """Turn by an angle under the position controller, which goes as far as the speed reaches in a second."""
 
     @abstractmethod
-    def set_pulses(self, pulse_us: int) -> None:
-        """Set the pulse of both servos."""
+    def set_pulses(self, left_us: int, right_us: int) -> None:
+        """Set the pulses of the servos."""
 
     @abstractmethod
     def stop(self) -> None:

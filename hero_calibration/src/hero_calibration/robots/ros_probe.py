@@ -82,8 +82,8 @@ class RosProbe(Probe):
     def turn(self, angle_rad: float) -> None:
         self._position.publish(Twist(angular=Vector3(z=angle_rad)))
 
-    def set_pulses(self, pulse_us: int) -> None:
-        self._motors.publish(Motor(pulse_us, pulse_us))
+    def set_pulses(self, left_us: int, right_us: int) -> None:
+        self._motors.publish(Motor(left_us, right_us))
 
     def stop(self) -> None:
         self.drive(0.0)

@@ -112,7 +112,7 @@ class Session(Clock):
                     probe.check_alive(self.now_s)
                     say("%s once more: %s: %s" % (probe.name, step, error))
 
-            self.for_each(step, try_evaluating, waiting)
+            self.for_each(step, try_evaluating, [probe for probe in waiting if probe.failure is None])
             waiting = [probe for probe in self.active if probe.robot_id not in results]
             if not waiting:
                 break
