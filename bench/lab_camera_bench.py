@@ -20,7 +20,7 @@ from hero_localization.calibration.lens_calibration import BoardView, calibrate_
 from hero_localization.calibration.print_fit import refine_corners
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import CalibrationError
-from hero_localization.filter.pose_filter import StampedPose
+from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors

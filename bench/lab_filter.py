@@ -9,7 +9,8 @@ from typing import Callable, Dict, List, Tuple
 
 import numpy as np
 
-from hero_localization.filter.pose_filter import Outcome, PoseFilter, StampedPose, make_covariance
+from hero_localization.filter.pose_filter import Outcome, PoseFilter, make_covariance
+from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_node.geometry import Pose, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
 

@@ -22,7 +22,7 @@ from hero_localization.calibration.arena_calibration import average_tags, calibr
 from hero_localization.calibration.lens_calibration import calibrate_lens, find_board
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
 from hero_localization.camera.camera_model import Camera, Intrinsics
-from hero_localization.filter.pose_filter import StampedPose
+from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.simulated_camera.board_renderer import BoardRenderer, list_board_places

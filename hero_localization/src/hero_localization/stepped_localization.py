@@ -15,7 +15,8 @@ from hero_client.values.errors import FrameError
 from hero_node.geometry import Pose
 from hero_sim.stepped.swarm import StepSwarm
 
-from .filter.pose_filter import PoseFilter, StampedPose, make_covariance
+from .filter.pose_filter import PoseFilter, make_covariance
+from .filter.pose_hypothesis import StampedPose
 from .filter.swarm_localizer import PUBLISH_RATE_HZ
 from .mapping.swarm_map import SwarmMap
 

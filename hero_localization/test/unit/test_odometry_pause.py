@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from hero_localization.filter.pose_filter import SYSTEMATIC, Outcome, PoseFilter, StampedPose
+from hero_localization.filter.pose_filter import SYSTEMATIC, Outcome, PoseFilter
+from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_node.geometry import Pose, transform_pose
 
 COVARIANCE = np.diag((1e-6, 1e-6, 3.6e-5))

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from hero_client.values.stamped_history import interpolate_pose
-from hero_localization.filter.pose_filter import REPLAYED_S, Outcome, PoseFilter, StampedPose
+from hero_localization.filter.pose_filter import Outcome, PoseFilter
+from hero_localization.filter.pose_hypothesis import REPLAYED_S, StampedPose
 from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
 
 ODOMETRY_S = 0.034

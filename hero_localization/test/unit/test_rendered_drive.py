@@ -12,7 +12,7 @@ from std_msgs.msg import Header
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.camera.frame_source import Frame
-from hero_localization.filter.pose_filter import StampedPose
+from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_localization.nodes import calibrate_camera
 from hero_localization.simulated_camera.renderer import CameraRenderer

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_localization.filter.pose_filter import StampedPose
+from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_msgs.msg import RobotPose
 from hero_node.geometry import Pose

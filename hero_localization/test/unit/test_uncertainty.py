@@ -7,7 +7,8 @@ import pytest
 from test_pose_filter import COVARIANCE as SEEN_COVARIANCE
 from test_pose_filter import start_filter
 
-from hero_localization.filter.pose_filter import Outcome, PoseFilter, StampedPose, make_covariance
+from hero_localization.filter.pose_filter import Outcome, PoseFilter, make_covariance
+from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.nodes.outputs import make_robot_pose
 from hero_node.geometry import Pose, transform_pose, wrap_angle
 from hero_sim.stepped.swarm import StepSwarm
@@ -70,7 +71,7 @@ class CoveredSwarm:
         """Return errors of place and yaw, rms over the robots, by what is reported of them."""
         shares = []
         for pose_filter, true in zip(self.filters, self.true):
-            pose, covariance = pose_filter.estimate()[1:]
+            pose, covariance = pose_filter.estimate()[1:3]
             report = make_robot_pose(0, 0, None, pose, covariance)
             off_m = math.hypot(pose.x_m - true[0], pose.y_m - true[1])
             off_rad = wrap_angle(pose.yaw_rad - true[2])
@@ -158,7 +159,7 @@ def test_a_measured_pose_is_weighed_by_its_uncertainty():
     pose_filter.add_odometry(1.05, Pose(0.0, 0.0, 0.0))
     measured = StampedPose(1.05, Pose(0.002, -0.002, 0.03), np.diag((1e-6, 4e-6, 1e-4)))
     assert pose_filter.add_measurement(measured) is Outcome.USED
-    pose, covariance = pose_filter.estimate()[1:]
+    pose, covariance = pose_filter.estimate()[1:3]
     assert pose == pytest.approx((0.8 * 0.002, -0.2 * 0.002, 0.9 * 0.03), rel=1e-2)
     # What calibration leaves stays: 0.7 mm and 0.003 rad.
     assert np.diag(covariance) == pytest.approx((8e-7 + 4.9e-7, 8e-7 + 4.9e-7, 9e-5 + 9e-6), rel=1e-2)
@@ -186,7 +187,7 @@ def test_correlated_poses_are_joined_as_the_kalman_filter_has_it():
     pose_filter, seen = start_filter(covariance=first), np.array((1e-3, -5e-4, 8e-4))
     pose_filter.add_odometry(1.001, Pose(0.0, 0.0, 0.0))
     assert pose_filter.add_measurement(StampedPose(1.001, Pose(*seen), second)) is Outcome.USED
-    pose, covariance = pose_filter.estimate()[1:]
+    pose, covariance = pose_filter.estimate()[1:3]
     joined = np.linalg.inv(np.linalg.inv(first) + np.linalg.inv(second))
     assert pose == pytest.approx(joined @ np.linalg.inv(second) @ seen, rel=1e-3)
     left = np.minimum((4.9e-7, 4.9e-7, 9e-6), np.diag(second))

@@ -13,7 +13,8 @@ from hero_node.texts import list_names
 from hero_node.token_bucket import TokenBucket
 
 from .heading_check import HeadingCheck, is_upside_down
-from .pose_filter import Outcome, PoseFilter, StampedPose
+from .pose_filter import Outcome, PoseFilter
+from .pose_hypothesis import StampedPose
 
 LOST_S = 1.0
 """A robot whose pose was not measured for this long is lost: its pose follows its odometry alone."""

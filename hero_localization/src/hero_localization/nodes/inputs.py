@@ -15,7 +15,7 @@ from nav_msgs.msg import Odometry
 from hero_client.values.readings import is_plausible, read_pose
 from hero_node.geometry import Pose
 
-from ..filter.pose_filter import StampedPose
+from ..filter.pose_hypothesis import StampedPose
 from .outputs import IN_PLANE
 
 _HEADER = struct.Struct("<3I")

@@ -17,7 +17,8 @@ from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
 from hero_node.parameters import number, robot_ids, words
 
-from ..filter.pose_filter import StampedPose, make_covariance
+from ..filter.pose_filter import make_covariance
+from ..filter.pose_hypothesis import StampedPose
 from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
 from .inputs import PoseInput, subscribe_odometry
 from .outputs import Outputs

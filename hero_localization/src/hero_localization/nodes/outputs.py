@@ -12,7 +12,7 @@ from tf2_msgs.msg import TFMessage
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
 
-from ..filter.pose_filter import StampedPose
+from ..filter.pose_hypothesis import StampedPose
 from ..filter.swarm_localizer import LocalizedRobot
 
 IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
@@ -65,7 +65,7 @@ class Outputs:
         return transform
 
     def _make_message(self, estimate: StampedPose) -> PoseWithCovarianceStamped:
-        stamp_s, pose, covariance = estimate
+        stamp_s, pose, covariance = estimate[:3]
         message = PoseWithCovarianceStamped()
         message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp_s), self._frame
         message.pose.pose.position.x, message.pose.pose.position.y = pose.x_m, pose.y_m
@@ -108,7 +108,7 @@ def make_robot_pose(robot_id: int, state: int, stamp: rospy.Time, pose: Pose, co
 
 def _describe_robot(robot: LocalizedRobot) -> RobotPose:
     if robot.estimate is not None:
-        stamp_s, pose, covariance = robot.estimate
+        stamp_s, pose, covariance = robot.estimate[:3]
         return make_robot_pose(robot.robot_id, int(robot.state), rospy.Time.from_sec(stamp_s), pose, covariance)
     message = RobotPose(id=robot.robot_id, state=int(robot.state))
     message.x = message.y = message.yaw = message.position_sd = message.yaw_sd = math.nan
