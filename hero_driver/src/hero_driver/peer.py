@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import List, Optional, Protocol
 
+from .commands.burst_gate import BurstGate
 from .commands.stop_progress import StopProgress
 from .corrections.message_layouts import CONVERSIONS, read_encoder
 from .corrections.wheel_motion import WheelMotion
@@ -34,6 +35,9 @@ class Peer:
     motion_mark: int = 0  # how much was written when the last motion command was
     send_due: bool = False
     stop: Optional[StopProgress] = None  # while the robot is stopped
+
+    def __post_init__(self) -> None:
+        self.bursts = BurstGate(self.wheels)
 
     @property
     def label(self) -> str:

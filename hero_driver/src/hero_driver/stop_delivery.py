@@ -10,8 +10,8 @@ robot that takes no Twist gets them.
 
 A robot that tunes itself (pid_calibration) drops every zero within 50 ms of its controller's last run, and that runs
 every 21 ms. Only a read that takes longer lets a zero through: BURST_LIGHTS light commands (1 ms each) and the zeros in
-one write, small enough for the robot's TCP window of 2144 bytes. They hold the robot's last color, so that its light
-stays as it was, dark if there was none.
+one write, small enough for the robot's TCP window of 2144 bytes, and no second one before the robot has read the first
+(burst_gate). They hold the robot's last color, so that its light stays as it was, dark if there was none.
 
 Runs on the thread of the sockets and never blocks, except stop_without_loop(), for when that thread's loop has broken.
 """
@@ -174,10 +174,14 @@ class StopDelivery:
         if stop is None or peer.link.closed:
             return
         before = stop.state
-        if stop.is_due(peer.has_acknowledged_motion(), now_s):
+        is_acknowledged = peer.has_acknowledged_motion()
+        may_burst = peer.bursts.is_open(is_acknowledged, now_s)
+        if stop.is_due(is_acknowledged, now_s):
             burst = stop.needs_burst(peer.bridge is not None and peer.bridge.commands.tunes(now_s), now_s)
-            self._send(peer, burst, now_s)
-            stop.note_sent(burst, now_s)
+            # The first one goes at once, whatever is on its way.
+            if may_burst or not burst or not stop.has_begun:
+                self._send(peer, burst and may_burst, now_s)
+                stop.note_sent(burst and may_burst, now_s)
         if stop.state is not before:
             if stop.state is StopState.MOVING:
                 self._owner.warn_robot(peer, "its wheels turn although it was stopped")
@@ -188,6 +192,8 @@ class StopDelivery:
     @staticmethod
     def _send(peer: Peer, with_burst: bool, now_s: float) -> None:
         peer.link.send_packet(encode_stop(peer, with_burst))
+        if with_burst:
+            peer.bursts.note_sent(now_s)
         peer.motion_mark = peer.link.handed_length
         if peer.bridge is not None:
             peer.bridge.commands.queue.discard_motion(now_s + MOTION_AFTER_S)

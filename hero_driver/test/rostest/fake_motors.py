@@ -45,17 +45,22 @@ class FakeMotors:
     Attributes:
         is_pushed: whether somebody turns the wheels by hand.
         lag_s: for how long the wheels turn on when nothing drives them.
+        light_s: for how long each led holds the robot's program.
+        read_s: when the robot has finished what it reads.
     """
 
-    def __init__(self, centers_us: Sequence[int] = (1500, 1500), lag_s: float = 0.0) -> None:
+    def __init__(
+        self, centers_us: Sequence[int] = (1500, 1500), lag_s: float = 0.0, light_s: float = LED_HOLD_S
+    ) -> None:
         """centers_us: the servos' real centers, left and right."""
         self.is_pushed = False
         self.lag_s = lag_s
+        self.light_s = light_s
+        self.read_s = 0.0
         self._centers_us = centers_us
         self._driven_s = _NEVER_S
         self._controllers: DefaultDict[str, Controller] = collections.defaultdict(Controller)
         self._has_pulses = False
-        self._read_s = 0.0
         self._ticks = 0.0
         self._turned_s = 0.0
 
@@ -77,18 +82,18 @@ class FakeMotors:
 
     def begin_read(self, now_s: float) -> None:
         """Be told that the robot reads what has come; until now its controllers ran."""
-        self._read_s = now_s
+        self.read_s = now_s
         for controller in list(self._controllers.values()):
             if controller.is_tuning:
                 controller.watchdog_s = now_s
 
     def take_led(self) -> None:
         """Take a color."""
-        self._read_s += LED_HOLD_S
+        self.read_s += self.light_s
 
     def take_pulses(self, payload: bytes) -> None:
         """Take a Motor command."""
-        self._read_s += PULSES_HOLD_S
+        self.read_s += PULSES_HOLD_S
         pulses_us = struct.unpack("<2h", payload)
         offsets_us = [pulse_us - center_us for pulse_us, center_us in zip(pulses_us, self._centers_us)]
         self._has_pulses = any(abs(offset_us) > DEAD_ZONE_US for offset_us in offsets_us)
@@ -96,11 +101,11 @@ class FakeMotors:
     def take_velocity(self, name: str, is_zero: bool) -> None:
         """Take a Twist for the controller in a topic's name, which may drop it."""
         controller = self._controllers[name.split("/")[-2]]
-        if self._read_s - controller.watchdog_s < VELOCITY_GATE_S:
+        if self.read_s - controller.watchdog_s < VELOCITY_GATE_S:
             return
         controller.is_tuning = False
         controller.is_driving = not is_zero
-        controller.watchdog_s = _NEVER_S if is_zero else self._read_s
+        controller.watchdog_s = _NEVER_S if is_zero else self.read_s
         if is_zero:
             self._has_pulses = False
 

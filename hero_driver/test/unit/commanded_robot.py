@@ -93,6 +93,9 @@ class CommandedRobot:
         self.stopped = False
         self._acknowledged_length = 0
         self._hangs_until_s = 0.0
+        self._is_reading = False
+        self._read_began_s = 0.0
+        self._longest_read_s = 0.0
         self._buffer = b""
         self._reader = packets.PacketReader()
         context = robot_bridge.BridgeContext(
@@ -168,9 +171,14 @@ class CommandedRobot:
         if self.clock.now_s < self._hangs_until_s:
             self.clock.call_later(self._hangs_until_s - self.clock.now_s, self._read)
             return
+        self.motors.begin_read(self.clock.now_s)
+        self._read_began_s = self.clock.now_s
+        self._read_on()
+
+    def _read_on(self):
+        """Read what has come, and what comes while that takes time: nothing else runs before all is read."""
         data, self._buffer = self._buffer[:WINDOW_LENGTH], self._buffer[WINDOW_LENGTH:]
         now_s = self.clock.now_s
-        self.motors.begin_read(now_s)
         for packet in self._reader.receive_bytes(data):
             name = self._names[packet.topic_id]
             self.taken.append((now_s, name, packet.payload))
@@ -180,16 +188,28 @@ class CommandedRobot:
                 self.motors.take_led()
             else:
                 self.motors.take_velocity(name, not any(packet.payload))
-        self.clock.call_later(READ_CYCLE_S, self._read)
+        self._is_reading = bool(data)
+        self._longest_read_s = max(self._longest_read_s, now_s - self._read_began_s)
+        if data:
+            self.clock.call_later(max(self.motors.read_s - now_s, 0.0), self._read_on)
+        else:
+            self.clock.call_later(READ_CYCLE_S, self._read)
 
     def _send_reading(self):
         if self.clock.now_s < self._hangs_until_s:
             self.clock.call_later(self._hangs_until_s - self.clock.now_s, self._send_reading)
             return
+        if self._is_reading:
+            self.clock.call_later(0.001, self._send_reading)
+            return
         ticks = self.motors.count_ticks(self.clock.now_s)
         self.peer.session.last_receive_s = self.clock.now_s
         self.peer.wheels.read_ticks(ticks, ticks)
         self.clock.call_later(ENCODER_INTERVAL_S, self._send_reading)
+
+    def find_longest_read_s(self):
+        """Return for how long the robot did nothing but read, at most."""
+        return self._longest_read_s
 
     def list_motor_packets(self):
         """Return the servo pulses among all that the driver wrote."""

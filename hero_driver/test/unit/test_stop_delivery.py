@@ -119,12 +119,55 @@ def test_repeated_stops_do_not_fill_the_window_of_a_tuning_robot():
         robot.bridge.commands.note_tuning(True)
         del robot.writes[:]
         stop(robot)
-        for _ in range(4):
+        for _ in range(3):
             clock.run(0.03)
             stop(robot)
         assert count_bursts(robot) == 1
         clock.run(CONFIRMED_S)
         assert robot.peer.stop.state is StopState.AT_REST
+
+
+@pytest.mark.parametrize("light_s", [0.001, 0.0018, 0.0027, 0.005])
+@given(phase_s=phases, network_s=networks)
+def test_bursts_leave_the_robot_its_loop_however_long_a_light_takes(light_s, phase_s, network_s):
+    with Clock().is_the_drivers() as clock:
+        motors = FakeMotors((1545, 1455), LAG_S, light_s)
+        robot = CommandedRobot(clock, has_readings=True, phase_s=phase_s, network_s=network_s, motors=motors)
+        motors.start_tuning("velocity_controller")
+        clock.run(2.0)
+        robot.bridge.commands.note_tuning(True)
+        stop(robot)
+        clock.run(0.11 + network_s)
+        assert not motors.is_tuning
+        clock.run(1.5 + 4 * network_s)
+        assert robot.peer.stop.state is StopState.AT_REST
+    assert robot.find_longest_read_s() <= (BURST_LIGHTS + 1) * light_s
+
+
+@pytest.mark.parametrize("light_s", [0.0027, 0.01])
+def test_a_robot_without_readings_gets_few_bursts_and_leaves_its_loop(light_s):
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock, motors=FakeMotors(light_s=light_s))
+        robot.bridge.commands.was_told_to_tune = True
+        stop(robot)
+        clock.run(20.0)
+        assert robot.peer.stop.state is StopState.UNCONFIRMED
+    assert count_bursts(robot) == 3
+    assert robot.find_longest_read_s() <= (2 * BURST_LIGHTS + 1) * light_s
+
+
+def test_programs_that_take_turns_bring_no_burst_into_another():
+    with Clock().is_the_drivers() as clock:
+        robot = make_moving(clock, "velocity_controller")
+        robot.bridge.commands.was_told_to_tune = True
+        del robot.writes[:]
+        for number in range(100):
+            robot.publish_velocity(0.1 * (number % 2), node="/program_%d" % (number % 2))
+            robot.bridge.commands.was_told_to_tune = True
+            clock.run(0.02)
+    bursts_s = [at_s for at_s, data in robot.writes if len(data) > 62 * 24]
+    assert len(bursts_s) > 3
+    assert min(later_s - earlier_s for earlier_s, later_s in zip(bursts_s, bursts_s[1:])) > 0.062
 
 
 def test_after_a_burst_the_light_has_the_color_that_it_had_before():

@@ -12,6 +12,9 @@ from ..corrections.wheel_motion import MOVES_KEPT, REST_READINGS, WheelMotion
 STOPS_MIN = 4
 """A stop may meet a motion command in the same reading cycle of the robot; one in the next cycle then counts."""
 
+BURST_STOPS = 2
+"""Number of stops that a burst counts for: the robot reads it in a reading cycle of its own, as it does two stops."""
+
 INTERVAL_S = 0.025
 """Between two stops: there is one in each reading cycle of the robot (51 ms). Those that the firmware drops, because
 they come within 50 ms of the last one that it took, do no harm."""
@@ -26,9 +29,6 @@ as many without a turn: slow creep shows."""
 UNREAD_AFTER_S = 1.0
 SILENT_AFTER_S = 2.0
 """Without any reading of its wheels a robot's stop is unconfirmed after this time; without a new one after that."""
-
-TUNING_INTERVAL_S = 0.15
-"""Between two stops to a robot that tunes itself, which needs 70 ms for each."""
 
 STUBBORN_AFTER_S = 0.5
 STUBBORN_INTERVAL_S = 0.25
@@ -70,21 +70,20 @@ class StopProgress:
         self._began_s = now_s
         self._stops = 0
         self._next_s = now_s
-        self._burst_ends_s = now_s
         self._mark = wheels.readings
         self._acknowledged: Optional[_Mark] = None  # when a stop first was
         self._watched: Optional[_Mark] = None  # when one first was after the last burst
         self._rest_readings = REST_READINGS
 
-    def renew(self, now_s: float) -> None:
-        """A stop was requested again: send the next stop at once, unless the wheels are at rest.
+    @property
+    def has_begun(self) -> bool:
+        """Whether a stop was sent."""
+        return self._stops > 0
 
-        A robot that tunes itself first finishes the burst that it has: a second one would fill its TCP window, and the
-        zeros would come late.
-        """
+    def renew(self, now_s: float) -> None:
+        """A stop was requested again: send the next stop at once, unless the wheels are at rest."""
         if self.state is not StopState.AT_REST:
-            self._next_s = max(now_s, self._burst_ends_s)
-            self._began_s = now_s
+            self._next_s = self._began_s = now_s
 
     def is_due(self, is_acknowledged: bool, now_s: float) -> bool:
         """Look at the wheels; return whether a stop is to be sent now.
@@ -110,18 +109,17 @@ class StopProgress:
 
     def note_sent(self, was_burst: bool, now_s: float) -> None:
         """A stop was sent."""
-        self._stops += 1
-        if self._stops <= STOPS_MIN:
+        if self._stops < STOPS_MIN:
             self._mark = self._wheels.readings
+        self._stops += BURST_STOPS if was_burst else 1
         if was_burst:
             self._watched = None
-            self._burst_ends_s = now_s + TUNING_INTERVAL_S
         elapsed_s = now_s - self._began_s
-        interval_s = TUNING_INTERVAL_S if was_burst else INTERVAL_S
+        interval_s = INTERVAL_S
         if elapsed_s >= TIRED_AFTER_S:
             interval_s = TIRED_INTERVAL_S
         elif elapsed_s >= STUBBORN_AFTER_S:
-            interval_s = max(interval_s, STUBBORN_INTERVAL_S)
+            interval_s = STUBBORN_INTERVAL_S
         self._next_s = now_s + interval_s
 
     def _has_passed(self, mark: Optional[_Mark], readings: int, now_s: float) -> bool:
