@@ -12,7 +12,7 @@ from typing import Optional, Sequence, Tuple, Union
 import numpy as np
 
 from hero_client.controllers.half_planes import nearest_allowed_all
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import HERO, MAX_LINEAR_M_S, MAX_WHEEL_M_S, RobotModel
 
 OFF, FENCE, ROBOTS = "off", "fence", "fence and robots"
 MODES = (OFF, FENCE, ROBOTS)
@@ -34,8 +34,9 @@ class SafetyFilter:
         gain_1_s: closing speed allowed for each meter that is left.
         neighbors: this many of the nearest robots are looked at: more do not fit around one.
         sidestep: share of what is taken from a velocity that goes to its right, so that robots that meet pass.
-        max_speed_m_s, max_angular_rad_s: limits of the commands.
+        max_speed_m_s, max_angular_rad_s, max_wheel_m_s: limits of the commands, and of what is wanted.
         radii_m: of the robots' bodies (N,), or one for all.
+        is_limited: which robots were asked in the last call for more than they can drive (W, N).
     """
 
     lookahead_m = 0.03
@@ -43,17 +44,25 @@ class SafetyFilter:
     gain_1_s = 4.0
     neighbors = 6
     sidestep = 3.0
-    max_speed_m_s = 0.2
+    max_speed_m_s = MAX_LINEAR_M_S
     max_angular_rad_s = 6.0
+    max_wheel_m_s = MAX_WHEEL_M_S
 
     def __init__(self, mode: str = ROBOTS, fence_m: Optional[np.ndarray] = None) -> None:
         """fence_m: x min, y min, x max, y max, which no body leaves. Raises: ValueError for another mode."""
         if mode not in MODES:
             raise ValueError("safety %r: must be one of %s" % (mode, ", ".join(MODES)))
         self.mode = mode
-        self.radii_m: Union[float, Sequence[float]] = BODY_RADIUS_M
+        self.radii_m: Union[float, Sequence[float]] = HERO.body_radius_m
+        self._separations_m: Union[float, Sequence[float]] = HERO.wheel_separation_m
         self._fence_m = fence_m
+        self.is_limited = np.zeros((1, 1), dtype=bool)
         self._last: Optional[np.ndarray] = None
+
+    def set_models(self, models: Sequence[RobotModel]) -> None:
+        """Take bodies and wheels from the models of the robots (N,)."""
+        self.radii_m = [model.body_radius_m for model in models]
+        self._separations_m = [model.wheel_separation_m for model in models]
 
     def __call__(
         self, poses: np.ndarray, linear_m_s: np.ndarray, angular_rad_s: np.ndarray, ages_s: Optional[np.ndarray] = None
@@ -62,7 +71,7 @@ class SafetyFilter:
 
         Wanted ones are those of all robots of all worlds (W * N,), or one for all, as a behavior gives them. Robots
         drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it; speeds
-        that are no finite numbers count as zero.
+        that are no finite numbers count as zero, and those beyond the limits as the fastest with the same curve.
         """
         linear_m_s, angular_rad_s = (
             np.broadcast_to(np.where(np.isfinite(values), values, 0.0).ravel(), poses[..., 0].size)
@@ -70,6 +79,10 @@ class SafetyFilter:
         )  # fmt: skip
         if self.mode == OFF:
             return linear_m_s, angular_rad_s
+        # First of all: the sweeps below do not converge from a velocity that is far from all that is allowed.
+        share = self._find_share(linear_m_s, angular_rad_s)
+        self.is_limited = share < 1.0
+        linear_m_s, angular_rad_s = linear_m_s * share, angular_rad_s * share
         ages_s = np.zeros(poses.shape[:2]) if ages_s is None else ages_s
         known = np.isfinite(poses).all(axis=2) & (ages_s <= MAX_AGE_S)
         yaw_rad = np.where(known, poses[..., 2], 0.0)
@@ -100,10 +113,22 @@ class SafetyFilter:
         found = found * slower.min(axis=2, initial=1.0, keepdims=True)
         linear_m_s = (found[..., 0] * cosine + found[..., 1] * sine) * known
         angular_rad_s = (found[..., 1] * cosine - found[..., 0] * sine) / self.lookahead_m * known
-        excess = np.maximum(np.abs(angular_rad_s) / self.max_angular_rad_s, 1.0)
-        linear_m_s, angular_rad_s = linear_m_s / excess, angular_rad_s / excess
+        share = self._find_share(linear_m_s, angular_rad_s)
+        linear_m_s, angular_rad_s = linear_m_s * share, angular_rad_s * share
         self._last = np.array((linear_m_s, angular_rad_s))
         return linear_m_s, angular_rad_s
+
+    def _find_share(self, linear_m_s: np.ndarray, angular_rad_s: np.ndarray) -> np.ndarray:
+        """Return the share of these speeds (W, N) that robots and their wheels can drive, at most 1."""
+        linear_m_s, angular_rad_s = np.abs(linear_m_s), np.abs(angular_rad_s)
+        # Each limit over the larger of itself and the speed: no speed is too large to be divided by.
+        share = np.minimum(
+            self.max_speed_m_s / np.maximum(linear_m_s, self.max_speed_m_s),
+            self.max_angular_rad_s / np.maximum(angular_rad_s, self.max_angular_rad_s),
+        )
+        arms_m = np.broadcast_to(self._separations_m, linear_m_s.shape[1]) / 2.0
+        wheels_m_s = share * linear_m_s + share * angular_rad_s * arms_m
+        return share * self.max_wheel_m_s / np.maximum(wheels_m_s, self.max_wheel_m_s)
 
     def _list_half_planes(self, points_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return normals (W, N, K, 2) and bounds (W, N, K) for the steered points (W, N, 2)."""

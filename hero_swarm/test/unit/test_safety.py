@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hero_client.controllers.half_planes import nearest_allowed_all
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values.robot_constants import BODY_RADIUS_M, MAX_WHEEL_M_S, MODELS, WHEEL_SEPARATION_M
+from hero_sim.stepped.swarm import StepSwarm
 from hero_swarm.behavior import Behavior
 from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.safety import OFF, ROBOTS, TOLERANCE_M_S, SafetyFilter
@@ -93,6 +94,41 @@ def test_of_the_allowed_velocities_the_nearest_is_found():
     assert found == pytest.approx(np.array([(0.1, 0.02), (0.0, 0.05)]))
     fast = nearest_allowed_all(np.array([(0.3, 0.4)]), normals[:1], np.array([[-1.0, -1.0]]), 0.2)
     assert fast == pytest.approx(np.array([(0.12, 0.16)]))
+
+
+@pytest.mark.parametrize("factor", [1.0, 5.0, 100.0, 1e300])
+def test_no_wanted_speed_makes_robots_touch_or_leave_the_fence(factor):
+    names = ["hero_plus" if number % 3 == 1 else "hero" for number in range(8)]
+    swarm = StepSwarm(8, seed=2, model=["%s,robot=%d" % (name, number) for number, name in enumerate(names)])
+    rows = swarm.rows
+    half_m = np.abs(rows.world.poses[:, :2]).max() + 0.12
+    safe = SafetyFilter(ROBOTS, half_m * np.array((-1.0, -1.0, 1.0, 1.0)))
+    safe.set_models([MODELS[name] for name in names])
+    radii_m, rows_of_all = np.array(safe.radii_m), np.arange(8)
+    nearest_m, farthest_m = np.inf, -np.inf
+    for _ in range(400):
+        poses = rows.world.poses.copy()
+        nearest_m = min(nearest_m, (measure_distances(poses[None, :, :2])[0] - radii_m[:, None] - radii_m).min())
+        farthest_m = max(farthest_m, (np.abs(poses[:, :2]).max(axis=1) + radii_m - half_m).max())
+        bearings_rad = np.arctan2(-poses[:, 1], 2.0 - poses[:, 0]) - poses[:, 2]
+        bearings_rad -= 2.0 * np.pi * np.rint(bearings_rad / (2.0 * np.pi))
+        linear_m_s, angular_rad_s = safe(poses[None], np.full(8, 0.2 * factor), 6.0 * factor * bearings_rad)
+        rows.send_velocity(rows_of_all, linear_m_s[0], angular_rad_s[0])
+        rows.advance(rows.now_ms + 50)
+    assert nearest_m > 0.005 and farthest_m < 0.0
+
+
+def test_speeds_beyond_the_limits_count_as_the_fastest_of_their_curve():
+    poses = np.array([[(0.0, 0.0, 0.0), (9.0, 0.0, 0.0), (18.0, 0.0, 0.0)]])
+    safe = SafetyFilter(ROBOTS)
+    for factor in (1.0, 1e3, 1e307):
+        linear_m_s, angular_rad_s = safe(poses, factor * np.array((0.3, 0.2, 0.0)), factor * np.array((0.0, 4.0, 9.0)))
+        assert linear_m_s[0, 0] == pytest.approx(0.2) and angular_rad_s[0, 2] == pytest.approx(6.0)
+        assert angular_rad_s[0, 1] / linear_m_s[0, 1] == pytest.approx(20.0)
+        assert linear_m_s[0, 1] + angular_rad_s[0, 1] * WHEEL_SEPARATION_M / 2.0 == pytest.approx(MAX_WHEEL_M_S)
+        assert safe.is_limited.all()
+    safe(poses, np.array((0.2, 0.1, np.nan)), np.array((0.0, -2.0, 9.0)))
+    assert safe.is_limited.tolist() == [[False, False, True]]
 
 
 RING_M = 0.6
@@ -196,7 +232,7 @@ def test_no_pair_and_no_fence_is_closed_faster_than_allowed(sidestep):
 def test_no_other_allowed_velocity_is_nearer_to_the_wanted_one():
     poses, linear_m_s, angular_rad_s = draw_worlds(2)
     safe = SafetyFilter(ROBOTS, SMALL_FENCE_M)
-    safe.sidestep, safe.max_angular_rad_s = 0.0, 100.0
+    safe.sidestep, safe.max_angular_rad_s, safe.max_wheel_m_s = 0.0, 100.0, 100.0
     found_m_s = find_velocities(poses, *safe(poses, linear_m_s, angular_rad_s))
     wanted_m_s = find_velocities(poses, linear_m_s, angular_rad_s)
     off_m_s = np.hypot(*np.moveaxis(found_m_s - wanted_m_s, -1, 0))

@@ -14,6 +14,9 @@ MAX_LINEAR_M_S = 0.20
 MAX_ANGULAR_RAD_S = 8.0
 """The firmware clamps angular.z to this."""
 
+MAX_WHEEL_M_S = 0.25
+"""At the 250 us to which the firmware limits a servo: the robot's published top speed."""
+
 WHEEL_SEPARATION_M = 0.063
 
 

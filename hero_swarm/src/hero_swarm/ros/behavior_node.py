@@ -86,7 +86,7 @@ class BehaviorNode:
         now_s = rospy.get_time()
         sensed = sense(self.behavior, now_s - self._start_s, poses[None], self._random, things)
         linear_m_s, angular_rad_s, self._memory = decide(self.behavior, sensed, self._memory, self._random)
-        self._filter.radii_m = [robot.model.body_radius_m for robot in self._swarm]
+        self._filter.set_models([robot.model for robot in self._swarm])
         speeds = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
         may_move = sensed.is_known & np.isfinite(linear_m_s) & np.isfinite(angular_rad_s)
         self._commands.send(speeds[0][0], speeds[1][0], may_move)

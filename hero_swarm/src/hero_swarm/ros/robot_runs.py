@@ -67,7 +67,7 @@ def run_on_robots(
             if answer == END:
                 break
             safety = SafetyFilter(ROBOTS)
-            safety.radii_m = [robot.model.body_radius_m for robot in swarm]
+            safety.set_models([robot.model for robot in swarm])
             trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], safety)
             commands = WheelCommands(swarm, trial.behavior.drive, options.calibration)
             name = "cell_%d_seed_%d" % (cell_index + 1, seed)
