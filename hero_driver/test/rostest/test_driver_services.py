@@ -128,12 +128,13 @@ class TestDriverServices(DriverCase):
 
         self.assertEqual(wait_for(look, "an answer").message, "in time")
 
-    def test_after_a_lost_answer_the_service_can_be_called_again(self):
+    def test_after_a_lost_answer_a_robot_that_returns_can_be_called_again(self):
         robot = self.join(7)
         robot.answers["set_odom"] = lambda _: None
         service = make_service(robot, "set_odom", SetOdom)
         Call(service, 1.0, 0.0, 0.0).wait()
-        del robot.answers["set_odom"]
+        robot.close()
+        self.join(7)
         answer = wait_for(lambda: Call(service, 2.0, 0.0, 0.0).wait().answer, "an answer")
         self.assertEqual(answer.message, "set_odom")
 

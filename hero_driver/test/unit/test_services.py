@@ -4,7 +4,7 @@ import pytest
 import rospy
 
 from hero_driver.ros import services
-from hero_driver.ros.services import RobotService
+from hero_driver.ros.services import LATE_ANSWER_S, RobotService
 from hero_driver.transport.event_loop import NoAnswerError
 
 NAME = "/hero_0/set_odom"
@@ -122,7 +122,7 @@ def test_a_late_answer_is_not_taken_for_that_of_the_next_call(robot):
     robot.call(b"first")
     robot.advance(TIMEOUT_S)
     robot.call(b"second")
-    assert robot.answers[b"second"] == "has not answered the call before this one yet; try again in 4.0 s"
+    assert robot.answers[b"second"].startswith("has not answered the call before this one yet; try again in 30 s")
     assert robot.requests == [b"first"]
     assert robot.service.receive_answer(b"late") == b"first"
     robot.call(b"third")
@@ -130,12 +130,44 @@ def test_a_late_answer_is_not_taken_for_that_of_the_next_call(robot):
     assert robot.answers[b"third"] == b"answer"
 
 
-def test_a_missing_answer_closes_the_service_for_one_more_timeout(robot):
+@pytest.mark.parametrize("delay_s", [0.5, 1.1, 2.5, 5.0])
+def test_of_a_robot_that_answers_late_no_call_gets_the_answer_of_another(robot, delay_s):
+    """delay_s: in units of the time limit."""
+    on_their_way = []
+
+    def send_request(service, request):
+        on_their_way.append((robot.now_s + delay_s * TIMEOUT_S, request))
+
+    robot.send_request = send_request
+    for number in range(500):
+        robot.call(b"%d" % number)
+        robot.advance(0.1 * TIMEOUT_S)
+        while on_their_way and on_their_way[0][0] <= robot.now_s:
+            robot.service.receive_answer(b"answer " + on_their_way.pop(0)[1])
+    answered = {request: answer for request, answer in robot.answers.items() if isinstance(answer, bytes)}
+    assert bool(answered) == (delay_s < 1.0)
+    assert all(answer == b"answer " + request for request, answer in answered.items())
+
+
+def test_a_lost_answer_closes_the_service_for_30_s_and_not_for_ever(robot):
     robot.call(b"first")
     robot.advance(TIMEOUT_S)
-    robot.advance(TIMEOUT_S)
+    robot.advance(0.99 * LATE_ANSWER_S)
     robot.call(b"second")
-    assert robot.requests == [b"first", b"second"]
+    assert robot.requests == [b"first"]
+    robot.advance(0.01 * LATE_ANSWER_S)
+    for request in (b"third", b"fourth"):
+        robot.call(request)
+        robot.service.receive_answer(b"answer of " + request)
+        assert robot.answers[request] == b"answer of " + request
+
+
+def test_a_robot_that_never_answers_is_asked_again_and_again(robot):
+    for number in range(1, 4):
+        robot.call(b"%d" % number)
+        robot.advance(TIMEOUT_S)
+        robot.advance(LATE_ANSWER_S)
+        assert len(robot.requests) == number
 
 
 def test_a_new_connection_ends_the_wait_for_a_late_answer(robot):

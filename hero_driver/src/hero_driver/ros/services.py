@@ -1,8 +1,10 @@
 """Services that a robot offers, as ROS services: one call at a time, with a time limit and clear errors.
 
-A call carries no number on the wire: its answer is known by topic and order only. So after a timeout the service stays
-closed until the late answer has come or as long again has passed; otherwise the late answer would be taken for that of
-the next call. Everything here runs on the thread of the sockets, except RobotService.call().
+A call carries no number on the wire: its answer is known by topic and order only. So one answer at most is outstanding:
+after a timeout the service stays closed, for further calls fail at once, until the late answer has come, the connection
+has ended, which no answer outlasts, or LATE_ANSWER_S has passed, because a request or its answer may be lost.
+Otherwise the late answer would be taken for that of the next call, and each one after it for that of the next but one.
+Everything here runs on the thread of the sockets, except RobotService.call().
 """
 
 import collections
@@ -19,6 +21,10 @@ Answer = Tuple[bytes, str]
 
 HANG_WAIT_S = 1.0
 """Grace after a call's time limit: the thread of the sockets hangs if it has not answered by then."""
+
+LATE_ANSWER_S = 30.0
+"""An answer that is later than its time limit by more than this never comes. A robot that reads or sends nothing for
+~silence_timeout_s (6 s) is disconnected, and one that runs answers what it has read within 0.1 s."""
 
 
 class _Call:
@@ -98,7 +104,8 @@ class RobotService:
             now_s = time.monotonic()
             if self._late_request is not None and now_s < self._late_until_s:
                 call.fail(
-                    "has not answered the call before this one yet; try again in %.1f s" % (self._late_until_s - now_s)
+                    "has not answered the call before this one yet; try again in %.0f s at most, or when the robot has"
+                    " connected again" % (self._late_until_s - now_s)
                 )
                 continue
             # An answer may come before send_request() returns.
@@ -122,6 +129,6 @@ class RobotService:
                 return
             self._current = None
             self._late_request = call.request
-            self._late_until_s = now_s + self._timeout_s
+            self._late_until_s = now_s + max(self._timeout_s, LATE_ANSWER_S)
             call.fail("was not answered within %s" % limit)
             self._send_next()
