@@ -5,11 +5,15 @@ A busy machine is not a failure. Every run tries the same examples, whatever ear
 
 import importlib
 import os
+import sys
 from pathlib import Path
 
 import hypothesis
 import hypothesis.configuration
 import pytest
+
+ROOT = Path(__file__).resolve().parent
+sys.path.append(str(ROOT / "test"))  # sources.py, which knows where packages and modules are
 
 # Before numpy is imported: threads of OpenBLAS take turns with the tests beside, and more CPU than they save.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -23,7 +27,7 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("repeatable")
 # Its tables of characters; the sources stay clean.
-hypothesis.configuration.set_hypothesis_home_dir(str(Path(__file__).resolve().parent / ".work" / "hypothesis"))
+hypothesis.configuration.set_hypothesis_home_dir(str(ROOT / ".work" / "hypothesis"))
 
 
 def pytest_configure(config):

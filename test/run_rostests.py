@@ -11,6 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import sources
 from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -26,7 +27,7 @@ cat "$kept"
 
 def find_rostests(pattern):
     """All .test files of the suite whose path contains the pattern."""
-    paths = sorted(ROOT.glob("*/test/rostest/*.test"))
+    paths = sources.find("test/rostest/*.test")
     return [path for path in paths if pattern in str(path.relative_to(ROOT))]
 
 

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import run_rostests
+import sources
 from jobs import Job, count_cores, run_jobs
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,10 +46,12 @@ def make_unit_jobs(results_dir, packages):
 def find_unit_tests(paths=()):
     """Return the files of the unit tests of each package: all, or of the packages or tests that the paths name."""
     if not paths:
-        paths = [path.parents[1] for path in ROOT.glob("*/test/unit")]
+        paths = sources.PACKAGES.values()
     packages = {}
     for path in paths:
-        package = ROOT / path.relative_to(ROOT).parts[0]
+        package = sources.PACKAGES.get(sources.package_of(path / "x"))
+        if package is None:
+            continue
         is_test = path.name.startswith("test_") and package / "test" / "unit" in path.parents
         found = {path} if is_test else set((package / "test" / "unit").rglob("test_*.py"))
         if found:

@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 # The parts of the driver's own tests: robots that a test scripts, drivers with parameters of their own.
-sys.path[:0] = [str(ROOT / "hero_driver" / "test" / "rostest"), str(ROOT / "bench")]
+sys.path[:0] = [str(ROOT / "hero_driver" / "test" / "rostest"), str(ROOT / "test" / "bench")]
 
 import rospy  # noqa: E402
 from rig import Master  # noqa: E402

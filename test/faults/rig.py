@@ -16,7 +16,7 @@ from hero_test.waiting import wait_for
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-BENCH = ROOT / "bench"
+BENCH = ROOT / "test" / "bench"
 DEADLINE_S = 60.0
 EMULATED_NAMES = 12
 STOCK_NAMES = 19

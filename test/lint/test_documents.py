@@ -11,7 +11,7 @@ from functools import lru_cache
 import documents
 import sources
 
-PACKAGES = sources.list_packages()
+PACKAGES = sources.PACKAGES
 COMMANDS = [command for page in sources.list_files(".md") for command in documents.read_commands(page)]
 TEST_NAME = re.compile(r"`(test_\w+)`")
 # Begin no command but stand before one.
@@ -64,7 +64,7 @@ def find_options(words):
 @lru_cache(maxsize=None)
 def read_words(package):
     """Everything between backticks in the README of a package; the topics of robots have a page of their own."""
-    lines = documents.read_lines(sources.ROOT / package / "README.md")
+    lines = documents.read_lines(PACKAGES[package] / "README.md")
     if package == "hero_driver":
         lines += documents.read_lines(sources.ROOT / "docs" / "robot_interface.md")
     return {word for line in lines for word in documents.INLINE.findall(line.text)}
@@ -117,7 +117,7 @@ def test_every_script_and_its_options_exist():
             path = sources.ROOT / "script" / words[0].split("/")[-1]
             assert path.is_file(), f"{place}: there is no script/{path.name}"
             text = path.read_text(encoding="utf-8")
-            programs = re.findall(r"[\w/]+\.py", text) + [f"bench/{word}_bench.py" for word in words[1:]]
+            programs = re.findall(r"[\w/]+\.py", text) + [f"test/bench/{word}_bench.py" for word in words[1:]]
             files = (sources.ROOT / name for name in programs)
             text += "".join(file.read_text(encoding="utf-8") for file in files if file.is_file())
             for option in find_options(words):
@@ -141,7 +141,7 @@ def test_every_type_that_a_command_shows_exists():
         for word in words[1:]:
             package, _, kind = word.partition("/")
             if package in PACKAGES and kind:
-                assert (sources.ROOT / package / folder / f"{kind}.{folder}").is_file(), f"{place}: {word}"
+                assert (PACKAGES[package] / folder / f"{kind}.{folder}").is_file(), f"{place}: {word}"
 
 
 def test_every_module_that_a_command_runs_has_its_options():
@@ -154,7 +154,7 @@ def test_every_module_that_a_command_runs_has_its_options():
 
 def test_every_option_of_a_program_is_in_the_readme_of_its_package():
     for package in PACKAGES:
-        readme = (sources.ROOT / package / "README.md").read_text(encoding="utf-8")
+        readme = (PACKAGES[package] / "README.md").read_text(encoding="utf-8")
         for option in set(re.findall(r'add_argument\(\s*"(--[\w-]+)"', read_package_text(package))):
             # Or as the argument of a launch file of the same name.
             argument = f"`{option[2:].replace('-', '_')}`"

@@ -6,12 +6,13 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 import pytest
-import sources
 import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package_version import get_forthcoming_label
 
-PACKAGES = sources.list_packages()
+import sources
+
+PACKAGES = sources.PACKAGES
 LAUNCH_FILES = sources.list_files(".launch")
 STANDARD_LIBRARY = getattr(sys, "stdlib_module_names", None)
 
@@ -33,8 +34,10 @@ ORDER = (
     "hero_examples",
     "hero_bringup",
     "hero_tutorial",
+    "hero_options",
     "hero",
 )
+METAPACKAGES = ("hero", "hero_options")
 FOR_LEARNING = {"hero_examples", "hero_tutorial"}
 KNOW_NEITHER_DRIVER_NOR_SIMULATOR = {"hero_client", "hero_examples", "hero_tutorial", "hero_description"}
 
@@ -63,13 +66,14 @@ def find_needs(package, in_tests):
     """Return the packages that the Python sources of a package import, each with one place."""
     needs = {}
     for path in sources.list_python_files():
-        parts = path.relative_to(sources.ROOT).parts
-        if parts[0] == package and path.name != "setup.py" and ("test" in parts) == in_tests:
+        if sources.package_of(path) != package or path.name == "setup.py":
+            continue
+        if ("test" in path.relative_to(PACKAGES[package]).parts) == in_tests:
             for found in sources.read_imports(path):
                 needed = needed_package(found.module, package)
                 if needed:
                     needs.setdefault(needed, f"{sources.name_of(path)}:{found.line}")
-    build = sources.ROOT / package / "CMakeLists.txt"
+    build = PACKAGES[package] / "CMakeLists.txt"
     if not in_tests and re.search(r"^hero_add_(node|script)\(", build.read_text(encoding="utf-8"), re.MULTILINE):
         needs.setdefault("hero_node", sources.name_of(build))  # reads their arguments
     return needs
@@ -91,7 +95,7 @@ def find_launch_needs(package):
 def test_every_package_xml_is_complete_and_like_the_others():
     versions = set()
     for package in PACKAGES:
-        root = ElementTree.parse(sources.ROOT / package / "package.xml").getroot()
+        root = ElementTree.parse(PACKAGES[package] / "package.xml").getroot()
         versions.add(root.findtext("version"))
         assert root.get("format") == "3", package
         assert root.findtext("name") == package
@@ -103,21 +107,21 @@ def test_every_package_xml_is_complete_and_like_the_others():
 
 def test_every_package_has_a_changelog_of_its_version():
     for package in PACKAGES:
-        changelog = get_changelog_from_path(str(sources.ROOT / package), package)
+        changelog = get_changelog_from_path(str(PACKAGES[package]), package)
         assert changelog, f"{package} has no CHANGELOG.rst"
-        version = ElementTree.parse(sources.ROOT / package / "package.xml").getroot().findtext("version")
+        version = ElementTree.parse(PACKAGES[package] / "package.xml").getroot().findtext("version")
         versions = [found for found, _, _ in changelog.foreach_version()]
         assert version in versions or get_forthcoming_label(changelog.rst), f"{package}: nothing about {version}"
 
 
 def test_every_package_has_a_readme_that_begins_with_its_name():
     for package in PACKAGES:
-        assert (sources.ROOT / package / "README.md").read_text(encoding="utf-8").startswith(f"# {package}\n")
+        assert (PACKAGES[package] / "README.md").read_text(encoding="utf-8").startswith(f"# {package}\n")
 
 
 def test_setup_py_installs_exactly_the_rooms_of_its_package(monkeypatch):
     for package in PACKAGES:
-        setup, source = sources.ROOT / package / "setup.py", sources.ROOT / package / "src"
+        setup, source = PACKAGES[package] / "setup.py", PACKAGES[package] / "src"
         if not setup.exists():
             continue
         rooms = {".".join(path.parent.relative_to(source).parts) for path in source.rglob("__init__.py")}
@@ -130,12 +134,12 @@ def test_setup_py_installs_exactly_the_rooms_of_its_package(monkeypatch):
 
 
 def test_packages_depend_only_on_packages_below_them():
-    assert sorted(ORDER) == PACKAGES
+    assert sorted(ORDER) == sorted(PACKAGES)
     for package in PACKAGES:
         depends = set(sources.read_dependencies(package, "depend", "build_depend", "exec_depend")) & set(PACKAGES)
         above = depends - set(ORDER[: ORDER.index(package)])
         assert not above, f"{package} depends on {above}"
-        if package not in (*FOR_LEARNING, "hero_bringup", "hero"):
+        if package not in (*FOR_LEARNING, "hero_bringup", *METAPACKAGES):
             assert not depends & FOR_LEARNING, f"{package} depends on {depends & FOR_LEARNING}"
         if package in KNOW_NEITHER_DRIVER_NOR_SIMULATOR:
             assert not depends & {"hero_driver", "hero_sim"}, f"{package} knows topics only"
@@ -161,7 +165,7 @@ def test_every_declared_dependency_of_ours_or_of_ros_is_used():
         paths = [path for path in sources.list_files(*suffixes) if sources.package_of(path) == package]
         text = "\n".join(path.read_text(encoding="utf-8") for path in paths)
         for name in sources.read_dependencies(package, "depend", "exec_depend", "test_depend"):
-            if package != "hero" and (name in checkable or name.endswith("_msgs")):
+            if package not in METAPACKAGES and (name in checkable or name.endswith("_msgs")):
                 assert name in used or re.search(rf"\b{name}\b", text), f"{package} declares {name} for nothing"
 
 
@@ -172,7 +176,7 @@ def test_only_known_libraries_are_imported():
         for found in sources.read_imports(path):
             known = found.top in STANDARD_LIBRARY | sources.WITHOUT_ROSDEP_KEY | {package}
             known = known or needed_package(found.module, package)
-            assert known, f"{path}:{found.line}: {found.module}: tell test/lint/sources.py which package it is in"
+            assert known, f"{path}:{found.line}: {found.module}: tell test/sources.py which package it is in"
 
 
 def test_every_dependency_is_a_known_rosdep_key():
@@ -203,7 +207,7 @@ def test_every_program_has_a_module_with_a_main():
     for package in PACKAGES:
         text = sources.read_cmake(package)
         for name, module in re.findall(r"hero_add_(?:program|node)\((\w+) ?([\w.]*)\)", text):
-            path = sources.ROOT / package / "src" / package / f"{(module or name).replace('.', '/')}.py"
+            path = PACKAGES[package] / "src" / package / f"{(module or name).replace('.', '/')}.py"
             functions = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.FunctionDef)]
             assert "main" in [function.name for function in functions], f"{package}: {name}"
 
@@ -213,7 +217,7 @@ def find_forwarded(path):
     for include in ElementTree.parse(path).getroot().findall("include"):
         if include.get("pass_all_args") == "true":
             package, file = re.fullmatch(r"\$\(find (\w+)\)/(.+)", include.get("file")).groups()
-            return sources.ROOT / package / file
+            return PACKAGES[package] / file
     return None
 
 
@@ -223,7 +227,7 @@ def read_arguments(path):
 
 def test_launch_arguments_are_documented_there_and_in_the_readme():
     for path in LAUNCH_FILES:
-        readme = (sources.ROOT / sources.package_of(path) / "README.md").read_text(encoding="utf-8")
+        readme = (PACKAGES[sources.package_of(path)] / "README.md").read_text(encoding="utf-8")
         assert path.name in readme, f"{path.name} is not in the README of {sources.package_of(path)}"
         forwarded = find_forwarded(path)
         if forwarded:
@@ -239,8 +243,8 @@ def test_launch_arguments_are_documented_there_and_in_the_readme():
 
 def find_parameters(package, program):
     """Return the names of the parameters that a program reads; none if these are not written where it begins."""
-    path = sources.ROOT / package / "src" / package / f"{program}.py"
-    if not path.exists():
+    path = PACKAGES[package] / "src" / package / f"{program}.py" if package in PACKAGES else None
+    if path is None or not path.exists():
         return set()
     calls = [node for node in ast.walk(sources.parse(path)) if isinstance(node, ast.Call)]
     tables = [call.args[0] for call in calls if getattr(call.func, "id", "") == "read_parameters"]

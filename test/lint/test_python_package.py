@@ -6,8 +6,9 @@ import sys
 
 import pytest
 import setuptools
-import sources
 from catkin_pkg.package import parse_package
+
+import sources
 
 PACKAGES = ("hero_node", "hero_driver", "hero_client", "hero_sim", "hero_swarm", "hero_monitor", "hero_recording")
 
@@ -43,7 +44,8 @@ def built(tmp_path_factory):
     shutil.copy(str(sources.ROOT / "pyproject.toml"), str(copy))
     leave_out = shutil.ignore_patterns("__pycache__", "*.egg-info")
     for package in PACKAGES:
-        shutil.copytree(str(sources.ROOT / package / "src"), str(copy / package / "src"), ignore=leave_out)
+        source = sources.PACKAGES[package] / "src"
+        shutil.copytree(str(source), str(copy / source.relative_to(sources.ROOT)), ignore=leave_out)
     command = [sys.executable, "-W", "ignore", "-c", "import setuptools; setuptools.setup()", "-q"]
     subprocess.run([*command, "build_py", "--build-lib", str(built)], cwd=str(copy), check=True)
     return built
@@ -51,7 +53,7 @@ def built(tmp_path_factory):
 
 def test_every_module_and_data_file_is_in_the_package(built):
     for package in PACKAGES:
-        source = sources.ROOT / package / "src" / package
+        source = sources.PACKAGES[package] / "src" / package
         kept = {path.relative_to(source) for path in source.rglob("*") if path.suffix in (".py", ".yaml", ".typed")}
         assert kept == {path.relative_to(built / package) for path in (built / package).rglob("*") if path.is_file()}
 

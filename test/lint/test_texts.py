@@ -15,7 +15,7 @@ WITHOUT = ("hero_examples", "hero_test")
 SUFFIXES = ("", *".py .md .rst .launch .test .xml .yaml .yml .toml .txt .msg .srv .action .urdf".split())
 CHOSEN = os.environ.get("HERO_LINT_FILES", "").split("\n")  # of script/lint FILE ...
 PYTHON = [path for path in sources.list_python_files() if CHOSEN == [""] or sources.name_of(path) in CHOSEN]
-TESTS = [path for path in PYTHON if "test" in path.parts]
+TESTS = [path for path in PYTHON if "test" in path.parts and not {"bench", "src"} & set(path.parts)]
 
 
 def dotted_name(node):

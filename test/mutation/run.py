@@ -32,7 +32,7 @@ from reached import ReachedLines
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 EQUIVALENT = HERE / "equivalent.txt"
-sys.path.insert(0, str(ROOT / "test" / "lint"))
+sys.path.insert(0, str(ROOT / "test"))
 import sources  # noqa: E402
 
 CPU_LIMIT_FACTOR, CPU_LIMIT_LEAST_S = 5.0, 10
@@ -91,7 +91,7 @@ class Mutant(NamedTuple):
 
 def list_packages():
     """Return the packages that have both modules and unit tests."""
-    folders = sorted(path.parents[1] for path in ROOT.glob("*/test/unit"))
+    folders = [path.parents[1] for path in sources.find("test/unit")]
     return [folder.name for folder in folders if (folder / "src" / folder.name).is_dir()]
 
 
@@ -128,7 +128,7 @@ def run_pytest(paths, *plugins, options=()):
 
 def find_reached_lines(package, paths, state):
     """Return what each test executes, and the modules of others that the tests import."""
-    state_hash = hash_files([*paths, *sorted((ROOT / package / "test" / "unit").rglob("*.py"))])
+    state_hash = hash_files([*paths, *sorted((sources.PACKAGES[package] / "test" / "unit").rglob("*.py"))])
     kept, log = state / "reached.json", state / "tests.log"
     if kept.is_file():
         reached = json.loads(kept.read_text(encoding="utf-8"))
@@ -139,7 +139,7 @@ def find_reached_lines(package, paths, state):
         with open(log, "wb") as file:
             os.dup2(file.fileno(), 1)
         plugin = ReachedLines(map(str, paths))
-        code = run_pytest([ROOT / package / "test" / "unit"], plugin)
+        code = run_pytest([sources.PACKAGES[package] / "test" / "unit"], plugin)
         imported = [
             name
             for name, module in sys.modules.items()
@@ -250,7 +250,7 @@ def try_package(package, work_dir, sample, seed):
     """Try a package; return how many mutants it has, and [(mutant, verdict), ...] of those tried."""
     state = work_dir / package
     state.mkdir(parents=True, exist_ok=True)
-    paths = sorted(path for path in (ROOT / package / "src").rglob("*.py") if path.name != "__init__.py")
+    paths = sorted(path for path in (sources.PACKAGES[package] / "src").rglob("*.py") if path.name != "__init__.py")
     reached = find_reached_lines(package, paths, state)
     for name in reached["imported"]:
         with contextlib.suppress(Exception):  # only saves the children time

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "test" / "lint"))
+sys.path.insert(0, str(ROOT / "test"))
 import sources  # noqa: E402
 
 LIBRARIES = {"PIL", "cv2", "matplotlib", "numpy", "pexpect", "rospkg", "scipy", "tornado", "tqdm", "yaml"}
@@ -25,7 +25,7 @@ def uses_library(path, modules, seen):
 
 def main():
     """Run from the command line."""
-    for tests in sorted(ROOT.glob("*/test/unit")):
+    for tests in sources.find("test/unit"):
         # A directory of tests is on the path: its modules go by their stem.
         modules = {**sources.list_source_modules(), **{path.stem: path for path in tests.rglob("*.py")}}
         for path in sorted(tests.rglob("test_*.py")):

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "hero_swarm/test/unit"))
+sys.path.insert(0, str(ROOT / "options/hero_swarm/test/unit"))
 from test_behaviors import CASES, OPEN, place  # noqa: E402
 
 from hero_client.values.robot_constants import BODY_RADIUS_M  # noqa: E402

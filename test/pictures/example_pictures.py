@@ -17,7 +17,7 @@ from hero_client import Robot
 from hero_sim.world.arena_file import load_arena
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "bench"))
+sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
 from hero_test.light_watch import LightWatch  # noqa: E402
@@ -28,7 +28,7 @@ DOCS = ROOT / "hero_examples" / "docs"
 
 def arena_file(name):
     """Return the path of an arena of the tests."""
-    return str(ROOT / "hero_test" / "arenas" / ("%s_arena.yaml" % name))
+    return str(ROOT / "test" / "hero_test" / "arenas" / ("%s_arena.yaml" % name))
 
 
 class Recording:

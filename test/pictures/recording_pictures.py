@@ -19,11 +19,11 @@ from PIL import Image
 from hero_sim.srv import InjectFault
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "bench"))
+sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"
-CALIBRATION_ARENA = ROOT / "hero_calibration" / "test" / "rostest" / "calibration_arena.yaml"
+CALIBRATION_ARENA = ROOT / "options" / "hero_calibration" / "test" / "rostest" / "calibration_arena.yaml"
 RECORDED_S = 60
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from picture_program import make_pictures
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "bench"), str(ROOT / "hero_monitor" / "test" / "rostest")]
+sys.path += [str(ROOT / "test" / "bench"), str(ROOT / "options" / "hero_monitor" / "test" / "rostest")]
 from monitor_page import MonitorPage  # noqa: E402
 from running_suite import RunningSuite  # noqa: E402
 

@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 from picture_program import make_pictures
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "bench"))
+sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
 from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402

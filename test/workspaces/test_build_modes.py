@@ -18,21 +18,20 @@ from pathlib import Path
 
 import pytest
 
+import sources
 from hero_test.processes import find_free_port
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "test" / "lint"))
-import sources  # noqa: E402
 
 SCRATCH = ROOT / ".work" / "workspaces"
 BUILD_TIMEOUT_S = 1800.0
 PROBE_TIMEOUT_S = 120.0
 ASK_PROGRAMS = Path(__file__).with_name("ask_programs.py")
-LAUNCH_FILES = sorted(ROOT.glob("*/launch/*.launch"))
-PACKAGES = sorted(path.parent.name for path in ROOT.glob("*/package.xml"))
+LAUNCH_FILES = sources.find("launch/*.launch")
+PACKAGES = sources.PACKAGES
 PROGRAMS = [
     (path.parent.name, program)
-    for path in sorted(ROOT.glob("*/CMakeLists.txt"))
+    for path in sources.find("CMakeLists.txt")
     for program in re.findall(
         r"hero_add_(?:program|node|script)\((?:nodes/)?([\w.]+)",
         path.read_text().replace("${PROJECT_NAME}", path.parent.name),
@@ -72,8 +71,8 @@ def run(script, directory, timeout_s=PROBE_TIMEOUT_S):
 def copy_sources(destination):
     """Copy the packages, without what git ignores, to a directory of a new workspace."""
     ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
-    for package in PACKAGES:
-        shutil.copytree(str(ROOT / package), str(destination / package), ignore=ignored)
+    for folder in PACKAGES.values():
+        shutil.copytree(str(folder), str(destination / folder.relative_to(ROOT)), ignore=ignored)
 
 
 class Workspace:
@@ -145,7 +144,7 @@ def test_run_tests_runs_unit_tests_rostests_and_launch_checks(workspace):
 
 
 def test_every_package_is_found_only_in_the_workspace(workspace):
-    names = sorted(set(PACKAGES) - {"hero"})  # rospack knows no metapackages
+    names = sorted(set(PACKAGES) - {"hero", "hero_options"})  # rospack knows no metapackages
     found = workspace.run(f"for name in {' '.join(names)}; do rospack find $name; done").split()
     assert len(found) == len(names)
     assert all(path.startswith(str(workspace.directory)) for path in found), found
@@ -154,8 +153,8 @@ def test_every_package_is_found_only_in_the_workspace(workspace):
 @INSTALLED
 def test_every_module_can_be_imported(workspace):
     modules = []
-    for package in PACKAGES:
-        source = ROOT / package / "src"
+    for folder in PACKAGES.values():
+        source = folder / "src"
         for path in sorted(source.rglob("*.py")):
             name = ".".join(path.relative_to(source).with_suffix("").parts)
             if not name.endswith("__main__"):

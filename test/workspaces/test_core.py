@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+import sources
 from hero_test.processes import find_free_port
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -54,8 +55,10 @@ def run_in_core():
     shutil.rmtree(str(WORKSPACE), ignore_errors=True)
     for name in (*CORE, "hero_test"):  # no part of the suite: helpers of its tests
         ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
-        shutil.copytree(str(ROOT / name), str(WORKSPACE / "src" / "hero" / name), ignore=ignored)
-    shutil.copy(str(ROOT / "conftest.py"), str(WORKSPACE / "src" / "hero"))
+        folder = sources.PACKAGES[name]
+        shutil.copytree(str(folder), str(WORKSPACE / "src" / "hero" / folder.relative_to(ROOT)), ignore=ignored)
+    for name in ("conftest.py", "test/sources.py"):
+        shutil.copy(str(ROOT / name), str(WORKSPACE / "src" / "hero" / name))
     # Tests compare what packages document with the pages of the repository.
     shutil.copytree(str(ROOT / "docs"), str(WORKSPACE / "src" / "hero" / "docs"))
     (WORKSPACE / "refuse").mkdir()

@@ -16,7 +16,7 @@ from hero_sim.world.arena_file import load_arena
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples.swarm_go_to import STEP_HZ, Formation
 
-CIRCLE = str(Path(__file__).resolve().parents[3] / "hero_test" / "arenas" / "circle_arena.yaml")
+CIRCLE = str(Path(__file__).resolve().parents[3] / "test" / "hero_test" / "arenas" / "circle_arena.yaml")
 LAW = AvoidanceLaw()
 
 

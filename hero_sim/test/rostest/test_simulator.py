@@ -103,7 +103,7 @@ class SimulatorTest(unittest.TestCase):
 
     def test_robots_from_elsewhere_and_simulated_ones_share_a_driver(self):
         """A robot that is none of ours stands for a real one: another program, which knows no simulator."""
-        program = Path(__file__).resolve().parents[3] / "bench" / "emulated_swarm.py"
+        program = Path(__file__).resolve().parents[3] / "test" / "bench" / "emulated_swarm.py"
         command = [sys.executable, program, "--port", "21081", "--first-id", "100", "--count", "1"]
         other = subprocess.Popen([*command, "--seconds", "60"], stdout=subprocess.PIPE)
         try:

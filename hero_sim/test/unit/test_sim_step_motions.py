@@ -11,7 +11,7 @@ from hero_client import FrameError, GoalError, RobotNotReadyError, StoppedError
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
 
-CORNER_ARENA = str(Path(__file__).resolve().parents[3] / "hero_test" / "arenas" / "examples_arena.yaml")
+CORNER_ARENA = str(Path(__file__).resolve().parents[3] / "test" / "hero_test" / "arenas" / "examples_arena.yaml")
 CORNERED = 4
 """hero_4 stands in the corner: a wall 0.12 m ahead of its center, another 0.16 m to its left."""
 

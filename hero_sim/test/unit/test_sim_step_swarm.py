@@ -19,7 +19,7 @@ from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world import arena
 from hero_test.robot_program import go_around
 
-CORNER_ARENA = str(Path(__file__).resolve().parents[3] / "hero_test" / "arenas" / "examples_arena.yaml")
+CORNER_ARENA = str(Path(__file__).resolve().parents[3] / "test" / "hero_test" / "arenas" / "examples_arena.yaml")
 CORNERED = 4
 """hero_4 stands in the corner: a wall 0.12 m ahead of its center, another 0.16 m to its left."""
 

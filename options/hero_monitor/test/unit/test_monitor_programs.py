@@ -5,11 +5,11 @@ import signal
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import pytest
 import yaml
 
+import sources
 from hero_client.apps.formations import FormationError
 from hero_monitor.control import programs as programs_module
 from hero_monitor.control.offers import BEHAVIORS, OFFERS, check_values, make_arguments, place_robots
@@ -18,7 +18,6 @@ from hero_monitor.control.requests import RequestError
 from hero_swarm.behaviors import find_behavior, list_names
 from hero_test.waiting import wait_for
 
-PACKAGES = Path(__file__).resolve().parents[3]
 DEADLINE_S = 300.0
 
 CIRCLE = {"shape": "circle", "spacing_m": 0.3, "turn_deg": 90.0, "x_m": 1.0, "y_m": -0.5, "linear_m_s": 0.08}
@@ -31,7 +30,7 @@ DEAF = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print
 
 
 def read_launch_arguments(package, program):
-    text = (PACKAGES / package / "launch" / (program + ".launch")).read_text(encoding="utf-8")
+    text = (sources.PACKAGES[package] / "launch" / (program + ".launch")).read_text(encoding="utf-8")
     return [line.split('name="')[1].split('"')[0] for line in text.splitlines() if "<arg " in line]
 
 

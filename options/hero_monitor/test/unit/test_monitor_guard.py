@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import sources
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_monitor.control import guard as module
 from hero_monitor.control import programs as programs_module
@@ -19,8 +20,6 @@ from hero_monitor.fleet_feed.master_link import MasterLink
 from hero_monitor.fleet_feed.page_state import LogRing, PageState
 from hero_monitor.fleet_feed.placement import Placement
 from hero_node.geometry import Pose
-
-PACKAGES = Path(__file__).resolve().parents[3]
 
 
 def run_guard(monkeypatch, signs, ends_after=10**6, code=0):
@@ -66,7 +65,7 @@ def test_a_program_ends_with_the_monitor_after_five_seconds_of_silence(monkeypat
 
 def test_what_pages_offer_is_what_launch_files_say():
     for name, offer in OFFERS.items():
-        text = (PACKAGES / offer.package / "launch" / (offer.program + ".launch")).read_text(encoding="utf-8")
+        text = (sources.PACKAGES[offer.package] / "launch" / (offer.program + ".launch")).read_text(encoding="utf-8")
         for field, default, doc in re.findall(r'<arg name="(\w+)" default="([^"]*)" doc="([^"]*)"', text):
             given = offer.fields.get(field)
             if given is None or not isinstance(given.default, float):

@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Dict, List, NamedTuple
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 
 gc.disable()  # it would look through all syntax trees again and again, of which none is garbage
 
@@ -65,14 +65,18 @@ def list_files(*suffixes: str) -> List[Path]:
     return sorted({path for path in paths if path.is_file() and str(path).endswith(suffixes or ("",))})
 
 
-def list_packages() -> List[str]:
-    """Names of the catkin packages, which are also their directories."""
-    return sorted(path.parent.name for path in ROOT.glob("*/package.xml"))
+def find(pattern: str) -> List[Path]:
+    """Paths that match in the folders of the packages: those of the core, of the options, and of the tests."""
+    return sorted(path for place in (ROOT, ROOT / "options", ROOT / "test") for path in place.glob(f"hero*/{pattern}"))
+
+
+PACKAGES: Dict[str, Path] = {path.parent.name: path.parent for path in find("package.xml")}
+"""Folders of the catkin packages, which are called as they are."""
 
 
 def list_programs(package: str) -> List[str]:
     """Programs of a package that rosrun finds: those that CMake makes, and scripts in nodes/."""
-    scripts = [path.name for path in sorted((ROOT / package / "nodes").glob("*"))]
+    scripts = [path.name for path in sorted((PACKAGES[package] / "nodes").glob("*"))]
     return re.findall(r"hero_add_(?:program|node)\((\w+)", read_cmake(package)) + scripts
 
 
@@ -103,18 +107,19 @@ def parse(path: Path) -> ast.Module:
 
 def read_cmake(package: str) -> str:
     """CMakeLists.txt of a package."""
-    text = (ROOT / package / "CMakeLists.txt").read_text(encoding="utf-8")
+    text = (PACKAGES[package] / "CMakeLists.txt").read_text(encoding="utf-8")
     return text.replace("${PROJECT_NAME}", package)
 
 
 def package_of(path: Path) -> str:
     """The catkin package that a file belongs to, or the top directory's name."""
-    return path.relative_to(ROOT).parts[0]
+    own = [folder.name for folder in path.parents if PACKAGES.get(folder.name) == folder]
+    return own[0] if own else path.relative_to(ROOT).parts[0]
 
 
 def module_name(path: Path) -> str:
     """The name by which a file below <package>/src is imported."""
-    parts = list(path.relative_to(ROOT / package_of(path) / "src").with_suffix("").parts)
+    parts = list(path.relative_to(PACKAGES[package_of(path)] / "src").with_suffix("").parts)
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
@@ -145,7 +150,7 @@ def list_source_modules() -> Dict[str, Path]:
     return {
         module_name(path): path
         for path in list_python_files()
-        if path.suffix == ".py" and path.relative_to(ROOT).parts[1:2] == ("src",)
+        if path.suffix == ".py" and PACKAGES.get(package_of(path), ROOT) / "src" in path.parents
     }
 
 
@@ -168,7 +173,7 @@ def list_pure_modules() -> List[Path]:
 
 def read_dependencies(package: str, *kinds: str) -> List[str]:
     """What package.xml of a package declares, of the given kinds (exec_depend, ...), or of every kind."""
-    root = ElementTree.parse(ROOT / package / "package.xml").getroot()
+    root = ElementTree.parse(PACKAGES[package] / "package.xml").getroot()
     tags = kinds or ("depend", "build_depend", "buildtool_depend", "exec_depend", "test_depend")
     return [element.text.strip() for tag in tags for element in root.findall(tag)]
 
