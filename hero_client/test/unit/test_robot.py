@@ -6,9 +6,15 @@ import pytest
 from linkless_robot import make_robot
 
 from hero_client.robots.group import READY_TIMEOUT_S
-from hero_client.robots.robot_base import STOPPED_WARNING_PERIOD_S
-from hero_client.values.errors import GoalError, RobotNotReadyError, StaleDataError, StoppedError
-from hero_client.values.readings import FRESH_S
+from hero_client.robots.robot_base import WARNING_PERIOD_S
+from hero_client.values.errors import (
+    GoalError,
+    NotCalibratedError,
+    RobotNotReadyError,
+    StaleDataError,
+    StoppedError,
+)
+from hero_client.values.readings import FRESH_S, NOT_CALIBRATED
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, MODELS
 from hero_node.geometry import Pose, Velocity
 
@@ -44,8 +50,31 @@ def test_the_nearest_obstacle_is_told_in_the_body_frame():
     robot, link = make_robot()
     link.ranges[6], link.ranges[1] = 0.1, 0.2
     assert robot.nearest() == pytest.approx((0.1, -math.pi / 2.0))
-    link.ranges = []
+    link.ranges = [math.inf] * 8
     assert robot.nearest() is None
+
+
+@pytest.mark.parametrize("unknown", [1, 8])
+def test_what_no_calibrated_sensor_sees_is_not_known_and_never_free(unknown):
+    robot, link = make_robot()
+    link.ranges = [math.inf] * (8 - unknown) + [math.nan] * unknown
+    with pytest.raises(NotCalibratedError, match="what is near hero_3 is not known: its infrared .* calibrate`"):
+        robot.nearest()
+    assert (robot.missing_ranges() is not None) == (unknown == 8)
+    link.ranges[0] = 0.1
+    assert robot.nearest() == (0.1, 0.0)
+    link.ranges = []
+    with pytest.raises(NotCalibratedError):
+        robot.nearest()
+
+
+def test_a_blind_robot_stops_and_names_the_calibration_now_and_then():
+    robot, link = make_robot()
+    assert not robot.stop_if_blind() and not link.sent
+    link.ranges = [math.nan] * 8
+    assert all(robot.stop_if_blind() for _ in range(3))
+    assert [velocity[1:] for velocity in link.sent] == [(0.0, 0.0)] * 3
+    assert link.warned == ["hero_3 waits: " + NOT_CALIBRATED]
 
 
 def test_a_pose_in_another_frame_is_the_measured_one_or_by_the_origin():
@@ -109,7 +138,7 @@ def test_commands_to_a_stopped_robot_are_warned_about_now_and_then():
     link.is_stopped = True
     robot.drive(0.0, 0.0)
     assert link.warned == []
-    for step_s in (0.0, STOPPED_WARNING_PERIOD_S - 0.1, 0.1):
+    for step_s in (0.0, WARNING_PERIOD_S - 0.1, 0.1):
         link.clock.sleep(step_s)
         robot.drive(0.0, 1.0)
     assert link.warned == ["hero_3 does not move: the driver has stopped all robots"] * 2

@@ -77,6 +77,15 @@ def test_a_listener_takes_no_implausible_pose(number, monkeypatch):
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_a_free_track_is_told_from_one_whose_sensors_are_not_calibrated(number):
+    track = RobotTrack()
+    track.receive_proximity([math.inf] * 7 + [number], 0.0, 0.8)
+    assert track.is_free == (number == math.inf)
+    track.receive_proximity([], 0.0, 0.8)
+    assert not track.is_free
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_ranges_at_invalid_angles_are_not_seen(number):
     track = RobotTrack()
     for angle_min_rad, increment_rad, is_seen in ((0.0, 0.8, True), (number, 0.8, False), (0.0, number, False)):

@@ -10,6 +10,7 @@ from hero_client import CommonFrame, Program, open_swarm, read_parameters
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
 from hero_client.controllers.motion import State
+from hero_client.values.readings import is_blind
 from hero_node.geometry import STOP
 from hero_node.parameters import flag, number, robot_ids, whole_number
 
@@ -42,7 +43,9 @@ class Explorer:
         """Send the next command. frontiers: places on the frontier of the map; taken: goals of the other robots."""
         pose, ranges = self.common.pose_of(self.robot), self.robot.fresh_proximity()
         command = STOP
-        if pose is not None and not all(map(math.isnan, ranges)):
+        if is_blind(ranges):
+            self.common.missing[self.robot.name] = self.robot.missing_ranges()
+        elif pose is not None:
             self.choose(pose, frontiers, taken, now_s)
             ranges = shorten_for_body(ranges, self.robot.model.body_radius_m)
             if self.controller:

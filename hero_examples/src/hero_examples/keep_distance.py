@@ -6,6 +6,8 @@ from hero_client import BaseRobot, Robot, rate
 
 
 def step(robot: BaseRobot) -> None:
+    if robot.stop_if_blind():  # its sensors are not calibrated
+        return
     nearest = robot.nearest()
     if nearest is None:
         robot.drive(0.05, 0.0)  # the sensors see 0.24 m far

@@ -1,12 +1,12 @@
 """Robots walk at random and avoid obstacles; their lights show green: walking, yellow: bending away, red: turning."""
 
-import math
 import random
 
 import rospy
 
 from hero_client import Program, open_swarm, read_parameters
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
+from hero_client.values.readings import is_blind
 from hero_client.values.robot_constants import MAX_LINEAR_M_S
 from hero_node.geometry import STOP
 from hero_node.parameters import number, robot_ids, whole_number
@@ -23,9 +23,8 @@ class Walker:
 
     def step(self):
         """Send the next command; return why the robot cannot walk, or None."""
-        ranges, missing = self.robot.fresh_proximity(), self.robot.missing()
-        if all(map(math.isnan, ranges)):
-            missing = missing or "no usable ranges: infrared calibration?"
+        ranges, missing = self.robot.fresh_proximity(), self.robot.missing_ranges() or self.robot.missing()
+        if is_blind(ranges):
             command, self.memory, color = STOP, WanderMemory(), "blue"
         else:
             ranges = shorten_for_body(ranges, self.robot.model.body_radius_m)

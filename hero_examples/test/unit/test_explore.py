@@ -7,6 +7,7 @@ import true_paths
 
 from hero_client import CommonFrame
 from hero_client.controllers.motion import State
+from hero_client.values.readings import NOT_CALIBRATED
 from hero_node.geometry import Pose
 from hero_sim.stepped.swarm import StepSwarm
 
@@ -80,6 +81,7 @@ def test_a_robot_without_ranges_stops_and_goes_on_when_they_come(swarm, monkeypa
     for known in ([math.nan] * 8, [*ranges[:1], *[math.nan] * 7]):
         monkeypatch.setattr(robot, "fresh_proximity", lambda known=known: known)
         explorer.step([LEFT], [], 0.0)
+        assert (explorer.common.missing["hero_0"] == NOT_CALIBRATED) == all(map(math.isnan, known))
     assert driven[0] == (0.0, 0.0) and driven[1] != (0.0, 0.0)
 
 

@@ -105,6 +105,28 @@ def test_all_robots_turns_every_robot_in_a_color_of_its_own():
     assert any(len(set(lights)) == 5 for lights in seen)
 
 
+@pytest.mark.parametrize("script", [avoid, keep_distance])
+def test_robots_that_are_not_calibrated_wait_and_drive_once_they_are(script):
+    with StepSwarm(1, seed=1, arena="obstacles", worlds=4) as swarm:
+        calibrations = swarm.rows._calibration_counts_m2.copy()
+        for row in range(4):
+            swarm.rows.set_infrared_calibration(row, np.full(8, math.nan))
+        swarm.sleep(0.3)  # the next scan
+        for path in true_paths.run(swarm, step_all(swarm, script.step), 10.0):
+            assert np.ptp(path, axis=0).max() < 1e-6
+        for row, calibration in enumerate(calibrations):
+            swarm.rows.set_infrared_calibration(row, calibration)
+        swarm.sleep(0.3)
+        for path in true_paths.run(swarm, step_all(swarm, script.step), 3.0):
+            assert true_paths.measure_lengths(path).min() > 0.03
+
+
+def test_avoid_turns_where_only_the_front_is_not_calibrated():
+    robot = Noting((math.nan, *[math.inf] * 7))
+    avoid.step(robot)
+    assert robot.told == [("drive", 0.0, -1.5)]
+
+
 class Noting:
     """A robot that sees what a test says, and notes what it is told."""
 
@@ -114,6 +136,9 @@ class Noting:
 
     def nearest(self):
         return self._nearest
+
+    def stop_if_blind(self):
+        return False
 
     def __iter__(self):
         return iter(self.robots)

@@ -9,6 +9,7 @@ import true_paths
 
 from hero_client.apps.goals import MAX_QUEUED_GOALS, GoalQueue, GoalRequest, InvalidGoalError
 from hero_client.controllers.go_to_goal import Goal
+from hero_client.values.errors import GoalError
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 
@@ -143,6 +144,17 @@ def test_a_new_goal_replaces_the_old_one(goals):
     assert first.elapsed_s < 1.3
     assert second.reached and goals.queue.reached
     assert math.dist(goals.swarm[0].pose[:2], (0.0, 0.1)) < TRUE_TOLERANCE_M
+
+
+def test_a_goal_around_obstacles_fails_for_sensors_without_calibration():
+    with StepSwarm(1, seed=1, arena="empty") as swarm:
+        swarm.rows.set_infrared_calibration(0, np.full(8, math.nan))
+        swarm.sleep(0.3)
+        log, start_s = swarm.log(), swarm.now_s
+        with pytest.raises(GoalError, match="cannot go around obstacles: its infrared sensors are not calibrated"):
+            swarm[0].go_to(0.3, 0.0, avoid=True)
+        assert swarm.now_s - start_s < 3.0
+        assert np.ptp(log.true_pose[:, 0, 0], axis=0).max() < 1e-6
 
 
 def stream(goals, count, put):

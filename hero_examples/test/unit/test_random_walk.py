@@ -71,7 +71,7 @@ def test_a_walker_without_usable_ranges_stops_and_says_why():
         assert swarm[0].velocity.linear_m_s > 0.05
         swarm.rows.set_infrared_calibration(0, np.full(8, math.nan))
         swarm.sleep(0.3)  # the next scan
-        path = true_paths.run(swarm, lambda time_s: "infrared calibration" not in walker.step(), 2.0)[0]
+        path = true_paths.run(swarm, lambda time_s: "not calibrated" not in walker.step(), 2.0)[0]
         assert np.ptp(path[-20:], axis=0).max() < 1e-6
         assert swarm[0].light == (0.0, 0.0, 1.0)
 
@@ -81,6 +81,7 @@ def test_a_walker_that_lost_its_ranges_forgets_where_it_turned():
     robot = SimpleNamespace(
         fresh_proximity=lambda: [math.nan] * 8,
         missing=lambda: "no laser",
+        missing_ranges=lambda: "no laser",
         drive=lambda *command: sent.append(command),
         led=sent.append,
     )

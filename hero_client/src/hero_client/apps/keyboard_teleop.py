@@ -16,7 +16,7 @@ from hero_node.ros.program import Program
 from ..robot import Robot
 from ..ros.stop_status import paint
 from ..swarm import Swarm
-from ..values.errors import StaleDataError
+from ..values.errors import NotCalibratedError, StaleDataError
 from ..values.robot_constants import MAX_LINEAR_M_S
 from .keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard
 from .teleop_output import PauseDetector, TeleopOutput
@@ -229,14 +229,21 @@ class KeyboardTeleop:
         if missing is not None:
             return "info", "%s | waiting: %s" % (robots, missing)
         try:
-            pose, nearest = robot.pose, robot.nearest()
+            pose, near = robot.pose, _describe_nearest(robot)
         except StaleDataError as error:
             return "info", "%s | waiting: %s" % (robots, error)
-        near = "free"
-        if nearest is not None:
-            near = "%.2f m at %+.0f deg" % (nearest.range_m, math.degrees(nearest.bearing_rad))
         where = "x %.2f y %.2f m %.0f deg" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
         return "info", "%s | %s | %s | near: %s" % (robots, speeds, where, near)
+
+
+def _describe_nearest(robot: Robot) -> str:
+    try:
+        nearest = robot.nearest()
+    except NotCalibratedError:
+        return "not calibrated"
+    if nearest is None:
+        return "free"
+    return "%.2f m at %+.0f deg" % (nearest.range_m, math.degrees(nearest.bearing_rad))
 
 
 def read_stops(keyboard: Keyboard) -> Optional[List[str]]:

@@ -9,7 +9,7 @@ from typing import NamedTuple, Optional, Sequence
 from hero_node.geometry import STOP, Pose, Velocity, wrap_angle
 from hero_node.number_checks import check_finite
 
-from ..values.readings import find_nearest
+from ..values.readings import NOT_CALIBRATED, find_nearest, is_blind
 from .avoidance import bend_around
 from .motion import AIM_SHARE, DEFAULT_TIMEOUT_S, MotionController
 from .unicycle import GoToLaw, go_to_point, go_to_pose
@@ -18,6 +18,9 @@ DEFAULT_TOLERANCE_M = 0.01
 
 FREE_S = 1.5
 """After this long without an obstacle the next one may be passed on the other side."""
+
+BLIND_S = 2.0
+"""After this long without ranges, although it is to go around obstacles, the motion has failed."""
 
 PROGRESS_S = 30.0
 """After this long without coming nearer, a robot that goes around obstacles is in a dead end."""
@@ -57,6 +60,7 @@ class GoToGoalController(MotionController):
         self.goal = goal
         self._tolerance_m = tolerance_m
         self._avoid = avoid
+        self._blind_since_s = math.inf
         self._side = 0
         self._last_bent_s = -math.inf
         self._min_distance_m, self._progress_s = math.inf, now_s
@@ -86,8 +90,14 @@ class GoToGoalController(MotionController):
             command = go_to_point(pose, goal.x_m, goal.y_m, law)
         else:
             command = go_to_pose(pose, Pose(goal.x_m, goal.y_m, goal.yaw_rad), law)
-        if not self._avoid or not ranges:
+        if not self._avoid:
             return command
+        if is_blind(ranges):
+            self._blind_since_s = min(self._blind_since_s, seen_s)
+            if seen_s - self._blind_since_s > BLIND_S:
+                self._fail("it cannot go around obstacles: " + NOT_CALIBRATED)
+            return STOP
+        self._blind_since_s = math.inf
         bearing_rad = wrap_angle(math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m) - pose.yaw_rad)
         if seen_s - self._last_bent_s > FREE_S:
             self._side = 0

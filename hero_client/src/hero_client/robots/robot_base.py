@@ -7,9 +7,9 @@ front, y to the left, angles counter-clockwise from the front.
 import math
 from contextlib import suppress
 from functools import partial
-from typing import Callable, Generator, List, Optional, Tuple
+from typing import Callable, Generator, Optional
 
-from hero_node.geometry import Pose, Velocity, clamp, transform_pose, wrap_angle
+from hero_node.geometry import Pose, clamp, transform_pose
 from hero_node.number_checks import check_finite, check_speed
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController, make_goal
@@ -18,17 +18,14 @@ from ..controllers.straight_and_turn import ForwardController, TurnController
 from ..values.background_motion import BackgroundMotion, Sleep, Steps
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
-from ..values.readings import FRESH_S, Obstacle, find_nearest
-from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, RobotModel
+from ..values.readings import NOT_CALIBRATED, is_blind
+from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from ..values.robot_link import RobotLink
-from ..values.sensing import Neighbor
-from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, Group, carry_out, wait_for_all
+from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, carry_out, wait_for_all
 from .light import Light
+from .robot_readings import NEXT_ODOM_S, RobotReadings
 
-NEXT_ODOM_S = 5.0
-"""The next odometry comes within 0.1 s, on a busy machine within a second."""
-
-STOPPED_WARNING_PERIOD_S = 5.0
+WARNING_PERIOD_S = 5.0
 
 COMMAND_S = 2.0
 """A robot obeys a command that no other follows for this long."""
@@ -36,7 +33,7 @@ COMMAND_S = 2.0
 OnStep = Callable[[GoToGoalController], None]
 
 
-class BaseRobot(Group):
+class BaseRobot(RobotReadings):
     """One robot: what Robot has that needs no ROS.
 
     Attributes:
@@ -61,171 +58,6 @@ class BaseRobot(Group):
         self._moves_sent = 0
         self._last_move_s = -math.inf
         self._is_clipped = False
-
-    # ------------------------------------------------------------------ data
-
-    def age_s(self, topic: str) -> float:
-        """Return the seconds since the last message of "odom", "proximity" or "encoder" arrived.
-
-        inf before the first message.
-        """
-        return self._link.age_s(topic)
-
-    def await_first(self, topic: str) -> None:
-        """Wait for the first message of "odom" or "proximity", in the first 2 s of this object only."""
-        if self._link.age_s(topic) == math.inf and self.now_s < self._first_data_s:
-            with suppress(StaleDataError):  # reported by those who read it
-                self._link.wait_for_next(topic, self._first_data_s - self.now_s)
-
-    def _check_fresh(self, topic: str) -> None:
-        age_s = self._link.age_s(topic)
-        if age_s == math.inf:
-            self.await_first(topic)
-            age_s = self._link.age_s(topic)
-        if age_s <= FRESH_S:
-            return
-        name = "%s/%s" % (self.namespace, topic)
-        if age_s == math.inf:
-            raise StaleDataError("no message on %s yet: is the robot on, and does the driver run?" % name)
-        raise StaleDataError("the last message on %s came %.1f s ago: has the robot gone?" % (name, age_s))
-
-    def _check_asked(self, topic: str) -> None:
-        """Check that a topic, which only its readers subscribe to, has fresh data. Raises: StaleDataError."""
-        self._link.subscribe(topic)
-        if self._link.age_s(topic) == math.inf:
-            self._link.wait_for_next(topic, NEXT_ODOM_S)
-        self._check_fresh(topic)
-
-    @property
-    def pose(self) -> Pose:
-        """The robot's pose by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
-
-        In the first 2 s of a Robot it waits for the first odometry, as other data properties wait for theirs.
-
-        Raises: StaleDataError if odometry is older than 1 s.
-        """
-        self._check_fresh("odom")
-        return self._link.read_pose()
-
-    def pose_in(self, frame: str, timeout_s: float = 2.0) -> Pose:
-        """Return where the robot is in another frame, such as "map", which hero_localization gives all robots.
-
-        A frame that localize does not know, such as "world" of simulated robots, is looked up in tf: the first such
-        call subscribes to /tf, which is a load with many robots. What is not known yet is waited for up to timeout_s.
-
-        Raises: StaleDataError as `pose`, or if the robot drove on where nothing measures it. FrameError if the robot
-        was never measured, or tf does not connect frame with hero_N/odom.
-        """
-        frame = frame.lstrip("/")
-        localized = self._link.find_localized(frame, timeout_s)
-        pose = localized or transform_pose(self._link.find_origin(frame, timeout_s), self.pose)
-        return pose._replace(yaw_rad=wrap_angle(pose.yaw_rad))
-
-    @property
-    def velocity(self) -> Velocity:
-        """Velocity by odometry, in hero_N/base_link. Raises: StaleDataError as `pose`."""
-        self._check_fresh("odom")
-        return self._link.read_velocity()
-
-    @property
-    def proximity(self) -> List[float]:
-        """Eight ranges in m from the robot's center, front first, counter-clockwise, 45 degrees apart.
-
-        Index 0 is the front, 2 left, 4 rear, 6 right. inf: nothing in range (0.24 m); 0.0: too close to measure (0.047
-        m); nan: not calibrated. The topic /hero_N/proximity has the same ranges rear first (index 4 is the front), and
-        -Inf for too close.
-
-        Raises: StaleDataError if they are older than 1 s.
-        """
-        self._check_fresh("proximity")
-        return self._link.read_ranges()
-
-    @property
-    def wheel_speeds(self) -> Tuple[float, float]:
-        """Speeds of the left and right wheel at the rim, m/s, by the odometry. Raises: StaleDataError as `pose`."""
-        linear_m_s, angular_rad_s = self.velocity
-        turning_m_s = angular_rad_s * self.model.wheel_separation_m / 2.0
-        return linear_m_s - turning_m_s, linear_m_s + turning_m_s
-
-    @property
-    def infrared_counts(self) -> List[float]:
-        """Readings of the eight infrared sensors without ambient light, in counts; in the order of `proximity`.
-
-        The first use subscribes, and waits up to 5 s. Raises: StaleDataError if they are older than 1 s.
-        """
-        self._check_asked("laser")
-        return self._link.read_infrared_counts()
-
-    @property
-    def distance(self) -> float:
-        """The distance ahead by HeRo+'s sensor, in m from the robot's center; it sees 0.04 to 2.9 m.
-
-        The first use waits up to 5 s. Raises: StaleDataError as `pose`, also on a robot without the sensor.
-        """
-        self._check_asked("distance")
-        return self._link.read_distance()
-
-    @property
-    def neighbors(self) -> List[Neighbor]:
-        """Robots around, nearest first, which `rosrun hero_swarm neighbors` computes; in process, all of the world.
-
-        The first use waits up to 5 s. Raises: StaleDataError if they are older than 1 s, or the own pose is not known.
-        """
-        try:
-            self._check_asked("neighbors")
-        except StaleDataError as error:
-            raise StaleDataError("%s: does `rosrun hero_swarm neighbors` run?" % str(error).split(":")[0]) from None
-        return self._link.read_neighbors()
-
-    def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
-        """Wait for the next scan, which comes 5 times a second, and return its ranges as `proximity` does.
-
-        Raises: StaleDataError if none comes within timeout_s.
-        """
-        self._link.subscribe("proximity")
-        self._link.wait_for_next("proximity", timeout_s)
-        return self._link.read_ranges()
-
-    def fresh_pose(self) -> Optional[Pose]:
-        """Return `pose` without waiting, or None if it is not fresh."""
-        return self._link.read_pose() if self._link.age_s("odom") <= FRESH_S else None
-
-    def fresh_velocity(self) -> Optional[Velocity]:
-        """Return `velocity` without waiting, or None if it is not fresh."""
-        return self._link.read_velocity() if self._link.age_s("odom") <= FRESH_S else None
-
-    def fresh_proximity(self) -> List[float]:
-        """Return `proximity` without waiting, or eight times nan (not known) if it is not fresh."""
-        return self._link.read_ranges() if self._link.age_s("proximity") <= FRESH_S else [math.nan] * 8
-
-    def nearest(self) -> Optional[Obstacle]:
-        """Return range (m, from the center) and bearing (rad) of the nearest obstacle, or None. Raises: as `pose`."""
-        ranges = self.proximity
-        return find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
-
-    # ------------------------------------------------------------------ state
-
-    @property
-    def connected(self) -> bool:
-        """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
-        return self._link.connected
-
-    @property
-    def model(self) -> RobotModel:
-        """Dimensions, such as model.body_radius_m; the stock robot's until the driver has reported. Never waits."""
-        return self._link.model
-
-    @property
-    def is_stopped(self) -> bool:
-        """Whether the robot takes no motion because its driver has stopped all robots (emergency stop).
-
-        Never waits. False until the robot's driver has reported, which wait_until_ready() waits for.
-        """
-        return self._link.is_stopped
-
-    def missing(self) -> Optional[str]:
-        """Return why the robot cannot be driven now, as text for users; None if it can."""
-        return self._link.missing()
 
     def set_pose(self, x_m: float, y_m: float, yaw_rad: float) -> None:
         """Set the odometry: from now on the robot is at this pose of hero_N/odom. Returns when `pose` says so.
@@ -258,9 +90,13 @@ class BaseRobot(Group):
             return
         self._end_motion()
         self._send_velocity(linear_m_s, angular_rad_s)
-        if (linear_m_s or angular_rad_s) and self._link.is_stopped and self.now_s >= self._next_warning_s:
-            self._next_warning_s = self.now_s + STOPPED_WARNING_PERIOD_S
-            self._link.log_warning(self._describe_stop())
+        if (linear_m_s or angular_rad_s) and self._link.is_stopped:
+            self._warn(self._describe_stop())
+
+    def _warn(self, text: str) -> None:
+        if self.now_s >= self._next_warning_s:
+            self._next_warning_s = self.now_s + WARNING_PERIOD_S
+            self._link.log_warning(text)
 
     def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         check_finite("speeds", linear_m_s, angular_rad_s)
@@ -274,6 +110,14 @@ class BaseRobot(Group):
                 % (self.name, linear_m_s, angular_rad_s, MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S)
             )
         self._link.send_velocity(clamp(linear_m_s, MAX_LINEAR_M_S), clamp(angular_rad_s, MAX_ANGULAR_RAD_S))
+
+    def stop_if_blind(self) -> bool:
+        """Stop the robot if no sensor is calibrated, and log that every 5 s; return whether so. Raises: as `pose`."""
+        if not is_blind(self.proximity):
+            return False
+        self.drive(0.0, 0.0)
+        self._warn("%s waits: %s" % (self.name, NOT_CALIBRATED))
+        return True
 
     def _describe_stop(self) -> str:
         return "%s does not move: %s" % (self.name, self._link.describe_stop())

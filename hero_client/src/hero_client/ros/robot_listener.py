@@ -13,7 +13,7 @@ from sensor_msgs.msg import LaserScan
 
 from hero_node.geometry import Pose, measure_distance, wrap_angle
 
-from ..values.readings import Obstacle, find_nearest, read_pose, read_ranges
+from ..values.readings import Obstacle, find_nearest, is_free, read_pose, read_ranges
 
 RATE_WINDOW_S = 3.0
 """Long enough that 5 Hz reads steadily, short enough to see a robot fall silent."""
@@ -66,7 +66,11 @@ class RateMeter:
 
 
 class RobotTrack:
-    """Readings of one robot's odometry and proximity so far."""
+    """Readings of one robot's odometry and proximity so far.
+
+    Attributes:
+        nearest: obstacle; None if nothing is in range, if is_free, or else because that is not known.
+    """
 
     def __init__(self) -> None:
         self.odometry = RateMeter()
@@ -74,6 +78,7 @@ class RobotTrack:
         self.distance_m = 0.0
         self.turned_rad = 0.0
         self.proximity_seen = False
+        self.is_free = False
         self.nearest: Optional[Obstacle] = None
 
     def receive_pose(self, pose: Optional[Pose]) -> None:
@@ -86,6 +91,7 @@ class RobotTrack:
     def receive_proximity(self, ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float) -> None:
         """Take the newest proximity scan; an invalid one, without ranges, counts as none."""
         self.proximity_seen = len(ranges_m) > 0
+        self.is_free = is_free(ranges_m)
         self.nearest = find_nearest(ranges_m, angle_min_rad, increment_rad)
 
 

@@ -19,6 +19,10 @@ class StaleDataError(RobotError):
     """The newest message is missing or too old to act upon."""
 
 
+class NotCalibratedError(StaleDataError):
+    """Infrared sensors of a robot are not calibrated, so that it is not known what is near it."""
+
+
 class StoppedError(RobotError):
     """The robot does not move because all robots are stopped (emergency stop); the text says how to release them."""
 

@@ -19,6 +19,10 @@ MAX_RANGES = 64
 """A robot has eight sensors; a scan with more ranges than this is invalid."""
 
 
+NOT_CALIBRATED = "its infrared sensors are not calibrated: `rosrun hero_calibration calibrate`"
+"""Why ranges are nan, for users: a stock robot sends them for sensors without constants (RangeSensor.ino)."""
+
+
 class Obstacle(NamedTuple):
     """The nearest thing that a proximity sensor sees."""
 
@@ -77,6 +81,16 @@ def find_nearest(ranges_m: Sequence[float], angle_min_rad: float, increment_rad:
         return None
     range_m, index = min(seen)
     return Obstacle(range_m, wrap_angle(angle_min_rad + index * increment_rad))
+
+
+def is_blind(ranges_m: Sequence[float]) -> bool:
+    """Return whether no sensor tells what is near: neither an obstacle nor free space."""
+    return all(map(math.isnan, ranges_m))
+
+
+def is_free(ranges_m: Sequence[float]) -> bool:
+    """Return whether every sensor tells that nothing is in range; False if only one does not know."""
+    return len(ranges_m) > 0 and all(range_m == math.inf for range_m in ranges_m)
 
 
 def finite(value: float) -> Optional[float]:

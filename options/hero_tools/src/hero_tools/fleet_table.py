@@ -26,12 +26,12 @@ def format_pose(pose: Optional[Pose]) -> str:
     return "%6.2f %6.2f m %4.0f deg" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
 
 
-def format_nearest(seen: bool, nearest: Optional[Obstacle]) -> str:
+def format_nearest(seen: bool, free: bool, nearest: Optional[Obstacle]) -> str:
     """Return range and direction of the nearest obstacle; seen: whether any scan has arrived."""
     if not seen:
         return "-"
     if nearest is None:
-        return "free"
+        return "free" if free else "not calibrated"
     where = DIRECTIONS[round(nearest.bearing_rad / (math.pi / 4)) % 8]
     return "touch %s" % where if nearest.range_m == -math.inf else "%.2f m %s" % (nearest.range_m, where)
 
@@ -48,7 +48,7 @@ def format_cells(row: RobotRow) -> List[str]:
         "%.1f kB/s" % (robot.bytes_per_s / 1e3),
         format_pose(track.pose),
         "%.2f m" % track.distance_m,
-        format_nearest(track.proximity_seen, track.nearest),
+        format_nearest(track.proximity_seen, track.is_free, track.nearest),
         make_printable("; ".join(filter(None, notes))),
     ]
 
@@ -84,7 +84,10 @@ def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent
 
 
 def make_row_dict(row: RobotRow) -> Dict[str, Any]:
-    """Return one robot for JSON. nearest is null if nothing is in range, its range_m null on contact."""
+    """Return one robot for JSON. nearest is null if nothing is in range, which is_free confirms.
+
+    Its range_m is null on contact.
+    """
     robot, track = row.robot, row.track
     return {
         "id": robot.id,
@@ -99,6 +102,7 @@ def make_row_dict(row: RobotRow) -> Dict[str, Any]:
         "distance_m": finite(track.distance_m),
         "moved": row.moved,
         "nearest": track.nearest and {name: finite(value) for name, value in track.nearest._asdict().items()},
+        "is_free": track.is_free,
         "reconnects": robot.reconnects,
         "clock_offset_s": finite(robot.clock_offset),
         "firmware": robot.firmware,

@@ -206,7 +206,7 @@ def test_cells_have_units_and_the_table_its_words():
         ("front", "front left", "left", "rear left", "rear", "rear right", "right", "front right")
     ):
         nearest = SimpleNamespace(range_m=0.1, bearing_rad=eighth * 0.7854 + 0.3)
-        assert format_nearest(True, nearest) == "0.10 m " + words
+        assert format_nearest(True, False, nearest) == "0.10 m " + words
     assert format_title([], "", True) == "0 of 0 robots ready, ALL STOPPED"
     shown = make_row_dict(RobotRow(row.robot, row.track, 29.3456))
     assert (shown["odom_hz"], shown["bytes_per_s"], shown["distance_m"], shown["nearest"]) == (

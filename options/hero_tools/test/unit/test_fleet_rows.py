@@ -25,7 +25,7 @@ def make_row(robot_id, nearest=None, pose=ORIGIN, distance_m=1.0, turned_rad=0.0
     for name, value in reported.items():
         setattr(robot, name, value)
     track = RobotTrack()
-    track.pose, track.nearest, track.proximity_seen = pose, nearest, True
+    track.pose, track.nearest, track.proximity_seen, track.is_free = pose, nearest, True, nearest is None
     track.distance_m, track.turned_rad = distance_m, turned_rad
     return RobotRow(robot, track, odom_hz=29.3)
 

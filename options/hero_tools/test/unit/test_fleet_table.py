@@ -53,13 +53,13 @@ def test_texts_of_robots_cannot_draw_on_the_terminal():
     ],
 )
 def test_the_nearest_obstacle_has_a_direction_in_words(bearing_rad, where):
-    assert format_nearest(True, Obstacle(0.123, bearing_rad)) == "0.12 m " + where
-    assert format_nearest(True, Obstacle(-math.inf, bearing_rad)) == "touch " + where
+    assert format_nearest(True, False, Obstacle(0.123, bearing_rad)) == "0.12 m " + where
+    assert format_nearest(True, False, Obstacle(-math.inf, bearing_rad)) == "touch " + where
 
 
 def test_free_is_shown_apart_from_no_scan_yet():
-    assert format_nearest(True, None) == "free"
-    assert format_nearest(False, None) == "-"
+    assert format_nearest(True, True, None) == "free" and format_nearest(True, False, None) == "not calibrated"
+    assert format_nearest(False, False, None) == "-"
 
 
 def test_the_title_counts_ready_robots_and_shows_a_stop():

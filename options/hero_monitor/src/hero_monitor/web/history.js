@@ -10,17 +10,28 @@ const JUMP_MM = 500; // moved by hand, or its odometry was set
 export const QUANTITIES = {
   speed: { title: "speed", unit: "m/s", of: (from, to, seconds) => distance(from, to) / 1000 / seconds },
   turn: { title: "turn rate", unit: "rad/s", of: (from, to, seconds) => wrap(to.yaw - from.yaw) / seconds },
-  nearest: { title: "nearest obstacle", unit: "m", of: (from, to) => (to.nearest === null ? null : to.nearest / 1000) },
+  nearest: { title: "nearest obstacle", unit: "m", of: (from, to) => (isRange(to.nearest) ? to.nearest / 1000 : null) },
   odometry: { title: "odometry rate", unit: "Hz", of: (from, to) => to.odom },
 };
 
 const distance = (from, to) => Math.hypot(to.x - from.x, to.y - from.y);
 const wrap = (mrad) => Math.atan2(Math.sin(mrad / 1000), Math.cos(mrad / 1000));
 
-/** Nearest valid range in mm; null without one. */
+const isRange = (range) => Number.isFinite(range) && range >= 0;
+
+/** Nearest range in mm; Infinity: nothing in range; -1: not known, a sensor is not calibrated; null without data. */
 export function nearestOf(ranges) {
-  const valid = (ranges || []).filter((range) => range !== null && range >= 0);
-  return valid.length ? Math.min(...valid) : null;
+  if (!ranges || !ranges.length) return null;
+  const valid = ranges.filter(isRange);
+  if (valid.length) return Math.min(...valid);
+  return ranges.includes(-1) ? -1 : Infinity;
+}
+
+/** What users read of nearestOf(). */
+export function nearestText(mm, digits) {
+  if (mm === null) return "-";
+  if (mm < 0) return "not calibrated";
+  return isRange(mm) ? `${(mm / 1000).toFixed(digits)} m` : "free";
 }
 
 export class History {

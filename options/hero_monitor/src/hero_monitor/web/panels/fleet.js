@@ -2,7 +2,7 @@
 
 import { Lines, element, isPressed, make, setPressed } from "../dom.js";
 import { colorOf } from "../map/colors.js";
-import { nearestOf } from "../history.js";
+import { nearestOf, nearestText } from "../history.js";
 import { sourceOf, stateOf } from "../losses.js";
 
 export function spanOf(seconds) {
@@ -38,7 +38,7 @@ const COLUMNS = [
   { title: "State", value: stateText, tag: "state", lasting: true },
   { title: "Stop", value: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", className: "stop", lasting: true },
   { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => LIGHTS[light] || light || "off", byName: true },
-  { title: "Nearest", value: nearestRange, text: (mm) => number(mm === null ? null : mm / 1000, 2, " m"), className: "number", byName: true },
+  { title: "Nearest", value: nearestRange, text: (mm) => nearestText(mm, 2), className: "number", byName: true },
   { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), className: "number", byName: true },
   { title: "Pose", value: sourceOf, text: (source) => source || "own odometry", tag: "source", lasting: true, byName: true },
   { title: "Address", value: (robot) => robot.address, className: "details", lasting: true },

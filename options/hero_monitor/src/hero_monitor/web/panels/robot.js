@@ -9,7 +9,7 @@ import { colorOf } from "../map/colors.js";
 import { isLate } from "../connection.js";
 import { listenToHold } from "../hold.js";
 import { healthOf, spanOf } from "./fleet.js";
-import { nearestOf } from "../history.js";
+import { nearestOf, nearestText } from "../history.js";
 import { stateOf } from "../losses.js";
 
 const HOLD_MS = 100;
@@ -167,7 +167,6 @@ export class RobotPanel {
   listFacts(robot, state) {
     if (stateOf(robot, state) === "UNKNOWN") return [["all data", "unknown"]];
     const pose = state.poses[robot.name];
-    const nearest = nearestOf(state.ranges[robot.name]);
     const meters = (value) => (value / 1000).toFixed(3);
     const facts = [
       ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
@@ -175,7 +174,7 @@ export class RobotPanel {
       ["pose source", robot.source || "own odometry: position on the map unknown"],
       ["frame", robot.source ? state.fleet.frame : "-"],
       ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
-      ["nearest", nearest === null ? "nothing in range" : `${meters(nearest)} m`],
+      ["nearest", nearestText(nearestOf(state.ranges[robot.name]), 3)],
       ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
       ["from robot", `${robot.packets.toFixed(0)} packets/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
       ["address", robot.address],
