@@ -254,7 +254,7 @@ class Lab:
         """Take an image."""
         self.now_s += FRAME_S
         for tag in self.robots:
-            self.lines += self.localizer.add_odometry(tag.tag_id, self.now_s, Pose(0.0, 0.0, 0.0))
+            self.lines += self.localizer.add_odometry(tag.tag_id, self.now_s, Pose(0.0, 0.0, 0.0), self.now_s)
         expected = self.tracker.project(
             {robot.robot_id: robot.estimate.pose for robot in self.localizer.list_robots(self.now_s) if robot.estimate}
         )
@@ -264,9 +264,9 @@ class Lab:
         for robot_id, seen in sightings.robots.items():
             if not self.tracker.is_moved:
                 measurement = StampedPose(self.now_s, seen.pose, seen.covariance)
-                self.lines += self.localizer.add_measurement(robot_id, measurement)
+                self.lines += self.localizer.add_measurement(robot_id, measurement, self.now_s)
         if self.tracker.is_moved:
-            self.localizer.distrust(self.now_s, list(sightings.robots))
+            self.localizer.distrust(self.now_s, list(sightings.robots), self.now_s)
         self.lines += self.localizer.find_lost(self.now_s)
 
     def list_wrong(self, limit_m: float = 0.01) -> List[int]:

@@ -278,7 +278,7 @@ class Localization:
         """Take an image, and the odometry up to it; return the tags of the images that arrive now."""
         for robot, readings in enumerate(self._scene.odometry):
             for odometry_s, pose in readings[self._fed[robot] :]:
-                self._localizer.add_odometry(robot, odometry_s, pose)
+                self._localizer.add_odometry(robot, odometry_s, pose, stamp_s)
             self._fed[robot] = len(readings)
         self._waiting.append((stamp_s, tags))
         arrived = []
@@ -302,10 +302,10 @@ class Localization:
         lines: Dict[int, List[str]] = {}
         for robot, sighting in locate(self._camera, tags, self._layout).robots.items():
             measurement = StampedPose(taken_s - self._delay_s, sighting.pose, sighting.covariance)
-            lines[robot] = self._localizer.add_measurement(robot, measurement)
-        for robot, (_, after, _) in self._list_estimates(now_s).items():
+            lines[robot] = self._localizer.add_measurement(robot, measurement, now_s)
+        for robot, estimate in self._list_estimates(now_s).items():
             if robot in before and not lines.get(robot):
-                step_m = measure_distance(before[robot].pose, after)
+                step_m = measure_distance(before[robot].pose, estimate.pose)
                 self.unannounced_m = max(self.unannounced_m, step_m)
 
 

@@ -13,7 +13,7 @@ from hero_localization.filter.odometry_history import (
     MAX_TURN_RAD_S,
     OdometryHistory,
 )
-from hero_localization.filter.pose_filter import REPLAYED_S
+from hero_localization.filter.pose_hypothesis import REPLAYED_S
 from hero_node.geometry import Pose, transform_pose
 
 ORIGIN = Pose(0.0, 0.0, 0.0)

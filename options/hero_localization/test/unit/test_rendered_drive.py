@@ -111,7 +111,10 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
     cameras = [TrackedCamera(scene, 0.0, 100), TrackedCamera(scene, FIELD_M + gap_m, 110)]
     localizer, lines, seen_by = SwarmLocalizer(), [], []
     localizer.add_robots([0])
-    scene.on_odometry.append(lambda *reading: lines.extend(localizer.add_odometry(0, *reading)))
+    def follow(stamp_s, pose):
+        lines.extend(localizer.add_odometry(0, stamp_s, pose, stamp_s))
+
+    scene.on_odometry.append(follow)
     while len(seen_by) < 20 or seen_by[-10:] != [(False, True)] * 10:
         assert len(seen_by) < 200, seen_by
         scene.swarm[0].drive(0.15, 0.0)
@@ -119,7 +122,8 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
         sightings = [camera.look(scene) for camera in cameras]
         for seen in sightings:
             if seen is not None:
-                lines += localizer.add_measurement(0, StampedPose(scene.taken_s, seen.pose, seen.covariance))
+                measured = StampedPose(scene.taken_s, seen.pose, seen.covariance)
+                lines += localizer.add_measurement(0, measured, scene.taken_s)
         lines += localizer.find_lost(scene.taken_s)
         seen_by.append(tuple(seen is not None for seen in sightings))
         (robot,) = localizer.list_robots(scene.taken_s)

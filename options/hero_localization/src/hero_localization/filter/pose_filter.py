@@ -39,6 +39,7 @@ class Outcome(enum.Enum):
     """Outcome of a measured pose."""
 
     FIRST = "first"
+    """Of the robot, or the first true one: the estimate had begun with a wrong pose."""
     USED = "used"
     WAITING = "waiting"
     """For odometry of its time."""
@@ -117,8 +118,9 @@ class PoseFilter:
             expected = self._main.expect(measurement.stamp_s)
             if not self._was_moved(measurement):
                 return Outcome.OUTLIER
+            if not is_near(expected, measurement.pose):
+                outcome = Outcome.MOVED if self._main.support >= MOVED_POSES else Outcome.FIRST
             self._main = self._rival
-            outcome = Outcome.USED if _is_near(expected, measurement.pose) else Outcome.MOVED
         self._rival = None
         # Of a motion capture system that claims less, no more than it claims.
         self._systematic = np.minimum(SYSTEMATIC, np.diagonal(measurement.covariance))
@@ -165,7 +167,8 @@ def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
     return np.diag((position_sd_m**2, position_sd_m**2, yaw_sd_rad**2))
 
 
-def _is_near(one: Pose, other: Pose) -> bool:
+def is_near(one: Pose, other: Pose) -> bool:
+    """Return whether two poses are so near to each other that no hand moved the robot from one to the other."""
     turned_rad = abs(wrap_angle(other.yaw_rad - one.yaw_rad))
     return measure_distance(one, other) < MIN_MOVED_M and turned_rad < MIN_MOVED_RAD
 

@@ -1,6 +1,6 @@
 """Poses of all robots of a swarm in one frame: a filter for each, and reports. Pure.
 
-now_s and stamps are ROS time.
+now_s and stamps are ROS time. now_s is that of this computer; other computers' stamps may be wrong.
 """
 
 import enum
@@ -8,19 +8,19 @@ import math
 from collections import Counter
 from typing import Dict, Iterable, List, NamedTuple, Optional
 
+import numpy as np
+
 from hero_node.geometry import Pose, measure_distance, wrap_angle
 from hero_node.texts import list_names
 from hero_node.token_bucket import TokenBucket
 
 from .heading_check import HeadingCheck, is_upside_down
-from .pose_filter import Outcome, PoseFilter
+from .pose_filter import Outcome, PoseFilter, is_near
 from .pose_hypothesis import StampedPose
+from .pose_sources import DISAGREEING_S, NO_OFFSET, Conflict, PoseSources, describe_conflict
 
 LOST_S = 1.0
 """A robot whose pose was not measured for this long is lost: its pose follows its odometry alone."""
-
-DISAGREEING_POSES, DISAGREEING_S = 2, 0.1
-"""Outliers in a row, and time since the last pose that was used: the robot is not where odometry has it."""
 
 ANNOUNCED_STEP_M = 0.02
 """A correction that moves a robot by more than this is said."""
@@ -32,7 +32,14 @@ SILENT_S = 1.0
 """Odometry comes 29 times a second."""
 
 AHEAD_S = 0.2
-"""A simulated clock may go in steps of 0.1 s."""
+"""A measured pose whose stamp is this far ahead of this computer's clock, and of odometry, is not used: until that time
+it would count as newer than all others. A simulated clock may go in steps of 0.1 s."""
+
+BACK_S = 0.1
+"""A clock that was set back by more makes all stamps older than those before: robots would stay where they are."""
+
+NAMED_S = 30.0
+"""A cause is named once while it lasts; after this long without it, again."""
 
 LOSS_LINES, LOSS_PERIOD_S = 4, 10.0
 """Burst and period of log lines on robots lost or found: a busy computer loses all robots at once."""
@@ -72,16 +79,24 @@ class _Robot:
         self.is_lost = False
         self.untrusted_s = -math.inf
         """Stamp of the last image of a camera that moved; -inf if the robot was measured since."""
+        self.sources = PoseSources()
         self.outliers = 0
         self.jumps = 0
         self.measured_s = -math.inf
-        self.late_s: Optional[float] = None
-        """Stamp of the last measured pose if it was too old to be used."""
+        self.clock_offset_s: Optional[float] = None
+        """Stamp of the last measured pose less the time at which it came, if it was too old or too new to be used."""
+        self.odometry_offset_s = 0.0
+        """The same of the last reading of odometry, always."""
+        self.heard_s = self.advanced_s = -math.inf
+        """Times at which the last reading of odometry came, and the last one that was newer than those before."""
 
-    @property
-    def disagrees(self) -> bool:
-        """Whether it is measured elsewhere, as while it is moved by hand."""
-        return self.outliers >= DISAGREEING_POSES and self.measured_s - self.filter.used_s >= DISAGREEING_S
+    def find_disagreement(self) -> Optional[Pose]:
+        """Return by how much poses are measured elsewhere, as while it is moved by hand; None if they agree."""
+        return self.sources.find_disagreement(self.filter.support)
+
+    def find_conflict(self) -> Optional[Conflict]:
+        """Return two sources of its poses that contradict each other; None if they agree."""
+        return self.sources.find_conflict(self.filter.support)
 
 
 class SwarmLocalizer:
@@ -92,16 +107,30 @@ class SwarmLocalizer:
         self._now_s = -math.inf
         self._loss_lines = _limit_loss_lines()
         self._summed: Dict[str, int] = Counter()
+        self._named_s: Dict[str, float] = {}
 
     def add_robots(self, robot_ids: Iterable[int]) -> None:
         """Expect these robots too."""
         for robot_id in robot_ids:
             self._robots.setdefault(robot_id, _Robot())
 
-    def add_odometry(self, robot_id: int, stamp_s: float, pose: Pose) -> List[str]:
+    def add_odometry(self, robot_id: int, stamp_s: float, pose: Pose, now_s: float) -> List[str]:
         """Follow a reading of /hero_N/odom; return lines for users."""
+        lines = self._follow_clock(now_s)
         robot = self._robots[robot_id]
-        used_s, lines = robot.filter.used_s, []
+        if stamp_s > now_s + SILENT_S:
+            robot.odometry_offset_s, robot.heard_s = stamp_s - now_s, now_s
+            text = "hero_%d: its odometry comes with stamps %.1f s ahead, and is not used: do the clocks agree?"
+            return lines + self._name("odometry %d" % robot_id, text % (robot_id, stamp_s - now_s))
+        back_s = robot.filter.odometry.newest_s - stamp_s
+        if back_s >= 0.0 and now_s > robot.advanced_s + SILENT_S:
+            self._robots[robot_id] = robot = _Robot()
+            text = "hero_%d: the clock of its driver was set back by %.1f s: it is localized again"
+            lines += self._name("driver %d" % robot_id, text % (robot_id, back_s))
+        if stamp_s > robot.filter.odometry.newest_s:
+            robot.advanced_s = now_s
+        robot.odometry_offset_s, robot.heard_s = stamp_s - now_s, now_s
+        used_s = robot.filter.used_s
         for measurement, before, outcome in robot.filter.add_odometry(stamp_s, pose):
             lines += self._note(robot_id, measurement, outcome, before, used_s)
             used_s = robot.filter.used_s
@@ -110,16 +139,30 @@ class SwarmLocalizer:
             lines.append("hero_%d: its odometry was set or it restarted; its place in the map stays" % robot_id)
         return lines
 
-    def add_measurement(self, robot_id: int, measurement: StampedPose) -> List[str]:
+    def add_measurement(self, robot_id: int, measurement: StampedPose, now_s: float) -> List[str]:
         """Correct a robot by a measured pose; return lines for users.
 
         Raises: KeyError for a robot that is not expected. ValueError as PoseFilter.add_measurement().
         """
+        lines = self._follow_clock(now_s)
         robot = self._robots[robot_id]
+        offset_s = measurement.stamp_s - now_s
+        # The robot's driver and the camera may share a clock that is not this computer's.
+        if measurement.stamp_s > max(now_s, robot.filter.odometry.newest_s) + AHEAD_S:
+            robot.clock_offset_s = offset_s
+            text = "poses from %s come with stamps %.1f s ahead, and are not used: do the clocks agree?"
+            return lines + self._name(measurement.source, text % (measurement.source, offset_s))
         before = robot.filter.pose()
         used_s = robot.filter.used_s
         outcome = robot.filter.add_measurement(measurement)
-        return [] if outcome is Outcome.WAITING else self._note(robot_id, measurement, outcome, before, used_s)
+        if outcome is Outcome.WAITING:
+            return lines
+        return lines + self._note(robot_id, measurement, outcome, before, used_s)
+
+    def _name(self, key: str, line: str) -> List[str]:
+        """Return a line unless one of this key was named, or went on, in the last NAMED_S."""
+        named_s, self._named_s[key] = self._named_s.get(key, -math.inf), self._now_s
+        return [] if named_s <= self._now_s < named_s + NAMED_S else [line]
 
     def _note(
         self, robot_id: int, measurement: StampedPose, outcome: Outcome, before: Optional[Pose], used_s: float
@@ -130,20 +173,24 @@ class SwarmLocalizer:
         """
         robot = self._robots[robot_id]
         is_late = outcome in (Outcome.TOO_LATE, Outcome.NO_ODOMETRY)
-        robot.late_s = measurement.stamp_s if is_late else None
+        offset_s = measurement.stamp_s - self._now_s
+        robot.clock_offset_s = offset_s if is_late or offset_s > AHEAD_S else None
         odometry = robot.filter.odometry.find(measurement.stamp_s)
         if odometry is not None and measurement.stamp_s > robot.measured_s:
             robot.heading.add(measurement.pose, odometry.pose)
         robot.measured_s = max(robot.measured_s, measurement.stamp_s)
-        if is_late or outcome is Outcome.OUTLIER:
-            robot.outliers += outcome is Outcome.OUTLIER
+        if is_late:
             return []
+        conflict = self._note_source(robot, measurement, outcome)
+        if outcome is Outcome.OUTLIER or conflict is not None:
+            robot.outliers += outcome is Outcome.OUTLIER
+            return [] if conflict is None else self._name_conflict(robot_id, conflict)
         robot.outliers = 0
         was_lost, robot.untrusted_s = robot.is_lost, -math.inf
         # What comes late tells where a lost robot was; it would be lost again at once.
         robot.is_lost = was_lost and measurement.stamp_s < self._now_s - LOST_S
         after = robot.filter.pose()
-        if before is None or after is None:
+        if outcome is Outcome.FIRST or before is None or after is None:
             return ["hero_%d found at %s" % (robot_id, _describe_pose(measurement.pose))]
         step_m = measure_distance(before, after)
         step_deg = math.degrees(abs(wrap_angle(after.yaw_rad - before.yaw_rad)))
@@ -158,27 +205,37 @@ class SwarmLocalizer:
             return self._tell_loss(robot_id, line)
         return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
 
-    def distrust(self, stamp_s: float, robot_ids: Iterable[int]) -> None:
+    @staticmethod
+    def _note_source(robot: _Robot, measurement: StampedPose, outcome: Outcome) -> Optional[Conflict]:
+        """Note what became of a pose of a source; return the conflict that this source has with another one."""
+        if outcome is Outcome.OUTLIER:
+            robot.sources.note_outlier(measurement, robot.filter.expect(measurement.stamp_s))
+            return robot.find_conflict()
+        conflict = robot.find_conflict() if outcome is Outcome.MOVED else None
+        if outcome is not Outcome.USED:
+            robot.sources.begin_anew()
+        robot.sources.note_used(measurement)
+        return conflict
+
+    def _name_conflict(self, robot_id: int, conflict: Conflict) -> List[str]:
+        key = " ".join(sorted((conflict.name, conflict.other)))  # of all robots that both see
+        return self._name(key, "hero_%d: %s" % (robot_id, describe_conflict(conflict)))
+
+    def distrust(self, stamp_s: float, robot_ids: Iterable[int], now_s: float) -> None:
         """Take robots as lost, without a line, until a pose is used again: the camera that sees them moved.
 
         Unless another camera has seen them.
         """
+        if stamp_s > now_s + AHEAD_S:
+            return
         for robot_id in robot_ids:
             robot = self._robots.get(robot_id)
             if robot is not None and stamp_s > robot.filter.used_s + DISAGREEING_S:
                 robot.untrusted_s = stamp_s
 
     def find_lost(self, now_s: float) -> List[str]:
-        """Notice robots that are not measured any more; return lines for users. Call it some times a second.
-
-        If time jumps back, as when a recording is played again, all robots are to be found anew.
-        """
-        lines = []
-        if now_s < self._now_s - LOST_S:
-            lines.append("time jumped back by %.1f s: all robots are localized again" % (self._now_s - now_s))
-            self._robots = {robot_id: _Robot() for robot_id in self._robots}
-            self._loss_lines = _limit_loss_lines()
-        self._now_s = now_s
+        """Notice robots that are not measured any more; return lines for users. Call it some times a second."""
+        lines = self._follow_clock(now_s)
         if self._summed and self._loss_lines.take(1.0, now_s):
             text = "%d more lines on robots lost or found again: %s"
             lines.append(text % (sum(self._summed.values()), list_names(list(self._summed))))
@@ -189,6 +246,15 @@ class SwarmLocalizer:
                 robot.is_lost = True
                 lines += self._tell_loss(robot_id, "hero_%d lost: its pose follows its odometry" % robot_id)
         return lines
+
+    def _follow_clock(self, now_s: float) -> List[str]:
+        """If time jumps back, as when a recording is played again, begin anew with all robots; return lines."""
+        back_s, self._now_s = self._now_s - now_s, now_s
+        if back_s <= BACK_S:
+            return []
+        self._robots = {robot_id: _Robot() for robot_id in self._robots}
+        self._loss_lines = _limit_loss_lines()
+        return ["time jumped back by %.1f s: all robots are localized again" % back_s]
 
     def _tell_loss(self, robot_id: int, line: str) -> List[str]:
         """Return a line on a robot that is lost or found; of many, find_lost() tells how many there were."""
@@ -202,12 +268,14 @@ class SwarmLocalizer:
         return [self._describe(robot_id, robot, now_s) for robot_id, robot in sorted(self._robots.items())]
 
     def _describe(self, robot_id: int, robot: _Robot, now_s: float) -> LocalizedRobot:
-        estimate = robot.filter.estimate()
+        estimate, off = robot.filter.estimate(), robot.find_disagreement()
         state = RobotState.TRACKED
         if estimate is None:
             state = RobotState.UNKNOWN
-        elif robot.is_lost or robot.untrusted_s > -math.inf or robot.disagrees:
+        elif robot.is_lost or robot.untrusted_s > -math.inf or not is_near(NO_OFFSET, off or NO_OFFSET):
             state = RobotState.LOST
+        if estimate is not None and off is not None:  # it may be at either place
+            estimate = estimate._replace(covariance=estimate.covariance + np.diag(np.square(off)))
         problem = self._find_problem(robot, state, now_s)
         origin = None if estimate is None else robot.filter.find_odom_origin(estimate.pose)
         return LocalizedRobot(robot_id, state, estimate, origin, problem)
@@ -215,20 +283,24 @@ class SwarmLocalizer:
     @staticmethod
     def _find_problem(robot: _Robot, state: RobotState, now_s: float) -> str:
         newest_s = robot.filter.odometry.newest_s
-        if newest_s == -math.inf:
-            return "no odometry: is the robot on?"
         if newest_s < now_s - SILENT_S:
+            if now_s < robot.heard_s + SILENT_S:
+                offset = _describe_offset(robot.odometry_offset_s)
+                return "its odometry comes with stamps %s: do the clocks agree?" % offset
+            if newest_s == -math.inf:
+                return "no odometry: is the robot on?"
             return "no odometry for %.0f s: is the robot on and in reach?" % (now_s - newest_s)
+        if robot.clock_offset_s is not None:
+            return "measured poses come with stamps %s: do the clocks agree?" % _describe_offset(robot.clock_offset_s)
         if robot.measured_s == -math.inf:
             return "its pose was never measured: is its tag in view?"
-        if robot.late_s is not None:
-            return "measured poses come with stamps %.1f s old: do the clocks agree?" % (now_s - robot.late_s)
-        if robot.measured_s > now_s + AHEAD_S:
-            return "measured poses come with stamps %.1f s ahead: do the clocks agree?" % (robot.measured_s - now_s)
         if robot.untrusted_s > now_s - LOST_S:
             return "the camera that sees it moved: calibrate_camera arena"
         if robot.is_lost:
             return "not measured for %.0f s: is its tag occluded or out of view?" % (now_s - robot.filter.used_s)
+        conflict = robot.find_conflict()
+        if conflict is not None:
+            return describe_conflict(conflict)
         error_rad = robot.heading.error_rad
         if error_rad is not None and abs(error_rad) > WRONG_HEADING_RAD:
             kind = "upside down" if is_upside_down(error_rad) else "turned"
@@ -241,6 +313,10 @@ class SwarmLocalizer:
 
 def _limit_loss_lines() -> TokenBucket:
     return TokenBucket(LOSS_LINES, 1.0 / LOSS_PERIOD_S, 0.0)
+
+
+def _describe_offset(offset_s: float) -> str:
+    return "%.1f s %s" % (abs(offset_s), "ahead" if offset_s > 0.0 else "old")
 
 
 def _describe_pose(pose: Pose) -> str:

@@ -3,7 +3,7 @@
 import math
 import struct
 from contextlib import suppress
-from typing import Callable, Optional, Tuple
+from typing import Any, Callable, Optional, Tuple
 
 import genpy
 import numpy as np
@@ -60,6 +60,11 @@ def _read_odometry(data: bytes) -> Tuple[float, Pose]:
     x_m, y_m, _, x, y, z, w = _POSE.unpack_from(data, offset)
     yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     return seconds + 1e-9 * nanoseconds, Pose(x_m, y_m, yaw_rad)
+
+
+def describe_source(topic: str, message: Any) -> str:
+    """Return the topic and node that a message came from."""
+    return "%s (%s)" % (topic, (message._connection_header or {}).get("callerid", "unknown node"))
 
 
 def find_pose_mistake(pose: PoseMessage) -> str:
@@ -146,4 +151,4 @@ class PoseInput:
             covariance = told if told.any() else covariance  # may not be filled in
         # A stamp of zero says that the sender does not know the time: that of arrival is the best there is.
         stamp = content.header.stamp if content.header.stamp else rospy.get_rostime()
-        return StampedPose(stamp.to_sec(), pose, covariance)
+        return StampedPose(stamp.to_sec(), pose, covariance, describe_source(self._topic, message))

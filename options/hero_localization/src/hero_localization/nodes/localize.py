@@ -20,7 +20,7 @@ from hero_node.parameters import number, robot_ids, words
 from ..filter.pose_filter import make_covariance
 from ..filter.pose_hypothesis import StampedPose
 from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
-from .inputs import PoseInput, subscribe_odometry
+from .inputs import PoseInput, describe_source, subscribe_odometry
 from .outputs import Outputs
 
 DIAGNOSTICS_PERIOD_S = 1.0
@@ -67,9 +67,9 @@ class LocalizationNode:
             self._inputs[robot_id] = PoseInput(topic, self._pose_frame, self._covariance, correct, warn)
 
     def _call(self, work: Callable[..., List[str]], *values: Any) -> None:
-        """Call a method of the localizer, and log the lines that it returns."""
+        """Call a method of the localizer with these values and the time, and log the lines that it returns."""
         with self._lock:
-            lines = work(*values)
+            lines = work(*values, rospy.get_time())
         for line in lines:
             rospy.loginfo(line)
 
@@ -79,6 +79,7 @@ class LocalizationNode:
             text = "%s is in the frame %r, but must be in %r: give its publisher and this node the same ~frame"
             rospy.logwarn_throttle(10.0, text % (self._swarm_topic, report.header.frame_id, self._frame))
             return
+        source = describe_source(self._swarm_topic, report)
         for robot in report.robots:
             pose = Pose(robot.x, robot.y, robot.yaw)
             if robot.id not in self._inputs:
@@ -86,11 +87,11 @@ class LocalizationNode:
             if robot.id in self._inputs and robot.state == RobotPose.TRACKED and is_plausible(pose):
                 is_told = 0.0 < robot.position_sd < MAX_SD and 0.0 < robot.yaw_sd < MAX_SD
                 covariance = make_covariance(robot.position_sd, robot.yaw_sd) if is_told else self._covariance
-                measurement = StampedPose(robot.stamp.to_sec(), pose, covariance)
+                measurement = StampedPose(robot.stamp.to_sec(), pose, covariance, source)
                 self._call(self._localizer.add_measurement, robot.id, measurement)
         with self._lock:
             lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
-            self._localizer.distrust(report.header.stamp.to_sec(), lost)
+            self._localizer.distrust(report.header.stamp.to_sec(), lost, rospy.get_time())
         self._image_used.set()
 
     def step(self, period_s: float) -> None:
@@ -101,7 +102,7 @@ class LocalizationNode:
             report = share_drivers().read()
             self._add_robots(sorted(robot.id for robot in report.robots if robot.id >= 0) if report else [])
         now_s = rospy.get_time()
-        self._call(self._localizer.find_lost, now_s)
+        self._call(self._localizer.find_lost)
         with self._lock:
             robots = self._localizer.list_robots(now_s)
         self._outputs.publish(robots)
