@@ -32,7 +32,7 @@ from hero_node.texts import shorten
 
 __all__ = [
     "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Objects",
-    "ObjectsInSight", "Random", "Sensed", "Sight", "decide", "derive_seed", "sense",
+    "ObjectsInSight", "Random", "Sensed", "Sight", "decide", "derive_seed", "lock", "sense",
 ]  # fmt: skip
 
 VELOCITY, PULSES = DRIVES = ("velocity", "pulses")
@@ -64,9 +64,17 @@ class Random:
         return self._draw("standard_normal", columns)
 
 
+def lock(values: np.ndarray) -> np.ndarray:
+    """Return a read-only view: what a program writes into what it was given would falsify what others read."""
+    view = values.view()
+    view.flags.writeable = False
+    return view
+
+
 class Sensed:
     """Readings of R robots, as attributes: those below, and one for each sensor of the behavior, by its name.
 
+    All arrays are read-only.
     A Binary gives an array (R,) of bool, Neighbors a Neighborhood, a Sight an array (R,) of NOTHING, OBJECT or ROBOT,
     and Objects an ObjectsInSight.
 
@@ -82,16 +90,21 @@ class Sensed:
         """Take the poses (W, N, 3) and the readings of all sensors by their names."""
         worlds, self.count, _ = poses.shape
         self.time_s = time_s
-        self.poses = poses.reshape(-1, 3)
-        self.is_known = np.isfinite(self.poses).all(axis=1)
-        self.numbers = np.tile(np.arange(self.count), worlds)
-        self._readings = readings
+        self.poses = lock(poses.reshape(-1, 3).copy())
+        self.is_known = lock(np.isfinite(self.poses).all(axis=1))
+        self.numbers = lock(np.tile(np.arange(self.count), worlds))
+        self._readings = {name: _lock_reading(reading) for name, reading in readings.items()}
 
     def __getattr__(self, name: str) -> Any:
         try:
             return self.__dict__["_readings"][name]
         except KeyError:
             raise AttributeError("the behavior has no sensor %r" % name) from None
+
+
+def _lock_reading(reading: Any) -> Any:
+    """Return what a sensor gives, an array or a named tuple of arrays, read-only."""
+    return type(reading)(*map(lock, reading)) if isinstance(reading, tuple) else lock(reading)
 
 
 class Behavior:
@@ -158,9 +171,17 @@ def sense(
 def decide(behavior: Behavior, sensed: Sensed, memory: Any, random: Random) -> Tuple[np.ndarray, np.ndarray, Any]:
     """Return linear m/s and angular rad/s of all robots (R,), and the memory, as the behavior's step() gives them.
 
-    Raises: ValueError for other shapes.
+    Raises: ValueError for other shapes, and for a step that writes into what it senses.
     """
-    command, robots = behavior.step(sensed, memory, random), len(sensed.numbers)
+    robots = len(sensed.numbers)
+    try:
+        command = behavior.step(sensed, memory, random)
+    except ValueError as error:
+        if "read-only" not in str(error):
+            raise
+        text = "%s.step() writes into an array of sensed, which is read-only: copy it first, as in sensed.poses.copy()"
+        # With the traceback of the line that writes.
+        raise ValueError(text % type(behavior).__name__).with_traceback(error.__traceback__) from None
     if not isinstance(command, tuple) or len(command) != 3:
         text = "%s.step() must return linear_m_s, angular_rad_s, memory, not %s"
         raise ValueError(text % (type(behavior).__name__, shorten(command)))

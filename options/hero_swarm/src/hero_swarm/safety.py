@@ -17,6 +17,9 @@ from hero_client.values.robot_constants import HERO, MAX_LINEAR_M_S, MAX_WHEEL_M
 OFF, FENCE, ROBOTS = "off", "fence", "fence and robots"
 MODES = (OFF, FENCE, ROBOTS)
 
+RATE_HZ = 20.0
+"""Calls per second by which the gains below keep robots apart; at 3 Hz they left the fence, at 1 Hz they touched."""
+
 MAX_AGE_S = 0.5
 """A robot whose pose is older is stopped."""
 
@@ -31,17 +34,20 @@ class SafetyFilter:
         mode: off, fence, or fence and robots.
         lookahead_m: the steered point lies this far in front of the axle.
         margin_m: free space kept around each body.
-        gain_1_s: closing speed allowed for each meter that is left.
+        gain_1_s: closing speed allowed to two robots for each meter that is left.
+        fence_gain_1_s: the same of a robot and the fence: half, as a fence does not give way to wheels that lag.
         neighbors: this many of the nearest robots are looked at: more do not fit around one.
         sidestep: share of what is taken from a velocity that goes to its right, so that robots that meet pass.
         max_speed_m_s, max_angular_rad_s, max_wheel_m_s: limits of the commands, and of what is wanted.
         radii_m: of the robots' bodies (N,), or one for all.
         is_limited: which robots were asked in the last call for more than they can drive (W, N).
+        calls, limited_calls: number of all calls, and of those in which a robot was asked for more than it can drive.
     """
 
     lookahead_m = 0.03
     margin_m = 0.012
     gain_1_s = 4.0
+    fence_gain_1_s = 2.0
     neighbors = 6
     sidestep = 3.0
     max_speed_m_s = MAX_LINEAR_M_S
@@ -57,7 +63,13 @@ class SafetyFilter:
         self._separations_m: Union[float, Sequence[float]] = HERO.wheel_separation_m
         self._fence_m = fence_m
         self.is_limited = np.zeros((1, 1), dtype=bool)
+        self.calls = self.limited_calls = 0
         self._last: Optional[np.ndarray] = None
+
+    @property
+    def rate_hz(self) -> float:
+        """Least number of calls per second; 0 if nothing is filtered."""
+        return 0.0 if self.mode == OFF else RATE_HZ
 
     def set_models(self, models: Sequence[RobotModel]) -> None:
         """Take bodies and wheels from the models of the robots (N,)."""
@@ -82,6 +94,8 @@ class SafetyFilter:
         # First of all: the sweeps below do not converge from a velocity that is far from all that is allowed.
         share = self._find_share(linear_m_s, angular_rad_s)
         self.is_limited = share < 1.0
+        self.calls += 1
+        self.limited_calls += bool(self.is_limited.any())
         linear_m_s, angular_rad_s = linear_m_s * share, angular_rad_s * share
         ages_s = np.zeros(poses.shape[:2]) if ages_s is None else ages_s
         known = np.isfinite(poses).all(axis=2) & (ages_s <= MAX_AGE_S)
@@ -151,5 +165,5 @@ class SafetyFilter:
             gaps_m -= radii_m[:, None]
             inward = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
             normals.append(np.broadcast_to(inward, (*points_m.shape[:2], 4, 2)))
-            bounds.append(-self.gain_1_s * gaps_m)
+            bounds.append(-self.fence_gain_1_s * gaps_m)
         return np.concatenate(normals, axis=2), np.concatenate(bounds, axis=2)

@@ -19,7 +19,9 @@ from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena, measure_clearance
 from hero_sim.world.pushing.shapes import PushedBody
 
-from .behavior import PULSES, Behavior, Random, decide, derive_seed, sense
+from .behavior import PULSES, Behavior, Random, derive_seed, lock
+from .control import Control
+from .safety import SafetyFilter
 from .wheel_pulses import find_pulses, list_dead_zones
 
 OPEN = Arena("open", np.empty((0, 4)), np.empty((0, 3)), (), np.array([-50.0, -50.0, 50.0, 50.0]))
@@ -77,9 +79,8 @@ class Trial:
 
     Attributes:
         rows: the robots, as arrays.
-        poses: true poses (W, N, 3).
-        velocities: how they changed in the last control step, per second (W, N, 3).
-        memory: what the behavior remembers.
+        poses: true poses (W, N, 3), read-only.
+        velocities: how they changed in the last step of the behavior, per second (W, N, 3), read-only.
     """
 
     def __init__(
@@ -91,7 +92,7 @@ class Trial:
         size_m: Optional[Tuple[float, float]] = None,
         errors: float = 1.0,
         delay_s: float = 0.0,
-        filter_commands: Any = None,
+        filter_commands: Optional[SafetyFilter] = None,
         starts: Optional[np.ndarray] = None,
         objects: Optional[Sequence[Sequence[PushedBody]]] = None,
         known_errors: Sequence[str] = (),
@@ -99,7 +100,7 @@ class Trial:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
         errors: 0 for nominal robots, 1 for usual ones. delay_s: age of the poses that robots sense each
-        other by. filter_commands: called with poses (W, N, 3), linear and angular speeds (W, N), returns speeds.
+        other by. filter_commands: keeps robots apart, or inside a fence, between the steps of the behavior as well.
         objects: of each world; None: those of the arena, where it has them. known_errors: of robots 0 to N - 1, as
         hero_sim --error takes them.
         """
@@ -110,15 +111,19 @@ class Trial:
         self.behavior = behavior
         self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects, known_errors))
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
-        self.poses, self.velocities = starts, np.zeros_like(starts)
-        self.memory: Any = None
-        self._random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
+        self.poses, self.velocities = lock(np.array(starts)), lock(np.zeros_like(starts))
+        random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
+        self._control = Control(behavior, random, filter_commands)
         self._delay_s = delay_s
-        self._filter = filter_commands
-        self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, starts)])
+        self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, self.poses)])
         objects = [arena.objects] if objects is None else objects
         self._radii_m = np.array([thing.shape.reach_m for thing in objects[0]])
         self._all = np.arange(starts.shape[0] * robots)
+
+    @property
+    def memory(self) -> Any:
+        """The memory of the behavior."""
+        return self._control.memory
 
     @property
     def things(self) -> Things:
@@ -126,29 +131,29 @@ class Trial:
         return Things(self.rows.world.object_poses, self._radii_m)
 
     def step(self) -> float:
-        """Take one control step, let its time pass, and return the time (s)."""
+        """Take one step of the behavior, let its time pass, and return the time (s)."""
+        rows, start_ms, start = self.rows, self.rows.now_ms, self.poses
+        for number in range(1, self._control.steps_per_decision + 1):
+            self._drive()
+            rows.advance(start_ms + round(number * 1000.0 / self._control.rate_hz))
+            self.poses = lock(rows.world.poses.reshape(start.shape).copy())
+        self.velocities = lock((self.poses - start) * self.behavior.rate_hz)
+        return rows.now_ms / 1000.0
+
+    def _drive(self) -> None:
+        """Send the next commands, and the colors that were decided."""
         rows, now_s = self.rows, self.rows.now_ms / 1000.0
         self._seen.append((now_s, self.poses))
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - self._delay_s + 1e-9:
             self._seen.popleft()
-        sensed_poses = self._seen[0][1]
-        sensed = sense(self.behavior, now_s, sensed_poses, self._random, self.things)
-        linear_m_s, angular_rad_s, self.memory = decide(self.behavior, sensed, self.memory, self._random)
-        if self._filter is not None:
-            safe = self._filter(sensed_poses, linear_m_s, angular_rad_s)
-            linear_m_s, angular_rad_s = (values.ravel() for values in safe)
+        linear_m_s, angular_rad_s = self._control.step(now_s, self._seen[0][1], self.things)
         if self.behavior.drive == PULSES:
             rows.send_pulses(self._all, *find_pulses(linear_m_s, angular_rad_s, self._dead_zones_us))
         else:
             rows.send_velocity(self._all, linear_m_s, angular_rad_s)
-        colors = self.behavior.colors(self.memory)
+        colors = self.behavior.colors(self.memory) if self._control.has_decided else None
         if colors is not None:
             rows.send_light(self._all, np.column_stack((colors, np.ones(len(colors)))))
-        rows.advance(rows.now_ms + round(1000.0 / self.behavior.rate_hz))
-        poses = rows.world.poses.reshape(self.poses.shape).copy()
-        self.velocities = (poses - self.poses) * self.behavior.rate_hz
-        self.poses = poses
-        return rows.now_ms / 1000.0
 
     def run(self, time_s: float, every_s: float = 1.0) -> Iterator[Tuple[float, np.ndarray]]:
         """Yield the time (s) and the poses (W, N, 3) every so often, for this long."""

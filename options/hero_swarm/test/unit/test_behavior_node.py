@@ -19,6 +19,7 @@ from hero_sim.main import build_parser
 from hero_sim.stepped.swarm import StepSwarm
 from hero_swarm.behavior import Behavior, Binary, Neighbors, Sight, sense
 from hero_swarm.metrics import consensus_error
+from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.ros import behavior_node, pose_source
 from hero_swarm.ros.behavior_markers import BehaviorMarkers
 from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode, _parse_fence
@@ -57,12 +58,12 @@ class Stage:
 
     def run(self, seconds):
         """Let the behavior step, at the poses of robots that are not silent."""
-        for _ in range(round(seconds * self.node.behavior.rate_hz)):
+        for _ in range(round(seconds * self.node.control.rate_hz)):
             for robot in self.swarm:
                 if robot.robot_id not in self.silent:
                     self.node._source._receive_truth(robot.robot_id, self.tell(robot.true_pose))
             self.node.step()
-            self.swarm.sleep(1.0 / self.node.behavior.rate_hz)
+            self.swarm.sleep(1.0 / self.node.control.rate_hz)
 
     def tell(self, pose):
         message = Odometry()
@@ -185,6 +186,38 @@ def test_speeds_that_are_no_numbers_stop_their_robot_alone(stage, tmp_path):
     assert stage.warnings == [
         "the behavior gives hero_1 a speed that is no finite number; the robots are stopped meanwhile"
     ]
+
+
+LEAVE = """\
+import numpy as np
+from hero_swarm.behavior import Behavior
+class Leave(Behavior):
+    rate_hz = %g
+    def step(self, sensed, memory, random):
+        x_m, y_m, yaw_rad = sensed.poses.T
+        return 1e300, 6.0 * np.sin(np.arctan2(-y_m, 3.0 - x_m) - yaw_rad), memory
+"""
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 20.0])
+def test_robots_stay_in_the_fence_whatever_the_rate_and_speed(stage, tmp_path, rate_hz):
+    (tmp_path / "leave.py").write_text(LEAVE % rate_hz)
+    half_m = np.abs(stage.places_m).max() + 0.1
+    fence = "%g %g %g %g" % (-half_m, -half_m, half_m, half_m)
+    stage.start(str(tmp_path / "leave.py"), safety="fence and robots", fence=fence)
+    farthest_m, nearest_m = [], []
+
+    def watch(_):
+        farthest_m.append(np.abs(stage.places_m).max())
+        nearest_m.append(measure_distances(stage.places_m).min())
+
+    stage.swarm.rows.on_cycle.append(watch)
+    stage.run(8.0)
+    assert max(farthest_m) < half_m - BODY_RADIUS_M and max(farthest_m) > half_m - 0.1
+    assert min(nearest_m) > 2.0 * BODY_RADIUS_M
+    (text, *more) = stage.warnings
+    assert text.startswith("the behavior asks hero_0 for 1e+300 m/s and ") and "it drives this curve slower" in text
+    assert len(more) <= 1, "once in 5 s"
 
 
 def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):

@@ -131,6 +131,33 @@ def test_speeds_beyond_the_limits_count_as_the_fastest_of_their_curve():
     assert safe.is_limited.tolist() == [[False, False, True]]
 
 
+class LeaveTogether(Behavior):
+    """All robots drive to one place outside of the fence as fast as they can."""
+
+    def step(self, sensed, memory, random):
+        x_m, y_m, yaw_rad = sensed.poses.T
+        bearing_rad = np.arctan2(-y_m, 3.0 - x_m) - yaw_rad
+        return 0.2, 6.0 * (bearing_rad - 2.0 * np.pi * np.rint(bearing_rad / (2.0 * np.pi))), memory
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 3.0, 20.0])
+def test_behaviors_that_decide_seldom_are_filtered_as_often_as_others(rate_hz):
+    behavior = LeaveTogether(rate_hz=rate_hz)
+    trial = Trial(behavior, OPEN, 8, (1, 2, 3), (1.2, 1.2), filter_commands=SafetyFilter(ROBOTS, FENCE_M))
+    nearest_m, farthest_m = [], []
+
+    def watch(_):
+        poses = trial.rows.world.poses.reshape(trial.poses.shape)
+        nearest_m.append(measure_distances(poses[..., :2]).min())
+        farthest_m.append(np.abs(poses[..., :2]).max())
+
+    trial.rows.on_cycle.append(watch)
+    for _ in trial.run(12.0):
+        pass
+    assert len(nearest_m) > 300
+    assert min(nearest_m) > 2.0 * BODY_RADIUS_M and max(farthest_m) < 0.7 - BODY_RADIUS_M
+
+
 RING_M = 0.6
 
 
@@ -213,7 +240,7 @@ def measure_slack(poses, velocities_m_s, fence_m):
     for axis in (0, 1):
         for sign, edge_m in ((-1.0, fence_m[axis]), (1.0, fence_m[axis + 2])):
             left_m = sign * (edge_m - points_m[..., axis]) - POINT_RADIUS_M
-            slack = np.minimum(slack, SafetyFilter.gain_1_s * left_m - sign * velocities_m_s[..., axis])
+            slack = np.minimum(slack, SafetyFilter.fence_gain_1_s * left_m - sign * velocities_m_s[..., axis])
     return slack
 
 

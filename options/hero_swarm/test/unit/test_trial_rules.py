@@ -8,7 +8,7 @@ import pytest
 from hero_client.values.robot_constants import BODY_RADIUS_M, MAX_LINEAR_M_S
 from hero_sim.world.arena import build_rectangle
 from hero_swarm import metrics
-from hero_swarm.behavior import Behavior
+from hero_swarm.behavior import Behavior, Neighbors
 from hero_swarm.experiments.starts import _place_in_circle, _place_in_grid
 from hero_swarm.learning.episode import MAX_ANGULAR_RAD_S, Episode, count_observations
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
@@ -110,6 +110,44 @@ def test_a_trial_senses_poses_of_a_while_ago_and_tells_speeds():
         for number, (time_s, seen) in enumerate(trial.memory):
             assert time_s == pytest.approx(0.1 * number) and seen == pytest.approx(true[max(0, number - steps)])
     assert len(list(Trial(Note(), OPEN, 1, (1,), (1.0, 1.0)).run(2.0, every_s=0.5))) == 4
+
+
+class Write(Behavior):
+    """Writes into what it senses, after it has taken copies."""
+
+    near = Neighbors()
+
+    def __init__(self, name):
+        super().__init__()
+        self._name = name
+
+    def step(self, sensed, memory, random):
+        copied = sensed.poses.copy()
+        copied -= 1.0
+        values = sensed.near.forward_m if self._name == "near" else getattr(sensed, self._name)
+        values[:1] += 1
+        return 0.0, 0.0, memory
+
+
+@pytest.mark.parametrize("name", ["poses", "numbers", "is_known", "near"])
+def test_a_behavior_that_writes_into_what_it_senses_is_told_to_copy(name):
+    trial = Trial(Write(name), OPEN, 2, (1,), (1.0, 1.0))
+    before = trial.poses.copy()
+    with pytest.raises(ValueError, match=r"^Write.step\(\) writes into .* read-only: copy it first") as caught:
+        trial.step()
+    assert caught.traceback[-1].name == "step", "the line that writes"
+    assert (trial.poses == before).all()
+
+
+def test_poses_that_a_trial_yields_are_read_only_and_starts_the_callers():
+    starts = np.zeros((1, 2, 3)) + ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0))
+    trial = Trial(Note(), OPEN, 2, (1,), starts=starts)
+    starts[...] = 9.0
+    for _, poses in trial.run(0.5, every_s=0.1):
+        assert np.abs(poses).max() < 1.0
+        for values in (poses, trial.velocities):
+            with pytest.raises(ValueError, match="read-only"):
+                values[0, 0, 0] = 7.0
 
 
 def test_robots_are_scattered_inside_and_apart():

@@ -10,7 +10,8 @@ import numpy as np
 
 from hero_client.values.object_sensing import NO_OBJECTS, Things
 
-from ..behavior import Random, decide, derive_seed, sense
+from ..behavior import Random, derive_seed
+from ..control import Control
 from ..safety import SafetyFilter
 from .batch import SAMPLE_S, load_cell_arena, make_behavior, measure, take_values
 from .errors import report_place
@@ -36,11 +37,15 @@ class RobotTrial:
         self._objects = len(load_cell_arena(experiment, cell).objects)
         self._names = names
         self._filter = safety
-        self._random = Random([derive_seed(seed, "behavior")], len(names))
-        self._memory = None
+        self._control = Control(self.behavior, Random([derive_seed(seed, "behavior")], len(names)), safety)
         self._samples: List[np.ndarray] = []
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._reached = False
+
+    @property
+    def rate_hz(self) -> float:
+        """Calls of step() per second."""
+        return self._control.rate_hz
 
     def step(
         self, time_s: float, poses: np.ndarray, ages_s: np.ndarray, things: Things = NO_OBJECTS
@@ -61,11 +66,8 @@ class RobotTrial:
             self._sample(time_s, poses, things)
         if self._reached or time_s >= self._experiment.time_s:
             return None
-        sensed = sense(self.behavior, time_s, poses[None], self._random, things)
         with report_place(self._label):
-            linear_m_s, angular_rad_s, self._memory = decide(self.behavior, sensed, self._memory, self._random)
-        linear_m_s, angular_rad_s = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
-        return linear_m_s[0], angular_rad_s[0]
+            return self._control.step(time_s, poses[None], things, ages_s[None])
 
     def _sample(self, time_s: float, poses: np.ndarray, things: Things) -> None:
         if self._last is None:

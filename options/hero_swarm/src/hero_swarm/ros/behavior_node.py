@@ -16,8 +16,9 @@ from hero_client.swarm import open_swarm
 from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 
-from ..behavior import Behavior, Objects, Random, Sensed, decide, sense
+from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior
+from ..control import Control
 from ..metrics import METRICS
 from ..safety import MODES, SafetyFilter
 from .behavior_markers import BehaviorMarkers
@@ -52,6 +53,7 @@ class BehaviorNode:
 
     Attributes:
         behavior: with the numbers that were given.
+        control: its loop, which step() steps.
     """
 
     def __init__(self, swarm: Swarm, parameters: Any) -> None:
@@ -67,8 +69,7 @@ class BehaviorNode:
         self._filter = SafetyFilter(parameters["safety"], _parse_fence(parameters["fence"]))
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
-        self._random = Random([parameters["seed"]], len(ids))
-        self._memory: Any = None
+        self.control = Control(self.behavior, Random([parameters["seed"]], len(ids)), self._filter)
         self._start_s = rospy.get_time()
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._next_show_s = 0.0
@@ -84,23 +85,30 @@ class BehaviorNode:
         if self._objects.are_needed and not len(things.radii_m):
             poses, things = np.full_like(poses, np.nan), Things(np.full((1, 1, 3), np.nan), np.ones(1))
         now_s = rospy.get_time()
-        sensed = sense(self.behavior, now_s - self._start_s, poses[None], self._random, things)
-        linear_m_s, angular_rad_s, self._memory = decide(self.behavior, sensed, self._memory, self._random)
         self._filter.set_models([robot.model for robot in self._swarm])
-        speeds = self._filter(poses[None], linear_m_s, angular_rad_s, ages_s[None])
-        may_move = sensed.is_known & np.isfinite(linear_m_s) & np.isfinite(angular_rad_s)
-        self._commands.send(speeds[0][0], speeds[1][0], may_move)
-        self._show_colors()
+        speeds = self.control.step(now_s - self._start_s, poses[None], things, ages_s[None])
+        is_known = np.isfinite(poses).all(axis=1)
+        may_move = is_known & np.isfinite(self.control.wanted).all(axis=0)
+        self._commands.send(*speeds, may_move)
         if not may_move.all():
             name = self._swarm.robots[int(may_move.argmin())].name
             missing = self._objects.describe_missing() or self._source.describe_missing()
             missing = missing or "the behavior gives %s a speed that is no finite number" % name
             self._source.warn(missing + "; the robots are stopped meanwhile")
-        if time.monotonic() >= self._next_show_s and sensed.is_known.any():
+        elif self._filter.is_limited.any():
+            self._source.warn(self._describe_limit(int(self._filter.is_limited[0].argmax())))
+        if not self.control.has_decided:
+            return
+        self._show_colors()
+        if time.monotonic() >= self._next_show_s and is_known.any():
             self._next_show_s = time.monotonic() + SHOW_PERIOD_S
-            self._show(now_s, poses, sensed, things)
+            self._show(now_s, poses, things)
 
-    def _show(self, now_s: float, poses: np.ndarray, sensed: Sensed, things: Things) -> None:
+    def _describe_limit(self, row: int) -> str:
+        text = "the behavior asks %s for %.3g m/s and %.3g rad/s, more than it can drive: it drives this curve slower"
+        return text % (self._swarm.robots[row].name, *self.control.wanted[:, row])
+
+    def _show(self, now_s: float, poses: np.ndarray, things: Things) -> None:
         """Publish the metric of the robots whose poses are known, and what RViz and the monitor draw."""
         last_s, last = self._last or (now_s - SHOW_PERIOD_S, poses)
         velocities = (poses - last) / max(now_s - last_s, 1e-3)
@@ -110,12 +118,12 @@ class BehaviorNode:
             return
         value = float(METRICS[self.behavior.metric](poses[None, known], velocities[None, known], things.poses)[0])
         self._metric.publish(Float32(value))
-        markers = self._drawing.draw(poses, sensed, value)
+        markers = self._drawing.draw(poses, self.control.sensed, value)
         if self._markers.get_num_connections():
             self._markers.publish(MarkerArray(markers))
 
     def _show_colors(self) -> None:
-        colors = self.behavior.colors(self._memory)
+        colors = self.behavior.colors(self.control.memory)
         if colors is None:
             return
         for row, (robot, color) in enumerate(zip(self._swarm, colors)):
@@ -151,7 +159,7 @@ def main() -> None:
             text = "%s drives %d robots; its metric, %s, is on %s"
             made = node.behavior
             rospy.loginfo(text, type(made).__name__, len(swarm), made.metric, rospy.resolve_name("~metric"))
-            for time_s in program.rate(made.rate_hz):
+            for time_s in program.rate(node.control.rate_hz):
                 if time_s >= end_s:
                     break
                 node.step()

@@ -78,6 +78,9 @@ def run_on_robots(
             folder.write_batch([Run(cell_index, seed, trial.list_values(), REAL, trial.remark)])
             folder.write_table(folder.read_runs())
             print("%s: %s" % (label, "does not count: " + trial.remark if trial.remark else "done"))
+            if safety.limited_calls:
+                text = "%s: in %.0f %% of the steps the behavior asked for more than robots drive: they drove slower"
+                print(text % (label, 100.0 * safety.limited_calls / safety.calls))
             done += not trial.remark
     again = "; start it again for the others" if done < len(missing) else ""
     return "%s: %d of %d missing trials done%s" % (os.path.join(folder.path, "runs.csv"), done, len(missing), again)
@@ -183,7 +186,7 @@ def _drive(
     start_s = rospy.get_time()
     all_may_move = np.ones(len(swarm), dtype=bool)
     try:
-        for _ in program.rate(trial.behavior.rate_hz):
+        for _ in program.rate(trial.rate_hz):
             for robot in swarm:
                 robot.check_not_stopped()
                 reason = robot.missing()

@@ -38,7 +38,7 @@ def drive(text=FILE, lost_s=math.inf):
         if speeds is None:
             return trial, time_s, poses
         rows.send_velocity(np.arange(3), *speeds)
-        rows.advance(rows.now_ms + round(1000.0 / trial.behavior.rate_hz))
+        rows.advance(rows.now_ms + round(1000.0 / trial.rate_hz))
 
 
 def test_a_trial_ends_at_its_time_with_values_and_without_contact():
@@ -134,6 +134,19 @@ def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
     for _ in range(2):
         late.step(5.0, STARTS, np.zeros(3))
     assert [values[0] for values in late._samples] == [0.0, 0.0], "also where no time has passed"
+
+
+def test_a_trial_is_filtered_between_decisions_and_counts_limits(tmp_path):
+    file = tmp_path / "meet.py"
+    file.write_text(
+        "import numpy as np\nfrom hero_swarm.behavior import Behavior\n\n\nclass Meet(Behavior):\n    rate_hz = 1.0\n\n"
+        "    def step(self, sensed, memory, random):\n        x_m, y_m, yaw_rad = sensed.poses.T\n"
+        "        return 5.0, 9.0 * np.sin(np.arctan2(0.2 - y_m, 0.2 - x_m) - yaw_rad), memory\n"
+    )
+    trial, end_s, poses = drive(FILE.replace("rendezvous", str(file)).replace("consensus_error, ", "collisions, "))
+    assert trial.rate_hz == 20.0 and end_s == pytest.approx(12.0)
+    assert trial.list_values()[0] == METRICS["collisions"](poses[None], None)[0] == 0.0
+    assert trial._filter.calls == trial._filter.limited_calls == 240
 
 
 def test_what_a_behavior_raises_in_a_trial_is_one_line_with_its_place(tmp_path):
