@@ -6,6 +6,7 @@
 Everything here runs on the thread of the sockets, except what says otherwise. It never blocks.
 """
 
+import os
 import time
 import traceback
 from typing import Callable, Dict, List, Optional, Tuple
@@ -28,7 +29,7 @@ from .rosserial.payloads import Log
 from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
 from .stop_delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
 from .transport.event_loop import THE_DRIVER_ENDS, EventLoop
-from .transport.link import Link, LinkHandler
+from .transport.link import READ_LENGTH, Link, LinkHandler
 
 NS_PER_S = 10**9
 
@@ -63,7 +64,7 @@ class Gateway(LinkHandler):
         self._admission = Admission(config)
         self._sender = CommandSender(loop.call_later, self)
         self._stops = StopDelivery(loop.call_later, self)
-        self._robot_log = RobotLog(log, self._stops.begin)
+        self._robot_log = RobotLog(log, self._stops.begin, self.warn_late)
         self._transforms = TransformPublisher(config.transform_period_s, loop.call_later)
         self._context = BridgeContext(
             self, loop, log, self._transforms, registrar, config, config, 2 * config.max_topics
@@ -113,6 +114,8 @@ class Gateway(LinkHandler):
         reader = session.reader
         packets, skipped_bytes = reader.packets, reader.skipped_bytes
         arrival_ns = self._clock_ns()
+        # What fills a read has more behind it; two bursts of a robot do not, so the driver or the network was late.
+        peer.wheels.is_late = len(data) >= READ_LENGTH
         events = session.receive_bytes(data, now_s, arrival_ns / NS_PER_S)
         refusal = peer.rate_limit.admit(reader.packets - packets, len(data), now_s)
         if refusal is None and reader.skipped_bytes != skipped_bytes:
@@ -407,6 +410,18 @@ class Gateway(LinkHandler):
         group = peer.label if peer.bridge is not None else peer.link.address.host
         line = "%s: %s" % (peer.label, text)
         self._log.log_throttled("error", peer.label + text[:80], line, group, peer.link.address.host)
+
+    def warn_late(self) -> None:
+        """Log that what robots send is read too late to tell what they do, if that is this PC's doing."""
+        late_s = self._loop.find_lateness_s()
+        if late_s > 0.0:
+            self._log.log_throttled(
+                "warn",
+                "overload",
+                "the PC is overloaded (load %.1f on %d CPUs): the driver ran up to %.1f s late, and does not know yet"
+                " whether robots that were stopped are at rest; end other programs"
+                % (os.getloadavg()[0], os.cpu_count() or 1, late_s),
+            )
 
     def note_change(self) -> None:
         """A robot's state changed."""

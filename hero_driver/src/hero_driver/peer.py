@@ -76,5 +76,8 @@ class PeerOwner(Protocol):
     def warn_robot(self, peer: Peer, text: str) -> None:
         """Log what is wrong with a robot."""
 
+    def warn_late(self) -> None:
+        """Log that what robots send is read too late to tell what they do, if that is this PC's doing."""
+
     def note_change(self) -> None:
         """A robot's state changed."""

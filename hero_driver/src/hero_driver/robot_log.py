@@ -21,10 +21,11 @@ EARLY_LINES_MAX = 10
 class RobotLog:
     """The log of all robots' lines."""
 
-    def __init__(self, log: LogRelay, stop: Callable[[Peer], None]) -> None:
-        """stop(peer) stops a robot that tunes itself though it was not told to."""
+    def __init__(self, log: LogRelay, stop: Callable[[Peer], None], warn_late: Callable[[], None]) -> None:
+        """stop(peer) stops a robot that tunes itself though it was not told to; warn_late() is PeerOwner's."""
         self._log = log
         self._stop = stop
+        self._warn_late = warn_late
 
     def receive(self, peer: Peer, log: Log, now_s: float) -> None:
         """Take a line of a robot: note what it tells, and pass it on."""
@@ -43,9 +44,7 @@ class RobotLog:
         if line.tunes is not None:
             peer.bridge.commands.note_tuning(line.tunes)
             if line.tunes and not peer.bridge.commands.was_told_to_tune and peer.stop is None:
-                # Left by an earlier driver or connection: nothing else would end it.
-                self._log.log("warn", "%s tunes itself, without a request from this driver: stopped" % peer.label)
-                self._stop(peer)
+                self._receive_unrequested_tuning(peer)
         if line.uptime_s is not None:
             self._receive_uptime(peer, record, line.uptime_s, now_s)
         if now_s - peer.log_window_s >= 1.0:
@@ -56,6 +55,15 @@ class RobotLog:
             return
         level = "debug" if line.is_routine else LEVELS.get(log.level, "error")
         self._log.log(level, "%s: %s" % (peer.label, line.text))
+
+    def _receive_unrequested_tuning(self, peer: Peer) -> None:
+        if peer.wheels.is_late:
+            # The line may be from before the tuning was ended. While it goes on 47 more follow each second.
+            self._warn_late()
+            return
+        # Left by an earlier driver or connection: nothing else would end it.
+        self._log.log("warn", "%s tunes itself, without a request from this driver: stopped" % peer.label)
+        self._stop(peer)
 
     def _receive_uptime(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
         # By its own clock: a line may be late by any time, as after a stall of the network or a pause of the driver.

@@ -182,6 +182,8 @@ class StopDelivery:
             if may_burst or not burst or not stop.has_begun:
                 self._send(peer, burst and may_burst, now_s)
                 stop.note_sent(burst and may_burst, now_s)
+        if stop.lacks_evidence(now_s):
+            self._owner.warn_late()
         if stop.state is not before:
             if stop.state is StopState.MOVING:
                 self._owner.warn_robot(peer, "its wheels turn although it was stopped")

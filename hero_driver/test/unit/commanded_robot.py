@@ -139,6 +139,9 @@ class CommandedRobot:
     def note_change(self):
         pass
 
+    def warn_late(self):
+        self.lines.append("late")
+
     def warn_robot(self, _, text):
         self.warnings.append(text)
 

@@ -247,6 +247,23 @@ def test_calls_and_timers_run_in_order_and_one_that_fails_harms_no_other(still_l
     assert ran.count("soon") == 3 and [type(error) for error in handler.bugs] == [ZeroDivisionError]
 
 
+def test_the_longest_recent_time_without_a_turn_is_known(still_loop, monkeypatch):
+    (loop, _), now_s = still_loop, [1000.0]
+    monkeypatch.setattr(event_loop.time, "monotonic", lambda: now_s[0])
+    monkeypatch.setattr(event_loop.time, "clock_gettime", lambda clock: now_s[0])
+    for pause_s, lateness_s in ((0.0, 0.0), (0.09, 0.0), (0.3, 0.3), (0.2, 0.3), (0.05, 0.3)):
+        now_s[0] += pause_s
+        loop._look_for_pause()
+        assert loop.find_lateness_s() == pytest.approx(lateness_s)
+    for _ in range(100):
+        now_s[0] += 0.051
+        loop._look_for_pause()
+    assert loop.find_lateness_s() == 0.0
+    now_s[0] += 0.15
+    loop._look_for_pause()
+    assert loop.find_lateness_s() == pytest.approx(0.15)
+
+
 @pytest.mark.parametrize(("pause_s", "is_pause"), [(0.9, False), (1.1, True)])
 def test_a_pause_of_more_than_a_second_is_told_to_all_who_read(still_loop, monkeypatch, pause_s, is_pause):
     loop, handler = still_loop

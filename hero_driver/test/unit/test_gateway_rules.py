@@ -15,7 +15,10 @@ from hero_driver.gateway import Gateway
 from hero_driver.rosserial.packets import encode_packet
 from hero_driver.rosserial.payloads import TopicInfo
 from hero_driver.rosserial.session import Topic, TopicKind
+from hero_driver.transport.link import READ_LENGTH
 from hero_msgs.msg import Robot
+
+ENCODER_ID = 128
 
 
 class Link(FakeLink):
@@ -53,7 +56,9 @@ class Driver:
             log_throttled=self.log_throttled,
             log=lambda level, text: self.lines.append((level, text)),
         )
+        self.lateness_s = 0.0
         loop = SimpleNamespace(
+            find_lateness_s=lambda: self.lateness_s,
             call_later=lambda delay_s, call: self.later.append((self.now_s + delay_s, call)), call_soon=self.soon.append
         )
         self.gateway = Gateway(
@@ -349,6 +354,48 @@ def test_the_end_waits_two_seconds_for_wheels_that_turn(driver):
         assert answers == expected
     (line,) = [text for level, text in driver.lines if level == "error" and "the driver ends" in text]
     assert line.endswith("hero_0 (its wheels turn)")
+
+
+class TurningRobot:
+    """A robot whose wheels turn, and whose readings the driver reads."""
+
+    def __init__(self, driver, number):
+        self.link = driver.join(port=number, number=number, declarations=STOCK_DECLARATIONS)
+        self.driver = driver
+        self.motors = FakeRobot(number).motors
+        self.motors.is_pushed = True
+        self.read_s = driver.now_s
+
+    def read(self, length):
+        """Let the driver read so many bytes, or a few more."""
+        data = b""
+        while len(data) < length:
+            self.read_s += 0.034
+            data += encode_packet(ENCODER_ID, self.motors.encode_encoder("hero_0", self.read_s, self.read_s))
+        self.driver.receive(self.link, data)
+
+
+@pytest.mark.parametrize("lateness_s", [0.0, 0.4])
+def test_an_overloaded_pc_is_named_instead_of_robots_until_it_is_not(driver, monkeypatch, lateness_s):
+    driver.lateness_s = lateness_s
+    monkeypatch.setattr(gateway_module.os, "getloadavg", lambda: (71.26, 0.0, 0.0))
+    robots = [TurningRobot(driver, number) for number in range(3)]
+    driver.lines.clear()
+    driver.gateway.set_stopped(True)
+    for _ in range(20):
+        for robot in robots:
+            robot.read(READ_LENGTH)
+        driver.run(0.1)
+    said = [text for level, text in driver.lines if level in ("warn", "error")]
+    assert bool(said) == (lateness_s > 0.0), "a network that is late says nothing of the PC"
+    assert all(text.startswith("the PC is overloaded (load 71.3 on ") and "up to 0.4 s late" in text for text in said)
+    assert {key for key in driver.keys if "overload" in key} <= {"overload"}, "one line for all robots"
+    assert {state for _, state in driver.gateway.list_stops()} == {StopState.STOPPING}
+    for _ in range(40):
+        for robot in robots:
+            robot.read(1)
+        driver.run(0.034)
+    assert {state for _, state in driver.gateway.list_stops()} == {StopState.MOVING}
 
 
 def test_a_robot_that_has_said_who_it_is_leaves_the_unidentified_ones(driver):

@@ -25,6 +25,7 @@ def make_peer():
         link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
         bridge=SimpleNamespace(corrections=SimpleNamespace(note_reboot=lambda: None), commands=SimpleNamespace()),
         record=SimpleNamespace(booted_s=None, heard_uptime_s=0.0, dropped_messages=0),
+        wheels=SimpleNamespace(is_late=False),
         refused=False,
         boot=None,
         log_window_s=0.0,
@@ -37,14 +38,14 @@ def say_uptime(robot_log, peer, uptime_ms, now_s=NOW_S):
 
 
 def test_a_robot_whose_uptime_falls_has_rebooted(lines):
-    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     say_uptime(robot_log, peer, 60000)
     say_uptime(robot_log, peer, 2500)
     assert ("warn", "hero_1 rebooted 2.5 s ago") in lines
 
 
 def test_a_robot_that_says_again_and_again_that_it_rebooted_gives_one_line(lines):
-    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     for _ in range(500):
         say_uptime(robot_log, peer, 9999999999)
         say_uptime(robot_log, peer, 1)
@@ -61,15 +62,29 @@ def test_a_robot_that_tunes_itself_without_being_told_to_is_stopped(lines, was_t
         stopped.append(robot)
         robot.stop = "in progress"
 
-    robot_log = RobotLog(LogRelay(), stop)
+    robot_log = RobotLog(LogRelay(), stop, None)
     for _ in range(5):
         robot_log.receive(peer, Log(LOG_INFO, "[/hero_1] Tunning Motor Set: [0,0]"), NOW_S)
     assert stopped == [peer] * stops
 
 
+def test_a_line_about_a_tuning_that_is_read_late_accuses_no_robot(lines):
+    peer, stopped, late = make_peer(), [], []
+    peer.bridge.commands.was_told_to_tune, peer.stop = False, None
+    peer.bridge.commands.note_tuning = lambda tunes: None
+    robot_log = RobotLog(LogRelay(), stopped.append, lambda: late.append(peer.wheels.is_late))
+    for peer.wheels.is_late in (True, True, False):
+        robot_log.receive(peer, Log(LOG_INFO, "[/hero_1] Tunning Motor Set: [0,0]"), NOW_S)
+        assert len(stopped) == (not peer.wheels.is_late)
+    assert late == [True, True]
+    assert [text for level, text in lines if level == "warn"] == [
+        "hero_1 tunes itself, without a request from this driver: stopped"
+    ]
+
+
 @pytest.mark.parametrize("late_s", [1.5, 3.0, 60.0])
 def test_a_line_that_is_late_is_no_reboot_and_changes_no_boot_time(lines, late_s):
-    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     reboots = []
     peer.bridge.corrections.note_reboot = lambda: reboots.append(peer.record.booted_s)
     for second in range(0, 200, 2):
@@ -81,7 +96,7 @@ def test_a_line_that_is_late_is_no_reboot_and_changes_no_boot_time(lines, late_s
 
 
 def test_a_reboot_counts_once_however_late_the_lines_after_it_are(lines):
-    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     reboots = []
     peer.bridge.corrections.note_reboot = lambda: reboots.append(peer.record.booted_s)
     say_uptime(robot_log, peer, 60000)
@@ -94,7 +109,7 @@ def test_a_reboot_counts_once_however_late_the_lines_after_it_are(lines):
 
 @pytest.mark.parametrize("boots", [1, 3])
 def test_a_boot_line_tells_of_a_reboot_after_which_the_uptime_is_longer(lines, boots):
-    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     peer.bridge.corrections.note_reboot = lambda: pytest.fail("a new connection has told the corrections")
     for first_s in range(0, 100 * boots, 100):
         robot_log.receive(peer, Log(LOG_INFO, "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 1"), NOW_S)
@@ -105,7 +120,7 @@ def test_a_boot_line_tells_of_a_reboot_after_which_the_uptime_is_longer(lines, b
 
 
 def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):
-    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     for second in range(3):
         for number in range(LINES_PER_S + 7):
             robot_log.receive(peer, Log(LOG_INFO, "line %d" % number), NOW_S + second + 0.005 * number)
@@ -114,7 +129,7 @@ def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):
 
 
 def test_ten_lines_of_a_robot_without_a_name_are_kept(lines):
-    robot_log, peer = RobotLog(LogRelay(), None), make_peer()
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     peer.bridge, peer.early_logs = None, []
     logs = [Log(LOG_INFO, "line %d" % number) for number in range(12)]
     for log in logs:

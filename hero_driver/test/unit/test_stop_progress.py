@@ -40,6 +40,13 @@ class Robot:
             self.wheels.read_ticks(0.0, 0.0)
         self.stop = StopProgress(self.now_s, self.wheels)
 
+    def read(self, now_s):
+        """Give the driver what it reads now."""
+        if now_s >= self.held_until_s:
+            for ticks in self.held:
+                self.wheels.read_ticks(ticks, ticks)
+            del self.held[:]
+
     def run(self, until_s, tunes=False):
         """Run to until_s after the beginning; return the states in order, each once."""
         states = []
@@ -49,10 +56,7 @@ class Robot:
                 self.ticks += self.turns(self.now_s - 100.0) * READING_S
                 if self.reads:
                     self.held.append(self.ticks)
-            if self.now_s >= 100.0 + self.held_until_s:
-                for ticks in self.held:
-                    self.wheels.read_ticks(ticks, ticks)
-                del self.held[:]
+            self.read(self.now_s - 100.0)
             if self.stop.is_due(self.is_acknowledged(self.now_s - 100.0), self.now_s):
                 burst = self.stop.needs_burst(tunes, self.now_s)
                 self.stop.note_sent(burst, self.now_s)
@@ -133,6 +137,52 @@ def test_readings_of_before_the_stop_that_come_late_do_not_call_it_moving():
     robot.held_until_s = 0.05
     assert robot.run(3.0) == [StopState.STOPPING, StopState.AT_REST]
     assert not any(robot.bursts)
+
+
+class BusyDriver(Robot):
+    """The robot as a driver sees it that lacks CPU until free_s: 2 s behind, it reads 25 readings a second of 29."""
+
+    def __init__(self, turns, free_s):
+        super().__init__(turns)
+        self.free_s = free_s
+        self.blind_s = []
+        self.next_read_s = 0.0
+        for number in range(60):
+            self.ticks += turns((number - 60) * READING_S) * READING_S
+            self.held.append(self.ticks)
+
+    def read(self, now_s):
+        if now_s >= self.free_s:
+            self.wheels.is_late = len(self.held) > 3
+            super().read(now_s)
+            self.wheels.is_late = False
+        elif now_s >= self.next_read_s:
+            self.next_read_s += 0.12
+            self.wheels.is_late = True
+            for _ in range(3):
+                ticks = self.held.pop(0)
+                self.wheels.read_ticks(ticks, ticks)
+        if self.stop.lacks_evidence(self.now_s):
+            self.blind_s.append(now_s)
+
+
+def test_what_an_overloaded_driver_reads_late_does_not_call_a_robot_moving():
+    robot = BusyDriver(lambda now_s: 186.0 if now_s < 0.3 else 0.0, free_s=4.0)
+    assert robot.run(4.0) == [StopState.STOPPING]
+    assert robot.run(5.0) == [StopState.STOPPING, StopState.AT_REST]
+    assert 0.9 < robot.blind_s[0] < 1.1 and robot.blind_s[-1] < 4.1
+
+
+def test_rest_of_before_a_motion_that_is_read_late_confirms_no_stop():
+    robot = BusyDriver(lambda now_s: 186.0 if -0.5 < now_s < 3.0 else 0.0, free_s=2.5)
+    assert robot.run(2.9) == [StopState.STOPPING]
+    assert robot.run(4.5)[-1] is StopState.AT_REST
+
+
+def test_wheels_that_really_turn_are_reported_once_readings_are_in_time():
+    robot = BusyDriver(lambda now_s: 186.0, free_s=4.0)
+    assert robot.run(4.0) == [StopState.STOPPING]
+    assert robot.run(5.1) == [StopState.STOPPING, StopState.MOVING]
 
 
 def test_no_stops_pile_up_in_front_of_a_robot_that_acknowledges_nothing():

@@ -133,3 +133,17 @@ def test_readings_without_a_turn_count_to_how_wheels_slow_down():
         left_ticks += step_ticks
         wheels.read_ticks(left_ticks, 0.0)
     assert wheels.still_readings == 1 and not wheels.go_on
+
+
+def test_late_readings_count_for_nothing_and_the_next_one_starts_from_them():
+    wheels = WheelMotion()
+    read_all(wheels, [(5.0, 7.0)] * 4)
+    wheels.is_late = True
+    read_all(wheels, [(50.0, 70.0), (500.0, 700.0), (math.nan, math.inf)])
+    wheels.read_velocity(0.1, 0.0)
+    assert (wheels.readings, wheels.still_readings) == (4, 3)
+    wheels.is_late = False
+    wheels.read_ticks(500.0, 700.0)
+    assert (wheels.readings, wheels.still_readings) == (5, 4)
+    wheels.read_ticks(502.0, 700.0)
+    assert wheels.still_readings == 0

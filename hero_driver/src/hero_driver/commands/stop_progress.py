@@ -1,7 +1,8 @@
 """The stop of one robot: when to send it, and what the robot's wheels show. Pure: times and readings go in.
 
-See stop_delivery for what is sent and why. Wheels are classified by readings and by time since the robot acknowledged a
-stop: readings that a network or a busy PC delays come all at once, and an ordinary stop takes 0.25 to 0.35 s.
+See stop_delivery for what is sent and why. Wheels are classified by readings in time and by time since the robot
+acknowledged a stop: delayed readings come all at once, and an ordinary stop takes 0.25 to 0.35 s. Late readings are
+ignored, whatever they show: a robot whose wheels turn is reported as soon as readings are in time.
 """
 
 import enum
@@ -70,6 +71,7 @@ class StopProgress:
         self._began_s = now_s
         self._stops = 0
         self._next_s = now_s
+        self._late_s = now_s  # when the robot was last heard late
         self._mark = wheels.readings
         self._acknowledged: Optional[_Mark] = None  # when a stop first was
         self._watched: Optional[_Mark] = None  # when one first was after the last burst
@@ -84,6 +86,14 @@ class StopProgress:
         """A stop was requested again: send the next stop at once, unless the wheels are at rest."""
         if self.state is not StopState.AT_REST:
             self._next_s = self._began_s = now_s
+
+    def lacks_evidence(self, now_s: float) -> bool:
+        """Return whether only late readings have come for as long as it takes to see that wheels turn on."""
+        return (
+            self._wheels.is_late
+            and self._acknowledged is not None
+            and now_s - self._acknowledged.now_s >= MOVING_READINGS * READING_S
+        )
 
     def is_due(self, is_acknowledged: bool, now_s: float) -> bool:
         """Look at the wheels; return whether a stop is to be sent now.
@@ -132,6 +142,8 @@ class StopProgress:
 
     def _assess(self, is_acknowledged: bool, now_s: float) -> None:
         wheels = self._wheels
+        if wheels.is_late:
+            self._late_s = now_s
         if is_acknowledged and self._stops > 0:
             self._acknowledged = self._acknowledged or _Mark(wheels.readings, now_s)
             self._watched = self._watched or _Mark(wheels.readings, now_s)
@@ -151,5 +163,6 @@ class StopProgress:
         elif not is_still and self._has_passed(self._acknowledged, MOVING_READINGS, now_s):
             self.state = StopState.MOVING
         elif fresh == 0 and is_acknowledged and self.state is not StopState.MOVING:
-            if now_s - self._began_s >= (SILENT_AFTER_S if wheels.readings else UNREAD_AFTER_S):
+            silent_s = now_s - max(self._began_s, self._late_s)
+            if silent_s >= (SILENT_AFTER_S if wheels.readings else UNREAD_AFTER_S):
                 self.state = StopState.UNCONFIRMED

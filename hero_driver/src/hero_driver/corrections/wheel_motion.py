@@ -1,7 +1,8 @@
 """Whether the wheels of one robot turn, from its encoder readings, or from odometry where it has no encoder. Pure.
 
 Rest is counted in readings (29 per second of the robot's own time), not in time of arrival: readings that a
-network held back arrive all at once.
+network held back arrive all at once. Readings behind which more wait to be read are late, and no evidence: they may be
+from before a stop.
 """
 
 import collections
@@ -29,11 +30,13 @@ class WheelMotion:
     """Motion of the wheels by the readings of one connection.
 
     Attributes:
-        readings: how many came.
-        still_readings: how many came since a wheel was last seen to turn.
+        is_late: whether the readings that come now are late; set by the receiver.
+        readings: how many came in time.
+        still_readings: how many of them came since a wheel was last seen to turn.
     """
 
     def __init__(self) -> None:
+        self.is_late = False
         self.readings = 0
         self.still_readings = 0
         self._has_anchor = False
@@ -59,6 +62,9 @@ class WheelMotion:
 
     def read_ticks(self, left_ticks: float, right_ticks: float) -> None:
         """Take a reading of the wheels' counters; one that is not finite shows no turn."""
+        if self.is_late:
+            self._anchor(left_ticks, right_ticks)
+            return
         tolerance_ticks = self._tolerance_ticks
         left_turn, right_turn = left_ticks - self._left_ticks, right_ticks - self._right_ticks
         # Comparisons with what is not finite fail.
@@ -80,11 +86,18 @@ class WheelMotion:
             self.still_readings = 0
             self._moves.append(distance)
             self._tolerance_ticks = REST_TICKS
-        self._has_anchor = True
-        self._left_ticks, self._right_ticks = left_ticks, right_ticks
+        self._anchor(left_ticks, right_ticks)
+
+    def _anchor(self, left_ticks: float, right_ticks: float) -> None:
+        """Compare the next reading with this one, if it is finite."""
+        if math.isfinite(left_ticks + right_ticks):
+            self._has_anchor = True
+            self._left_ticks, self._right_ticks = left_ticks, right_ticks
 
     def read_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         """Take a velocity from odometry."""
+        if self.is_late:
+            return
         self.readings += 1
         is_still = abs(linear_m_s) <= LINEAR_REST_M_S and abs(angular_rad_s) <= ANGULAR_REST_RAD_S
         self.still_readings = self.still_readings + 1 if is_still else 0

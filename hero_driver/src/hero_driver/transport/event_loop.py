@@ -38,6 +38,12 @@ silence and repeated requests. One timer for all, because each costs a turn of t
 PAUSE_S = 1.0
 """Between two turns of the loop: after more, the driver or its PC was suspended, or too busy to run the loop."""
 
+LATE_S = 0.1
+"""Between two turns of the loop, which has a timer every POLL_INTERVAL_S: after more, it lacks CPU or was suspended."""
+
+LATE_KEPT_S = 5.0
+"""For so long it is known that the loop was late."""
+
 CALLS_MAX = 10000
 """Calls of other threads that may wait: each of them has a bound of its own, so more come only if the loop hangs."""
 
@@ -95,6 +101,7 @@ class EventLoop(LinkOwner):
         self._turned_s = 0.0  # when the last turn ended
         self._ran_s = math.inf  # when the loop was last seen to run, on a clock that runs while the PC sleeps
         self._resumed_s = -math.inf
+        self._late_s, self._late_seen_s = 0.0, -math.inf
         self._polls = 0
         self._timers: List[Tuple[float, int, Callable[[], None]]] = []
         self._timer_numbers = itertools.count()
@@ -162,7 +169,11 @@ class EventLoop(LinkOwner):
     def _look_for_pause(self) -> None:
         """Tell the others of a pause in which this loop did not run, before anything is read that came meanwhile."""
         ran_s, self._ran_s = self._ran_s, time.clock_gettime(time.CLOCK_BOOTTIME)
-        if self._ran_s - ran_s > PAUSE_S:
+        pause_s = self._ran_s - ran_s
+        if pause_s > LATE_S:
+            self._late_s = max(pause_s, self.find_lateness_s())
+            self._late_seen_s = time.monotonic()
+        if pause_s > PAUSE_S:
             self._resumed_s = time.monotonic()
             for reader in self._readers:
                 reader.resume()
@@ -171,6 +182,10 @@ class EventLoop(LinkOwner):
     def has_resumed_within(self, duration_s: float) -> bool:
         """Return whether a pause has just ended in which this loop did not run; from any thread."""
         return time.monotonic() - self._resumed_s < duration_s
+
+    def find_lateness_s(self) -> float:
+        """Return the longest recent time for which this loop did not run though it was due to; 0 if there was none."""
+        return self._late_s if time.monotonic() - self._late_seen_s < LATE_KEPT_S else 0.0
 
     def stop(self) -> None:
         """Make run() return; from any thread."""
