@@ -6,15 +6,12 @@
 Simulated time is slowed down to real time meanwhile. The server runs in a thread of its own.
 """
 
-import asyncio
 import threading
 import time
 from collections import deque
 from concurrent.futures import Future
 from contextlib import ExitStack
 from typing import Any, Deque, Dict, List, Sequence, Set
-
-import tornado.ioloop
 
 from hero_node.errors import ProgramError
 from hero_sim.stepped.robot_rows import RobotRows
@@ -25,6 +22,7 @@ from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
 from .foxglove.hub import TopicMessage, TopicType
 from .serving.access import Access
 from .serving.client_limits import CONNECTIONS_MAX, ClientLimits
+from .serving.monotonic_loop import MonotonicLoop
 from .serving.server import Server
 
 WAITING_MAX = 20_000
@@ -98,8 +96,7 @@ class LiveView(ExitStack):
             self._waiting.append(message)
 
     def _serve(self, port: int, origins: Sequence[str], listening: "Future[int]") -> None:
-        asyncio.set_event_loop(asyncio.new_event_loop())
-        self._loop = tornado.ioloop.IOLoop.current()
+        self._loop = MonotonicLoop()
         endpoint = FoxgloveEndpoint(TopicSource(lambda: self._types, self._want, self._take), origins)
         server = Server(Access(None, ()), ClientLimits(CONNECTIONS_MAX), None, endpoint.route)
         try:

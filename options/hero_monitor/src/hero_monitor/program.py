@@ -46,6 +46,7 @@ class Monitor:
         from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
         from .foxglove.hub import Publisher
         from .foxglove.ros_topics import RosTopics
+        from .serving.monotonic_loop import MonotonicLoop
         from .serving.server import Actions, Server
 
         self._parameters = parameters
@@ -53,7 +54,7 @@ class Monitor:
         self._background = Background()
         self._feed = FleetFeed(parameters.map_frame, self._background)
         self._commander = Commander(self._feed.drivers, self._background)
-        self._loop = tornado.ioloop.IOLoop.current()
+        self._loop = MonotonicLoop()
         self._requests = PageRequests(
             parameters,
             self._feed,

@@ -45,13 +45,20 @@ def log_in(host, token, source="127.0.0.1"):
     return status, (headers["Set-Cookie"] or "").partition(";")[0]
 
 
-class PageClient:
-    """The socket of a page, without a browser: sends requests, and reads nothing."""
+def make_frame(kind, content):
+    """Return a short WebSocket frame, with a mask of zeros (RFC 6455, section 5.2)."""
+    return bytes([kind, 0x80 | len(content), 0, 0, 0, 0]) + content
 
-    def __init__(self, host, cookie=""):
+
+class PageClient:
+    """The socket of a page, or of another client, without a browser: sends requests, and reads nothing."""
+
+    def __init__(self, host, cookie="", path="/live", protocol=""):
         address, _, port = host.rpartition(":")
         self.socket = socket.create_connection((address, int(port)), TIMEOUT_S)
-        lines = ["GET /live HTTP/1.1", "Host: " + host, "Origin: http://" + host, "Cookie: " + cookie]
+        lines = ["GET %s HTTP/1.1" % path, "Host: " + host, "Origin: http://" + host, "Cookie: " + cookie]
+        if protocol:
+            lines.append("Sec-WebSocket-Protocol: " + protocol)
         lines += ["%s: %s" % item for item in UPGRADE.items()]
         self.socket.sendall("\r\n".join([*lines, "", ""]).encode())
         assert b"101" in self.socket.recv(12), "no socket for this page"
@@ -65,9 +72,7 @@ class PageClient:
                 self.socket.sendall(b"\x8a\x80\0\0\0\0")
 
     def send(self, **request):
-        text = json.dumps(request).encode()
-        # RFC 6455, section 5.2: one text frame, with a mask of zeros.
-        self.socket.sendall(bytes([0x81, 0x80 | len(text), 0, 0, 0, 0]) + text)
+        self.socket.sendall(make_frame(0x81, json.dumps(request).encode()))
 
     def close(self):
         self.end.set()

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """The fleet monitor beset by clients without the token: those who know it get in, and their STOP ALL works."""
 
+import contextlib
+import itertools
 import resource
 import select
 import selectors
@@ -20,6 +22,7 @@ from monitor_process import (
     ask,
     end,
     log_in,
+    make_frame,
     start_monitor,
     start_scripted_driver,
     wait_until_it_answers,
@@ -173,6 +176,42 @@ class DoorsTest(unittest.TestCase):
         for _ in range(3):
             page.send(do="stop")
             self.wait_until_stopped(True)
+            self.release()
+
+    def test_messages_without_pause_keep_no_page_from_stopping_all_robots(self):
+        page = self.open_page()
+        _, cookie = log_in(OTHER_HOST, TOKEN)
+        foxglove = {"path": "/foxglove", "protocol": "foxglove.websocket.v1"}
+        for options, frame in (
+            ({}, make_frame(0x89, b"a ping")),
+            ({}, make_frame(0x81, b'{"do": "stop_some", "robots": ["hero_0"]}')),
+            (foxglove, make_frame(0x82, b"\1\0\0\0\0no channel")),
+            (foxglove, make_frame(0x89, b"a ping")),
+        ):
+            client, is_sending = PageClient(OTHER_HOST, cookie, **options), threading.Event()
+            client.end.set()  # here pongs go with the rest: two threads would mix their frames
+            flooding = 100 * frame + make_frame(0x8A, b"")
+
+            def send_without_pause(client=client, flooding=flooding, is_sending=is_sending):
+                for count in itertools.count():
+                    try:
+                        client.socket.sendall(flooding)
+                    except OSError:
+                        break  # the test has shut it down
+                    with contextlib.suppress(BlockingIOError):
+                        client.socket.recv(1 << 20, socket.MSG_DONTWAIT)
+                    if count == 10:
+                        is_sending.set()
+
+            flood = threading.Thread(target=send_without_pause)
+            flood.start()
+            self.assertTrue(is_sending.wait(TIMEOUT_S))
+            page.send(do="stop")
+            self.wait_until_stopped(True)
+            self.assertTrue(flood.is_alive())
+            client.socket.shutdown(socket.SHUT_RDWR)
+            flood.join()
+            client.close()
             self.release()
 
     def test_a_connection_that_sends_no_request_is_closed(self):

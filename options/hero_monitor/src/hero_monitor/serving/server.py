@@ -1,7 +1,7 @@
 """HTTP and one WebSocket per page (tornado): sends updates as JSON, receives requests. Knows nothing of ROS.
 
 One thread owns all connections. No page can delay another: a slow page misses updates (every part is complete in
-itself), and what cannot be sent at once takes 64 kB at most.
+itself), and what cannot be sent at once takes 64 kB at most; what pages send is read in turns (FairStream).
 """
 
 import itertools
@@ -26,6 +26,7 @@ from hero_node.token_bucket import TokenBuckets
 from ..fleet_feed.page_state import encode
 from .access import Access
 from .client_limits import ClientLimits, group_address
+from .fair_stream import FairStream
 
 WEB = Path(__file__).resolve().parents[1] / "web"
 FILES = {path.relative_to(WEB).as_posix(): path for path in WEB.glob("**/*") if path.is_file()}
@@ -285,10 +286,11 @@ class LimitedServer(tornado.httpserver.HTTPServer):
 
     def handle_stream(self, stream: tornado.iostream.IOStream, address: Tuple[Any, ...]) -> None:
         """Serve a new connection, or close it."""
-        if self.limits.admit(stream, str(address[0]), time.monotonic()):
-            super().handle_stream(stream, address)
+        fair = FairStream(stream.socket, max_buffer_size=stream.max_buffer_size)
+        if self.limits.admit(fair, str(address[0]), time.monotonic()):
+            super().handle_stream(fair, address)
         else:
-            stream.close()
+            fair.close()
 
 
 class Server:
