@@ -111,3 +111,25 @@ def test_the_time_until_is_the_first_one_and_endless_if_never():
     times_s, values = np.arange(4.0), np.array([(3, 3), (2, 3), (1, 3), (2, 3)], dtype=float)
     assert metrics.time_until(times_s, values, 2.0).tolist() == [1.0, math.inf]
     assert metrics.time_until(times_s, values, 3.0, falls=False).tolist() == [0.0, 0.0]
+
+
+def test_one_robot_has_no_area_and_no_connectivity():
+    alone = np.array([[(0.3, 0.4, 1.0)], [(0.0, 0.0, 0.0)]])
+    assert metrics.METRICS["hull_area"](alone).tolist() == [0.0, 0.0]
+    assert np.isnan(metrics.METRICS["algebraic_connectivity"](alone)).all()
+    assert metrics.METRICS["cluster_fraction"](alone).tolist() == [1.0, 1.0]
+
+
+OF_OBJECTS = ("object_cluster_fraction", "object_distance")
+
+
+@pytest.mark.parametrize("name", sorted(set(metrics.METRICS) - set(OF_OBJECTS)))
+def test_a_world_with_an_unknown_pose_has_no_value_and_others_keep_theirs(name):
+    known = np.array([(0.0, 0.0, 0.0), (0.1, 0.0, 1.0), (0.0, 0.1, 2.0), (0.4, 0.3, 3.0)])
+    lost = known.copy()
+    lost[1] = math.nan
+    velocities = np.full((2, 4, 3), 0.1)
+    velocities[1, 1] = math.nan
+    alone = metrics.METRICS[name](known[None], velocities[:1])
+    values = metrics.METRICS[name](np.array((known, lost)), velocities)
+    assert values[0] == alone[0] and math.isnan(values[1])

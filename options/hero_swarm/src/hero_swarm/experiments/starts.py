@@ -5,17 +5,24 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
+from hero_client.values.readings import MAX_POSITION_M, is_plausible
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.geometry import Pose
+from hero_node.texts import shorten
 from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena, place_robots
 from hero_sim.world.pushing.shapes import PushedBody
 
 from ..behavior import derive_seed
+from ..metrics.graphs import measure_distances
 from ..trial import scatter, scatter_objects
 from .errors import ExperimentError
 from .experiment_file import Start
 
 _DIAMETER_M = 2.0 * BODY_RADIUS_M
+
+_MAX_OVERLAP_M = 0.002
+"""Of the bodies in a start file, which may hold where robots of a run ended: contacts leave 1.2 mm."""
 
 
 def place_all(start: Start, arena: Arena, robots: int, seeds: Sequence[int]) -> np.ndarray:
@@ -80,23 +87,37 @@ def _place_in_circle(robots: int, spacing_m: float) -> np.ndarray:
 
 def _read_poses(path: str, robots: int) -> np.ndarray:
     """Return the first poses of a file with a line x m, y m, yaw rad for each robot. Raises: ExperimentError."""
-    poses: List[List[float]] = []
+    poses, numbers = [], []
     number = 0
     try:
         with open(path, encoding="utf-8") as file:
-            for line in file:
-                number += 1
+            for number, line in enumerate(file, 1):
                 if line.strip() and not line.startswith("#"):
-                    pose = [float(word) for word in line.split(",")]
-                    if len(pose) != 3 or not all(map(math.isfinite, pose)):
-                        raise ValueError("must be x m, y m, yaw rad")
-                    poses.append(pose)
+                    poses.append(_parse_pose(line))
+                    numbers.append(number)
     except OSError as error:
         raise ExperimentError("start.file %s cannot be read: %s" % (path, error.strerror)) from error
     except ValueError as error:
-        raise ExperimentError(
-            "start.file %s, line %d: %s; must be x m, y m, yaw rad" % (path, number, error)
-        ) from error
+        raise ExperimentError("start.file %s, line %d: %s" % (path, number, error)) from error
     if len(poses) < robots:
         raise ExperimentError("start.file %s: has %d poses for %d robots" % (path, len(poses), robots))
-    return np.array(poses[:robots])
+    starts = np.array(poses[:robots])
+    apart_m = measure_distances(starts[None, :, :2])[0]
+    overlapping = np.argwhere(apart_m < _DIAMETER_M - _MAX_OVERLAP_M)
+    if len(overlapping):
+        first, second = overlapping[0]
+        text = "start.file %s: the robots of lines %d and %d overlap: %.0f mm between centers; bodies are %.0f mm wide"
+        values = numbers[first], numbers[second], 1e3 * apart_m[first, second], 1e3 * _DIAMETER_M
+        raise ExperimentError(text % (path, *values))
+    return starts
+
+
+def _parse_pose(line: str) -> Pose:
+    """Return the pose of a line. Raises: ValueError."""
+    try:
+        pose = Pose(*map(float, line.split(",")))
+    except (TypeError, ValueError):
+        pose = Pose(math.nan, math.nan, math.nan)
+    if not is_plausible(pose):
+        raise ValueError("%s must be x m, y m, yaw rad, within %g m" % (shorten(line.strip()), MAX_POSITION_M))
+    return pose

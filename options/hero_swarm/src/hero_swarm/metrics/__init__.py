@@ -26,7 +26,7 @@ METRICS: Dict[str, Metric] = {
     "algebraic_connectivity": lambda poses, *_: algebraic_connectivity(poses[..., :2], 0.5),
     "cluster_fraction": lambda poses, *_: cluster_fraction(poses[..., :2]),
     "collisions": lambda poses, velocities, objects=None, radii_m=BODY_RADIUS_M: (
-        collisions(poses[..., :2], radii_m).astype(float)
+        collisions(poses[..., :2], radii_m)
     ),
     "consensus_error": lambda poses, *_: consensus_error(poses[..., :2]),
     "dispersion": lambda poses, *_: dispersion(poses[..., :2]),

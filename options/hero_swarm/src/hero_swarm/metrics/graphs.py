@@ -1,4 +1,4 @@
-"""Metrics of who is near whom. Pure: places (W, N, 2) in m; results (W,)."""
+"""Metrics of who is near whom. Pure: places (W, N, 2) in m; results (W,), nan where a place is not known."""
 
 from typing import Union
 
@@ -13,6 +13,11 @@ def measure_distances(places_m: np.ndarray) -> np.ndarray:
     robots = np.arange(places_m.shape[1])
     apart_m[:, robots, robots] = np.inf
     return apart_m
+
+
+def _if_known(places_m: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values (W,), nan for worlds with a place that is not known: comparisons would take it for far away."""
+    return np.where(np.isnan(places_m).any(axis=(1, 2)), np.nan, values)
 
 
 def cluster_fraction(places_m: np.ndarray, reach_m: float = 4.0 * BODY_RADIUS_M) -> np.ndarray:
@@ -30,8 +35,7 @@ def cluster_fraction(places_m: np.ndarray, reach_m: float = 4.0 * BODY_RADIUS_M)
             break
         labels = spread
     sizes = (labels[:, :, None] == labels[:, None]).sum(axis=2).max(axis=1)
-    share: np.ndarray = sizes / places_m.shape[1]
-    return share
+    return _if_known(places_m, sizes / places_m.shape[1])
 
 
 def nearest_neighbor(places_m: np.ndarray) -> np.ndarray:
@@ -41,11 +45,16 @@ def nearest_neighbor(places_m: np.ndarray) -> np.ndarray:
 
 
 def algebraic_connectivity(places_m: np.ndarray, reach_m: float) -> np.ndarray:
-    """Return the second smallest eigenvalue of the graph of robots less than reach_m apart; 0 if it falls apart."""
+    """Return the second smallest eigenvalue of the graph of robots less than reach_m apart.
+
+    0 if it falls apart; nan for one robot, which has no such graph.
+    """
+    if places_m.shape[1] < 2:
+        return np.full(len(places_m), np.nan)
     near = (measure_distances(places_m) < reach_m).astype(float)
     laplacian = near.sum(axis=2)[..., None] * np.eye(near.shape[1]) - near
     values: np.ndarray = np.linalg.eigvalsh(laplacian)[:, 1]
-    return np.where(values < 1e-9, 0.0, values)
+    return _if_known(places_m, np.where(values < 1e-9, 0.0, values))
 
 
 def collisions(
@@ -55,4 +64,4 @@ def collisions(
     radii_m = np.broadcast_to(radii_m, places_m.shape[1])
     touching_m = radii_m[:, None] + radii_m + tolerance_m
     counts: np.ndarray = (measure_distances(places_m) < touching_m).sum(axis=(1, 2)) // 2
-    return counts
+    return _if_known(places_m, counts)

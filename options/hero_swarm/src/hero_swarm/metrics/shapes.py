@@ -52,7 +52,11 @@ def hull_area(places_m: np.ndarray) -> np.ndarray:
 
 
 def _measure_hull(points_m: np.ndarray) -> float:
-    """Return the area of a convex hull, found by the monotone chain (Andrew 1979)."""
+    """Return the area of a convex hull, found by the monotone chain (Andrew 1979); nan where a point is not known."""
+    if np.isnan(points_m).any():
+        return math.nan
+    if len(points_m) < 3:
+        return 0.0
     order = np.lexsort((points_m[:, 1], points_m[:, 0]))
     corners: List[Point] = []
     for way in (points_m[order], points_m[order[::-1]]):

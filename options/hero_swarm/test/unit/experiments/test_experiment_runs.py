@@ -278,6 +278,12 @@ def test_starts_of_a_file_are_its_first_poses(tmp_path):
     assert poses.tolist() == [[[0.0, 0.5, 1.0], [-1.0, 2.0, -3.0]]] * 2
 
 
+def test_starts_of_a_file_may_touch_as_robots_at_the_end_of_a_run(tmp_path):
+    path = tmp_path / "starts.csv"
+    path.write_text("0,0,0\n%.4f,0,0\n" % (2.0 * BODY_RADIUS_M - 0.0012))
+    assert place_all(Start("file", 0.0, 0.0, str(path)), None, 2, [1]).shape == (1, 2, 3)
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -285,7 +291,10 @@ def test_starts_of_a_file_are_its_first_poses(tmp_path):
         ("0,0\n", "line 1"),
         ("0,0,0\n0,x,0\n", "line 2"),
         ("0,0,inf\n", "line 1"),
-        ("0,0,0,0\n", "line 1: must be x m, y m, yaw rad"),
+        ("0,0,0,0\n", "line 1: '0,0,0,0' must be x m, y m, yaw rad"),
+        ("0,0,0\n1e308,0,0\n", "line 2: '1e308,0,0' must be x m, y m, yaw rad, within 1000 m"),
+        ("#\n0,0,0\n0,0,1\n", "lines 2 and 3 overlap: 0 mm between centers; bodies are 74 mm wide"),
+        ("0,0,0\n0.07,0,0\n", "lines 1 and 2 overlap: 70 mm"),
         ("#\n\n0,0,0\n\nx\n", "line 5"),
     ],
 )
