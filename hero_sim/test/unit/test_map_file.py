@@ -1,5 +1,9 @@
 """Arenas from maps of map_server: what is solid, where robots start, wrong files."""
 
+import os
+import struct
+import zlib
+
 import numpy as np
 import pytest
 
@@ -74,6 +78,10 @@ def test_a_negated_map_is_free_where_it_is_black(write_map):
         (MAP.replace("0.01", "none"), "resolution must be a number"),
         (MAP.replace("0.01", "50"), "resolution must be from 0.001 to 1 m"),
         (MAP.replace("0.0]", "0.5]"), "its yaw 0"),
+        (MAP.replace("-0.6", "1e300"), r"origin must be within 1000 m .* not \['1e300', '-0.5', '0.0'\]"),
+        (MAP.replace("0.196", "25"), "free_thresh must be above 0 and at most 1, such as 0.25 for 25 %, not 25"),
+        (MAP.replace("0.196", "0"), "free_thresh must be above 0"),
+        (MAP.replace("negate: 0", "negate: true"), "negate must be 0 or 1, not 'true'"),
         (MAP.replace("[-0.6, -0.5, 0.0]", "here"), "origin must be x, y and yaw"),
         (MAP.replace("room.png", "none.png"), "none.png cannot be read"),
         (MAP.replace("room.png", "room.yaml"), "room.yaml cannot be read"),
@@ -82,6 +90,24 @@ def test_a_negated_map_is_free_where_it_is_black(write_map):
 def test_a_wrong_map_is_refused_with_the_reason(write_map, text, reason):
     with pytest.raises(OptionError, match=reason):
         load_arena(write_map(text))
+
+
+def test_a_large_picture_is_refused_by_its_header(write_map, tmp_path):
+    path = write_map()
+    header = b"IHDR" + struct.pack(">2I5B", 13000, 13000, 8, 0, 0, 0, 0)
+    chunks = struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header))
+    # Decoding it would say that the file is cut off.
+    (tmp_path / "room.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunks + struct.pack(">I", 100) + b"IDAT")
+    with pytest.raises(OptionError, match="the picture has 13000 x 13000 pixels, more than 4000000"):
+        load_arena(path)
+
+
+def test_a_pipe_as_picture_is_refused(write_map, tmp_path):
+    path = write_map()
+    (tmp_path / "room.png").unlink()
+    os.mkfifo(tmp_path / "room.png")
+    with pytest.raises(OptionError, match="room.png cannot be read: it is a pipe, device or socket"):
+        load_arena(path)
 
 
 def test_a_map_without_free_cells_is_refused(write_map):

@@ -6,6 +6,7 @@ The README has the format.
 import io
 import math
 import os
+import warnings
 from typing import Any, Callable, Dict, List
 
 import numpy as np
@@ -19,7 +20,7 @@ from hero_node.yaml_text import decode_text, parse_yaml
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .arena import Arena, is_free, outline
-from .map_file import build_map_arena
+from .map_file import build_map_arena, check_size
 from .pushing.shapes import Disc, Polygon, PushedBody, Shape
 
 SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
@@ -60,8 +61,11 @@ def _build_from_map(content: Dict[str, Any], path: str, read: Callable[[str], by
         raise ValueError("pictures of maps need python3-pil: install it") from None
     picture = os.path.join(os.path.dirname(path), str(content["image"]))
     try:
-        with Image.open(io.BytesIO(read(picture))) as image:
-            gray = np.asarray(image.convert("L"), dtype=float)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # check_size() refuses it
+            image = Image.open(io.BytesIO(read(picture)))
+        check_size(*image.size)  # by its header: nothing is decoded yet
+        gray = np.asarray(image.convert("L"), dtype=float)
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ValueError("its picture %s cannot be read: %s" % (picture, reason)) from error

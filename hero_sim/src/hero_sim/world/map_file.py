@@ -8,9 +8,18 @@ from typing import Any, Dict, List, Tuple
 
 import numpy as np
 
+from hero_node.texts import shorten
+
 from .arena import Arena
 
 _MAX_CELLS = 4_000_000
+_MAX_ORIGIN_M = 1000.0
+
+
+def check_size(width: int, height: int) -> None:
+    """Check the size of a picture before it is decoded. Raises: ValueError."""
+    if width * height > _MAX_CELLS:
+        raise ValueError("the picture has %d x %d pixels, more than %d in all" % (width, height, _MAX_CELLS))
 
 
 def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Arena:
@@ -20,19 +29,23 @@ def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Are
     """
     cell_m = _read_number(content, "resolution", 0.05)
     free_share = _read_number(content, "free_thresh", 0.196)
+    if not 0.0 < free_share <= 1.0:
+        raise ValueError("free_thresh must be above 0 and at most 1, such as 0.25 for 25 %%, not %g" % free_share)
+    negate = content.get("negate", "0")
+    if negate not in ("0", "1"):
+        raise ValueError("negate must be 0 or 1, not %s" % shorten(negate))
     origin = content.get("origin", ["0", "0", "0"])
     try:
         x_m, y_m, yaw_rad = (float(value) for value in origin)
     except (TypeError, ValueError):
-        raise ValueError("origin must be x, y and yaw, not %r" % (origin,)) from None
-    if not (math.isfinite(x_m) and math.isfinite(y_m) and yaw_rad == 0.0):
-        raise ValueError("origin must be finite and its yaw 0, not %r" % (origin,))
+        raise ValueError("origin must be x, y and yaw, not %s" % shorten(origin)) from None
+    if not (abs(x_m) <= _MAX_ORIGIN_M and abs(y_m) <= _MAX_ORIGIN_M and yaw_rad == 0.0):
+        text = "origin must be within %.0f m (x and y, in m) and its yaw 0, not %s"
+        raise ValueError(text % (_MAX_ORIGIN_M, shorten(origin)))
     if not 0.001 <= cell_m <= 1.0:
         raise ValueError("resolution must be from 0.001 to 1 m, not %g" % cell_m)
-    if gray.size > _MAX_CELLS:
-        raise ValueError("the picture has %d pixels, more than %d" % (gray.size, _MAX_CELLS))
     shade = gray[::-1] / 255.0  # the first row of a picture is its upper one
-    occupied_share = shade if content.get("negate", "0") == "1" else 1.0 - shade
+    occupied_share = shade if negate == "1" else 1.0 - shade
     solid = occupied_share >= free_share
     rows, columns = np.nonzero(~solid)
     if not len(rows):

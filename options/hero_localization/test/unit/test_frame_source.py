@@ -1,5 +1,6 @@
 """Images from topics and videos become gray; what cannot be used or opened is named; the newest image counts."""
 
+import os
 import re
 import threading
 
@@ -181,12 +182,15 @@ def test_a_video_waits_for_a_slow_program(video, clock):
         ("/dev/video-of-nobody", "does not exist; ls /dev/video* lists cameras"),
         ("{folder}/arena.avi", "does not exist"),
         ("{folder}", "is a folder, but must be a camera or a video"),
+        ("{folder}/pipe", "is a pipe, socket or file of another kind, but must be a video file"),
+        ("/dev/../{folder}/pipe", "is a pipe, socket or file of another kind, but must be a camera"),
         (__file__, "cannot be opened: no video that OpenCV can read"),
         ("/dev/null", "cannot be opened: no camera, or another program uses it"),
     ],
 )
 def test_what_cannot_be_opened_is_told_with_the_reason(tmp_path, device, reason):
     device = device.format(folder=tmp_path)
+    os.mkfifo(tmp_path / "pipe")
     with pytest.raises(FrameSourceError, match=re.escape("%s %s" % (device, reason))):
         open_source("", device, "640x480", 30.0, DeviceControls())
 

@@ -39,6 +39,8 @@ def test_lens_of_camera_calibration_is_read(tmp_path):
         ("{", "no YAML"),
         ("a: 1", "'image_width' is missing"),
         (STOCK_LENS.replace("438.7", "0.0"), "not calibrated"),
+        (STOCK_LENS.replace("640", "-1920"), "1 to 20000 pixels in width and height, not -1920 x 480"),
+        (STOCK_LENS.replace("480", 400 * "9"), "1 to 20000 pixels in width and height, not 640 x 999"),
         (STOCK_LENS.replace("plumb_bob", "equidistant"), "equidistant"),
         (STOCK_LENS.replace("438.7", "[1, 2]"), "lens.yaml"),
     ],

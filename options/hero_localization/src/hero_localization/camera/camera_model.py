@@ -9,7 +9,12 @@ from typing import NamedTuple, Sequence, Union
 
 import numpy as np
 
+from hero_node.texts import shorten
+
 from ..errors import CalibrationError
+
+MAX_SIZE_PX = 20_000
+"""Of an image's width and height; cameras have up to 12,000."""
 
 _MAX_ROUNDS = 50
 _ROUNDING = 1e-10
@@ -32,8 +37,11 @@ class Intrinsics(NamedTuple):
     ) -> "Intrinsics":
         """Return the intrinsics that a sensor_msgs/CameraInfo describes (K as nine numbers, distortion_model, D).
 
-        Raises: ValueError for a camera that is not calibrated, or a lens of another model.
+        Raises: ValueError for images of no size, a camera that is not calibrated, or a lens of another model.
         """
+        if not (0 < width_px <= MAX_SIZE_PX and 0 < height_px <= MAX_SIZE_PX):
+            size = "%s x %s" % (shorten(width_px), shorten(height_px))
+            raise ValueError("images must have 1 to %d pixels in width and height, not %s" % (MAX_SIZE_PX, size))
         values = np.asarray(matrix, dtype=float).reshape(-1)
         if values.shape != (9,) or not np.isfinite(values).all() or values[0] <= 0.0 or values[4] <= 0.0:
             raise ValueError("this camera is not calibrated: K is %s" % list(values))

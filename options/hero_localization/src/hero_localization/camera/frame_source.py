@@ -3,6 +3,7 @@
 import itertools
 import math
 import os
+import stat
 import threading
 import time
 from typing import Any, NamedTuple, Optional, Tuple
@@ -271,8 +272,12 @@ def _check_path(path: str) -> None:
     is_device = path.startswith(_DEVICES)
     if not os.path.exists(path):
         raise FrameSourceError("%s does not exist%s" % (path, "; ls /dev/video* lists cameras" if is_device else ""))
-    if os.path.isdir(path):
+    mode = os.stat(path).st_mode
+    if stat.S_ISDIR(mode):
         raise FrameSourceError("%s is a folder, but must be a camera or a video" % path)
+    if not (stat.S_ISCHR(mode) if is_device else stat.S_ISREG(mode)):  # a pipe would be waited for
+        kind = "a camera" if is_device else "a video file"
+        raise FrameSourceError("%s is a pipe, socket or file of another kind, but must be %s" % (path, kind))
     if not os.access(path, os.R_OK):
         remedy = ": sudo usermod -aG video $USER, and log in again" if is_device else ""
         raise FrameSourceError("%s may not be read by this user%s" % (path, remedy))

@@ -23,6 +23,9 @@ _LENGTH = struct.Struct("<I")
 _POSE = struct.Struct("<7d")
 
 MAX_FIELD_M = 100.0
+QUATERNION_TOLERANCE = 0.01
+"""Of the square of a quaternion's length, 1: as tf has it."""
+
 MIN_UPRIGHT = 0.7
 """Of the robot's axis, the part that points up: 45 degrees."""
 
@@ -47,19 +50,29 @@ def _receive_odometry(message: rospy.AnyMsg, receive: Callable[[float, Pose], No
         return
     with suppress(struct.error):
         stamp_s, pose = _read_odometry(message._buff)
-        if is_plausible(pose) and math.isfinite(stamp_s):
+        if pose is not None and is_plausible(pose) and math.isfinite(stamp_s):
             receive(stamp_s, pose)
 
 
-def _read_odometry(data: bytes) -> Tuple[float, Pose]:
-    """Return stamp (s) and pose in the plane of a serialized nav_msgs/Odometry. Raises: struct.error."""
+def _read_odometry(data: bytes) -> Tuple[float, Optional[Pose]]:
+    """Return stamp (s) and pose in the plane of a serialized nav_msgs/Odometry; no pose for an invalid quaternion.
+
+    Raises: struct.error.
+    """
     _, seconds, nanoseconds = _HEADER.unpack_from(data)
     offset = _HEADER.size
     for _ in range(2):  # frame_id, child_frame_id
         offset += _LENGTH.size + _LENGTH.unpack_from(data, offset)[0]
     x_m, y_m, _, x, y, z, w = _POSE.unpack_from(data, offset)
+    if not is_rotation(x, y, z, w):
+        return seconds + 1e-9 * nanoseconds, None
     yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     return seconds + 1e-9 * nanoseconds, Pose(x_m, y_m, yaw_rad)
+
+
+def is_rotation(x: float, y: float, z: float, w: float) -> bool:
+    """Return whether a quaternion is one of a rotation: (0, 0, 0, 0), which was not filled in, is no heading."""
+    return abs(x * x + y * y + z * z + w * w - 1.0) <= QUATERNION_TOLERANCE  # x**2 raises OverflowError
 
 
 def describe_source(topic: str, message: Any) -> str:
@@ -73,8 +86,10 @@ def find_pose_mistake(pose: PoseMessage) -> str:
     farthest_m = max(abs(place.x), abs(place.y))
     if MAX_FIELD_M < farthest_m < math.inf:
         return "has a position of %.0f m: does the motion capture system publish mm?" % farthest_m
-    norm2 = turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2
-    if norm2 > 0.5 and 1.0 - 2.0 * (turn.x**2 + turn.y**2) / norm2 < MIN_UPRIGHT:
+    if not is_rotation(turn.x, turn.y, turn.z, turn.w):
+        text = "has the orientation %g, %g, %g, %g, but a quaternion has the length 1: is it filled in?"
+        return text % (turn.x, turn.y, turn.z, turn.w)
+    if 1.0 - 2.0 * (turn.x**2 + turn.y**2) < MIN_UPRIGHT:
         return "holds a robot that lies on its side: is the up axis of the motion capture system z?"
     return ""
 

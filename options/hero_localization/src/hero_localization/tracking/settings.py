@@ -3,12 +3,14 @@
 Pure but for the file. Lengths in m, angles in degrees, pixels as in camera_model.
 """
 
+import itertools
 import math
 import os
 from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
+from hero_client.values.readings import is_plausible
 from hero_node.geometry import Pose
 from hero_node.number_checks import is_number, is_whole_number
 from hero_node.safe_file import lock_file, write_file
@@ -138,6 +140,7 @@ def _build(content: Mapping[str, Any]) -> Settings:
         height_m=_number(content, "tag_height_m", DEFAULT_HEIGHT_M, 0.0, 1.0),
         reference_size_m=_number(content, "reference_size_m", REFERENCE_SIZE_M, 0.005, 1.0),
     )
+    _check_meanings(layout)
     lens = _build_lens(content["lens"]) if "lens" in content else None
     return Settings(
         _choice(content, "detector", DEFAULT_BACKEND, BACKENDS),
@@ -150,6 +153,15 @@ def _build(content: Mapping[str, Any]) -> Settings:
         _by_tag(content, "seen_references", POSE_FORM, _pose),
         _build_controls(content),
     )
+
+
+def _check_meanings(layout: TagLayout) -> None:
+    """Check that no tag has two meanings. Raises: ValueError."""
+    meanings = {"references": layout.references, "objects": layout.objects, "tag_robots": layout.tag_robots}
+    for (one, tags), (other, others) in itertools.combinations(meanings.items(), 2):
+        for tag_id in sorted(tags.keys() & others.keys()):
+            text = "tag %d is named in %s and in %s, but has one meaning: remove it from one of them"
+            raise ValueError(text % (tag_id, one, other))
 
 
 def _build_controls(content: Mapping[str, Any]) -> DeviceControls:
@@ -184,7 +196,7 @@ def _by_tag(content: Mapping[str, Any], key: str, form: str, read: Callable[[Any
         return {}
     try:
         return {_whole_number(tag_id): read(value) for tag_id, value in given.items()}
-    except (AttributeError, TypeError, ValueError):
+    except (AttributeError, OverflowError, TypeError, ValueError):
         raise ValueError("%s must hold ID: %s for each tag, not %s" % (key, form, shorten(given))) from None
 
 
@@ -204,9 +216,10 @@ def _pose(values: Any) -> Pose:
     if not isinstance(values, list):
         raise ValueError
     x_m, y_m, yaw_deg = map(float, values)
-    if not all(map(math.isfinite, (x_m, y_m, yaw_deg))):
+    pose = Pose(x_m, y_m, math.radians(yaw_deg))
+    if not is_plausible(pose):
         raise ValueError
-    return Pose(x_m, y_m, math.radians(yaw_deg))
+    return pose
 
 
 def _build_lens(part: Any) -> Intrinsics:
@@ -230,7 +243,7 @@ def _build_camera(part: Any, lens: Optional[Intrinsics]) -> Camera:
         is_rotation = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) and np.linalg.det(rotation) > 0.0
         if is_rotation and np.isfinite(position_m).all():
             return Camera(lens, rotation, position_m)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, OverflowError, TypeError, ValueError):
         pass  # keys that are missing, other values than numbers, or too few of them
     keys = "rotation (nine numbers) and position_m (three)"
     raise ValueError("camera is %s, but must hold %s: calibrate the arena" % (shorten(part), keys))
