@@ -220,6 +220,7 @@ def test_whatever_happens_to_its_link_a_robot_runs_again_but_not_at_once(script)
             robot.switch_on(now_ms)
 
 
+@pytest.mark.slow
 def test_robots_started_together_do_the_same_for_the_same_seed():
     runs = []
     for _ in range(2):

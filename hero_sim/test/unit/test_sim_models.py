@@ -102,6 +102,7 @@ def test_one_swarm_holds_robots_of_several_models():
     assert all(any(packet.topic_id == packets.ID_LOG for packet in sent) for sent in driver.arrivals)
 
 
+@pytest.mark.slow
 def test_a_robot_with_a_bump_shield_keeps_others_and_walls_farther_away():
     errors = draw_errors([np.random.RandomState(index) for index in range(2)], 0.0)
     errors.radius_m[0] = 0.060

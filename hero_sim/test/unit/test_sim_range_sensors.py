@@ -179,6 +179,7 @@ def test_readings_that_are_due_in_one_step_are_computed_together():
     assert looks[3:] == [[1]], "a reading of the step before is not given"
 
 
+@pytest.mark.slow
 def test_robots_that_stream_expect_all_of_their_readings():
     driver = DriverSide("--count", "12")
     driver.start_streaming()

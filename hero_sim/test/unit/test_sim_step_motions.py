@@ -62,6 +62,7 @@ def find_stops(sent):
     return [at_ms for at_ms, _, *velocity in sent if velocity == [0.0, 0.0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_forward_and_turn_move_by_what_they_are_told(seed):
     robot = StepSwarm(1, seed=seed).robots[0]
@@ -77,6 +78,7 @@ def test_forward_and_turn_move_by_what_they_are_told(seed):
         assert travel_m(robot, before) < 0.01
 
 
+@pytest.mark.slow
 def test_many_robots_reach_a_place_and_a_heading():
     swarm = StepSwarm(1, worlds=MANY)
     before = [robot.true_pose for robot in swarm]
@@ -88,6 +90,7 @@ def test_many_robots_reach_a_place_and_a_heading():
     assert is_at_rest(swarm)
 
 
+@pytest.mark.slow
 def test_goals_may_be_in_odometry_relative_or_in_the_world():
     swarm = StepSwarm(1, worlds=MANY, perfect=True)
     before = [robot.true_pose for robot in swarm]

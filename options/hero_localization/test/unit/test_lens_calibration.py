@@ -130,6 +130,7 @@ def test_too_few_pictures_are_refused():
         calibrate(project(list_holds(5, 0.5)))
 
 
+@pytest.mark.slow
 def test_board_that_is_never_tilted_is_told_to_be():
     found = calibrate(project(list_holds(12, 0.01), noise_px=0.2))
     assert any("tilted" in problem for problem in found.problems)

@@ -91,6 +91,7 @@ def test_a_camera_without_delay_shows_robots_where_they_are():
         assert np.hypot(*np.subtract(swarm[0].pose_in("map"), swarm[0].true_pose)[:2]) < 1e-4
 
 
+@pytest.mark.slow
 def test_the_map_shows_the_walls_before_which_robots_turn():
     grid = OccupancyGrid((-1.1, -1.1, 1.1, 1.1))
     with StepSwarm(4, seed=1, arena="empty") as swarm:

@@ -73,6 +73,7 @@ def record(kind, time_s=60.0, delay_ms=0, turns=True):
     return Recording(*tables)
 
 
+@pytest.mark.slow
 def test_hidden_errors_come_back_and_predict_paths_not_seen():
     fit = fit_robot([record(PULSES, delay_ms=90)])
     for key, hidden in (entry.split("=") for entry in HIDDEN.split(",")):

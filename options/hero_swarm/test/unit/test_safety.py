@@ -96,6 +96,7 @@ def test_of_the_allowed_velocities_the_nearest_is_found():
     assert fast == pytest.approx(np.array([(0.12, 0.16)]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 5.0, 100.0, 1e300])
 def test_no_wanted_speed_makes_robots_touch_or_leave_the_fence(factor):
     names = ["hero_plus" if number % 3 == 1 else "hero" for number in range(8)]

@@ -86,6 +86,7 @@ def test_killed_anywhere_a_resumed_experiment_gives_the_same_bytes(finished, tmp
     assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_all_runs_differ_and_start_alike_for_the_same_seed_in_paired_cells(finished):
     rows = read_table(finished)
     assert len(rows) == 20 and len({row["dispersion"] for row in rows}) == 20
@@ -215,6 +216,7 @@ def test_changed_code_of_the_behavior_is_noticed(tmp_path):
     run(path, "--fresh")
 
 
+@pytest.mark.slow
 def test_paths_are_relative_to_the_file_wherever_programs_run(tmp_path, monkeypatch, capsys):
     home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
     for folder in (home, elsewhere):
