@@ -21,6 +21,7 @@ from typing import Any, Callable, List, Optional
 import rosgraph
 import rospy
 
+from hero_node.command_line import print_error
 from hero_node.errors import NodeError, ProgramError
 from hero_node.ros.connections import limit_xmlrpc_connections, open_tcpros_server
 from hero_node.ros.master import find_running_node, read_master_uri
@@ -36,6 +37,7 @@ from .ros.rospy_internals import (
     keep_publishers_connected,
     leave_topics_out_of_rosout,
 )
+from .ros.thread_watch import ThreadWatch
 from .ros.worker import Worker
 from .stop_interface import StopInterface
 from .stop_store import StopStore
@@ -73,8 +75,9 @@ def make_ros_clock() -> Callable[[], int]:
 class DriverNode:
     """The whole driver: open() until close()."""
 
-    def __init__(self, config: DriverConfig, log: LogRelay) -> None:
+    def __init__(self, config: DriverConfig, log: LogRelay, threads: ThreadWatch) -> None:
         self._config = config
+        self._threads = threads
         # Not an Event: a signal handler that interrupts the waiting thread would wait for the Event's lock for ever.
         self._ends: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._changed = threading.Event()
@@ -121,7 +124,7 @@ class DriverNode:
         reporter = Reporter()
         next_report_s = time.monotonic()
         # The first reports of a burst of changes may be put off a little, so that 50 robots make a few.
-        while not self._has_ended(REPORT_CHECK_S):
+        while not self._has_ended(REPORT_CHECK_S) and not self._threads.failure:
             now_s = time.monotonic()
             is_due = now_s >= next_report_s
             if is_due or self._changed.is_set():
@@ -131,6 +134,9 @@ class DriverNode:
                 next_report_s = now_s + self._config.report_period_s
         if self._crash is not None:
             rospy.logfatal("the driver broke: %s: %s", type(self._crash).__name__, self._crash)
+            return 1
+        if self._threads.failure:
+            rospy.logfatal("hero_driver ends, as programs could not stop robots any more: %s", self._threads.failure)
             return 1
         return 0
 
@@ -226,10 +232,24 @@ def main(argv: Optional[List[str]] = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         # Into a pipe or file Python writes nothing before it has 8 kB, and rospy does not flush.
         sys.stdout.reconfigure(line_buffering=True)
+    threads = ThreadWatch()
+    try:
+        code = _run(argv, threads)
+    except (MemoryError, RuntimeError, ProgramError) as error:
+        if not threads.note(error) and not threads.failure:
+            raise
+        print_error("cannot run: %s" % threads.failure)
+        code = 1
+    if threads.failure:
+        os._exit(code)  # Python would wait for rospy's threads, which wait for what could not start
+    return code
+
+
+def _run(argv: Optional[List[str]], threads: ThreadWatch) -> int:
     log = LogRelay()
     try:
         _enter_ros(argv, log)
-        node = DriverNode(read_config(_read_private_parameters()), log)
+        node = DriverNode(read_config(_read_private_parameters()), log, threads)
         sys.setswitchinterval(SWITCH_INTERVAL_S)
         # The driver handles signals itself: robots are stopped before ROS goes down.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -239,13 +259,16 @@ def main(argv: Optional[List[str]] = None) -> int:
     except KeyboardInterrupt:
         return 130
     except ProgramError as error:
+        if threads.failure:
+            raise
         rospy.logfatal("hero_driver cannot start: %s", error)
         return 2
     try:
         return node.spin()
     finally:
         node.close()
-        end_ros_node("the driver ended", LEAVE_WAIT_S)
+        if not threads.failure:
+            end_ros_node("the driver ended", LEAVE_WAIT_S)
 
 
 def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:

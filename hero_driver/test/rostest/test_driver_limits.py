@@ -1,6 +1,11 @@
 #!/usr/bin/env python3
 """Who is let in, and how much one robot may send."""
 
+import http.client
+import resource
+import xmlrpc.client
+
+import rosgraph
 import rospy
 import rostest
 import stock_messages
@@ -32,6 +37,23 @@ class TestDriverLimits(OwnDriverCase):
         refused = self.dial(driver, 1, ready=False)
         self.wait_refused(driver, refused, "connection of 127.0.0.1.* refused: .*~allow")
         self.dial(driver, 1, source_host="127.0.0.2")
+
+    def test_a_driver_that_can_start_no_thread_for_a_program_ends(self):
+        driver = self.start()
+        robot = self.dial(driver, 30)
+        with open("/proc/%d/statm" % driver.process.pid, encoding="utf-8") as file:
+            used_length = int(file.read().split()[0]) * resource.getpagesize()
+        limit = used_length + 4 * 2**20  # half the stack of a thread
+        resource.prlimit(driver.process.pid, resource.RLIMIT_AS, (limit, limit))
+        # Each open connection has a thread; the stacks of some that have ended are used again.
+        uri = rosgraph.Master("/test").lookupNode(driver.node)
+        connections = [xmlrpc.client.ServerProxy(uri) for _ in range(20)]
+        with self.assertRaises((OSError, http.client.HTTPException)):
+            for connection in connections:
+                connection.getPid("/test")
+        driver.wait_line("hero_driver ends, as .* no thread can be started: free memory")
+        self.assertEqual(driver.wait_end(), 1, driver.lines)
+        wait_for(lambda: robot.ended, "the connection to be closed")
 
     def test_more_connections_than_allowed_are_refused_and_those_there_go_on(self):
         driver = self.start(max_connections=2)

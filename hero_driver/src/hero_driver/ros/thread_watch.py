@@ -1,0 +1,54 @@
+"""Notices that a thread could not start, or ran out of memory: on rospy's threads that would only be a traceback.
+
+rospy starts a thread for each connection to a program and each call from one, and one that registers the node. Without
+any of them robots would join while some program's commands and stops go unheard.
+"""
+
+import threading
+from typing import Any
+
+HANDSHAKE = "handshake"
+"""Name of threads that handle their failure themselves: the program is refused, and connects again."""
+
+REMEDY = "free memory, or raise the limits of threads and memory (ulimit -u and -v, TasksMax), and start again"
+
+NO_THREAD = "can't start new thread"
+"""Python's RuntimeError where the system has no thread left."""
+
+
+class ThreadWatch:
+    """All threads of this process, from now on.
+
+    Attributes:
+        failure: what went wrong first, with a remedy, for users; empty: nothing.
+    """
+
+    def __init__(self) -> None:
+        self.failure = ""
+        start, report = threading.Thread.start, threading.excepthook
+
+        def start_or_tell(thread: threading.Thread) -> None:
+            try:
+                start(thread)
+            except RuntimeError as error:
+                if thread.name != HANDSHAKE:
+                    self.note(error)
+                raise
+
+        def report_thread(arguments: Any) -> None:
+            if not self.note(arguments.exc_value):
+                report(arguments)
+
+        threading.Thread.start = start_or_tell  # type: ignore[method-assign]
+        threading.excepthook = report_thread
+
+    def note(self, error: BaseException) -> bool:
+        """Return whether error is a lack of threads or memory; the first one is kept."""
+        if isinstance(error, RuntimeError) and NO_THREAD in str(error):
+            lack = "no thread can be started"
+        elif isinstance(error, MemoryError):
+            lack = "there is no memory"
+        else:
+            return False
+        self.failure = self.failure or "%s: %s" % (lack, REMEDY)
+        return True
