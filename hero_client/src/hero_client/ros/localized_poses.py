@@ -3,7 +3,7 @@
 import math
 import time
 from functools import lru_cache
-from typing import Dict, NamedTuple, Optional
+from typing import Dict, NamedTuple, Optional, Set
 
 import rospy
 
@@ -96,6 +96,12 @@ class PoseListener:
                 if time.monotonic() >= deadline_s or rospy.is_shutdown():
                     raise
             time.sleep(POLL_PERIOD_S)
+
+    @property
+    def ids(self) -> Set[int]:
+        """Robots that localize names, whether their poses are known or not."""
+        report = self._report
+        return set(report.robots) if report else set()
 
     def age_s(self, robot_id: int) -> float:
         """Return how old the pose of a robot is; inf if it has none."""

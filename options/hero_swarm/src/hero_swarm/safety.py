@@ -40,6 +40,7 @@ class SafetyFilter:
         sidestep: share of what is taken from a velocity that goes to its right, so that robots that meet pass.
         max_speed_m_s, max_angular_rad_s, max_wheel_m_s: limits of the commands, and of what is wanted.
         radii_m: of the robots' bodies (N,), or one for all.
+        others_m: x m, y m and body radius m of robots that are not commanded (M, 3), and so do not give way.
         is_limited: which robots were asked in the last call for more than they can drive (W, N).
         calls, limited_calls: number of all calls, and of those in which a robot was asked for more than it can drive.
     """
@@ -55,12 +56,18 @@ class SafetyFilter:
     max_wheel_m_s = MAX_WHEEL_M_S
 
     def __init__(self, mode: str = ROBOTS, fence_m: Optional[np.ndarray] = None) -> None:
-        """fence_m: x min, y min, x max, y max, which no body leaves. Raises: ValueError for another mode."""
+        """fence_m: x min, y min, x max, y max, which no body leaves.
+
+        Raises: ValueError for another mode, and for a fence that is missing.
+        """
         if mode not in MODES:
             raise ValueError("safety %r: must be one of %s" % (mode, ", ".join(MODES)))
+        if mode == FENCE and fence_m is None:
+            raise ValueError("safety %s needs a fence: x min, y min, x max, y max in m" % mode)
         self.mode = mode
         self.radii_m: Union[float, Sequence[float]] = HERO.body_radius_m
         self._separations_m: Union[float, Sequence[float]] = HERO.wheel_separation_m
+        self.others_m = np.empty((0, 3))
         self._fence_m = fence_m
         self.is_limited = np.zeros((1, 1), dtype=bool)
         self.calls = self.limited_calls = 0
@@ -146,24 +153,28 @@ class SafetyFilter:
 
     def _list_half_planes(self, points_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return normals (W, N, K, 2) and bounds (W, N, K) for the steered points (W, N, 2)."""
-        radii_m = np.broadcast_to(self.radii_m, points_m.shape[1]) + self.lookahead_m + self.margin_m
-        normals, bounds = [np.empty((*points_m.shape[:2], 0, 2))], [np.empty((*points_m.shape[:2], 0))]
-        robots = points_m.shape[1]
-        count = min(self.neighbors, robots - 1)
+        worlds, robots, _ = points_m.shape
+        radii_m = np.broadcast_to(self.radii_m, robots) + self.lookahead_m + self.margin_m
+        normals, bounds = [np.empty((worlds, robots, 0, 2))], [np.empty((worlds, robots, 0))]
+        others = len(self.others_m)
+        count = min(self.neighbors, robots - 1 + others)
         if self.mode == ROBOTS and count > 0:
-            away_m = points_m[:, :, None] - points_m[:, None]
+            standing_m = np.broadcast_to(self.others_m[:, :2], (worlds, others, 2))
+            away_m = points_m[:, :, None] - np.concatenate((points_m, standing_m), axis=1)[:, None]
             square_m2 = (away_m * away_m).sum(axis=-1)
             square_m2[:, np.arange(robots), np.arange(robots)] = np.inf
             nearest = np.argpartition(square_m2, count - 1, axis=2)[..., :count]
             away_m = np.take_along_axis(away_m, nearest[..., None], axis=2)
             distance_m = np.sqrt(np.maximum(np.take_along_axis(square_m2, nearest, axis=2), 1e-12))
             normals.append(away_m / distance_m[..., None])
-            # Half of the closing speed that the pair may have.
-            bounds.append(-0.5 * self.gain_1_s * (distance_m - radii_m[:, None] - radii_m[nearest]))
+            gaps_m = distance_m - radii_m[:, None] - np.append(radii_m, self.others_m[:, 2])[nearest]
+            # Half of the closing speed that a pair may have, and all of it where the other one does not know.
+            shares = np.repeat((0.5, 1.0), (robots, others))[nearest]
+            bounds.append(-self.gain_1_s * shares * gaps_m)
         if self._fence_m is not None:
             gaps_m = np.concatenate((points_m - self._fence_m[:2], self._fence_m[2:] - points_m), axis=-1)
             gaps_m -= radii_m[:, None]
             inward = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)])
-            normals.append(np.broadcast_to(inward, (*points_m.shape[:2], 4, 2)))
+            normals.append(np.broadcast_to(inward, (worlds, robots, 4, 2)))
             bounds.append(-self.fence_gain_1_s * gaps_m)
         return np.concatenate(normals, axis=2), np.concatenate(bounds, axis=2)

@@ -12,15 +12,18 @@ from nav_msgs.msg import Odometry
 from visualization_msgs.msg import Marker
 
 from hero_client import ProgramError
+from hero_client.ros.localized_poses import PoseListener, PoseReport
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_msgs.msg import Robot, RobotArray, RobotPose
+from hero_node.geometry import Pose
 from hero_node.parameters import check_parameters
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
-from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.stepped.swarm import StepSwarm, StepWorld
 from hero_swarm.behavior import Behavior, Binary, Neighbors, Sight, sense
 from hero_swarm.metrics import consensus_error
 from hero_swarm.metrics.graphs import measure_distances
-from hero_swarm.ros import behavior_node, pose_source
+from hero_swarm.ros import behavior_node, other_robots, pose_source
 from hero_swarm.ros.behavior_markers import BehaviorMarkers
 from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode, _parse_fence
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
@@ -45,23 +48,35 @@ class Stage:
         monkeypatch.setattr(rospy, "Subscriber", lambda *arguments, **options: None)
         monkeypatch.setattr(rospy, "Publisher", self.advertise)
         monkeypatch.setattr(rospy, "logwarn", lambda text, *values: self.warnings.append(text % values))
-        for module in (behavior_node, pose_source):
+        self.joined = range(count)
+        monkeypatch.setattr(other_robots, "share_drivers", lambda: self)
+        for module in (behavior_node, pose_source, other_robots):
             monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.swarm.now_s))
 
     def advertise(self, topic, message_class, **options):
         messages = self.sent.setdefault(topic, [])
         return SimpleNamespace(publish=messages.append, get_num_connections=lambda: 1)
 
-    def start(self, behavior, **given):
+    def read(self):
+        """Return the report of the driver."""
+        return RobotArray(robots=[Robot(id=robot_id, state=Robot.READY) for robot_id in self.joined])
+
+    def find_model(self, namespace):
+        return "hero_plus" if namespace == "/hero_5" else "hero"
+
+    def start(self, behavior, commanded=None, **given):
         given = {"behavior": behavior, "frame": "world", "calibration_folder": "", **given}
-        self.node = BehaviorNode(self.swarm, check_parameters(PARAMETERS, given))
+        swarm = StepWorld(self.swarm.robots[:commanded], self.swarm._clock)
+        self.node = BehaviorNode(swarm, check_parameters(PARAMETERS, given))
 
     def run(self, seconds):
         """Let the behavior step, at the poses of robots that are not silent."""
+        sources = [one._source for one in (self.node, self.node._others) if one]
         for _ in range(round(seconds * self.node.control.rate_hz)):
             for robot in self.swarm:
                 if robot.robot_id not in self.silent:
-                    self.node._source._receive_truth(robot.robot_id, self.tell(robot.true_pose))
+                    for source in sources:
+                        source._receive_truth(robot.robot_id, self.tell(robot.true_pose))
             self.node.step()
             self.swarm.sleep(1.0 / self.node.control.rate_hz)
 
@@ -218,6 +233,75 @@ def test_robots_stay_in_the_fence_whatever_the_rate_and_speed(stage, tmp_path, r
     (text, *more) = stage.warnings
     assert text.startswith("the behavior asks hero_0 for 1e+300 m/s and ") and "it drives this curve slower" in text
     assert len(more) <= 1, "once in 5 s"
+
+
+CHASE = """\
+import numpy as np
+from hero_swarm.behavior import Behavior
+class Chase(Behavior):
+    def step(self, sensed, memory, random):
+        x_m, y_m, yaw_rad = sensed.poses.T
+        return 0.2, 6.0 * np.sin(np.arctan2(%g - y_m, %g - x_m) - yaw_rad), memory
+"""
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.06])
+def test_robots_of_others_are_avoided_by_their_own_radii(stage, tmp_path, speed_m_s):
+    goal = stage.swarm.robots[5].true_pose
+    (tmp_path / "chase.py").write_text(CHASE % (goal.y_m, goal.x_m))
+    stage.start(str(tmp_path / "chase.py"), 4, safety="fence and robots")
+    stage.swarm.robots[5].drive(speed_m_s, speed_m_s / 0.05)
+    gaps_m = []
+
+    def watch(_):
+        apart_m = measure_distances(stage.places_m)[0]
+        others = np.column_stack((apart_m[:4, 4], apart_m[:4, 5] - 0.060 + BODY_RADIUS_M))
+        gaps_m.append(min(apart_m[:4, :4].min(), others.min()) - 2.0 * BODY_RADIUS_M)
+
+    stage.swarm.rows.on_cycle.append(watch)
+    for _ in range(6):
+        stage.swarm.robots[5].drive(speed_m_s, speed_m_s / 0.05)
+        stage.run(1.0)
+    assert 0.0 < min(gaps_m) < 0.3, min(gaps_m)
+
+
+def test_robots_of_others_without_a_pose_are_named_and_new_ones_added(stage):
+    stage.joined, stage.silent = range(5), {4}
+    stage.start("milling", 3, safety="fence and robots")
+    stage.run(0.5)
+    assert stage.node._filter.others_m[:, 2].tolist() == [BODY_RADIUS_M]
+    stage.joined = range(6)
+    stage.run(3.5)
+    assert stage.node._filter.others_m[:, 2].tolist() == [BODY_RADIUS_M, 0.060]
+    assert stage.warnings[-1] == "not avoided, for want of a pose in the frame world: hero_4"
+
+
+def test_robots_that_localize_alone_knows_are_avoided_in_its_frame(stage, monkeypatch):
+    stage.joined = (0, 4)
+    places = {0: Pose(0.0, 0.0, 0.0), 2: Pose(1.0, 2.0, 0.0)}
+    poses = PoseListener.__new__(PoseListener)
+    robots = {number: RobotPose(id=number, state=RobotPose.UNKNOWN) for number in (0, 2, 3)}
+    poses._report = PoseReport("map", 0.0, 0.0, robots)
+    monkeypatch.setattr(poses, "find", lambda robot_id, *_, **__: places.get(robot_id))
+    monkeypatch.setattr(poses, "age_s", lambda _: 0.1)
+    for module in (other_robots, pose_source):
+        monkeypatch.setattr(module, "share_poses", lambda: poses)
+    others = other_robots.OtherRobots([0], "map")
+    assert others.read().tolist() == [[1.0, 2.0, BODY_RADIUS_M]]
+    assert others.describe_missing() == "not avoided, for want of a pose in the frame map: hero_4"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"safety": "fence"}, "~safety is fence, but ~fence is empty"),
+        ({"safety": "fence", "fence": " "}, "~safety is fence, but ~fence is empty"),
+        ({"fence": "-1 -1 1 1"}, "~fence is '-1 -1 1 1', but ~safety is off"),
+    ],
+)
+def test_a_fence_that_limits_nothing_is_refused(stage, given, words):
+    with pytest.raises(ProgramError, match=words):
+        stage.start("milling", **given)
 
 
 def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):

@@ -42,8 +42,18 @@ def test_two_robots_close_no_faster_than_what_is_left_of_their_distance():
     safe.sidestep = 1.0
     commands = keep_safe([(0, 0, 0), (0.05 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], 0.1, safe=safe)
     assert commands[0] == pytest.approx((0.05, -0.05 / 0.03), abs=1e-6), "what is left over goes to the right"
-    free = keep_safe([(0, 0, 0), (0.0 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], 0.1, mode=FENCE)
+    poses, wide_m = [(0, 0, 0), (0.0 + 2.0 * RADIUS_M + 0.06, 0, math.pi)], np.array((-9.0, -9.0, 9.0, 9.0))
+    free = keep_safe(poses, 0.1, mode=FENCE, fence_m=wide_m)
     assert free == [pytest.approx((0.1, 0.0))] * 2
+
+
+def test_robots_that_are_not_commanded_are_given_all_of_the_way():
+    for left_m, expected_m_s in ((0.05, 0.1), (0.0, 0.0), (-0.02, -0.04)):
+        safe = make_filter(ROBOTS)
+        safe.others_m = np.array([(9.0, 0.0, 0.06), (0.03 + RADIUS_M + 0.06 + left_m, 0.0, 0.06)])
+        assert keep_safe([(0, 0, 0)], 0.2, safe=safe) == [pytest.approx((expected_m_s, 0.0), abs=1e-6)]
+        safe.mode = FENCE
+        assert keep_safe([(0, 0, 0)], 0.2, safe=safe) == [pytest.approx((0.2, 0.0))]
 
 
 def test_a_fence_is_approached_no_faster_than_its_distance_allows():
@@ -85,6 +95,8 @@ def test_commands_keep_their_limits_and_their_curve():
     assert angular_rad_s == pytest.approx(6.0) and linear_m_s / angular_rad_s == pytest.approx(0.05 / 6.5, rel=0.05)
     with pytest.raises(ValueError, match="safety 'walls': must be one of off, fence, fence and robots"):
         SafetyFilter("walls")
+    with pytest.raises(ValueError, match="safety fence needs a fence"):
+        SafetyFilter(FENCE)
 
 
 class Note(Behavior):

@@ -23,6 +23,7 @@ class RobotTrial:
 
     Attributes:
         behavior: with the parameters of the cell.
+        safety: the filter of its commands.
         remark: why the trial does not count; empty while it does.
     """
 
@@ -36,7 +37,7 @@ class RobotTrial:
         self.behavior = make_behavior(experiment, cell)
         self._objects = len(load_cell_arena(experiment, cell).objects)
         self._names = names
-        self._filter = safety
+        self.safety = safety
         self._control = Control(self.behavior, Random([derive_seed(seed, "behavior")], len(names)), safety)
         self._samples: List[np.ndarray] = []
         self._last: Optional[Tuple[float, np.ndarray]] = None
@@ -75,7 +76,7 @@ class RobotTrial:
         else:
             velocities = (poses - self._last[1]) / max(time_s - self._last[0], 1e-3)
         self._last = (time_s, poses.copy())
-        state = poses[None], velocities[None], things.poses, self._filter.radii_m
+        state = poses[None], velocities[None], things.poses, self.safety.radii_m
         (sample,), (self._reached,) = measure(self._experiment, *state)
         self._samples.append(sample)
 

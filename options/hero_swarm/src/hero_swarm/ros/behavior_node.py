@@ -20,8 +20,9 @@ from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior
 from ..control import Control
 from ..metrics import METRICS
-from ..safety import MODES, SafetyFilter
+from ..safety import FENCE, MODES, OFF, ROBOTS, SafetyFilter
 from .behavior_markers import BehaviorMarkers
+from .other_robots import OtherRobots
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
 
@@ -48,6 +49,16 @@ def _parse_fence(text: str) -> Optional[np.ndarray]:
     return bounds_m
 
 
+def _make_filter(parameters: Any) -> SafetyFilter:
+    """Return the filter of ~safety and ~fence. Raises: ProgramError if they do not go together."""
+    mode, fence_m = parameters["safety"], _parse_fence(parameters["fence"])
+    if mode == FENCE and fence_m is None:
+        raise ProgramError('~safety is fence, but ~fence is empty: give "x_min y_min x_max y_max" in m')
+    if mode == OFF and fence_m is not None:
+        raise ProgramError('~fence is %r, but ~safety is off: set it to "fence"' % parameters["fence"])
+    return SafetyFilter(mode, fence_m)
+
+
 class BehaviorNode:
     """One behavior on one swarm.
 
@@ -66,7 +77,8 @@ class BehaviorNode:
         are_needed = any(isinstance(sensor, Objects) for sensor in self.behavior.sensors().values())
         topic, radius_m = parameters["objects_topic"], parameters["object_radius_m"]
         self._objects = ObjectSource(self._frame, topic, radius_m, are_needed)
-        self._filter = SafetyFilter(parameters["safety"], _parse_fence(parameters["fence"]))
+        self._filter = _make_filter(parameters)
+        self._others = OtherRobots(ids, self._frame) if self._filter.mode == ROBOTS else None
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         self.control = Control(self.behavior, Random([parameters["seed"]], len(ids)), self._filter)
@@ -86,6 +98,8 @@ class BehaviorNode:
             poses, things = np.full_like(poses, np.nan), Things(np.full((1, 1, 3), np.nan), np.ones(1))
         now_s = rospy.get_time()
         self._filter.set_models([robot.model for robot in self._swarm])
+        if self._others:
+            self._filter.others_m = self._others.read()
         speeds = self.control.step(now_s - self._start_s, poses[None], things, ages_s[None])
         is_known = np.isfinite(poses).all(axis=1)
         may_move = is_known & np.isfinite(self.control.wanted).all(axis=0)
@@ -95,6 +109,8 @@ class BehaviorNode:
             missing = self._objects.describe_missing() or self._source.describe_missing()
             missing = missing or "the behavior gives %s a speed that is no finite number" % name
             self._source.warn(missing + "; the robots are stopped meanwhile")
+        elif self._others and self._others.describe_missing():
+            self._source.warn(self._others.describe_missing())
         elif self._filter.is_limited.any():
             self._source.warn(self._describe_limit(int(self._filter.is_limited[0].argmax())))
         if not self.control.has_decided:
@@ -153,6 +169,8 @@ def main() -> None:
     with Program("behavior") as program:
         parameters = read_parameters(PARAMETERS)
         _make_behavior(parameters)
+        if _make_filter(parameters).mode == ROBOTS and not parameters["fence"].strip():
+            rospy.logwarn("~fence is not given: robots are kept apart, but may drive anywhere")
         with open_swarm(program, parameters["robots"], odom=False, proximity=False) as swarm:
             node = BehaviorNode(swarm, parameters)
             end_s = parameters["time_s"] or np.inf

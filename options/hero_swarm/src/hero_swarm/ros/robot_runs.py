@@ -23,6 +23,7 @@ from ..experiments.results_folder import REAL, ResultsFolder, Run
 from ..experiments.robot_trial import RobotTrial
 from ..experiments.start_drive import PERIOD_S, StartDrive
 from ..safety import ROBOTS, SafetyFilter
+from .other_robots import OtherRobots
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
 
@@ -56,6 +57,7 @@ def run_on_robots(
     with Program("experiment") as program, Swarm(ids) as swarm:
         source = PoseSource(ids, frame)
         objects = ObjectSource(frame, "", OBJECT_RADIUS_M, are_needed=False)
+        others = OtherRobots(ids, frame)
         for cell_index, seed in missing:
             cell = experiment.cells[cell_index]
             (starts,) = place_robots(experiment, cell, [seed])
@@ -72,7 +74,7 @@ def run_on_robots(
             commands = WheelCommands(swarm, trial.behavior.drive, options.calibration)
             name = "cell_%d_seed_%d" % (cell_index + 1, seed)
             with _record(program, folder.path, name, ids, experiment.time_s):
-                finished = _drive(program, swarm, trial, commands, source, objects)
+                finished = _drive(program, swarm, trial, commands, source, objects, others)
             if not finished:
                 break
             folder.write_batch([Run(cell_index, seed, trial.list_values(), REAL, trial.remark)])
@@ -181,6 +183,7 @@ def _drive(
     commands: WheelCommands,
     source: PoseSource,
     objects: ObjectSource,
+    others: OtherRobots,
 ) -> bool:
     """Run one trial; return whether it has ended by itself, by a stop or a loss."""
     start_s = rospy.get_time()
@@ -194,6 +197,9 @@ def _drive(
                     trial.remark = "lost %s at %.1f s: %s" % (robot.name, rospy.get_time() - start_s, reason)
                     return True
             poses, ages_s = source.read()
+            trial.safety.others_m = others.read()
+            if others.describe_missing():
+                source.warn(others.describe_missing())
             speeds = trial.step(rospy.get_time() - start_s, poses, ages_s, objects.read())
             if speeds is None:
                 return True
