@@ -11,11 +11,11 @@ from hero_client.apps.formations import FormationError
 from hero_node.geometry import Pose
 
 from .background import Background
-from .control.client_commands import read_command
+from .control.client_commands import find_press, read_command
 from .control.commander import Commander
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
 from .control.programs import PROGRAMS_MAX, Child, Programs
-from .control.requests import RequestError, is_fresh, read_clock_ms, read_request
+from .control.requests import AGE_MAX_S, RequestError, is_fresh, read_clock_ms, read_request
 from .fleet_feed.feed import FleetFeed
 from .parameters import Parameters
 
@@ -34,8 +34,15 @@ INERT_S = 2.0
 """After a stop no release counts: the finger that stopped all robots may tap again."""
 
 
+UNSERVED = "too many pages are open: only STOP ALL works on this one"
+
+
 class RefusedError(Exception):
     """A valid request is not carried out; the message says why."""
+
+
+class LateError(RefusedError):
+    """A request was made before the connection or the monitor paused."""
 
 
 class PageRequests:
@@ -65,15 +72,20 @@ class PageRequests:
         except RequestError as error:
             page.tell("error", "invalid request (%s): reload the page" % error)
             return
+        do = request["do"]
         try:
-            if is_fresh(request, read_clock_ms()):
-                self._carry_out(page, request)
-                if request["do"] in ("stop", "release"):
-                    page.acknowledge(request["do"])
-            elif request["do"] != "drive":  # a button that is still held sends the next one at once
-                raise RefusedError("the request was delayed: nothing was done")
+            if do in AGE_MAX_S and not page.is_served:
+                raise RefusedError(UNSERVED)
+            self._carry_out(page, request)
+            if do in ("stop", "release"):
+                page.acknowledge(do)
+        except LateError as error:
+            if do != "drive":  # a button that is still held sends the next one at once
+                page.tell("error", str(error))
         except (RefusedError, FormationError) as error:
             page.tell("error", str(error))
+            if do == "drive":
+                page.end_hold(request["pressed_ms"])
 
     def publish(self, client: "Client", topic: str, message_type: str, content: bytes) -> str:
         """Carry out a message of a Foxglove client by the rules of the page; return why it is refused, empty if not."""
@@ -82,6 +94,11 @@ class PageRequests:
             return "%s: only /hero_N/cmd_vel (geometry_msgs/Twist) and stop_request (std_msgs/Bool) are taken" % topic
         if request["do"] == "release":
             return "robots are released on the page only"
+        request["heard_ms"] = client.heard_ms
+        if request["do"] == "end_drive":
+            client.presses.pop(request["robots"][0], None)
+        elif request["do"] == "drive":
+            request["pressed_ms"] = find_press(client.presses, request["robots"][0], client.heard_ms)
         try:
             self._carry_out(client, request)
         except RefusedError as error:
@@ -90,6 +107,8 @@ class PageRequests:
 
     def _carry_out(self, page: Union["PageSocket", "Client"], request: Request) -> None:
         """Carry out a request, if it may be made now. Raises: RefusedError or FormationError."""
+        if not is_fresh(request, read_clock_ms()):
+            raise LateError("the request was delayed: nothing was done")
         self._check(request["do"], request.get("robots", ()))
         getattr(self, "_do_" + request["do"])(page, request)
 
@@ -122,7 +141,7 @@ class PageRequests:
         if verb == "release" and stopped_ms is not None and read_clock_ms() - stopped_ms < 1e3 * INERT_S:
             raise RefusedError("NOT RELEASED: robots were stopped less than %g s ago; hold Release again" % INERT_S)
         self._commander.request_stop(verb == "stop")
-        self.end_programs_of_stopped_robots()
+        self.end_motions_of_stopped_robots()
         self._feed.read_stop()
         # After the acknowledgement has left.
         self._hand_over(self._broadcast)
@@ -130,10 +149,11 @@ class PageRequests:
 
     _do_release = _do_stop
 
-    def end_programs_of_stopped_robots(self) -> None:
-        """End all programs while all robots are stopped, from whichever source: a release then moves no robot."""
+    def end_motions_of_stopped_robots(self) -> None:
+        """End all programs and holds while robots are stopped, from whichever source: a release then moves no robot."""
         if self._feed.stopped or not self._commander.may_drive():
             self.programs.end_all()
+            self._commander.dead_man.end_all_holds(read_clock_ms())
 
     def _do_end_drive(self, page: "PageSocket", request: Request) -> None:
         for robot in request["robots"]:
@@ -141,18 +161,28 @@ class PageRequests:
 
     def _do_stop_some(self, page: "PageSocket", request: Request) -> None:
         self.programs.end_those_of(request["robots"])
-        for robot in request["robots"]:
-            if robot in self._feed.robots:
-                self._commander.dead_man.stop(robot)
+        now_ms, dead_man = read_clock_ms(), self._commander.dead_man
+        stopped = [robot for robot in request["robots"] if robot in self._feed.robots]
+        driven = [robot for robot in stopped if dead_man.end_hold(robot, now_ms) not in (None, page.number)]
+        if driven:
+            text = "stopped: %s; another page drove, and needs a new press to drive again"
+            page.tell("info", text % ", ".join(driven))
 
     # ---------------------------------------------------------------- motion
 
     def _do_drive(self, page: "PageSocket", request: Request) -> None:
-        velocity = float(request["linear"]), float(request["angular"])
-        taken = [robot for robot in request["robots"] if not self._commander.drive(page.number, robot, *velocity)]
+        robots, velocity = request["robots"], (float(request["linear"]), float(request["angular"]))
+        over = [robot for robot in robots if self._commander.dead_man.is_over(robot, request["pressed_ms"])]
+        if over:
+            verb = "was" if len(over) == 1 else "were"
+            raise RefusedError("%s %s stopped: let go, and press again to drive" % (", ".join(over), verb))
+        taken = [robot for robot in robots if not self._commander.drive(page.number, robot, *velocity)]
         if taken:
             verb = "is" if len(taken) == 1 else "are"
-            raise RefusedError("%s %s driven from another page" % (", ".join(taken), verb))
+            text = "%s %s driven from another page" % (", ".join(taken), verb)
+            if len(taken) == len(robots):
+                raise RefusedError(text)
+            page.tell("error", text)
 
     def _do_goal(self, page: "PageSocket", request: Request) -> None:
         if self._pending_goals >= GOALS_AT_ONCE:

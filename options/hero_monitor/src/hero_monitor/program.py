@@ -171,7 +171,7 @@ class Monitor:
     def _step(self) -> None:
         """Do what cannot wait for the next update of the pages."""
         self._commander.step()
-        self._requests.end_programs_of_stopped_robots()
+        self._requests.end_motions_of_stopped_robots()
         if self._feed.read_stop():
             self._broadcast_updates()
 
@@ -179,8 +179,10 @@ class Monitor:
         """Tell each page the time, which tells it that the monitor runs, and whether it is among those served."""
         served = set(self._server.served_pages())
         for page in self._server.pages:
+            page.is_served = page in served
             if page.ready:
-                page.send(encode({"clock_ms": read_clock_ms(), "served": page in served}))
+                page.send(encode({"clock_ms": read_clock_ms(), "served": page.is_served}))
+        self._foxglove.send_clock(read_clock_ms())
 
     def _broadcast_updates(self) -> None:
         """Send the pages what is new to them; a page that is still receiving the last update gets it later."""

@@ -155,6 +155,27 @@ class StopTest(unittest.TestCase):
         self.assertEqual(commands[-1].linear.x, 0.0)
         self.page.actions().release().perform()
 
+    def test_a_stop_of_one_robot_ends_the_hold_of_another_page(self):
+        self.open_other()
+        commands = []
+        rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
+        for page in self.pages:
+            page.choose("hero_2")
+
+        def is_driven():
+            return bool(commands) and commands[-1].linear.x > 0
+
+        self.page.hold("forward", is_driven, "a command")
+        self.other.click("#stop_some")
+        self.page.wait_for_notice("hero_2 was stopped: let go, and press again to drive")
+        self.other.wait_for_notice("stopped: hero_2; another page drove, and needs a new press to drive again")
+        wait_for(lambda: commands[-1].linear.x == 0, "a stop")
+        wait_for(lambda: not self.page.run("return !!document.querySelector('#pad .down')"), "the end of the hold")
+        self.page.save("monitor_hold_over.png")
+        self.assertEqual(commands[-1].linear.x, 0.0)
+        self.page.hold("forward", is_driven, "a command of a new press")
+        self.page.actions().release().perform()
+
     def test_a_driver_that_hangs_is_named_and_the_other_one_stops(self):
         with suspended(self.drivers[1].pid):
             self.page.click("#stop")

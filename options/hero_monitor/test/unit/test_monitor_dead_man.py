@@ -43,6 +43,17 @@ def test_the_end_of_the_program_stops_all(held):
     assert held.take_stops(10.1) == ["hero_0", "hero_2"]
 
 
+def test_a_stop_ends_the_hold_of_whoever_drives_until_a_new_press(held):
+    assert not held.is_over("hero_0", pressed_ms=0)
+    assert held.end_hold("hero_0", now_ms=5000) == 1 and held.end_hold("hero_1", now_ms=5000) is None
+    assert held.take_stops(10.1) == ["hero_0", "hero_1"]
+    assert held.is_over("hero_0", 5000) and not held.is_over("hero_0", 5001) and not held.is_over("hero_2", 4000)
+    held.hold(1, "hero_0", 10.2)
+    held.end_all_holds(6000)
+    assert held.take_stops(10.3) == ["hero_0"]
+    assert held.is_over("hero_0", 6000) and held.is_over("hero_2", 6000) and not held.is_over("hero_2", 6001)
+
+
 def test_a_robot_is_driven_from_one_page_at_a_time(held):
     assert not held.hold(2, "hero_0", 10.1)
     held.release(2, "hero_0")

@@ -152,6 +152,21 @@ def test_topics_are_subscribed_to_while_there_is_a_client(topics):
     assert opened == [7] and closed == [7], "without a publisher nothing is opened or closed"
 
 
+def test_clients_that_may_publish_return_the_clock_that_they_have_heard(topics):
+    for publisher, pings in ((Publisher(*[lambda *message: ""] * 3), [b"5000"]), (None, [])):
+        endpoint, socket = FoxgloveEndpoint(topics.source, [], publisher), make_socket()
+        sent = []
+        socket.ping = sent.append
+        endpoint.add(socket)
+        endpoint.send_clock(5000)
+        assert sent == pings
+    socket.on_pong(b"5000")
+    assert socket.client.heard_ms == 5000
+    for foreign in (b"", b"-5", b"hello"):
+        socket.on_pong(foreign)
+    assert socket.client.heard_ms == 5000
+
+
 def test_a_client_that_still_receives_gets_the_rest_in_one_write_later():
     socket = make_socket()
     socket.send_waiting()

@@ -82,7 +82,7 @@ def test_what_pages_offer_is_what_launch_files_say():
 
 def test_requests_end_at_the_limits_of_robots_and_texts():
     def read(**fields):
-        return read_request(str({"heard_ms": 5, **fields}).replace("'", '"'))
+        return read_request(str({"heard_ms": 5, "pressed_ms": 5, **fields}).replace("'", '"'))
 
     drive, goal = {"do": "drive", "robots": ["a"]}, {"do": "goal", "robots": ["a"]}
     read(**drive, linear=-MAX_LINEAR_M_S, angular=MAX_ANGULAR_RAD_S)

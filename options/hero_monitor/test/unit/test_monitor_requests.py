@@ -12,11 +12,13 @@ from hero_client.apps.formations import FormationError
 from hero_client.ros.stop_status import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import commander as commander_module
+from hero_monitor.control.client_commands import PRESS_GAP_MS
 from hero_monitor.control.commander import LISTENER_TIMEOUT_S, Commander
 from hero_monitor.control.dead_man import HOLD_TIMEOUT_S
 from hero_monitor.control.programs import PROGRAMS_MAX
 from hero_monitor.control.requests import AGE_MAX_S
 from hero_monitor.fleet_feed.placement import Placement
+from hero_monitor.foxglove.hub import Client
 from hero_monitor.page_requests import GOALS_AT_ONCE, INERT_S, PageRequests
 from hero_node.errors import NodeError
 from hero_node.geometry import Pose
@@ -30,9 +32,13 @@ class Page:
     def __init__(self, number=1):
         self.number, self.told, self.received = number, [], []
         self.ground_truth = self.picture = self.visible = None
+        self.is_served, self.ended = True, []
 
     def tell(self, level, text):
         self.told.append((level, text))
+
+    def end_hold(self, pressed_ms):
+        self.ended.append(pressed_ms)
 
     def acknowledge(self, request):
         self.received.append(request)
@@ -48,6 +54,7 @@ class Desk:
     def __init__(self, monkeypatch, control=True):
         self.noted, self.now_ms, self.pages = [], NOW_MS, [Page(1), Page(2)]
         self.may_drive, self.taken, self.submitted = True, set(), []
+        self.drivers, self.ended_ms = {}, {}
         monkeypatch.setattr(page_requests, "read_clock_ms", lambda: self.now_ms)
         monkeypatch.setattr(page_requests.rospy, "get_name", lambda: "/hero_monitor")
         placement = Placement("world")
@@ -65,6 +72,9 @@ class Desk:
             dead_man=SimpleNamespace(
                 release=lambda page, robot: self.note("end_drive", page, robot),
                 stop=lambda robot: self.note("stop_robot", robot),
+                end_hold=lambda robot, now_ms: self.note("end_hold", robot, now_ms) or self.drivers.get(robot),
+                end_all_holds=lambda now_ms: self.note("end_all_holds", now_ms),
+                is_over=lambda robot, pressed_ms: pressed_ms <= self.ended_ms.get(robot, -1),
             ),
             prepare=lambda robot: self.note("prepare", robot),
             drive=lambda page, robot, *speeds: self.note("drive", page, robot, *speeds) or robot not in self.taken,
@@ -114,7 +124,7 @@ class Desk:
 
 
 WALK = {"program": "random_walk", "robots": ["hero_0", "hero_1"], "values": {"linear_m_s": 0.1, "angular_rad_s": 1.0}}
-DRIVE = {"robots": ["hero_0", "hero_1"], "linear": 0.1, "angular": -1.0}
+DRIVE = {"robots": ["hero_0", "hero_1"], "linear": 0.1, "angular": -1.0, "pressed_ms": NOW_MS - 1000}
 GOAL = {"robots": ["hero_0"], "x": 2.0, "y": 0.5}
 MOVING = (("drive", DRIVE), ("goal", GOAL), ("start", WALK))
 
@@ -129,8 +139,10 @@ def test_a_button_drives_each_robot_of_its_page(desk):
     assert desk.take() == [("drive", 1, "hero_0", 0.1, -1.0), ("drive", 1, "hero_1", 0.1, -1.0)]
     desk.taken = {"hero_1"}
     assert desk.ask("drive", **DRIVE) == ["hero_1 is driven from another page"]
+    assert desk.pages[0].ended == [], "the others are driven"
     desk.taken = {"hero_0", "hero_1"}
     assert desk.ask("drive", **DRIVE) == ["hero_0, hero_1 are driven from another page"]
+    assert desk.pages[0].ended == [NOW_MS - 1000]
     desk.take()
     assert desk.ask("end_drive", page=1, robots=["hero_0", "hero_7"]) == []
     assert desk.take() == [("end_drive", 2, "hero_0"), ("end_drive", 2, "hero_7")]
@@ -182,16 +194,38 @@ def test_a_stop_always_counts_and_a_release_only_when_it_is_meant(monkeypatch):
 
 
 def test_programs_end_while_all_robots_are_stopped(desk):
-    desk.requests.end_programs_of_stopped_robots()
+    desk.requests.end_motions_of_stopped_robots()
     assert desk.take() == []
     for stopped, may_drive in ((True, True), (False, False)):
         desk.feed.stopped, desk.may_drive = stopped, may_drive
-        desk.requests.end_programs_of_stopped_robots()
-        assert desk.take() == [("end_all",)]
+        desk.requests.end_motions_of_stopped_robots()
+        assert desk.take() == [("end_all",), ("end_all_holds", NOW_MS)]
     desk.feed.stopped, desk.may_drive = False, True
     assert desk.ask("stop_some", robots=["hero_1", "hero_7"]) == []
-    assert desk.take() == [("end_those_of", "hero_1", "hero_7"), ("stop_robot", "hero_1")]
+    assert desk.take() == [("end_those_of", "hero_1", "hero_7"), ("end_hold", "hero_1", NOW_MS)]
     assert desk.ask("end", number=3) == [] and desk.take() == [("end", 3)]
+
+
+def test_a_stop_of_one_robot_ends_its_hold_and_both_pages_are_told(desk):
+    desk.drivers = {"hero_0": 1, "hero_1": 2}
+    assert desk.ask("stop_some", page=1, robots=["hero_0", "hero_1", "hero_2"]) == [
+        "stopped: hero_0; another page drove, and needs a new press to drive again"
+    ]
+    desk.take()
+    desk.ended_ms = {"hero_0": NOW_MS}
+    assert desk.ask("drive", **DRIVE) == ["hero_0 was stopped: let go, and press again to drive"]
+    assert desk.take() == [] and desk.pages[0].ended == [DRIVE["pressed_ms"]], "its other robots are not driven either"
+    assert desk.ask("drive", **{**DRIVE, "pressed_ms": NOW_MS + 1}) == []
+    assert [words[0] for words in desk.take()] == ["drive", "drive"]
+
+
+def test_a_page_that_is_not_served_can_stop_robots_and_move_none(desk):
+    desk.pages[0].is_served = False
+    for do, fields in (*MOVING, ("release", {}), ("record", {"on": True})):
+        assert desk.ask(do, **fields) == ["too many pages are open: only STOP ALL works on this one"]
+    assert desk.noted == [] and desk.started == [] and desk.pages[0].received == []
+    assert desk.ask("stop") == [] and desk.pages[0].received == ["stop"]
+    assert desk.ask("show", ground_truth=False, picture=False, visible=True) == []
 
 
 def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
@@ -267,8 +301,11 @@ def test_a_page_says_what_it_shows(desk):
 
 
 def test_foxglove_clients_drive_and_stop_by_the_rules_of_pages(desk, monkeypatch):
+    client = Client(lambda text: None, 9)
+    client.heard_ms = NOW_MS
+
     def publish(topic, kind, content):
-        return desk.requests.publish(SimpleNamespace(number=9), topic, kind, content)
+        return desk.requests.publish(client, topic, kind, content)
 
     def drive(*velocity):
         return publish(
@@ -289,7 +326,31 @@ def test_foxglove_clients_drive_and_stop_by_the_rules_of_pages(desk, monkeypatch
     assert desk.take() == []
     assert publish("/hero_driver/stop_request", "std_msgs/Bool", b"\1") == ""
     assert desk.take()[:2] == [("request_stop", True), ("end_all",)]
+    desk.feed.stopped, desk.taken = False, set()
+    client.heard_ms = NOW_MS - round(1e3 * AGE_MAX_S["drive"]) - 1
+    assert drive(0.1, 0.0) == "the request was delayed: nothing was done" and desk.take() == []
+    assert publish("/hero_driver/stop_request", "std_msgs/Bool", b"\1") == "", "a stop counts at any age"
     assert "/chatter: only /hero_N/cmd_vel" in publish("/chatter", "std_msgs/String", b"")
+
+
+def test_a_foxglove_client_drives_after_a_stop_once_it_has_let_go(desk):
+    client = Client(lambda text: None, 9)
+    content = struct.pack("<6d", 0.1, 0, 0, 0, 0, 0)
+
+    def drive_after(pause_ms, content=content):
+        desk.now_ms += pause_ms
+        client.heard_ms = desk.now_ms
+        return desk.requests.publish(client, "/hero_0/cmd_vel", "geometry_msgs/Twist", content)
+
+    refusal = "hero_0 was stopped: let go, and press again to drive"
+    assert drive_after(0) == "" == drive_after(100)
+    desk.ended_ms["hero_0"] = desk.now_ms
+    assert {drive_after(100) for _ in range(50)} == {refusal}
+    assert drive_after(PRESS_GAP_MS) == refusal, "one that sends a velocity a second has not let go"
+    assert drive_after(PRESS_GAP_MS + 1) == ""
+    desk.ended_ms["hero_0"] = desk.now_ms
+    assert drive_after(100) == refusal
+    assert drive_after(100, bytes(48)) == "" == drive_after(100), "a zero is letting go"
 
 
 class Ros:
@@ -399,8 +460,12 @@ def test_pages_may_drive_when_the_outcome_of_a_stop_is_known(monkeypatch):
         assert ros.commander.may_drive() == status.is_final
     ros.commander.request_stop(False)
     assert ros.commander.stopped_ms is None
+    assert ros.commander.dead_man.is_over("hero_0", 100000), "a release ends holds, too"
+    assert not ros.commander.dead_man.is_over("hero_0", 100001)
+    ros.now_s += 1.0
     ros.commander.request_stop(True)
-    assert ros.requests == [False, True] and ros.commander.stopped_ms == 100000
+    assert ros.commander.dead_man.is_over("hero_0", 101000)
+    assert ros.requests == [False, True] and ros.commander.stopped_ms == 101000
 
 
 def test_a_goal_is_sent_to_a_program_that_takes_it(monkeypatch):

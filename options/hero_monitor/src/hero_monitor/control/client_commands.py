@@ -3,7 +3,7 @@
 import math
 import re
 import struct
-from typing import Any, Dict, Optional
+from typing import Any, Dict, Optional, Tuple
 
 from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_node.geometry import clamp
@@ -11,6 +11,22 @@ from hero_node.geometry import clamp
 _VELOCITY_TOPIC = re.compile(r"/(hero_[0-9]+)(?:/velocity_controller)?/cmd_vel")
 _STOP_TOPIC = re.compile(r"/(?:[A-Za-z0-9_/]+/)?stop_request")
 _TWIST = struct.Struct("<6d")
+
+
+PRESS_GAP_MS = 1500
+"""Silence after which a client's next velocity counts as a new press: some send one a second while a button is held."""
+
+Presses = Dict[str, Tuple[int, int]]
+"""The clock as a client heard it with the first and the newest velocity of a press, by robot."""
+
+
+def find_press(presses: Presses, robot: str, heard_ms: int) -> int:
+    """Note a velocity for a robot; return the clock at the press that it belongs to."""
+    pressed_ms, newest_ms = presses.get(robot, (heard_ms, heard_ms))
+    if heard_ms - newest_ms > PRESS_GAP_MS:
+        pressed_ms = heard_ms
+    presses[robot] = pressed_ms, heard_ms
+    return pressed_ms
 
 
 def read_command(topic: str, message_type: str, content: bytes) -> Optional[Dict[str, Any]]:

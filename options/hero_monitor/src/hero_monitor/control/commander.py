@@ -118,10 +118,11 @@ class Commander:
     def request_stop(self, stop: bool) -> None:
         """Ask all drivers to stop all robots, or to release them."""
         self._drivers.request_stop(stop)
+        now_ms = read_clock_ms()
         if stop:
-            self.stopped_ms = read_clock_ms()
-            self.dead_man.drop_all()
-            self.step()
+            self.stopped_ms = now_ms
+        self.dead_man.end_all_holds(now_ms)
+        self.step()
 
     def may_drive(self) -> bool:
         """Return whether pages may drive robots: not while robots are being stopped or released."""

@@ -1,10 +1,11 @@
 """Dead man's switch: a robot drives only while a page keeps reporting that a button is held. Pure.
 
-Silence stops it: a hidden page, a browser that crashed and a lost network send nothing. Times enter as now_s,
-any clock that never steps.
+Silence stops it: a hidden page, a browser that crashed and a lost network send nothing. A stop or release ends every
+hold: those that began before count no more, whatever their page sends. Times enter as now_s, any clock that never
+steps, and of presses and stops as ms on the pages' clock.
 """
 
-from typing import Dict, List, NamedTuple, Set
+from typing import Dict, List, NamedTuple, Optional, Set
 
 HOLD_TIMEOUT_S = 0.4
 """Pages report every 0.1 s while a button is held; a robot is stopped after this time without a report."""
@@ -23,6 +24,24 @@ class DeadMan:
     def __init__(self) -> None:
         self._holds: Dict[str, Hold] = {}
         self._stops: Set[str] = set()
+        self._ended_ms: Dict[str, int] = {}
+        self._all_ended_ms = -1
+
+    def is_over(self, robot: str, pressed_ms: float) -> bool:
+        """Return whether a stop or release has ended the hold that began with a press."""
+        return pressed_ms <= max(self._all_ended_ms, self._ended_ms.get(robot, -1))
+
+    def end_hold(self, robot: str, now_ms: int) -> Optional[int]:
+        """Stop a robot until a new press, whichever program drives it; return the page that drove it, if any."""
+        held = self._holds.get(robot)
+        self._ended_ms[robot] = now_ms
+        self.stop(robot)
+        return None if held is None else held.page
+
+    def end_all_holds(self, now_ms: int) -> None:
+        """Stop all robots that are driven, until a new press."""
+        self._all_ended_ms = now_ms
+        self.drop_all()
 
     def hold(self, page: int, robot: str, now_s: float) -> bool:
         """Note that a page drives a robot; return False if another page drives it already."""

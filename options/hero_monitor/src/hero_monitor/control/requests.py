@@ -53,6 +53,8 @@ def _is_single(value: Any) -> bool:
     return _is_names(value) and len(value) == 1
 
 
+_is_clock, _is_yaw = _is_number(1e15), _is_number(2.0 * math.pi)
+
 REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
     "stop": {},
     "release": {},
@@ -60,6 +62,7 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
         "robots": _is_names,
         "linear": _is_number(MAX_LINEAR_M_S),
         "angular": _is_number(MAX_ANGULAR_RAD_S),
+        "pressed_ms": _is_clock,
     },
     "end_drive": {"robots": _is_names},
     "stop_some": {"robots": _is_names},
@@ -71,14 +74,12 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
 }
 """Requests of a page by its field "do", with the fields that it needs and their checks.
 
-stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s. end_drive: it is let
-go. stop_some: end what drives these robots, and stop them. goal: a pose on the map in m; yaw (rad) may be added.
-start: a program of offers.OFFERS, with values for its fields. end: a program, by its number. record: begin or end the
-recording. show: whether the page is visible, and what it shows in addition to the fleet.
+stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s, and the clock as heard
+when it was pressed. end_drive: it is let go. stop_some: end what drives these robots, and stop them. goal: a pose on
+the map in m; yaw (rad) may be added. start: a program of offers.OFFERS, with values for its fields. end: a program, by
+its number. record: begin or end the recording. show: whether the page is visible, and what it shows in addition to the
+fleet.
 """
-
-_is_clock, _is_yaw = _is_number(1e15), _is_number(2.0 * math.pi)
-
 
 def read_request(text: Union[str, bytes]) -> Dict[str, Any]:
     """Return the fields of the request in a text. Raises: RequestError."""

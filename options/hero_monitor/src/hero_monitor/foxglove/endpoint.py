@@ -83,6 +83,11 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Forget a client."""
         self.endpoint.remove(self)
 
+    def on_pong(self, data: bytes) -> None:
+        """Note the clock that the client has heard: what comes next was sent after that."""
+        if data.isdigit():
+            self.client.heard_ms = int(data)
+
     def send_waiting(self) -> None:
         """Send what waits, unless the client is still receiving the last of it."""
         stream = getattr(self.ws_connection, "stream", None)
@@ -122,6 +127,12 @@ class FoxgloveEndpoint:
         """Serve a client no longer; may be called twice."""
         self._sockets.discard(socket)
         self.hub.remove(socket.client)
+
+    def send_clock(self, clock_ms: int) -> None:
+        """Tell clients that may publish the time, as pages: every client returns the content of a ping."""
+        for socket in self._sockets if self.hub.takes_messages else ():
+            with contextlib.suppress(tornado.websocket.WebSocketClosedError):
+                socket.ping(str(clock_ms).encode())
 
     def _update(self) -> None:
         is_done = self._source.want(self.hub.wanted_topics)

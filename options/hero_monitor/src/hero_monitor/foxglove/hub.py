@@ -66,6 +66,8 @@ class Client:
         self.number = number
         self.published: Dict[int, Channel] = {}
         self.refusal = ""  # why the last message was refused; said once
+        self.heard_ms = 0  # the monitor's clock, as the client had heard it when it sent what came last
+        self.presses: Dict[str, Tuple[int, int]] = {}  # of robots that it drives (client_commands)
         self.subscriptions: Dict[int, Channel] = {}
         self._queue: Deque[bytes] = deque()
         self._queued_bytes = 0
@@ -111,6 +113,11 @@ class Hub:
         self._next_id = 1
 
     @property
+    def takes_messages(self) -> bool:
+        """Whether clients may publish."""
+        return self._publisher is not None
+
+    @property
     def wanted_topics(self) -> Set[str]:
         """Topics that a client subscribes to."""
         return {channel.topic for client in self.clients for channel in client.subscriptions.values()}
@@ -118,7 +125,7 @@ class Hub:
     def add(self, client: Client) -> None:
         """Greet a client."""
         self.clients.add(client)
-        client.send_text(make_server_info(self._publisher is not None))
+        client.send_text(make_server_info(self.takes_messages))
         if self._channels:
             client.send_text(make_advertise(self._channels.values()))
         if self._publisher is not None:

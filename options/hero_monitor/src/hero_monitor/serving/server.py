@@ -216,7 +216,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         self.number = next(PageSocket.numbers)
         self.seen: Dict[str, Any] = {}
         self.ground_truth = self.picture = False
-        self.visible = True
+        self.visible, self.is_served = True, False
         self._sent_s = time.monotonic()
         self._sending: Optional[Awaitable[None]] = None
         self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
@@ -263,6 +263,10 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     def acknowledge(self, request: str) -> None:
         """Tell the page that its request was received."""
         self._send_when_ready({"received": request})
+
+    def end_hold(self, pressed_ms: float) -> None:
+        """Tell the page that what it drives with this press stands until a new one."""
+        self._send_when_ready({"hold_over": pressed_ms})
 
     def _send_when_ready(self, value: Dict[str, Any]) -> None:
         self._waiting.append(encode(value))

@@ -155,6 +155,7 @@ function receive(updates) {
   stop.receive(updates);
   history.update(state);
   if ("notice" in updates) notice(updates.notice.level, updates.notice.text);
+  if ("hold_over" in updates) panel.endHold(updates.hold_over);
   if ("log" in updates) log.append(updates.log);
   if (SHOWN_BY_ALL.some((name) => name in updates)) showAll();
   else if ("poses" in updates) panel.show(state, listPresent().filter((robot) => state.chosen.has(robot.name)));

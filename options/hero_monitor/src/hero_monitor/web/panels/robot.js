@@ -2,7 +2,8 @@
 //
 // Dead man's switch: while a button or key is held, the page sends a command every 100 ms. It stops sending when the
 // button is let go, the page is hidden or loses focus, was suspended, or the network stalls. The monitor stops robots
-// on "end_drive", after 0.4 s of silence, or when the socket closes.
+// on "end_drive", after 0.4 s of silence, or when the socket closes. A stop or release ends the hold: each command tells
+// when the button was pressed, and the monitor takes those of a press after the stop only.
 
 import { Lines, element, isPressed, make, setPressed, setText } from "../dom.js";
 import { colorOf } from "../map/colors.js";
@@ -88,19 +89,20 @@ export class RobotPanel {
 
   liftKey(event) {
     if (!this.keys.delete(event.code)) return;
-    if (this.keys.size) this.holdKeys();
+    if (this.keys.size) this.holdKeys(this.driving.pressedMs);
     else this.endDrive();
   }
 
-  holdKeys() {
+  holdKeys(pressedMs) {
     const sum = [0, 0];
     for (const key of this.keys) KEYS[key].forEach((value, index) => (sum[index] += value));
-    this.hold(sum.map(Math.sign));
+    this.hold(sum.map(Math.sign), pressedMs);
   }
 
-  hold(direction) {
+  /** pressedMs: the monitor's clock at the press, if it is not a new one. */
+  hold(direction, pressedMs = this.connection.clockMs) {
     if (!this.names.length) return;
-    this.driving = { robots: this.names, direction };
+    this.driving = { robots: this.names, direction, pressedMs };
     this.sentMs = Date.now();
     this.sendCommand();
     if (this.timer === null) this.timer = setInterval(() => this.sendCommand(), HOLD_MS);
@@ -123,10 +125,16 @@ export class RobotPanel {
     }
     this.sentMs = now;
     if (this.connection.isCongested) return;
-    const { robots, direction } = this.driving;
+    const { robots, direction, pressedMs } = this.driving;
     // Backwards the turn is inverted, as in a car.
     const angular = direction[1] * (direction[0] < 0 ? -1 : 1) * Number(element("angular").value);
-    this.connection.send({ do: "drive", robots, linear: direction[0] * Number(element("linear").value), angular });
+    const linear = direction[0] * Number(element("linear").value);
+    this.connection.send({ do: "drive", robots, linear, angular, pressed_ms: pressedMs });
+  }
+
+  /** The monitor takes no more commands of this press. */
+  endHold(pressedMs) {
+    if (this.driving !== null && this.driving.pressedMs === pressedMs) this.endDrive();
   }
 
   endDrive() {
