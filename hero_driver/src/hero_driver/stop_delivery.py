@@ -220,4 +220,6 @@ def describe_doubt(peer: Peer) -> str:
         return "its wheels turn"
     if peer.stop is not None and peer.stop.state is StopState.UNCONFIRMED:
         return "it sends no readings of its wheels"
+    if peer.wheels.is_late:
+        return "what it sends is read late"
     return "it does not answer"

@@ -356,15 +356,17 @@ def test_a_deadline_that_has_come_is_not_waited_for():
 
 
 def test_why_a_robot_may_still_move_is_said_in_words():
-    for is_closed, state, text in (
-        (True, StopState.MOVING, "its connection ended"),
-        (False, StopState.MOVING, "its wheels turn"),
-        (False, StopState.UNCONFIRMED, "it sends no readings of its wheels"),
-        (False, StopState.STOPPING, "it does not answer"),
-        (False, None, "it does not answer"),
+    for is_closed, state, is_late, text in (
+        (True, StopState.MOVING, False, "its connection ended"),
+        (False, StopState.MOVING, True, "its wheels turn"),
+        (False, StopState.UNCONFIRMED, False, "it sends no readings of its wheels"),
+        (False, StopState.STOPPING, True, "what it sends is read late"),
+        (False, StopState.STOPPING, False, "it does not answer"),
+        (False, None, False, "it does not answer"),
     ):
         progress = None if state is None else SimpleNamespace(state=state)
-        peer = SimpleNamespace(link=SimpleNamespace(closed=is_closed), stop=progress)
+        wheels = SimpleNamespace(is_late=is_late)
+        peer = SimpleNamespace(link=SimpleNamespace(closed=is_closed), stop=progress, wheels=wheels)
         assert describe_doubt(peer) == text
 
 
