@@ -41,8 +41,8 @@ class SafetyFilter:
         max_speed_m_s, max_angular_rad_s, max_wheel_m_s: limits of the commands, and of what is wanted.
         radii_m: of the robots' bodies (N,), or one for all.
         others_m: x m, y m and body radius m of robots that are not commanded (M, 3), and so do not give way.
-        is_limited: which robots were asked in the last call for more than they can drive (W, N).
-        calls, limited_calls: number of all calls, and of those in which a robot was asked for more than it can drive.
+        is_limited: which robots were asked in the last call for more than they can drive, or for no number (W, N).
+        calls, limited_calls: number of all calls, and of those in which a robot was limited.
     """
 
     lookahead_m = 0.03
@@ -89,18 +89,20 @@ class SafetyFilter:
         """Return safe linear and angular speeds (W, N) for those wanted, at poses (W, N, 3) that are ages_s old (W, N).
 
         Wanted ones are those of all robots of all worlds (W * N,), or one for all, as a behavior gives them. Robots
-        drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it; speeds
-        that are no finite numbers count as zero, and those beyond the limits as the fastest with the same curve.
+        drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it. Speeds
+        that are no finite numbers stop their robot; those beyond the limits count as the fastest of the same curve.
         """
         linear_m_s, angular_rad_s = (
-            np.broadcast_to(np.where(np.isfinite(values), values, 0.0).ravel(), poses[..., 0].size)
-            .reshape(poses.shape[:2]) for values in (linear_m_s, angular_rad_s)
-        )  # fmt: skip
+            np.broadcast_to(np.ravel(values), poses[..., 0].size).reshape(poses.shape[:2])
+            for values in (linear_m_s, angular_rad_s)
+        )
+        are_numbers = np.isfinite(linear_m_s) & np.isfinite(angular_rad_s)
+        linear_m_s, angular_rad_s = (np.where(are_numbers, values, 0.0) for values in (linear_m_s, angular_rad_s))
         if self.mode == OFF:
             return linear_m_s, angular_rad_s
         # First of all: the sweeps below do not converge from a velocity that is far from all that is allowed.
         share = self._find_share(linear_m_s, angular_rad_s)
-        self.is_limited = share < 1.0
+        self.is_limited = (share < 1.0) | ~are_numbers
         self.calls += 1
         self.limited_calls += bool(self.is_limited.any())
         linear_m_s, angular_rad_s = linear_m_s * share, angular_rad_s * share

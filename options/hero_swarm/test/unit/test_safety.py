@@ -128,8 +128,9 @@ def test_speeds_beyond_the_limits_count_as_the_fastest_of_their_curve():
         assert angular_rad_s[0, 1] / linear_m_s[0, 1] == pytest.approx(20.0)
         assert linear_m_s[0, 1] + angular_rad_s[0, 1] * WHEEL_SEPARATION_M / 2.0 == pytest.approx(MAX_WHEEL_M_S)
         assert safe.is_limited.all()
-    safe(poses, np.array((0.2, 0.1, np.nan)), np.array((0.0, -2.0, 9.0)))
+    linear_m_s, angular_rad_s = safe(poses, np.array((0.2, 0.1, np.nan)), np.array((0.0, -2.0, 1.0)))
     assert safe.is_limited.tolist() == [[False, False, True]]
+    assert linear_m_s[0, 2] == angular_rad_s[0, 2] == 0.0
 
 
 class LeaveTogether(Behavior):

@@ -81,7 +81,7 @@ def run_on_robots(
             folder.write_table(folder.read_runs())
             print("%s: %s" % (label, "does not count: " + trial.remark if trial.remark else "done"))
             if safety.limited_calls:
-                text = "%s: in %.0f %% of the steps the behavior asked for more than robots drive: they drove slower"
+                text = "%s: in %.0f %% of the steps the behavior asked for more than robots can drive: limited"
                 print(text % (label, 100.0 * safety.limited_calls / safety.calls))
             done += not trial.remark
     again = "; start it again for the others" if done < len(missing) else ""
