@@ -6,6 +6,7 @@ import pytest
 from test_controllers import STEP_S, Body, cast_in_box
 
 from hero_client.controllers.go_to_goal import PROGRESS_S, Goal, GoToGoalController
+from hero_client.controllers.lateness import HOLD_S
 from hero_client.controllers.motion import BLOCKED_S, SILENT_STEPS, STALL_S, State
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
 from hero_node.geometry import STOP, Pose
@@ -162,7 +163,7 @@ def test_wheels_may_start_anew_after_a_pause_of_the_program():
             now_s += STEP_S
             controller.step(HERE, None, now_s)
         assert controller.state is State.ACTIVE, controller.reason
-    for _ in range(int(0.4 * STALL_S / STEP_S)):
+    for _ in range(int((0.4 * STALL_S + HOLD_S) / STEP_S)):  # after the pause it is told to turn slowly for a while
         now_s += STEP_S
         controller.step(HERE, None, now_s)
     assert "wheels do not turn" in controller.reason

@@ -58,19 +58,19 @@ def test_a_robot_wants_straight_to_its_goal_but_for_a_nudge():
     for distance_m, speed_m_s in ((1.0, 0.08), (0.1, 0.08), (0.05, 0.04)):
         turns_rad = []
         for _ in range(200):
-            wanted = controller._want((distance_m, 0.0), HERE, distance_m, _Jam())
+            wanted = controller._want((distance_m, 0.0), HERE, distance_m, _Jam(), STEP_S)
             assert np.hypot(*wanted) == pytest.approx(speed_m_s)
             turns_rad.append(math.atan2(wanted[1], wanted[0]))
         assert min(turns_rad) == pytest.approx(-NUDGE_RAD, abs=0.005) and max(turns_rad) <= NUDGE_RAD
         assert max(turns_rad) > 0.9 * NUDGE_RAD
-    assert controller._want((0.0, 0.0), HERE, 0.0, _Jam()).tolist() == [0.0, 0.0]
+    assert controller._want((0.0, 0.0), HERE, 0.0, _Jam(), STEP_S).tolist() == [0.0, 0.0]
 
 
 def test_a_jam_is_left_to_the_side_for_two_seconds_and_then_judged_anew():
     controller, jam = make((1.0, 0.0)), _Jam()
     aside = []
     for _ in range(130):
-        wanted = controller._want((1.0, 0.0), HERE, 1.0, jam)
+        wanted = controller._want((1.0, 0.0), HERE, 1.0, jam, STEP_S)
         turn_rad = math.atan2(wanted[1], wanted[0])
         aside.append(abs(turn_rad) > NUDGE_RAD)
         assert not aside[-1] or 0.5 <= abs(turn_rad) <= 2.5

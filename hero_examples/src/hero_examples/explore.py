@@ -49,7 +49,7 @@ class Explorer:
             self.choose(pose, frontiers, taken, now_s)
             ranges = shorten_for_body(ranges, self.robot.model.body_radius_m)
             if self.controller:
-                command = self.controller.step(pose, ranges, now_s)
+                command = self.controller.step(pose, ranges, now_s, pose_age_s=self.robot.age_s("odom"))
             else:
                 command, self.memory = wander(ranges, self.memory, self.random.random(), WanderLaw())
         self.robot.drive(*command)

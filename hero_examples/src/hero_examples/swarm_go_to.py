@@ -27,7 +27,12 @@ class Formation:
     def step(self, elapsed_s):
         """Send every robot its next command; elapsed_s: since the start. Raises: ProgramError after timeout_s."""
         poses = [self.common.pose_of(robot) for robot in self.swarm]
-        commands = self.controller.step(poses, [robot.fresh_proximity() for robot in self.swarm])
+        ranges = [robot.fresh_proximity() for robot in self.swarm]
+        ages_s = [robot.age_s("odom") for robot in self.swarm]
+        commands = self.controller.step(poses, ranges, self.swarm.now_s, ages_s)
+        warning = self.controller.lateness.take_warning()
+        if warning:
+            rospy.logwarn(warning)
         for robot, command, arrived in zip(self.swarm, commands, self.controller.arrived):
             robot.drive(*command)
             robot.led("green" if arrived else "yellow")

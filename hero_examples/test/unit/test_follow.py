@@ -5,6 +5,7 @@ import pytest
 import true_paths
 
 from hero_client import CommonFrame
+from hero_client.controllers.lateness import Lateness
 from hero_client.controllers.unicycle import FollowLaw
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
@@ -25,13 +26,13 @@ def follow_curve(folder, perfect, leader_s):
     arena = folder / "row.yaml"
     arena.write_text(ARENA)
     with StepSwarm(3, seed=1, arena=str(arena), perfect=perfect, worlds=20) as swarm:
-        commons = [CommonFrame("world") for _ in swarm.worlds]
+        commons = [(CommonFrame("world"), Lateness()) for _ in swarm.worlds]
 
         def step(time_s):
-            for world, common in zip(swarm.worlds, commons):
+            for world, (common, lateness) in zip(swarm.worlds, commons):
                 if time_s < leader_s:
                     world[0].drive(0.08, 0.25)
-                follow.step(world, common, FollowLaw(gap_m=GAP_M))
+                follow.step(world, common, FollowLaw(gap_m=GAP_M), lateness)
 
         return true_paths.run(swarm, step, leader_s + 8.0)
 
@@ -57,6 +58,6 @@ def test_a_chain_whose_odometry_drifts_follows_without_touching(tmp_path):
 def test_a_follower_whose_leader_is_not_known_stops():
     with StepSwarm(2) as swarm:
         common = CommonFrame("nowhere")
-        true_paths.run(swarm, lambda time_s: follow.step(swarm, common, FollowLaw()), 1.0)
+        true_paths.run(swarm, lambda time_s: follow.step(swarm, common, FollowLaw(), Lateness()), 1.0)
         assert "nowhere" in common.missing["hero_1"]
         assert swarm[1].velocity == (0.0, 0.0)

@@ -46,6 +46,20 @@ def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("count, hz", [(8, 6.8), (6, 3.0), (8, 3.0), (8, 1.6)])
+def test_robots_whose_program_is_late_are_slow_and_do_not_touch(count, hz, monkeypatch):
+    warnings = []
+    monkeypatch.setattr("rospy.logwarn", warnings.append)
+    with StepSwarm(count, seed=100, arena=CIRCLE) as swarm:
+        goals = [(-robot.true_pose.x_m, -robot.true_pose.y_m) for robot in swarm]
+        formation = Formation(swarm, CommonFrame("world"), goals, LAW, 100)
+        path = true_paths.run(swarm, formation.step, 60.0, hz=hz)[0]
+    assert true_paths.measure_gaps(path).min() > 0.005
+    assert true_paths.measure_lengths(path).min() > 0.3
+    assert hz > 5.0 or "commands are late by" in warnings[0]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["circle", "grid", "line"])
 def test_robots_take_their_places_in_a_formation(shape):
     wanted = {"shape": shape, "spacing_m": 0.25}

@@ -15,6 +15,7 @@ from hero_node.geometry import STOP, Velocity
 from hero_node.ros.program import Program
 
 from ..controllers.formation_drive import FormationDrive
+from ..controllers.lateness import Lateness
 from ..robots.common_frame import CommonFrame
 from ..robots.swarm_base import REPORT_PERIOD_S
 from ..swarm import Swarm
@@ -74,6 +75,7 @@ class JoystickTeleop:
     ) -> None:
         """Start stopped; frame: in which the poses of a formation are known."""
         self._formation: Optional[FormationDrive] = None
+        self._lateness = Lateness()
         self._frame = CommonFrame(frame)
         self._choice = RobotChoice(list(swarm), ChoiceButtons() if choice is None else choice)
         self._presses: Deque[Sequence[int]] = deque(maxlen=PRESSES_MAX)
@@ -153,6 +155,11 @@ class JoystickTeleop:
             if len(known) == len(robots):
                 self._formation = self._formation or FormationDrive(known)
                 commands = self._formation.step(known, command, 1.0 / STEP_HZ)
+                self._lateness.step(self._swarm.now_s)
+                commands = [self._lateness.slow(each, robot.age_s("odom")) for robot, each in zip(robots, commands)]
+                warning = self._lateness.take_warning()
+                if warning:
+                    rospy.logwarn(warning)
             else:
                 commands, missing = [STOP] * len(robots), self._frame.missing
         for robot, each in zip(robots, commands):

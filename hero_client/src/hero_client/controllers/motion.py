@@ -15,6 +15,7 @@ from hero_node.geometry import STOP, Pose, Velocity, measure_distance, wrap_angl
 from ..values.readings import Obstacle
 from ..values.robot_constants import BODY_RADIUS_M
 from .avoidance import find_in_path, shorten_for_body
+from .lateness import Lateness
 from .pose_check import PoseCheck
 
 DEFAULT_TIMEOUT_S = 120.0
@@ -79,6 +80,7 @@ class MotionController:
         reason: why it failed, for users; empty otherwise.
         distance_m: still to drive at the last step; nan before the first pose.
         body_radius_m: of this robot's model.
+        lateness: of its steps; a late motion is slow.
     """
 
     def __init__(self, now_s: float, timeout_s: float) -> None:
@@ -87,6 +89,7 @@ class MotionController:
         self.reason = ""
         self.distance_m = math.nan
         self.body_radius_m = BODY_RADIUS_M
+        self.lateness = Lateness()
         self._timeout_s = timeout_s
         self._start_s = now_s
         self._stepped_s = now_s
@@ -108,6 +111,7 @@ class MotionController:
         ranges: Optional[Sequence[float]],
         now_s: float,
         odometry: Optional[Pose] = None,
+        pose_age_s: float = 0.0,
     ) -> Velocity:
         """Return the next command; call it 10 times per second.
 
@@ -116,6 +120,7 @@ class MotionController:
         """
         if self.state is not State.ACTIVE:
             return STOP
+        self.lateness.step(now_s)
         if now_s - self._stepped_s > SILENCE_S:
             self._moved_pose = None
         step_s, self._stepped_s = min(now_s - self._stepped_s, MAX_STEP_S), now_s
@@ -138,6 +143,7 @@ class MotionController:
             return STOP
         self._stopped_since_s = math.inf
         command = self._slow_for_obstacle(command, ranges, seen_s)
+        command = self.lateness.slow(command, pose_age_s)
         self._check_wheels(pose, odometry, command, seen_s)
         problem = self._pose_check.add(pose, odometry, seen_s) if odometry is not None else ""
         if problem:

@@ -7,6 +7,7 @@ import numpy as np
 
 from hero_node.geometry import STOP, Pose, Velocity
 
+from .lateness import Lateness
 from .motion import AIM_SHARE
 from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
 from .unicycle import GoToLaw, go_to_point
@@ -34,6 +35,10 @@ class SwarmGoToController:
     """Drives every robot to its goal; a robot that has arrived is stopped, and others drive around it.
 
     Poses and goals of all robots are in one frame.
+
+    Attributes:
+        arrived: which robots are in place.
+        lateness: of its steps.
     """
 
     def __init__(
@@ -44,7 +49,7 @@ class SwarmGoToController:
         seed: int,
         tolerance_m: float = 0.01,
     ) -> None:
-        """step_s: time between two calls of step(); seed: of the small random nudges."""
+        """step_s: planned time between two calls of step(); seed: of the small random nudges."""
         self.goals = [(float(x), float(y)) for x, y in goals]
         self.law = law
         self.step_s = step_s
@@ -54,38 +59,51 @@ class SwarmGoToController:
         self._random = np.random.RandomState(seed)
         self._last_places: Optional[np.ndarray] = None
         self._jams = [_Jam() for _ in self.goals]
+        self.lateness = Lateness(step_s)
+        self._now_s = 0.0
 
     def step(
-        self, poses: Sequence[Optional[Pose]], ranges: Optional[Sequence[Sequence[float]]] = None
+        self,
+        poses: Sequence[Optional[Pose]],
+        ranges: Optional[Sequence[Sequence[float]]] = None,
+        now_s: Optional[float] = None,
+        pose_ages_s: Optional[Sequence[float]] = None,
     ) -> List[Velocity]:
         """Return the next command of every robot: stop while the pose of any robot is None, for it may be anywhere.
 
-        ranges: what the proximity sensors of each robot see, as in avoidance; None: go by the poses alone.
+        ranges: what the proximity sensors of each robot see, as in avoidance; None: go by the poses alone. now_s: by
+        any clock that never steps back; None: step_s after the last call. pose_ages_s: of each pose; None: 0.
         """
+        now_s = self._now_s + self.step_s if now_s is None else now_s
+        elapsed_s, self._now_s = max(now_s - self._now_s, self.step_s), now_s
+        self.lateness.step(now_s)
         known = [pose for pose in poses if pose is not None]
         if len(known) < len(poses):
             self._last_places = None  # what they drive until the next step is no speed
             return [STOP] * len(poses)
-        return self._steer(known, ranges)
+        commands = self._steer(known, ranges, elapsed_s)
+        return [self.lateness.slow(*item) for item in zip(commands, pose_ages_s or [0.0] * len(commands))]
 
-    def _steer(self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]]) -> List[Velocity]:
+    def _steer(
+        self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]], elapsed_s: float
+    ) -> List[Velocity]:
         places = np.array([steered_point(pose, self.law.lookahead_m) for pose in poses])
         last_places = places if self._last_places is None else self._last_places
         # Measured, not commanded: the motors take half a second to follow.
-        velocities = (places - last_places) / self.step_s
+        velocities = (places - last_places) / elapsed_s
         self._last_places = places
         distances_m = [math.dist(goal, pose[:2]) for goal, pose in zip(self.goals, poses)]
         self.arrived = [
             distance_m < (self._tolerance_m if done else self._dock_law.tolerance_m)
             for done, distance_m in zip(self.arrived, distances_m)
         ]
-        straight = [self._want(*item) for item in zip(self.goals, poses, distances_m, self._jams)]
+        straight = [self._want(*item, elapsed_s) for item in zip(self.goals, poses, distances_m, self._jams)]
         commands = [STOP] * len(poses)
         for index, pose in enumerate(poses):
             if self.arrived[index]:
                 continue
             wanted, normals, bounds = avoid_sensed(pose, ranges[index] if ranges else (), straight[index], self.law)
-            velocity = avoid_others(index, places, velocities, wanted, self.law, self.step_s, normals, bounds)
+            velocity = avoid_others(index, places, velocities, wanted, self.law, elapsed_s, normals, bounds)
             free = float(np.hypot(*(velocity - straight[index]))) < 0.25 * float(np.hypot(*straight[index]))
             if distances_m[index] < DOCKING_M and free:
                 commands[index] = go_to_point(pose, *self.goals[index], self._dock_law)
@@ -93,13 +111,15 @@ class SwarmGoToController:
                 commands[index] = steer(pose, velocity, self.law)
         return commands
 
-    def _want(self, goal: Tuple[float, float], pose: Pose, distance_m: float, jam: "_Jam") -> np.ndarray:
+    def _want(
+        self, goal: Tuple[float, float], pose: Pose, distance_m: float, jam: "_Jam", elapsed_s: float
+    ) -> np.ndarray:
         """Return the velocity (2,) straight to the goal, with a small nudge; out of a jam, at an angle to that."""
         to_goal_m = np.array([goal[0] - pose.x_m, goal[1] - pose.y_m])
         speed_m_s = min(self.law.max_linear_m_s, SPEED_GAIN * distance_m)
         straight = to_goal_m * (speed_m_s / max(distance_m, 1e-9))
         side = np.array([-straight[1], straight[0]])
-        if jam.look(distance_m, self.step_s):
+        if jam.look(distance_m, elapsed_s):
             jam.angle_rad = self._random.uniform(0.5, 2.5) * self._random.choice((-1.0, 1.0))
         angle_rad = jam.angle_rad if jam.aside else NUDGE_RAD * self._random.uniform(-1.0, 1.0)
         wanted: np.ndarray = straight * math.cos(angle_rad) + side * math.sin(angle_rad)

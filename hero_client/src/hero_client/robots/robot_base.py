@@ -94,7 +94,7 @@ class BaseRobot(RobotReadings):
             self._warn(self._describe_stop())
 
     def _warn(self, text: str) -> None:
-        if self.now_s >= self._next_warning_s:
+        if text and self.now_s >= self._next_warning_s:
             self._next_warning_s = self.now_s + WARNING_PERIOD_S
             self._link.log_warning(text)
 
@@ -279,7 +279,9 @@ class BaseRobot(RobotReadings):
                 odometry = self.fresh_pose() if read_pose else None
             except StaleDataError as error:
                 absence = ": %s" % error
-            self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s, odometry))
+            age_s = self.age_s("odom")
+            self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s, odometry, age_s))
+            self._warn(controller.lateness.take_warning())
             on_step()
             if controller.state is State.REACHED:
                 return

@@ -176,7 +176,12 @@ class BaseSwarm(Group, Generic[AnyRobot]):
                 except StaleDataError as error:
                     poses.append(None)
                     absence = "; %s" % error
-            commands = controller.step(poses, [robot.fresh_proximity() for robot in self.robots])
+            ranges = [robot.fresh_proximity() for robot in self.robots]
+            ages_s = [robot.age_s("odom") for robot in self.robots]
+            commands = controller.step(poses, ranges, self.now_s, ages_s)
+            warning = controller.lateness.take_warning()
+            if warning:
+                self._log("warn", warning)
             for robot, command in zip(self.robots, commands):
                 robot.check_not_stopped()
                 robot._send_velocity(*command)

@@ -126,6 +126,21 @@ def test_a_robot_whose_pose_is_old_stops_alone_and_is_named(stage):
     assert np.abs(stage.swarm.rows.world.speeds_m_s[2]).max() > 0.02, "it goes on with a fresh pose"
 
 
+def test_a_program_that_is_late_drives_slowly_says_so_and_recovers(stage):
+    stage.start("milling")
+    stage.run(4.0)
+    usual_m_s = np.abs(stage.swarm.rows.world.speeds_m_s).mean()
+    planned_hz, stage.node.control.rate_hz = stage.node.control.rate_hz, 2.0
+    stage.run(3.0)
+    assert np.abs(stage.swarm.rows.world.speeds_m_s).mean() < 0.6 * usual_m_s
+    share = (1.0 / planned_hz + 0.1) / 0.5
+    text = "commands are late by 0.4 s: this PC is busy; robots drive at %.0f percent meanwhile"
+    assert stage.warnings[1:] == [text % (100.0 * share)]
+    stage.node.control.rate_hz = planned_hz
+    stage.run(4.0)
+    assert np.abs(stage.swarm.rows.world.speeds_m_s).mean() > 0.8 * usual_m_s
+
+
 def test_calibrated_motors_get_pulses_and_zero_velocity_at_rest(stage, tmp_path):
     for number in range(6):
         write_calibration(tmp_path, number)
@@ -313,9 +328,9 @@ def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):
     told_s = []
     for _ in range(240):
         stage.run(0.06)
-        if len(stage.warnings) > len(told_s):
+        if sum("hero_0" in text for text in stage.warnings) > len(told_s):
             told_s.append(stage.swarm.now_s)
-    assert told_s == pytest.approx([3.0, 8.0, 13.0], abs=0.2) and "hero_0" in stage.warnings[0]
+    assert told_s == pytest.approx([3.0, 8.0, 13.0], abs=0.2)
 
 
 @pytest.mark.parametrize(("count", "words"), [(10, "hero_8, hero_9 are not"), (11, "hero_9 and 1 more are not")])

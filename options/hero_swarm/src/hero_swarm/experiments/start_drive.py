@@ -32,13 +32,20 @@ class StartDrive:
         self._controller = SwarmGoToController([goal[:2] for goal in self._goals], law, PERIOD_S, seed=0)
         self._steps_at_rest = 0
 
-    def step(self, poses: np.ndarray, ranges_m: Optional[Sequence[Sequence[float]]] = None) -> np.ndarray:
+    def step(
+        self,
+        poses: np.ndarray,
+        ranges_m: Optional[Sequence[Sequence[float]]] = None,
+        now_s: Optional[float] = None,
+        ages_s: Optional[Sequence[float]] = None,
+    ) -> np.ndarray:
         """Return the speeds of all robots, m/s and rad/s (2, N), at poses (N, 3): zero while a pose of any is NaN.
 
         ranges_m: what the proximity sensors of each robot see: it does not drive into what has no pose.
+        now_s, ages_s: time and age of each pose, as in SwarmGoToController.step().
         """
         known: List[Optional[Pose]] = [Pose(*pose) if np.isfinite(pose).all() else None for pose in poses.tolist()]
-        commands = self._controller.step(known, ranges_m)
+        commands = self._controller.step(known, ranges_m, now_s, ages_s)
         for row, (pose, goal) in enumerate(zip(known, self._goals)):
             if self._controller.arrived[row] and None not in known:
                 assert pose is not None

@@ -12,6 +12,7 @@ from std_msgs.msg import Float32
 from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program, ProgramError, Swarm, read_parameters
+from hero_client.controllers.lateness import Lateness
 from hero_client.swarm import open_swarm
 from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
@@ -82,6 +83,7 @@ class BehaviorNode:
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         self.control = Control(self.behavior, Random([parameters["seed"]], len(ids)), self._filter)
+        self._lateness = Lateness(1.0 / self.control.rate_hz)
         self._start_s = rospy.get_time()
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._next_show_s = 0.0
@@ -103,7 +105,12 @@ class BehaviorNode:
         speeds = self.control.step(now_s - self._start_s, poses[None], things, ages_s[None])
         is_known = np.isfinite(poses).all(axis=1)
         may_move = is_known & np.isfinite(self.control.wanted).all(axis=0)
-        self._commands.send(*speeds, may_move)
+        self._lateness.step(time.monotonic())
+        linear_m_s, angular_rad_s = np.array(speeds) * self._lateness.find_shares(ages_s)
+        self._commands.send(linear_m_s, angular_rad_s, may_move)
+        late = self._lateness.take_warning()
+        if late:
+            rospy.logwarn(late)
         if not may_move.all():
             name = self._swarm.robots[int(may_move.argmin())].name
             missing = self._objects.describe_missing() or self._source.describe_missing()

@@ -14,6 +14,7 @@ import numpy as np
 import rospy
 
 from hero_client import Program, StoppedError, Swarm
+from hero_client.controllers.lateness import Lateness
 from hero_node.processes import end_process
 
 from ..experiments.batch import place_robots
@@ -98,9 +99,9 @@ def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source:
                 return
             missing = {robot.name: robot.missing() for robot in swarm}
             swarm.report_missing(missing)
-            poses = source.read()[0]
+            poses, ages_s = source.read()
             poses[[missing[robot.name] is not None for robot in swarm]] = np.nan
-            speeds = drive.step(poses, [robot.fresh_proximity() for robot in swarm])
+            speeds = drive.step(poses, [robot.fresh_proximity() for robot in swarm], swarm.now_s, ages_s)
             for robot, speed in zip(swarm, speeds.T.tolist()):
                 robot.check_not_stopped()
                 if missing[robot.name] is None:
@@ -186,7 +187,7 @@ def _drive(
     others: OtherRobots,
 ) -> bool:
     """Run one trial; return whether it has ended by itself, by a stop or a loss."""
-    start_s = rospy.get_time()
+    start_s, lateness = rospy.get_time(), Lateness(1.0 / trial.rate_hz)
     all_may_move = np.ones(len(swarm), dtype=bool)
     try:
         for _ in program.rate(trial.rate_hz):
@@ -203,7 +204,16 @@ def _drive(
             speeds = trial.step(rospy.get_time() - start_s, poses, ages_s, objects.read())
             if speeds is None:
                 return True
-            commands.send(*speeds, all_may_move)
+            lateness.step(time.monotonic())
+            shares = lateness.find_shares(ages_s)
+            late = lateness.take_warning()
+            if late:
+                rospy.logwarn(late)
+            if min(shares) == 0.0:
+                trial.remark = "commands too late for robots at %.1f s: %s" % (rospy.get_time() - start_s, late)
+                return True
+            linear_m_s, angular_rad_s = np.array(speeds) * shares
+            commands.send(linear_m_s, angular_rad_s, all_may_move)
     except StoppedError:
         trial.remark = "stopped at %.1f s" % (rospy.get_time() - start_s)
         return True
