@@ -28,12 +28,15 @@ from hero_client.values.object_sensing import (
     sense_sight,
 )
 from hero_client.values.sensing import Binary, Neighborhood, Neighbors, sense_binary, sense_neighbors
+from hero_node.number_checks import is_number
 from hero_node.texts import shorten
 
 __all__ = [
     "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Objects",
     "ObjectsInSight", "Random", "Sensed", "Sight", "decide", "derive_seed", "lock", "sense",
 ]  # fmt: skip
+
+MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 100.0
 
 VELOCITY, PULSES = DRIVES = ("velocity", "pulses")
 
@@ -122,11 +125,17 @@ class Behavior:
     drive: str = VELOCITY
 
     def __init__(self, **parameters: Any) -> None:
-        """Set parameters by name. Raises: TypeError for one that the behavior does not have; ValueError for drive."""
+        """Set parameters by name.
+
+        Raises: TypeError for one that the behavior does not have; ValueError for rate_hz or drive.
+        """
         for name, value in parameters.items():
             if name.startswith("_") or not hasattr(self, name) or callable(getattr(self, name)):
                 raise TypeError("%s has no parameter %r; it has %s" % (type(self).__name__, name, self.parameters()))
             setattr(self, name, value)
+        if not is_number(self.rate_hz, MIN_RATE_HZ, MAX_RATE_HZ):
+            text = "%s: rate_hz is %r, but must be a number from %g to %g"
+            raise ValueError(text % (type(self).__name__, self.rate_hz, MIN_RATE_HZ, MAX_RATE_HZ))
         if self.drive not in DRIVES:
             raise ValueError("%s: drive is %r, but must be %s" % (type(self).__name__, self.drive, " or ".join(DRIVES)))
 

@@ -50,10 +50,10 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         raise ExperimentError(
             "--seed %d: the experiment has seeds %d to %d" % (seed, experiment.seeds[0], experiment.seeds[-1])
         )
-    if about["code"] != hash_code(experiment.behavior_source):
+    trial = build_trial(experiment, cell, [seed])
+    if about["code"] != hash_code(experiment.list_code()):
         text = "note: the results are of other code (%s), so this run may differ from theirs"
         print(text % about["code"], file=sys.stderr)
-    trial = build_trial(experiment, cell, [seed])
     robot_ids = range(trial.poses.shape[1])
     print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
     if options.video:

@@ -1,19 +1,19 @@
 """The behaviors that come with the suite, by the names that programs and launch files take."""
 
 import importlib
-import importlib.util
 import inspect
 import os
-from typing import Any, Dict, List, Type
+from typing import Any, Dict, List, Optional, Type
 
 from hero_node.number_checks import is_number
 from hero_node.yaml_text import YamlError, parse_yaml
 
-from ..behavior import Behavior
+from ..behavior import MAX_RATE_HZ, MIN_RATE_HZ, Behavior
+from ..sources import Sources
+from ..user_module import load_user_module
 
 __all__ = ["find_behavior", "list_names", "make_behavior"]
 
-MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 100.0
 MAX_NUMBER = 1e6
 """Of the other parameters, whatever their unit."""
 
@@ -44,11 +44,12 @@ def list_names() -> List[str]:
     return sorted(_MODULES)
 
 
-def find_behavior(name: str) -> Type[Behavior]:
-    """Return a behavior by its name, its module.Class, FILE.py or FILE.py:Class.
+def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior]:
+    """Return a behavior by its name, its module.Class, FILE.py or FILE.py:Class; sources: None reads it anew.
 
     Raises: ValueError that says what there is.
     """
+    sources = sources or Sources()
     if name in _MODULES or name in _MODULES.values():
         module, class_name = _MODULES.get(name, name).split(".")
         found: Type[Behavior] = getattr(importlib.import_module(__name__ + "." + module), class_name)
@@ -56,13 +57,12 @@ def find_behavior(name: str) -> Type[Behavior]:
     path, _, class_name = name.partition(":")
     if not path.endswith(".py"):
         raise ValueError("behavior %r: must be FILE.py, FILE.py:Class, or one of %s" % (name, ", ".join(list_names())))
-    if not os.path.isfile(path):
+    if not sources.find(path):
         raise ValueError("behavior %s: no such file from %s; give its whole path" % (path, os.getcwd()))
-    spec = importlib.util.spec_from_file_location("user_behavior", path)
-    if spec is None or spec.loader is None:
-        raise ValueError("behavior %s: is not a Python file" % path)
-    loaded = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(loaded)
+    try:
+        loaded = sources.load(path, lambda: load_user_module(path, sources))
+    except OSError as error:
+        raise ValueError("behavior %s cannot be read: %s" % (path, error.strerror)) from error
     classes = {
         key: value for key, value in vars(loaded).items()
         if inspect.isclass(value) and issubclass(value, Behavior) and value.__module__ == loaded.__name__

@@ -5,13 +5,18 @@ Metrics are taken once per second of simulated time. A run has the same values a
 """
 
 import io
+import json
 import math
 import os
+import sys
+import threading
 import time
 from contextlib import contextmanager, suppress
-from typing import Any, Iterator, List, Sequence, Tuple
+from functools import lru_cache
+from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
+from tqdm import tqdm
 
 from hero_node.errors import HeroError
 from hero_node.safe_file import make_new_name, name_file, write_file
@@ -22,7 +27,9 @@ from hero_sim.world.robot_errors import read_known
 from ..behavior import Behavior, Objects
 from ..behaviors import find_behavior
 from ..metrics import METRICS
+from ..sources import Sources
 from ..trial import OPEN, Trial
+from .code_version import check_suite
 from .errors import ExperimentError, report_place
 from .experiment_file import ERRORS, Cell, Experiment, Metric, parse_experiment
 from .results_folder import Run
@@ -37,9 +44,17 @@ after a run's end."""
 
 
 def load_checked(experiment: Experiment) -> None:
-    """Build the first run of each cell, to report errors before anything runs. Raises: ExperimentError."""
-    for cell in experiment.cells:
-        build_trial(experiment, cell, experiment.seeds[:1])
+    """Build the first run of all cells that differ in it, to report errors before anything runs.
+
+    Raises: ExperimentError.
+    """
+    built = set()
+    for cell in tqdm(experiment.cells, "checking", unit=" cells", leave=False, disable=None, file=sys.stderr):
+        make_behavior(experiment, cell)
+        settings = json.dumps({**cell.settings, "delay_s": None}, sort_keys=True)
+        if settings not in built:
+            build_trial(experiment, cell, experiment.seeds[:1])
+            built.add(settings)
 
 
 def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Trial:
@@ -49,7 +64,7 @@ def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Tri
     """
     settings, files = cell.settings, experiment.list_files(cell)
     for name, path in files.items():
-        if not os.path.exists(path):
+        if not experiment.sources.find(path) and not os.path.exists(path):
             text = "%s: %s %s cannot be read: no such file; paths are relative to the experiment's file, or absolute"
             raise ExperimentError(text % (experiment.places[name], name, path))
     behavior = make_behavior(experiment, cell)
@@ -64,7 +79,8 @@ def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Tri
         objects = place_objects(settings.get("objects", "arena"), arena, starts, seeds)
     with _at(experiment, "errors"):
         scale = ERRORS.get(settings.get("errors", "default"), ERRORS["default"])
-        known = read_known(files["errors"], range(settings["robots"])) if "errors" in files else []
+        ids, read = range(settings["robots"]), experiment.sources.read
+        known = read_known(files["errors"], ids, read) if "errors" in files else []
         delay_s = settings.get("delay_s", 0.0)
         return Trial(
             behavior, arena, settings["robots"], seeds,
@@ -85,48 +101,82 @@ def _at(experiment: Experiment, name: str) -> Iterator[None]:
 def make_behavior(experiment: Experiment, cell: Cell) -> Behavior:
     """Return the behavior of a cell. Raises: ExperimentError."""
     with _at(experiment, "behavior"):
-        kind = find_behavior(experiment.behavior_source)
+        kind = find_behavior(experiment.behavior_source, experiment.sources)
         allowed = kind().numbers()
     for name in cell.parameters:
         if name not in allowed:
             text = "%s: %s has no parameter %r; it has %s"
             raise ExperimentError(text % (experiment.places[name], experiment.behavior, name, ", ".join(allowed)))
-    return kind(**cell.parameters)
+    with _at(experiment, "rate_hz"):
+        return kind(**cell.parameters)
 
 
 def load_cell_arena(experiment: Experiment, cell: Cell) -> Arena:
     """Return the arena of a cell, an open plane without one. Raises: OptionError."""
-    name = experiment.list_files(cell).get("arena") or cell.settings.get("arena")
-    return load_arena(name) if name else OPEN
+    path = experiment.list_files(cell).get("arena")
+    if path is None:
+        return load_arena(cell.settings["arena"]) if "arena" in cell.settings else OPEN
+    arena: Arena = experiment.sources.load(path, lambda: load_arena(path, experiment.sources.read))
+    return arena
 
 
 def place_robots(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> np.ndarray:
     """Return where the robots of runs begin (W, N, 3). Raises: ExperimentError."""
     start = experiment.start._replace(file=experiment.list_files(cell).get("file"))
-    return place_all(start, load_cell_arena(experiment, cell), cell.settings["robots"], seeds)
+    arena, robots = load_cell_arena(experiment, cell), cell.settings["robots"]
+    return place_all(start, arena, robots, seeds, experiment.sources.read)
 
 
-def compute_batch(
-    text: str, folder: str, cell_index: int, seeds: Sequence[int], stem: str
-) -> Tuple[List[Run], float]:
+class Inputs(NamedTuple):
+    """All that runs depend on, as they are sent to workers.
+
+    Attributes:
+        text, folder: of the experiment's file.
+        sources: all files that it names.
+        suite: digest of the suite's sources.
+    """
+
+    text: str
+    folder: str
+    sources: Sources
+    suite: str
+
+
+_one_at_a_time = threading.RLock()
+"""Modules of users are those of one experiment."""
+
+
+def compute_batch(inputs: Inputs, cell_index: int, seeds: Sequence[int], stem: str) -> Tuple[List[Run], float]:
     """Return the runs of one cell with these seeds, and the seconds that took.
 
-    Metrics over time, and poses, go to files that begin with stem. text, folder: of the experiment's file.
-    Raises: ExperimentError, also for whatever the behavior raises.
+    Metrics over time, and poses, go to files that begin with stem.
+    Raises: ExperimentError, also for whatever the behavior raises, and in a process with other sources of the suite.
     """
-    began_s = time.monotonic()
-    experiment = parse_experiment(text, "the experiment", folder)
+    with _one_at_a_time:
+        check_suite(inputs.suite)
+        began_s = time.monotonic()
+        return _compute_runs(inputs, cell_index, seeds, stem), time.monotonic() - began_s
+
+
+@lru_cache(maxsize=1)
+def _parse(text: str, folder: str) -> Experiment:
+    """Return the experiment of the last batch again: one with many cells takes seconds."""
+    return parse_experiment(text, "the experiment", folder)
+
+
+def _compute_runs(inputs: Inputs, cell_index: int, seeds: Sequence[int], stem: str) -> List[Run]:
+    # Not what was made of its files: a module may remember what it did in another batch.
+    experiment = _parse(inputs.text, inputs.folder)._replace(sources=inputs.sources)
     cell = experiment.cells[cell_index]
     trial = build_trial(experiment, cell, seeds)
     place = report_place("%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1]))
     with _record_poses(experiment, trial, stem + POSES_ENDING) as poses, place:
         series, ends = _run(experiment, trial, poses)
     _write_metrics(stem + METRICS_ENDING, series, ends)
-    runs = [
+    return [
         Run(cell_index, seed, take_values(experiment, series[: ends[world] + 1, world]))
         for world, seed in enumerate(seeds)
     ]
-    return runs, time.monotonic() - began_s
 
 
 def list_sources(experiment: Experiment) -> List[str]:

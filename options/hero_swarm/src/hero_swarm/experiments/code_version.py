@@ -5,35 +5,63 @@ import os
 import platform
 import subprocess
 import sys
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Dict
+from typing import Any, Dict, Mapping
 
 import numpy as np
+
+from .errors import ExperimentError
 
 PACKAGES = ("hero_client", "hero_driver", "hero_node", "hero_sim", "hero_swarm")
 """All whose modules a simulated run may use."""
 
+_SUFFIXES = (".py", ".yaml")
+"""Modules and arenas."""
 
-def hash_code(behavior: str) -> str:
-    """Return a digest of all source files that a run of behavior may use.
 
-    behavior: as in the file of an experiment; of FILE.py:Class the file counts, too.
-    """
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        folder = Path(str(import_module(package).__file__)).parent
-        sources = (path for path in folder.rglob("*.py") if "__pycache__" not in path.parts)
-        for path in sorted(sources):
-            _add_file(digest, "%s/%s" % (package, path.relative_to(folder)), path)
-    file = behavior.partition(":")[0]
-    if file.endswith(".py"):
-        _add_file(digest, "behavior", Path(file))
+def hash_code(own: Mapping[str, bytes]) -> str:
+    """Return a digest of all sources that a run may use; own: contents of the user's files, by name."""
+    digest = hashlib.sha256(hash_suite().encode())
+    for name, content in sorted(own.items()):
+        _add_file(digest, name, content)
     return digest.hexdigest()[:16]
 
 
-def _add_file(digest: Any, name: str, path: Path) -> None:
-    content = path.read_bytes()
+@lru_cache(maxsize=None)
+def hash_suite() -> str:
+    """Return a digest of the suite's sources, as they were when this process asked first."""
+    return _hash_packages()
+
+
+def _hash_packages() -> str:
+    digest = hashlib.sha256()
+    for package in PACKAGES:
+        folders = map(Path, import_module(package).__path__)
+        # In a devel space of catkin, the first folder holds but an __init__.py that leads to the second one.
+        folder = next(folder for folder in folders if {path.name for path in folder.glob("*.py")} > {"__init__.py"})
+        for path in sorted(filter(_is_source, folder.rglob("*"))):
+            _add_file(digest, "%s/%s" % (package, path.relative_to(folder)), path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _is_source(path: Path) -> bool:
+    return path.suffix in _SUFFIXES and "__pycache__" not in path.parts
+
+
+def check_suite(suite: str) -> None:
+    """Check that this process has the sources of the suite with this digest, and that they are still on the disk.
+
+    Raises: ExperimentError.
+    """
+    for own in (hash_suite(), _hash_packages()):  # what it imports later comes from the disk
+        if own != suite:
+            text = "%s has other code of the suite (%s, not %s) than this run began with: update it and start again"
+            raise ExperimentError(text % (platform.node(), own, suite))
+
+
+def _add_file(digest: Any, name: str, content: bytes) -> None:
     digest.update(("%s %d\n" % (name, len(content))).encode())
     digest.update(content)
 

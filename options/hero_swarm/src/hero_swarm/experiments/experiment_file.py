@@ -15,11 +15,12 @@ import itertools
 import json
 import math
 import os
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from hero_sim.world.arena_file import SHIPPED
 
 from ..metrics import FALLING, METRICS
+from ..sources import Sources
 from .errors import ExperimentError
 from .marked_yaml import Entry, read_entries
 
@@ -129,6 +130,7 @@ class Experiment(NamedTuple):
         record_hz: of trajectories; 0: none.
         places: name of a key, parameter or varied value -> file and line, for errors.
         folder: base of relative paths.
+        sources: contents of the files that runs read.
     """
 
     behavior: str
@@ -142,12 +144,21 @@ class Experiment(NamedTuple):
     compare: Optional[Comparing]
     places: Mapping[str, str]
     folder: str
+    sources: Sources
 
     @property
     def behavior_source(self) -> str:
         """The behavior as find_behavior() takes it from any folder."""
         is_file = self.behavior.partition(":")[0].endswith(".py")
         return os.path.join(self.folder, self.behavior) if is_file else self.behavior
+
+    def list_code(self) -> Dict[str, bytes]:
+        """Return the contents of all files that runs read besides those of list_files(), by paths relative to folder.
+
+        They are known once all cells were built: the behavior, the modules that it imports, and pictures of maps.
+        """
+        others = {os.path.abspath(path) for cell in self.cells for path in self.list_files(cell).values()}
+        return self.sources.list_contents(os.path.abspath(self.folder), others)
 
     def list_files(self, cell: Cell) -> Dict[str, str]:
         """Return the files that a run of cell reads, without that of the behavior: name in places -> path."""
@@ -169,25 +180,22 @@ class Experiment(NamedTuple):
         return json.dumps(description, sort_keys=True)
 
 
-def parse_experiment(text: str, file: str, folder: Optional[str] = None) -> Experiment:
+def parse_experiment(
+    text: str, file: str, folder: Optional[str] = None, sources: Optional[Sources] = None
+) -> Experiment:
     """Return the experiment in text, the contents of file.
 
-    folder: base of relative paths; None: that of file. Behavior and parameters are checked when they are loaded.
+    folder: base of relative paths; None: that of file. sources: contents of the files that runs read; None: each is
+    read when it is needed first. Behavior and parameters are checked when they are loaded.
     Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
     """
     root = read_entries(text, file).mapping(_KEYS, _REQUIRED)
     start = _parse_start(root.get("start"))
-    cells = _parse_cells(root)
+    seeds = _parse_seeds(root["seeds"])
+    cells = _parse_cells(root, len(seeds))
     metrics = tuple(_parse_metric(entry) for entry in root["metrics"].entries())
     names = [metric.name for metric in metrics]
-    for entry, name in zip(root["metrics"].entries(), names):
-        if names.count(name) > 1:
-            raise ExperimentError("%s: metrics holds %s more than once" % (entry.place, name))
-    seeds = _parse_seeds(root["seeds"])
-    if len(cells) * len(seeds) > MAX_RUNS:
-        root["seeds"].refuse(
-            "such that there are at most %d runs, not %d" % (MAX_RUNS, len(cells) * len(seeds))
-        )
+    _check_different(root["metrics"], names)
     time_s = root["time_s"].number(0.1, MAX_TIME_S, "s")
     until = _parse_bound(root["until"]) if "until" in root else None
     record_hz = 0.0
@@ -198,7 +206,10 @@ def parse_experiment(text: str, file: str, folder: Optional[str] = None) -> Expe
     inner = [root[name].mapping() for name in ("start", "vary", "parameters") if name in root]
     places = {name: entry.place for entries in (*inner, root) for name, entry in entries.items()}
     folder = os.path.dirname(file) if folder is None else folder
-    return Experiment(behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare, places, folder)
+    sources = sources or Sources()
+    return Experiment(
+        behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare, places, folder, sources
+    )
 
 
 def _parse_start(entry: Optional[Entry]) -> Start:
@@ -230,7 +241,16 @@ def _parse_parameter(entry: Entry) -> float:
     return entry.number(-1e6, 1e6, "")
 
 
-def _parse_cells(root: Dict[str, Entry]) -> Tuple[Cell, ...]:
+def _check_different(entry: Entry, values: Sequence[Any]) -> None:
+    """Check that values, those of the items of a list, differ. Raises: ExperimentError."""
+    seen = set()
+    for item, value in zip(entry.entries(), values):
+        if value in seen:
+            raise ExperimentError("%s: %s holds %r more than once" % (item.place, entry.name, value))
+        seen.add(value)
+
+
+def _parse_cells(root: Dict[str, Entry], seeds: int) -> Tuple[Cell, ...]:
     settings = {name: _parse_setting(name, root[name]) for name in SETTINGS if name in root}
     given = root["parameters"].mapping() if "parameters" in root else {}
     parameters = {name: _parse_parameter(entry) for name, entry in given.items()}
@@ -241,12 +261,13 @@ def _parse_cells(root: Dict[str, Entry]) -> Tuple[Cell, ...]:
         values = [
             _parse_setting(name, item) if name in SETTINGS else _parse_parameter(item) for item in entry.entries()
         ]
-        for value, item in zip(values, entry.entries()):
-            if values.count(value) > 1:
-                raise ExperimentError("%s: %s holds %r more than once" % (item.place, entry.name, value))
+        _check_different(entry, values)
         varied.append((name, values))
     if "robots" not in settings and "robots" not in dict(varied):
         raise ExperimentError("%s: robots is missing: give robots: 20, or vary it" % root["behavior"].place)
+    runs = math.prod(len(values) for _, values in varied) * seeds
+    if runs > MAX_RUNS:
+        root["seeds"].refuse("such that there are at most %d runs, not %d" % (MAX_RUNS, runs))
     names = [name for name, _ in varied]
     cells = []
     for combination in itertools.product(*(values for _, values in varied)):

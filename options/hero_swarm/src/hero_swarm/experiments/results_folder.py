@@ -289,8 +289,7 @@ def read_about(path: str) -> Dict[str, str]:
 def _digest_cell(experiment: Experiment, cell: Cell) -> str:
     digest = hashlib.sha256(experiment.describe_cell(cell).encode())
     for path in experiment.list_files(cell).values():
-        with open(path, "rb") as file:
-            digest.update(file.read())
+        digest.update(experiment.sources.read(path))
     return digest.hexdigest()
 
 

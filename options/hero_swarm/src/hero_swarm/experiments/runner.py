@@ -2,12 +2,14 @@
 
 import argparse
 import functools
+import itertools
 import math
 import os
 import sys
 import time
 from concurrent.futures import Executor
 from contextlib import contextmanager
+from operator import itemgetter
 from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple
 
 from tqdm import tqdm
@@ -16,8 +18,8 @@ from hero_node.parameters import given_ids_option, within
 from hero_node.yaml_text import YamlError, read_text
 
 from . import engines
-from .batch import compute_batch, load_checked
-from .code_version import describe_machine, hash_code
+from .batch import Inputs, compute_batch, load_checked
+from .code_version import describe_machine, hash_code, hash_suite
 from .errors import ExperimentError
 from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
 from .results_folder import REAL, SIMULATED, ResultsFolder, Run, RunKey, read_about
@@ -35,7 +37,7 @@ DASK = "dask:"
 FOLDER = "experiment_folder"
 """Key in about.json: folder of the experiment's file, base of its paths, relative to the results folder."""
 
-Task = Tuple[str, str, int, Tuple[int, ...], str]
+Task = Tuple[Inputs, int, Tuple[int, ...], str]
 """Arguments of compute_batch()."""
 
 
@@ -125,7 +127,7 @@ def choose_batch(experiment: Experiment, cell: int) -> int:
 
 
 def list_tasks(
-    text: str,
+    inputs: Inputs,
     experiment: Experiment,
     missing: Sequence[RunKey],
     batch: Optional[int],
@@ -137,19 +139,19 @@ def list_tasks(
     batch: runs that are computed together; None: as many as is fast, but something to do for each of the workers.
     """
     share = math.ceil(len(missing) / (_BATCHES_PER_WORKER * workers))
-    for cell in range(len(experiment.cells)):
-        seeds = [seed for own, seed in missing if own == cell]
+    for cell, keys in itertools.groupby(missing, key=itemgetter(0)):
+        seeds = [seed for _, seed in keys]
         size = batch or min(share, choose_batch(experiment, cell))
         for start in range(0, len(seeds), size):
             chosen = tuple(seeds[start : start + size])
-            yield text, experiment.folder, cell, chosen, folder.name_series(cell, chosen)
+            yield inputs, cell, chosen, folder.name_series(cell, chosen)
 
 
-def _choose_engine(options: argparse.Namespace, behavior: str) -> Tuple[Callable[[], Executor], int]:
+def _choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor], int]:
     """Return what opens the executor, and its number of workers."""
     if options.executor is None:
         return functools.partial(engines.open_pool, options.jobs), options.jobs
-    executor, workers = engines.open_dask(options.executor, functools.partial(hash_code, behavior))
+    executor, workers = engines.open_dask(options.executor, hash_suite)
     return lambda: executor, workers
 
 
@@ -158,7 +160,7 @@ def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterato
     with tqdm(total=missing + begun, initial=begun, unit="run", disable=None, file=sys.stderr) as bar:
         for task, result in done:
             yield task, result
-            bar.update(len(task[3]))
+            bar.update(len(task[2]))
 
 
 @contextmanager
@@ -169,8 +171,9 @@ def open_folder(options: argparse.Namespace) -> Iterator[Tuple[str, Experiment, 
     """
     text, experiment = read_experiment(options.file)
     load_checked(experiment)
+    experiment.sources.complete()
     path, kind = options.out or os.path.splitext(options.file)[0], SIMULATED if options.robots is None else REAL
-    folder = ResultsFolder(path, experiment, hash_code(experiment.behavior_source))
+    folder = ResultsFolder(path, experiment, hash_code(experiment.list_code()))
     about = {**describe_machine(), FOLDER: os.path.relpath(experiment.folder or ".", path)}
     if options.fresh:
         with folder.hold(kind):
@@ -198,11 +201,13 @@ def _run_missing(
     own = set(folder.list_missing(())[part - 1 :: parts])
     missing = [key for key in folder.list_missing(runs) if key in own]
     if missing:
-        opener, workers = _choose_engine(options, experiment.behavior_source)
-        tasks = list_tasks(text, experiment, missing, options.batch, workers, folder)
+        opener, workers = _choose_engine(options)
+        # Workers may have another working directory.
+        inputs = Inputs(text, os.path.abspath(experiment.folder), experiment.sources, hash_suite())
+        tasks = list_tasks(inputs, experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()
         done = engines.compute(opener, workers, compute_batch, tasks)
-        for (_, _, cell, seeds, _), (computed, wall_s) in _watch(done, len(missing), len(runs)):
+        for (_, cell, seeds, _), (computed, wall_s) in _watch(done, len(missing), len(runs)):
             folder.write_batch(computed)
             folder.note_time(cell, seeds, wall_s)
         print("%d runs in %.1f s" % (len(missing), time.monotonic() - began_s), file=sys.stderr)

@@ -1,14 +1,16 @@
 """Start poses of a run, which depend on seed and number alone. Pure but for a file."""
 
 import math
-from typing import List, Optional, Sequence
+from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
 from hero_client.values.readings import MAX_POSITION_M, is_plausible
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.geometry import Pose
+from hero_node.safe_file import read_file
 from hero_node.texts import shorten
+from hero_node.yaml_text import decode_text
 from hero_sim.errors import OptionError
 from hero_sim.world.arena import Arena, place_robots
 from hero_sim.world.pushing.shapes import PushedBody
@@ -25,11 +27,16 @@ _MAX_OVERLAP_M = 0.002
 """Of the bodies in a start file, which may hold where robots of a run ended: contacts leave 1.2 mm."""
 
 
-def place_all(start: Start, arena: Arena, robots: int, seeds: Sequence[int]) -> np.ndarray:
-    """Return poses (W, N, 3), x m, y m, yaw rad, of the robots of one world for each seed.
+def place_all(
+    start: Start, arena: Arena, robots: int, seeds: Sequence[int], read: Callable[[str], bytes] = read_file
+) -> np.ndarray:
+    """Return poses (W, N, 3), x m, y m, yaw rad, of the robots of one world for each seed; read: how files are read.
 
     Raises: ExperimentError if they find no place, or for a file that cannot be used.
     """
+    if start.kind == "file":
+        assert start.file is not None
+        return np.array([_read_poses(start.file, robots, read)] * len(seeds))
     try:
         return np.array([_place(start, arena, robots, seed) for seed in seeds])
     except (OptionError, ValueError) as error:
@@ -52,9 +59,6 @@ def place_objects(
 
 
 def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:
-    if start.kind == "file":
-        assert start.file is not None
-        return _read_poses(start.file, robots)
     if start.kind == "arena":
         return place_robots(arena, robots, np.random.RandomState(derive_seed(seed, "places")))
     if start.kind == "uniform":
@@ -85,16 +89,15 @@ def _place_in_circle(robots: int, spacing_m: float) -> np.ndarray:
     return np.column_stack((radius_m * np.cos(angle_rad), radius_m * np.sin(angle_rad), yaw_rad))
 
 
-def _read_poses(path: str, robots: int) -> np.ndarray:
+def _read_poses(path: str, robots: int, read: Callable[[str], bytes]) -> np.ndarray:
     """Return the first poses of a file with a line x m, y m, yaw rad for each robot. Raises: ExperimentError."""
     poses, numbers = [], []
     number = 0
     try:
-        with open(path, encoding="utf-8") as file:
-            for number, line in enumerate(file, 1):
-                if line.strip() and not line.startswith("#"):
-                    poses.append(_parse_pose(line))
-                    numbers.append(number)
+        for number, line in enumerate(decode_text(read(path)).splitlines(), 1):
+            if line.strip() and not line.startswith("#"):
+                poses.append(_parse_pose(line))
+                numbers.append(number)
     except OSError as error:
         raise ExperimentError("start.file %s cannot be read: %s" % (path, error.strerror)) from error
     except ValueError as error:

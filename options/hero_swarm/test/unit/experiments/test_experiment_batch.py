@@ -8,9 +8,11 @@ import pytest
 
 from hero_swarm import metrics
 from hero_swarm.experiments import runner
-from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING, compute_batch, take_values
+from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING, Inputs, compute_batch, take_values
+from hero_swarm.experiments.code_version import hash_suite
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_swarm.sources import Sources
 from hero_test.small_disk import SmallDisk
 
 FILE = """\
@@ -22,6 +24,10 @@ seeds: {from: 11, count: 3}
 metrics: [dispersion, {mean_of_last_s: {nearest_neighbor: 2}}, {time_until: {dispersion_ratio: 1.5}}]
 record: {hz: 2}
 """
+
+
+def compute(text, seeds, stem):
+    return compute_batch(Inputs(text, "", Sources(), hash_suite()), 0, seeds, stem)
 
 
 def take(text, series):
@@ -40,7 +46,7 @@ def test_columns_are_a_last_sample_a_mean_or_the_first_time_below_a_bound():
 
 
 def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
-    whole = compute_batch(FILE, "", 0, [11, 12, 13], str(tmp_path / "a"))[0]
+    whole = compute(FILE, [11, 12, 13], str(tmp_path / "a"))[0]
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
     assert series.shape == (5, 3, 3) and poses.shape == (9, 3, 3, 3) and np.isfinite(poses).all()
     assert [run.seed for run in whole] == [11, 12, 13] and {run.cell for run in whole} == {0}
@@ -50,7 +56,7 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
 
     bound = float(np.sort(series[2, :, 0])[0]) * 1.0001  # one run is below it after 2 s
     text = FILE.replace("time_s: 4", "time_s: 4\nuntil: {dispersion: %r}" % bound).replace("record: {hz: 2}\n", "")
-    runs = compute_batch(text, "", 0, [11, 12, 13], str(tmp_path / "b"))[0]
+    runs = compute(text, [11, 12, 13], str(tmp_path / "b"))[0]
     ended = np.load(str(tmp_path / ("b" + METRICS_ENDING)))
     for world in range(3):
         below = np.flatnonzero(series[:, world, 0] <= bound)
@@ -60,17 +66,17 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
     assert np.isnan(ended[-1]).any()
     assert not (tmp_path / ("b" + POSES_ENDING)).exists()
     first = 11 + int(series[2, :, 0].argmin())
-    compute_batch(text + "record: {hz: 2}\n", "", 0, [first], str(tmp_path / "d"))
+    compute(text + "record: {hz: 2}\n", [first], str(tmp_path / "d"))
     recorded = np.load(str(tmp_path / ("d" + POSES_ENDING)))
     assert recorded.dtype == np.float32 and recorded.shape == (9, 1, 3, 3)
     assert (recorded[:5, 0] == poses[:5, first - 11]).all() and np.isnan(recorded[5:]).all(), "it ended after 2 s"
-    alone = compute_batch(FILE, "", 0, [12], str(tmp_path / "c"))[0]
+    alone = compute(FILE, [12], str(tmp_path / "c"))[0]
     assert alone == whole[1:2], "a run has the same values alone"
 
 
 def test_metrics_get_speeds_in_meters_per_second(tmp_path, monkeypatch):
     monkeypatch.setitem(metrics.METRICS, "dispersion", lambda poses, velocities, *_: velocities[:, 0, 0])
-    compute_batch(FILE.replace("hz: 2", "hz: 20"), "", 0, [11], str(tmp_path / "a"))
+    compute(FILE.replace("hz: 2", "hz: 20"), [11], str(tmp_path / "a"))
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
     moved_m = float(poses[40, 0, 0, 0] - poses[39, 0, 0, 0])  # in the last cycle before 2 s
     assert series[2, 0, 0] == pytest.approx(moved_m * 20.0, rel=1e-3) and abs(moved_m) > 1e-4
@@ -79,7 +85,7 @@ def test_metrics_get_speeds_in_meters_per_second(tmp_path, monkeypatch):
 def test_what_a_behavior_raises_names_the_cell_and_the_seeds(tmp_path, monkeypatch):
     monkeypatch.setitem(metrics.METRICS, "dispersion", lambda *arguments: 1 // 0)
     with pytest.raises(ExperimentError, match="with seeds 11 to 13: ZeroDivisionError: .*test_experiment_batch"):
-        compute_batch(FILE, "", 0, [11, 12, 13], str(tmp_path / "a"))
+        compute(FILE, [11, 12, 13], str(tmp_path / "a"))
     assert not (tmp_path / ("a" + POSES_ENDING)).exists(), "a file has its name once it is whole"
 
 
@@ -101,9 +107,9 @@ def test_a_batch_is_some_seconds_of_work_and_something_for_each_worker():
     cases = ((None, 1, [40, 40, 20, 1, 1]), (None, 4, [13] * 7 + [9, 1, 1]), (30, 4, [30] * 3 + [10, 2]))
     for batch, workers, sizes in cases:
         tasks = list(runner.list_tasks("text", experiment, missing, batch, workers, Folder()))
-        assert [len(task[3]) for task in tasks] == sizes
-        assert [(task[2], seed) for task in tasks for seed in task[3]] == missing
-        assert tasks[-1][0] == "text" and tasks[0][4] == "0:11-%d" % (10 + sizes[0])
+        assert [len(task[2]) for task in tasks] == sizes
+        assert [(task[1], seed) for task in tasks for seed in task[2]] == missing
+        assert tasks[-1][0] == "text" and tasks[0][3] == "0:11-%d" % (10 + sizes[0])
 
 
 def test_options_of_run_have_their_limits(capsys):
@@ -126,11 +132,11 @@ def test_two_programs_that_record_one_batch_leave_it_whole(tmp_path, monkeypatch
 
     def measure_beside_another(*state):
         monkeypatch.setitem(metrics.METRICS, "dispersion", measured)
-        compute_batch(FILE, "", 0, [11], stem)
+        compute(FILE, [11], stem)
         return measured(*state)
 
     monkeypatch.setitem(metrics.METRICS, "dispersion", measure_beside_another)
-    compute_batch(FILE, "", 0, [11], stem)
+    compute(FILE, [11], stem)
     assert np.load(stem + POSES_ENDING).any(axis=(1, 2, 3)).all()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a" + METRICS_ENDING, "a" + POSES_ENDING]
 
@@ -139,7 +145,7 @@ def test_poses_for_which_a_disk_has_no_room_are_named_and_leave_nothing(tmp_path
     disk = SmallDisk(tmp_path, "64k")
     try:
         with pytest.raises(OSError, match="No space left on device: '.*a%s'" % POSES_ENDING):
-            compute_batch(FILE.replace("time_s: 4", "time_s: 4000"), "", 0, [11], os.path.join(disk.path, "a"))
+            compute(FILE.replace("time_s: 4", "time_s: 4000"), [11], os.path.join(disk.path, "a"))
         assert os.listdir(disk.path) == []
     finally:
         disk.close()

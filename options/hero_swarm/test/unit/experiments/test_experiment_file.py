@@ -201,3 +201,11 @@ def test_a_mean_of_the_last_seconds_is_a_column():
         FILE.replace("{time_until: {dispersion: 1.15}}", "{mean_of_last_s: {dispersion: 60}}")
     ).metrics[1:]
     assert (metric.name, metric.source, metric.last_s) == ("dispersion_mean_of_last_60_s", "dispersion", 60.0)
+
+
+def test_too_many_cells_are_refused_before_any_is_made(monkeypatch):
+    monkeypatch.setattr("hero_swarm.experiments.experiment_file.Cell", None)
+    values = ", ".join(map(str, range(100)))
+    vary = ", ".join("p%d: [%s]" % (number, values) for number in range(8))
+    with pytest.raises(ExperimentError, match="at most 1000000 runs, not 300000000000000000"):
+        parse(FILE.replace("robots: [10, 25], errors: [perfect, default]", "robots: [10], " + vary))

@@ -339,28 +339,45 @@ def test_times_of_batches_are_appended_below_one_heading(tmp_path):
     assert (tmp_path / "times.csv").read_text() == "cell,first_seed,runs,wall_s\n1,5,2,1.235\n0,7,1,0.500\n"
 
 
-def test_code_is_the_sources_of_all_packages_and_the_users_file(tmp_path, monkeypatch):
+def test_code_is_the_files_of_all_packages_and_the_users_modules(tmp_path, monkeypatch):
     for package in code_version.PACKAGES:
         (tmp_path / package / "deep" / "__pycache__").mkdir(parents=True)
-        (tmp_path / package / "__init__.py").write_text("")
-    modules = {name: SimpleNamespace(__file__=str(tmp_path / name / "__init__.py")) for name in code_version.PACKAGES}
+        for name in ("__init__.py", "module.py"):
+            (tmp_path / package / name).write_text("")
+        (tmp_path / "devel" / package).mkdir(parents=True)
+    modules = {
+        name: SimpleNamespace(__path__=[str(tmp_path / "devel" / name), str(tmp_path / name)])
+        for name in code_version.PACKAGES
+    }
     monkeypatch.setattr(code_version, "import_module", modules.__getitem__)
-    own = tmp_path / "own.py"
-    own.write_text("x = 1\n")
+    monkeypatch.setattr(code_version, "hash_suite", code_version.hash_suite.__wrapped__)
 
-    def change(path, text="changed\n", behavior="milling"):
-        before = code_version.hash_code(behavior)
+    def change(path, text="changed\n"):
+        before = code_version.hash_code({})
         path.write_text(text)
-        return code_version.hash_code(behavior) != before
+        return code_version.hash_code({}) != before
 
     inner = tmp_path / "hero_sim" / "deep"
     assert change(inner / "new.py") and change(inner / "new.py", "again\n") and change(tmp_path / "hero_node" / "b.py")
+    assert change(inner / "arena.yaml")
+    assert not change(tmp_path / "devel" / "hero_sim" / "__init__.py"), "of a devel space, which names the others"
     assert not change(inner / "notes.txt") and not change(inner / "__pycache__" / "c.py")
-    assert not change(own) and change(own, "x = 2\n", "%s:Own" % own)
-    before = code_version.hash_code("milling")
+    before = code_version.hash_code({})
     (inner / "new.py").rename(inner / "other.py")
-    assert len(before) == 16 and code_version.hash_code("milling") != before
+    assert len(before) == 16 and code_version.hash_code({}) != before
+    users = [{}, {"own.py": b"x = 1"}, {"own.py": b"x = 2"}, {"own.py": b"x = 1", "a/b.py": b""}, {"o.py": b"x = 1"}]
+    assert len(set(map(code_version.hash_code, users))) == len(users)
     assert {"commit", "machine", "numpy", "python"} == set(code_version.describe_machine())
+
+
+def test_a_process_whose_sources_differ_or_change_computes_nothing(monkeypatch):
+    suite = code_version.hash_suite()
+    code_version.check_suite(suite)
+    with pytest.raises(ExperimentError, match="has other code of the suite .*update it and start again"):
+        code_version.check_suite("0ther")
+    monkeypatch.setattr(code_version, "_hash_packages", lambda: "changed")
+    with pytest.raises(ExperimentError, match="other code of the suite .changed, not %s" % suite):
+        code_version.check_suite(suite)
 
 
 @pytest.mark.parametrize("failure", [OSError("no git"), subprocess.TimeoutExpired("git", 10.0)])

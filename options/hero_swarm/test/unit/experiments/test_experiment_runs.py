@@ -4,6 +4,7 @@ import csv
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from hero_swarm.experiments import batch, report, runner
 from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Start
+from hero_swarm.experiments.results_folder import Run
 from hero_swarm.experiments.starts import place_all
 
 FILE = """\
@@ -255,6 +257,90 @@ def test_paths_are_relative_to_the_file_wherever_programs_run(tmp_path, monkeypa
         report.write_report(str(moved))
     monkeypatch.chdir(str(tmp_path / "moved"))
     report.write_report(str(moved))
+
+
+OWN_FILES = {
+    "own.py": "import helper\nfrom hero_swarm.behavior import Behavior\n\n\nclass Own(Behavior):\n"
+    "    def step(self, sensed, memory, random):\n        return helper.V_M_S, 0.0, None\n",
+    "helper.py": "V_M_S = 0.1\n",
+    "own.yaml": "image: own.png\nresolution: 0.1\norigin: [-2, -2, 0]\n",
+    "own.errors": "left_gain=0.9\n",
+    "own.csv": "0,0,0\n0,0.5,1\n",
+    "e.yaml": "behavior: own.py\nrobots: 2\narena: own.yaml\nerrors: own.errors\nstart: {kind: file, file: own.csv}\n"
+    "time_s: 1\nseeds: {count: 3}\nmetrics: [dispersion]\n",
+}
+
+
+def write_own(folder):
+    folder.mkdir()
+    for name, text in OWN_FILES.items():
+        (folder / name).write_text(text)
+    Image.new("L", (40, 40), 255).save(str(folder / "own.png"))
+    return folder / "e.yaml"
+
+
+@pytest.mark.slow
+def test_files_that_are_edited_during_a_run_change_none_of_its_rows(tmp_path, monkeypatch):
+    undisturbed, path = run(write_own(tmp_path / "a")), write_own(tmp_path / "b")
+    write_batch = runner.ResultsFolder.write_batch
+
+    def edit_and_write(folder, runs):
+        for name in {*OWN_FILES, "own.png"} - {"e.yaml"}:
+            (path.parent / name).write_text("edited")
+        write_batch(folder, runs)
+
+    monkeypatch.setattr(runner.ResultsFolder, "write_batch", edit_and_write)
+    edited = run(path, "--batch", "1")
+    assert (edited / "runs.csv").read_bytes() == (undisturbed / "runs.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "words"),
+    [
+        ("helper.py", "0.1", "0.2", "computed by other code"),
+        ("own.errors", "0.9", "0.8", "other parameters"),
+        ("own.csv", "0.5", "0.6", "other parameters"),
+        ("own.yaml", "0.1", "0.2", "other parameters"),
+        ("own.png", "", "", "computed by other code"),
+    ],
+)
+def test_each_file_that_a_run_reads_counts_as_its_code_or_parameters(name, old, new, words, tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "_run_missing", lambda options, text, experiment, folder, runs: folder.write_batch(
+        [Run(0, 1, (1.0,))]
+    ))  # fmt: skip
+    path = write_own(tmp_path / "a")
+    run(path)
+    if old:
+        (path.parent / name).write_text(OWN_FILES[name].replace(old, new))
+    else:
+        Image.new("L", (41, 40), 255).save(str(path.parent / name))
+    with pytest.raises(ExperimentError, match=words):
+        run(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("robots: 2", "robots: 2\nparameters: {rate_hz: 3000}", "e.yaml, line 3: Own: rate_hz is 3000.0, but must be"),
+        ("own.errors", "/dev/zero", "line 4: errors /dev/zero cannot be read: it is a pipe, device or socket"),
+        ("own.yaml", "/dev/zero", "line 3: arena /dev/zero cannot be read: it is a pipe, device or socket"),
+        ("own.csv", "/dev/zero", "/dev/zero cannot be read: it is a pipe, device or socket"),
+        ("own.py", "no.py", "line 1: no.py, line 1: SyntaxError"),
+    ],
+)
+def test_files_and_rates_that_cannot_be_used_are_one_line(old, new, words, tmp_path):
+    path = write_own(tmp_path / "a")
+    path.write_text(OWN_FILES["e.yaml"].replace(old, new, 1))
+    (path.parent / "no.py").write_text("x = (\n")
+    with pytest.raises(ExperimentError) as caught:
+        run(path)
+    assert re.search(words, str(caught.value).replace(str(path.parent) + "/", "")), str(caught.value)
+    assert "\n" not in str(caught.value) and not path.with_suffix("").exists()
+
+
+def test_a_name_with_a_nul_character_is_refused(tmp_path):
+    with pytest.raises(ExperimentError, match="--out .*: a name cannot hold a NUL character"):
+        run(write_own(tmp_path / "a"), "--out", "a\0b")
 
 
 @pytest.mark.parametrize(
