@@ -321,3 +321,36 @@ def test_a_message_that_was_begun_before_a_pause_counts_to_what_is_old():
         assert stream.read()
         assert old == [(long, True), (b"short", True), (b"new", False)]
         assert (connection.stat_bytes, connection.stat_num_msg) == (54 + 9 + 7, 3)
+
+
+def test_of_motion_commands_of_before_a_pause_all_are_passed_on():
+    texts = [b"%05d" % number * 10 for number in range(1000)]
+    near, far = socket.socketpair()
+    with near, far:
+        received = []
+        subscriber = RawSubscriber(lambda payload: received.append((payload, subscriber.is_old)), None, moves=True)
+        stream = MessageStream(subscriber, SimpleNamespace(stat_bytes=0, stat_num_msg=0), far, b"")
+        near.sendall(b"".join(map(frame, texts)))
+        stream.resume()
+        assert stream.read() and stream.read()
+        assert received == [(text, True) for text in texts]
+
+
+def test_of_motion_commands_that_a_socket_has_piled_up_the_newest_counts():
+    texts = [b"%05d" % number * 10 for number in range(1000)]
+    for moves, reads_max in ((True, 2), (False, 1000)):
+        near, far = socket.socketpair()
+        with near, far:
+            received, ended = [], []
+            subscriber = RawSubscriber(received.append, None, lambda ended=ended: ended.append(True), moves=moves)
+            connection = SimpleNamespace(stat_bytes=0, stat_num_msg=0)
+            stream = MessageStream(subscriber, connection, far, b"")
+            near.sendall(b"".join(map(frame, texts)))
+            near.close()
+            reads = 0
+            while stream.read():
+                reads += 1
+            stream.close()
+            assert reads <= reads_max and ended == [True] and connection.stat_num_msg == len(texts)
+            first = raw_subscriber.READ_LENGTH // len(frame(texts[0]))
+            assert received == ([*texts[:first], texts[-1]] if moves else texts)

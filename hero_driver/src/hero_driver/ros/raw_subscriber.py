@@ -32,6 +32,10 @@ from .rospy_internals import (
 READ_LENGTH = 4096
 """Read at once from one publisher: 78 velocities, so that one that floods does not delay the robots."""
 
+BACKLOG_LENGTH = 262144
+"""Read at once from a publisher of motion that is ahead, of which the newest counts: one without a rate fills the
+sockets with more than a second of commands, which would move the robot on after its end."""
+
 MESSAGE_LENGTH_MAX = 1 << 20
 """A robot takes messages of 4 kB; a publisher that announces more than this does not speak TCPROS."""
 
@@ -54,18 +58,19 @@ class RawSubscriber:
         receive: Callable[[bytes], None],
         loop: EventLoop,
         on_sender_lost: Callable[[], None] = lambda: None,
-        finds_old: bool = False,
+        moves: bool = False,
     ) -> None:
         """receive(payload) is called on the loop's thread, on_sender_lost() when the newest one's publisher left.
 
-        finds_old: whether is_old is wanted, which takes one more call to the ROS master.
+        moves: whether messages are motion commands. Then is_old is wanted, which takes one more call to the ROS
+        master, and of a publisher that is ahead only the newest message of each read is passed on.
         """
         self.receive = receive
         self.on_sender_lost = on_sender_lost
         self.last_sender: Any = None  # connection of the newest message, where this module reads it
         self.is_old = False  # whether the newest message may be from before the subscription, or a pause of the driver
         self._name = ""
-        self._finds_old = finds_old
+        self.moves = moves
         self._earlier: Optional[FrozenSet[str]] = frozenset()
         self._loop = loop
         self._subscriber: Any = None
@@ -73,7 +78,7 @@ class RawSubscriber:
     def open(self, name: str, raw_class: Any, queue_length: int) -> None:
         """Subscribe to the topic called name; asks the ROS master, so it may block."""
         self._name = name
-        if self._finds_old:
+        if self.moves:
             self._earlier = list_publishers(name, raw_class._type)
         self._subscriber = rospy.Subscriber(
             name, raw_class, self._take, queue_size=queue_length, tcp_nodelay=True
@@ -126,6 +131,7 @@ class MessageStream(Reader):
         self._socket = sock
         self._remainder = remainder
         self._old_length = 0  # of what is still to be read
+        self._is_ahead = False
         self.ended = threading.Event()
         self.error: Optional[OSError] = None
 
@@ -142,7 +148,7 @@ class MessageStream(Reader):
     def read(self) -> bool:
         """Pass on the messages that have come; return whether the connection is still open."""
         try:
-            data = self._socket.recv(READ_LENGTH, socket.MSG_DONTWAIT)
+            data = self._socket.recv(BACKLOG_LENGTH if self._is_ahead else READ_LENGTH, socket.MSG_DONTWAIT)
         except (BlockingIOError, InterruptedError):
             return True
         except OSError as error:
@@ -154,6 +160,8 @@ class MessageStream(Reader):
         if self._remainder:
             data = self._remainder + data
         subscriber = self._subscriber
+        newest_only, self._is_ahead = self._is_ahead, subscriber.moves and length_read >= READ_LENGTH
+        newest: Optional[bytes] = None
         old_end = 0
         if self._old_length:
             old_end = self._old_length + len(self._remainder)
@@ -170,7 +178,12 @@ class MessageStream(Reader):
             position = start + length
             messages += 1
             subscriber.last_sender = self._connection
-            subscriber.receive(data[start:position])
+            if newest_only and not subscriber.is_old:  # of old ones stops count, whatever came after them
+                newest = data[start:position]
+            else:
+                subscriber.receive(data[start:position])
+        if newest is not None:
+            subscriber.receive(newest)
         self._remainder = data[position:]
         count_read(self._connection, length_read, messages)
         return True

@@ -100,7 +100,7 @@ class RobotCommands:
         """Return the subscriber to source, which is name, a topic that the robot subscribes to, or an alias of it."""
         receive = self.choose_receiver(name, source, ros_type)
         subscriber = RawSubscriber(
-            receive, self._loop, functools.partial(self._lose_sender, name, source), ros_type in STOP_PAYLOADS
+            receive, self._loop, functools.partial(self._lose_sender, name, source), moves=ros_type in STOP_PAYLOADS
         )
         self._subscribers[source] = subscriber
         return subscriber
