@@ -141,6 +141,10 @@ class Gateway(LinkHandler):
         """Stop robots whose programs have fallen silent, and take down what belongs to robots that left for good."""
         for bridge in self.bridges.values():
             bridge.commands.watch_commanders(now_s)
+            problem = bridge.corrections.take_problem()
+            if problem:
+                line = "%s: %s" % (bridge.label, problem)
+                self._log.log_throttled("warn", bridge.label + problem.split(" ", 1)[0], line, bridge.label)
         self._collect_expired(now_s)
 
     def poll_link(self, link: Link, now_s: float) -> None:
@@ -260,7 +264,9 @@ class Gateway(LinkHandler):
     def _resolve(self, peer: Peer, topic: Topic, identity: Identity) -> Optional[str]:
         """Return the ROS name of what a robot declared, None if it may not use it, which is logged."""
         info = topic.info
-        refusal = namespaces.find_refusal(info.name, info.message_type, identity, self._node)
+        refusal = namespaces.find_refusal(
+            info.name, info.message_type, identity, self._node, topic.kind.is_from_robot
+        )
         if refusal is not None:
             self.warn_robot(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
             return None

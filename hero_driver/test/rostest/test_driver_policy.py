@@ -58,6 +58,14 @@ class TestDriverPolicy(OwnDriverCase):
         self.assertEqual(list_driver_topics("/hero_10", driver.node), [])
         self.assertNotEqual(driver.fleet.find("/hero_1").last_error, "")
 
+    def test_a_robot_that_says_where_it_is_in_the_map_is_not_heard(self):
+        pose_type = "geometry_msgs/PoseWithCovarianceStamped"
+        own_pose = Declaration(PUB, 140, "/{}/measured_pose", pose_type, "953b798c0f514ff060a53a3498ce6246")
+        driver = self.share()
+        self.dial(driver, 5, declarations=[*STOCK_DECLARATIONS, own_pose])
+        driver.wait_line("hero_5: topic '/hero_5/measured_pose' refused: robots do not send it")
+        self.assertEqual(list_publishers("/hero_5/measured_pose"), [])
+
     def test_names_that_are_no_names_are_refused_and_cannot_forge_log_lines(self):
         evil = [
             Declaration(PUB, 140, "/hero_3/\x1b[2Jred\nFATAL forged", "std_msgs/String", STRING_MD5),

@@ -73,8 +73,18 @@ def test_what_identifies_a_hero_is_a_name_that_it_may_use(number, rest):
     assert resolve(name, Identity("/hero_%d" % (number + 1), number + 1)) is None
 
 
-def find(name, message_type="std_msgs/String", node="/lab/hero_driver"):
-    return find_refusal(name, message_type, Identity("/hero_1", 1), node)
+def find(name, message_type="std_msgs/String", node="/lab/hero_driver", is_from_robot=True):
+    return find_refusal(name, message_type, Identity("/hero_1", 1), node, is_from_robot)
+
+
+@pytest.mark.parametrize(
+    "name", ["measured_pose", "pose", "ground_truth", "neighbors", "proximity", "goal", "go_to/goal", "cmd_vel"]
+)
+def test_no_robot_may_send_what_would_move_it_in_the_map_or_drive_it(name):
+    for slash in ("/", ""):
+        assert "robots do not send it" in find(slash + "hero_1/" + name)
+    assert find("/hero_1/" + name, is_from_robot=False) is None
+    assert find("/hero_1/own/" + name) is None
 
 
 @pytest.mark.parametrize("message_type", ["hero_msgs/RobotArray", "hero_common/RobotArray"])

@@ -288,3 +288,55 @@ def test_ticks_are_those_of_the_model_that_the_robot_is(md5sum, given_plus, mode
     tick_m = {"hero": math.pi * 0.0492 / 288, "hero_plus": math.pi * 0.050 / 96}[model]
     assert robot.corrections.model == model
     assert odometry[2] == pytest.approx(20 * tick_m)
+
+
+# What cannot be true.
+
+
+def receive_odometry(robot, **numbers):
+    """Give one odometry message; return how many came out."""
+    return len(list_odometry(robot.receive("/hero_0/odom", build_odometry(NOW_NS, **numbers), NOW_NS)))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "text"),
+    [
+        ({"x_m": math.nan}, "x nan m"),
+        ({"y_m": 1e300}, "y 1e+300 m"),
+        ({"linear_m_s": 1688.0}, "1688 m/s"),
+        ({"angular_rad_s": -1e300}, "-1e+300 rad/s"),
+    ],
+)
+def test_odometry_that_cannot_be_true_is_refused_and_named(numbers, text):
+    robot = CorrectedRobot({"/hero_0/odom": TYPES["/hero_0/odom"]})
+    assert receive_odometry(robot, x_m=30.0, linear_m_s=-0.3, angular_rad_s=20.0) == 1
+    assert robot.corrections.take_problem() == ""
+    assert receive_odometry(robot, **numbers) == 0
+    assert "odom refused" in robot.corrections.refused * robot.corrections.take_problem()
+    receive_odometry(robot, **numbers)
+    assert text in robot.corrections.take_problem()
+    assert robot.corrections.take_problem() == ""
+    assert receive_odometry(robot) == 1
+
+
+@pytest.mark.parametrize(("ticks", "text"), [(1e6, "jumped by 999994"), (math.nan, "counts nan"), (math.inf, "inf")])
+def test_an_encoder_reading_that_cannot_be_true_is_named(ticks, text):
+    robot = CorrectedRobot()
+    robot.receive_burst(NOW_NS, (5.0, 5.0))
+    robot.receive_burst(NOW_NS + PERIOD_NS, (6.0, 6.0))
+    assert robot.corrections.take_problem() == ""
+    robot.receive_burst(NOW_NS + 2 * PERIOD_NS, (ticks, 7.0))
+    assert text in robot.corrections.take_problem()
+    assert robot.corrections.take_problem() == ""
+
+
+def test_stamps_too_close_together_give_no_impossible_velocity():
+    robot = CorrectedRobot()
+    for number in range(3):
+        robot.receive_burst(NOW_NS + number * PERIOD_NS, (10.0 * number, 10.0 * number))
+    before = robot.corrections.odometry.linear_m_s
+    robot.corrections.odometry.expect_reset()
+    robot.corrections.odometry.integrate(0.0, 0.0, 1.0)
+    robot.corrections.odometry.integrate(300.0, 300.0, 1.0 + 1e-6)
+    assert 0.1 < before < 1.0
+    assert robot.corrections.odometry.linear_m_s == 0.0

@@ -47,6 +47,6 @@ def test_what_costs_no_program_its_robots_is_no_failure(started, name, error):
 
 def test_a_thread_that_ends_for_lack_of_memory_is_noticed(started):
     watch = ThreadWatch()
-    for error in (ValueError("a bug"), MemoryError(), RuntimeError("another")):
+    for error in (MemoryError(), NO_THREAD):
         threading.excepthook(threading.ExceptHookArgs((type(error), error, None, None)))
     assert watch.failure.startswith("there is no memory")

@@ -13,6 +13,7 @@ from ..robot_constants import (
     DISTANCE_CONE_RAD,
     MAX_DISTANCE_M,
     MAX_RIM_RANGE_M,
+    MAX_WHEEL_SPEED_M_S,
     MIN_DISTANCE_M,
     MIN_RIM_RANGE_M,
     PROXIMITY_BEAMS,
@@ -49,6 +50,12 @@ ODOMETRY_TAIL_LENGTH = _POSE.size + _COVARIANCE.size + _TWIST.size + _COVARIANCE
 ENCODER_TAIL_LENGTH = 11 * 8
 
 CLAMP_TOLERANCE_M = 1e-4
+
+MAX_POSITION_M = 1e4
+"""Farther than a robot drives in half a day."""
+
+MAX_TURN_RAD_S = 100.0
+"""Three times what two wheels at MAX_WHEEL_SPEED_M_S could do to a robot."""
 
 
 def read_stamp_ns(payload: bytes) -> Optional[int]:
@@ -121,7 +128,7 @@ class OdometryWriter:
         """Return the robot's message with stamp and covariances, and with another estimate if one is given.
 
         estimate: pose, from pack_pose(), and velocities ahead (m/s) and around z (rad/s). None if payload is not a
-        nav_msgs/Odometry, or the robot's own numbers, where they are used, are not finite.
+        nav_msgs/Odometry, or the robot's own numbers, where they are used, cannot be true.
         """
         # A robot's frames never change, so they are looked at once.
         frames = payload[_ODOMETRY_FRAMES]
@@ -131,8 +138,7 @@ class OdometryWriter:
             self._frames = frames
         if estimate is None:
             pose, twist = payload[_ODOMETRY_POSE], payload[_ODOMETRY_TWIST]
-            # A sum is finite only if each part is.
-            if not math.isfinite(sum(_POSE.unpack(pose)) + sum(_TWIST.unpack(twist))):
+            if not _is_possible(_POSE.unpack(pose), _TWIST.unpack(twist)):
                 return None
         else:
             pose, linear_m_s, angular_rad_s = estimate
@@ -140,6 +146,26 @@ class OdometryWriter:
         secs, nsecs = divmod(stamp_ns, NS_PER_S)
         head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, secs, nsecs)
         return b"".join((head, frames, pose, self._pose_covariance, twist, self._twist_covariance))
+
+
+def _is_possible(pose: Sequence[float], twist: Sequence[float]) -> bool:
+    """Return whether the numbers of an odometry can be those of a robot; comparisons with NaN fail."""
+    return (
+        -MAX_POSITION_M <= pose[0] <= MAX_POSITION_M
+        and -MAX_POSITION_M <= pose[1] <= MAX_POSITION_M
+        and -MAX_WHEEL_SPEED_M_S <= twist[0] <= MAX_WHEEL_SPEED_M_S
+        and -MAX_TURN_RAD_S <= twist[5] <= MAX_TURN_RAD_S
+        # A sum is finite only if each part is.
+        and math.isfinite(sum(pose) + sum(twist))
+    )
+
+
+def describe_odometry(payload: bytes) -> str:
+    """Return position and velocity in a nav_msgs/Odometry, for users; its length if it is too short."""
+    if len(payload) < ODOMETRY_TAIL_LENGTH:
+        return "%d bytes" % len(payload)
+    pose, twist = _POSE.unpack(payload[_ODOMETRY_POSE]), _TWIST.unpack(payload[_ODOMETRY_TWIST])
+    return "x %.4g m, y %.4g m, %.4g m/s, %.4g rad/s" % (*pose[:2], twist[0], twist[5])
 
 
 def _holds_two_texts(data: bytes) -> bool:

@@ -104,6 +104,7 @@ class RobotCorrections:
             namespace, self.stamps, add_transform, self._take_odom_transform
         )
         self._refused = 0
+        self._problem = ""
         self._packed_pose = self._pack_pose()
         self._uses_estimate = False
         self._odom_name = namespace + "/odom"
@@ -159,6 +160,17 @@ class RobotCorrections:
         """Messages and transforms that could not be used."""
         return self._refused + self.transforms.refused
 
+    def take_problem(self) -> str:
+        """Return what was wrong with a message since the last call, with a remedy, for users; empty: nothing."""
+        problem, self._problem = self._problem or self.odometry.fault, ""
+        self.odometry.fault = ""
+        return problem
+
+    def _refuse(self, topic: str, payload: bytes) -> None:
+        self._refused += 1
+        what = message_layouts.describe_odometry(payload) if topic == "odom" else "%d bytes" % len(payload)
+        self._problem = "%s refused, it cannot be true (%s): reboot the robot, or flash its firmware" % (topic, what)
+
     def note_encoder(self, md5sum: str) -> None:
         """The robot declares an Encoder message of this md5, which tells its model."""
         model = self._settings.find_model(self._namespace, md5sum)
@@ -206,7 +218,7 @@ class RobotCorrections:
     def _correct_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
-            self._refused += 1
+            self._refuse(name[len(self._namespace) + 1 :], payload)
             return
         stamp_ns = self.stamps.correct(name, stamp_ns, arrival_ns)
         sink.publish(message_layouts.restamp(payload, next(self._seqs[name]), stamp_ns))
@@ -246,7 +258,7 @@ class RobotCorrections:
     def _correct_odometry(self, raw_sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
-            self._refused += 1
+            self._refuse("odom", payload)
             return
         self._offsets_ns.append(stamp_ns - arrival_ns)
         raw_sink.publish(payload)
@@ -268,7 +280,7 @@ class RobotCorrections:
     def _correct_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         reading = message_layouts.read_encoder(payload)
         if reading is None:
-            self._refused += 1
+            self._refuse("encoder", payload)
             return
         stamp_ns, left_ticks, right_ticks = reading
         self.wheels.read_ticks(left_ticks, right_ticks)
@@ -304,7 +316,7 @@ class RobotCorrections:
         )
         written = self._writer.rewrite(payload, next(self._odom_seqs), stamp_ns, estimate)
         if written is None:
-            self._refused += 1
+            self._refuse("odom", payload)
         else:
             self._odom_sink.publish(written)
 

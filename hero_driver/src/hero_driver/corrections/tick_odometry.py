@@ -58,12 +58,14 @@ class TickOdometry:
             while there are less than two.
         has_reading: whether there was one ever.
         resets: steps that were too large for a robot's motion.
+        fault: what was wrong with the newest reading that was not believed, with a remedy, for users.
     """
 
     def __init__(self, geometry: WheelGeometry) -> None:
         self.x_m = self.y_m = self.yaw_rad = 0.0
         self.linear_m_s = self.angular_rad_s = 0.0
         self.resets = 0
+        self.fault = ""
         self.has_reading = False
         self.change_wheels(geometry)
         self._ticks: Optional[Tuple[float, float]] = None
@@ -102,6 +104,10 @@ class TickOdometry:
         """
         # A sum of the two is finite only if both are.
         if not math.isfinite(left_ticks + right_ticks):
+            self.fault = "encoder counts %g and %g ticks, which odometry ignores: reboot the robot" % (
+                left_ticks,
+                right_ticks,
+            )
             return False
         self.has_reading = True
         last, self._ticks = self._ticks, (left_ticks, right_ticks)
@@ -122,6 +128,10 @@ class TickOdometry:
                 self._move(left_m, right_m)
             else:
                 self.resets += 1
+                self.fault = (
+                    "encoder jumped by %g and %g ticks, which odometry ignores: check where the robot is, and the"
+                    " encoders' wires if it happens again" % (left_ticks - last[0], right_ticks - last[1])
+                )
                 self._forget_velocity()
                 is_moving = False
         if not 0.0 < elapsed_s <= MAX_STEP_S:
@@ -131,8 +141,13 @@ class TickOdometry:
         if first_s != stamp_s:
             left_m_s = (left_ticks - first_left) * self._left_tick_m / (stamp_s - first_s)
             right_m_s = (right_ticks - first_right) * self._right_tick_m / (stamp_s - first_s)
-            self.linear_m_s = (left_m_s + right_m_s) / 2.0
-            self.angular_rad_s = (right_m_s - left_m_s) / self._separation_m
+            # Stamps that lie too close together say nothing about the velocity.
+            if (
+                -MAX_WHEEL_SPEED_M_S <= left_m_s <= MAX_WHEEL_SPEED_M_S
+                and -MAX_WHEEL_SPEED_M_S <= right_m_s <= MAX_WHEEL_SPEED_M_S
+            ):
+                self.linear_m_s = (left_m_s + right_m_s) / 2.0
+                self.angular_rad_s = (right_m_s - left_m_s) / self._separation_m
         return is_moving
 
     def _forget_velocity(self) -> None:

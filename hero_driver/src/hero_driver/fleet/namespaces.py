@@ -12,6 +12,16 @@ DRIVER_TYPES = frozenset(("hero_msgs/RobotArray", "hero_common/RobotArray"))
 
 RESERVED = "only drivers may use this name or type"
 
+NOT_FROM_ROBOTS = frozenset(
+    (
+        *("measured_pose", "pose", "ground_truth", "neighbors"),  # localization, simulators, hero_swarm
+        *("odom_raw", "proximity", "range"),  # this driver, from what the robot sends
+        *("cmd_vel", "velocity_controller/cmd_vel", "position_controller/cmd_vel", "cmd_motor"),  # programs
+        *("goal", "go_to/goal", "go_to/cancel", "go_to/status", "go_to/feedback", "go_to/result"),
+    )
+)
+"""Topics of a robot that others publish: one that sent them itself would move in the map, or drive by itself."""
+
 
 class Identity(NamedTuple):
     """Which robot a connection belongs to."""
@@ -37,11 +47,15 @@ def resolve(topic_name: str, identity: Identity) -> Optional[str]:
     return name if name.startswith(identity.namespace + "/") else None
 
 
-def find_refusal(topic_name: str, message_type: str, identity: Identity, node: str) -> Optional[str]:
+def find_refusal(
+    topic_name: str, message_type: str, identity: Identity, node: str, is_from_robot: bool
+) -> Optional[str]:
     """Return why the HeRo identity may not declare a topic or service to the driver called node, None if it may."""
     name = resolve(topic_name, identity)
     if name is None:
         return "outside %s" % identity.namespace
     if message_type in DRIVER_TYPES or name == node or name.startswith(node + "/"):
         return RESERVED
+    if is_from_robot and name[len(identity.namespace) + 1 :] in NOT_FROM_ROBOTS:
+        return "robots do not send it, other programs do; rename it in the firmware"
     return None

@@ -135,7 +135,7 @@ class Session:
         reader: the packet reader, for its counters.
         undeclared_messages: messages on ids that were not declared.
         outgoing: packets that the session itself wants to send; take_packets() takes them.
-        last_receive_s: when bytes came last, or the conversation began.
+        last_receive_s: when a whole packet came last, or the conversation began.
     """
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
@@ -159,10 +159,10 @@ class Session:
 
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
-        self.last_receive_s = now_s
         received = self.reader.receive_pairs(data)
         if not received:
             return []
+        self.last_receive_s = now_s
         topics = self._messages
         try:
             # Most reads hold messages only.
@@ -198,7 +198,7 @@ class Session:
         """Do what is due by now_s; call it at least a few times per second."""
         silent_s = now_s - max(self.last_receive_s, self._listening_s)
         if silent_s > self._limits.silence_timeout_s:
-            return [SessionEnded("silent for %.1f s" % silent_s)]
+            return [SessionEnded("silent for %.1f s: no whole packet came" % silent_s)]
         if (self._asks_again or not self.topics) and now_s >= self._request_due_s:
             self.outgoing.append(encode_packet(packets.ID_PUBLISHER, b""))
             self._last_request_s = now_s

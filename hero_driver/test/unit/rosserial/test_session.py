@@ -223,6 +223,16 @@ def test_a_session_ends_after_silence_and_not_before():
     assert ended.reason.startswith("silent for 6.1 s")
 
 
+def test_bytes_that_make_no_packet_are_silence():
+    session = open_declared_session(silence_timeout_s=6.0)
+    for number in range(7):
+        now_s = T0 + 0.9 * number
+        assert session.receive_bytes(b"\xff", now_s, 0.0) == []
+        assert session.poll(now_s) == []
+    (ended,) = session.poll(T0 + 6.2)
+    assert "no whole packet" in ended.reason
+
+
 def test_silence_counts_only_while_there_are_subscribers():
     session = open_declared_session(silence_timeout_s=6.0)
     session.forgive_silence(T0 + 60.0)
