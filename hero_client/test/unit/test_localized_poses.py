@@ -57,6 +57,14 @@ def test_an_old_or_uncertain_pose_is_an_error_with_its_cause(robot, now_s, text)
         receive(robot).find(3, now_s)
 
 
+@pytest.mark.parametrize("ahead_s", [1.2, 3600.0])
+def test_a_pose_that_is_stamped_ahead_is_no_pose(ahead_s):
+    poses = receive(make_pose(0, age_s=-0.05), make_pose(3, age_s=-ahead_s))
+    assert poses.find(0, 7.1) == (1.0, 2.0, 0.5)
+    with pytest.raises(StaleDataError, match="hero_3 in the frame map is stamped .* s ahead: do the clocks"):
+        poses.find(3, 7.1)
+
+
 def test_the_age_of_a_pose_is_that_of_its_stamp_and_of_the_silence_since():
     poses = receive(make_pose(3, age_s=0.03))
     assert poses.age_s(3, 7.1) == pytest.approx(0.13)

@@ -2,7 +2,7 @@
 
 import math
 
-from hero_client.controllers.pose_check import PoseCheck
+from hero_client.controllers.pose_check import FROZEN, FROZEN_M, FROZEN_S, FrozenCheck, PoseCheck
 from hero_node.geometry import Pose
 
 OFF = Pose(3.0, -2.0, 0.0)
@@ -75,3 +75,17 @@ def test_a_jump_of_the_odometry_counts_and_begins_a_drive_anew():
     # What was driven before it does not count with what comes after it.
     assert check.add(Pose(OFF.x_m + 0.03, OFF.y_m, 0.0), Pose(5.03, 0.0, 0.0), 0.2) == ""
     assert drive(check, [(0.05, 0.0, 0.0, 1.0)] * 3, 1.0) == ["", "", ""]
+
+
+def test_a_pose_that_stays_the_same_while_wheels_turn_is_frozen():
+    for odometry, is_frozen in (
+        (Pose(1.1 * FROZEN_M, 0.0, 0.0), True),
+        (Pose(0.0, 0.0, 1.1), True),
+        (Pose(0.9 * FROZEN_M, 0.0, 0.9), False),
+    ):
+        check = FrozenCheck()
+        assert check.add(OFF, Pose(0.0, 0.0, 0.0), 0.0) == ""
+        assert check.add(OFF, odometry, FROZEN_S - 0.1) == "", "it may be late"
+        assert check.add(OFF, odometry, FROZEN_S) == (FROZEN if is_frozen else "")
+        assert check.add(OFF, odometry, 100.0) == (FROZEN if is_frozen else ""), "as long as it stays"
+        assert check.add(Pose(3.1, -2.0, 0.0), odometry, 101.0) == ""

@@ -91,7 +91,8 @@ def test_a_light_waits_for_the_driver_at_the_start_only(monkeypatch, time):
     assert time.now_s == pytest.approx(203.0, abs=0.03)
 
 
-def test_a_transform_is_waited_for_until_its_time_is_out(time):
+def test_a_transform_is_waited_for_until_its_time_is_out(time, monkeypatch):
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(50))
     listener = FrameListener.__new__(FrameListener)
     found = SimpleNamespace(
         translation=SimpleNamespace(x=1.0, y=2.0), rotation=SimpleNamespace(x=0.0, y=0.0, z=1.0, w=0.0)
@@ -102,8 +103,9 @@ def test_a_transform_is_waited_for_until_its_time_is_out(time):
         asked.append((target, source))
         if time.now_s < 101.0:
             raise frames.tf2_ros.LookupException("not there.")
-        return SimpleNamespace(transform=found)
+        return SimpleNamespace(transform=found, header=SimpleNamespace(stamp=stamped))
 
+    stamped = rospy.Time(50.9)
     listener._buffer = SimpleNamespace(lookup_transform=look_up)
     with pytest.raises(FrameError, match=r"no transform from hero_0/odom to map \(not there\): start"):
         listener.find_origin("hero_0/odom", "map", 0.0)
@@ -113,6 +115,9 @@ def test_a_transform_is_waited_for_until_its_time_is_out(time):
     assert time.now_s == pytest.approx(100.5, abs=0.021)
     assert listener.find_origin("hero_0/odom", "map", 2.0) == pytest.approx((1.0, 2.0, math.pi))
     assert asked[0] == ("map", "hero_0/odom")
+    stamped = rospy.Time(3650)
+    with pytest.raises(StaleDataError, match="from map to hero_0/odom is stamped 3600.0 s ahead"):
+        listener.find_origin("hero_0/odom", "map", 2.0)
 
 
 def test_a_pose_of_localize_is_waited_for_if_localize_runs(time):

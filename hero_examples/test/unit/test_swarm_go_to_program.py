@@ -10,6 +10,7 @@ import true_paths
 from hero_client import CommonFrame, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers.orca import AvoidanceLaw
+from hero_client.values.errors import GoalError
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena_file import load_arena
 
@@ -79,6 +80,33 @@ def test_robots_that_are_not_in_place_in_time_are_named():
     swarm = StepSwarm(2, arena="empty")
     with pytest.raises(ProgramError, match="after 2 s not in place: hero_0, hero_1"):
         form(swarm, [(0.0, 50.0), (50.0, 0.0)], 0, timeout_s=2.0)
+
+
+def freeze_first(swarm):
+    """Let localize give the first robot's pose of now for ever, and true poses of the others."""
+    frozen = swarm[0].true_pose
+    swarm[0].localize_by(lambda: frozen)
+    swarm[1].localize_by(lambda: swarm[1].true_pose)
+
+
+def test_a_robot_whose_pose_is_frozen_ends_go_to_each_with_the_reason():
+    with StepSwarm(2, seed=1, arena="empty") as swarm:
+        freeze_first(swarm)
+        log, start_s = swarm.log(), swarm.now_s
+        with pytest.raises(GoalError, match="hero_0: its wheels turn, but its pose stays the same"):
+            swarm.go_to_each({0: (0.6, 0.5), 1: (-0.6, 0.5)})
+        assert swarm.now_s - start_s < 6.0
+        assert true_paths.measure_lengths(true_paths.split_worlds(log)[0])[0] < 0.45
+        assert true_paths.stop_within(swarm)
+
+
+def test_all_robots_stop_and_one_whose_pose_is_frozen_is_named():
+    with StepSwarm(2, seed=1, arena="empty") as swarm:
+        freeze_first(swarm)
+        formation = Formation(swarm, CommonFrame("map"), [(0.6, 0.5), (-0.6, 0.5)], LAW)
+        true_paths.run(swarm, formation.step, 8.0)
+        assert "pose stays the same" in formation.common.missing["hero_0"]
+        assert true_paths.stop_within(swarm, 0.0)
 
 
 def test_all_robots_stop_while_the_pose_of_one_is_not_known():

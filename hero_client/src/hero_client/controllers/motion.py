@@ -10,13 +10,13 @@ import enum
 import math
 from typing import Optional, Sequence
 
-from hero_node.geometry import STOP, Pose, Velocity, measure_distance, wrap_angle
+from hero_node.geometry import STOP, Pose, Velocity
 
 from ..values.readings import Obstacle
 from ..values.robot_constants import BODY_RADIUS_M
 from .avoidance import find_in_path, shorten_for_body
 from .lateness import Lateness
-from .pose_check import PoseCheck
+from .pose_check import FROZEN, FROZEN_S, SAME_M, SAME_RAD, PoseCheck, is_apart
 
 DEFAULT_TIMEOUT_S = 120.0
 
@@ -49,19 +49,12 @@ STALL_S = 5.0
 """After this long without motion of the wheels although they were told to move, the motion has failed. The slowest
 command moves wheels after up to 3 s, when the robot's own controller has overcome friction."""
 
-FROZEN_S = 3.0
-"""After this long with wheels that turn and a pose that stays the same, the motion has failed."""
-
 SILENCE_S = 0.4
 """The driver may have stopped a robot whose program took longer for a step; its wheels then start anew."""
 
 STALL_LINEAR_M_S = 0.02
 STALL_ANGULAR_RAD_S = 0.2
 """Commands below both may be too slow for the motors."""
-
-MOVED_M = 0.005
-MOVED_RAD = 0.05
-"""More than the noise of odometry (a tick is 0.5 mm and 0.017 rad)."""
 
 
 class State(enum.Enum):
@@ -188,9 +181,7 @@ class MotionController:
             return
         turns = odometry is not None and _has_moved(self._moved_odometry, odometry)
         if turns and seen_s - self._moved_s >= FROZEN_S:
-            self._fail(
-                "its wheels turn, but its pose stays the same: is the camera's image frozen, or is the robot held?"
-            )
+            self._fail(FROZEN)
         elif not turns and seen_s - self._moved_s >= STALL_S:
             self._fail(
                 "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
@@ -221,8 +212,4 @@ class MotionController:
 
 def _has_moved(last: Optional[Pose], pose: Pose) -> bool:
     """Return whether a pose differs from the last one by more than noise; True without a last one."""
-    return (
-        last is None
-        or measure_distance(last, pose) > MOVED_M
-        or abs(wrap_angle(pose.yaw_rad - last.yaw_rad)) > MOVED_RAD
-    )
+    return last is None or is_apart(last, pose, SAME_M, SAME_RAD)

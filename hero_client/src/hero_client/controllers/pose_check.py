@@ -32,6 +32,36 @@ JUMPS, JUMP_WINDOW_S = 3, 10.0
 """Number of jumps within this time: a robot that is moved by hand, or found again, jumps once."""
 
 
+FROZEN_S = 3.0
+FROZEN_M, FROZEN_RAD = 0.1, 1.0
+"""A pose that stayed the same for this long, and while odometry counted this much, is not where the robot is."""
+
+SAME_M, SAME_RAD = 0.005, 0.05
+"""Poses of a robot at rest differ by less."""
+
+FROZEN = "its wheels turn, but its pose stays the same: is the camera's image frozen, or is the robot held?"
+
+
+def is_apart(one: Pose, other: Pose, distance_m: float, angle_rad: float) -> bool:
+    """Return whether two poses are further apart than this."""
+    return measure_distance(one, other) > distance_m or abs(wrap_angle(one.yaw_rad - other.yaw_rad)) > angle_rad
+
+
+class FrozenCheck:
+    """Detects that the pose of one robot stays the same while its odometry counts."""
+
+    def __init__(self) -> None:
+        self._start: Optional[Tuple[Pose, Pose, float]] = None
+
+    def add(self, pose: Pose, odometry: Pose, now_s: float) -> str:
+        """Take both poses, each in its own frame, at every step; return FROZEN until the pose changes, else nothing."""
+        if self._start is None or is_apart(self._start[0], pose, SAME_M, SAME_RAD):
+            self._start = (pose, odometry, now_s)
+        _, start_odometry, start_s = self._start
+        has_driven = is_apart(start_odometry, odometry, FROZEN_M, FROZEN_RAD)
+        return FROZEN if has_driven and now_s - start_s >= FROZEN_S else ""
+
+
 class PoseCheck:
     """Compares the poses of one robot with its odometry."""
 

@@ -75,7 +75,8 @@ class SwarmGoToController:
         any clock that never steps back; None: step_s after the last call. pose_ages_s: of each pose; None: 0.
         """
         now_s = self._now_s + self.step_s if now_s is None else now_s
-        elapsed_s, self._now_s = max(now_s - self._now_s, self.step_s), now_s
+        elapsed_s = self.step_s if self._last_places is None else max(now_s - self._now_s, self.step_s)
+        self._now_s = now_s
         self.lateness.step(now_s)
         known = [pose for pose in poses if pose is not None]
         if len(known) < len(poses):

@@ -15,6 +15,7 @@ from hero_node.number_checks import check_finite
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M
 from ..controllers.motion import DEFAULT_TIMEOUT_S
 from ..controllers.orca import AvoidanceLaw
+from ..controllers.pose_check import FrozenCheck
 from ..controllers.swarm_go_to import SwarmGoToController
 from ..values.background_motion import BackgroundMotion, Steps
 from ..values.colors import Color
@@ -167,15 +168,24 @@ class BaseSwarm(Group, Generic[AnyRobot]):
                 raise GoalError(text % (one.name, other.name, apart_m, law.min_spacing_m))
         controller = SwarmGoToController(places, law, REPEAT_PERIOD_S, seed=0, tolerance_m=tolerance_m)
         end_s = self.now_s + timeout_s
+        checks = [FrozenCheck() for _ in self.robots]
         while not all(controller.arrived):
             poses: List[Optional[Pose]] = []
             absence = ""
-            for robot in self.robots:
+            missing: Dict[str, Optional[str]] = {}
+            for robot, check in zip(self.robots, checks):
                 try:
-                    poses.append(robot.pose_in(frame, timeout_s=0.0))
+                    pose = robot.pose_in(frame, timeout_s=0.0)
                 except StaleDataError as error:
                     poses.append(None)
-                    absence = "; %s" % error
+                    absence, missing[robot.name] = "; %s" % error, str(error)
+                    continue
+                poses.append(pose)
+                odometry = robot.fresh_pose()
+                problem = check.add(pose, odometry, self.now_s) if odometry else ""
+                if problem:
+                    raise GoalError("no goal is reached: %s: %s" % (robot.name, problem))
+            self.report_missing(missing)
             ranges = [robot.fresh_proximity() for robot in self.robots]
             ages_s = [robot.age_s("odom") for robot in self.robots]
             commands = controller.step(poses, ranges, self.now_s, ages_s)

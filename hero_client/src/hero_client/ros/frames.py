@@ -13,7 +13,8 @@ import tf2_ros
 from hero_node.geometry import Pose, pose_of
 from hero_node.texts import one_line
 
-from ..values.errors import FrameError
+from ..values.errors import FrameError, StaleDataError
+from ..values.readings import FRESH_S
 
 POLL_PERIOD_S = 0.02
 
@@ -29,12 +30,17 @@ class FrameListener:
         """Return the newest pose of the frame's origin in the frame within.
 
         Raises: FrameError if tf does not connect the two within timeout_s; after the start that takes a moment.
+        StaleDataError if it is stamped ahead: newer ones would not count until then.
         """
         deadline_s = time.monotonic() + timeout_s
         while True:
             try:
-                found = self._buffer.lookup_transform(within, frame, rospy.Time(0)).transform
-                return pose_of(found.translation, found.rotation)
+                found = self._buffer.lookup_transform(within, frame, rospy.Time(0))
+                ahead_s = (found.header.stamp - rospy.Time.now()).to_sec()
+                if ahead_s > FRESH_S:
+                    text = "the transform from %s to %s is stamped %.1f s ahead: do the clocks of its publishers agree?"
+                    raise StaleDataError(text % (within, frame, ahead_s))
+                return pose_of(found.transform.translation, found.transform.rotation)
             except tf2_ros.TransformException as error:
                 if time.monotonic() >= deadline_s or rospy.is_shutdown():
                     raise FrameError(

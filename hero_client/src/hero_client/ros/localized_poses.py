@@ -36,7 +36,7 @@ class PoseReport(NamedTuple):
     def find(self, robot_id: int, now_s: float) -> Pose:
         """Return where a robot is.
 
-        Raises: FrameError if it was never measured. StaleDataError if its pose is old, or uncertain.
+        Raises: FrameError if it was never measured. StaleDataError if its pose is old, stamped ahead, or uncertain.
         """
         robot = self.robots.get(robot_id)
         unknown = "hero_%d has no pose in the frame %s: " % (robot_id, self.frame)
@@ -53,6 +53,10 @@ class PoseReport(NamedTuple):
             )
         if age_s > FRESH_S:
             raise StaleDataError(stale + "%.1f s old, as is its odometry: is the robot on and in reach?" % age_s)
+        if age_s < -FRESH_S:
+            raise StaleDataError(
+                stale + "stamped %.1f s ahead: do the clocks of all that measures poses agree?" % -age_s
+            )
         if not robot.position_sd <= MAX_POSITION_SD_M:
             text = "uncertain by %.0f mm: it drove unseen: is its tag occluded or out of view?"
             raise StaleDataError(stale + text % (1e3 * robot.position_sd))
