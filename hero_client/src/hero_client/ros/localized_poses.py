@@ -58,7 +58,7 @@ class PoseReport(NamedTuple):
                 stale + "stamped %.1f s ahead: do the clocks of all that measures poses agree?" % -age_s
             )
         if not robot.position_sd <= MAX_POSITION_SD_M:
-            text = "uncertain by %.0f mm: it drove unseen: is its tag occluded or out of view?"
+            text = "uncertain by %.0f mm: is its tag occluded or out of view, or is it measured at two places?"
             raise StaleDataError(stale + text % (1e3 * robot.position_sd))
         return pose
 
