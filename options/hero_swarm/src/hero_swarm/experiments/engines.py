@@ -4,6 +4,7 @@ Knows nothing of experiments: it calls a function with arguments, and survives w
 """
 
 import collections
+import ipaddress
 import multiprocessing
 import os
 import signal
@@ -58,13 +59,16 @@ def _prepare_worker() -> None:
 
 
 def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
-    """Return an executor on the cluster at address (tcp://HOST:PORT, or the path of a scheduler file), and its workers.
+    """Return an executor on the cluster at address (tls://HOST:PORT, or the path of a scheduler file), and its workers.
 
     check() returns which code a process runs; a worker on which it differs is refused.
-    Raises: ProgramError without dask. ExperimentError without a cluster, or for a worker with other code.
+    Raises: ProgramError without dask. ExperimentError without a cluster, for a worker with other code, and for a
+    scheduler or worker that other PCs reach without TLS.
     """
     distributed = import_optional("distributed", "python3-distributed")
     is_address = "://" in address
+    if is_address:
+        _check_reach([address])
     if not is_address and not os.path.isfile(address):  # Dask would wait for it without end
         text = "no Dask scheduler file %s: start dask-scheduler --scheduler-file %s"
         raise ExperimentError(text % (address, address))
@@ -74,9 +78,11 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
         )
         client.wait_for_workers(1, timeout=DASK_TIMEOUT_S)
         threads = client.nthreads()
-    except (OSError, ValueError, distributed.TimeoutError) as error:
+        scheduler = client.scheduler_info()["address"]
+    except (OSError, TypeError, ValueError, distributed.TimeoutError) as error:  # TypeError: TLS without certificates
         text = "no Dask cluster with workers at %s (%s): start dask-scheduler and dask-worker"
         raise ExperimentError(text % (address, one_line(error))) from error
+    _check_reach([scheduler, *threads])
     own = check()
     try:
         codes = client.run(check)
@@ -91,6 +97,22 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
                 "worker %s runs other code (%s, here %s): update it and start it again" % (worker, code, own)
             )
     return client.get_executor(pure=False, retries=DASK_RETRIES), len(codes)
+
+
+def _check_reach(addresses: Iterable[str]) -> None:
+    """Check that what other PCs can reach has TLS. Raises: ExperimentError."""
+    for address in addresses:
+        protocol, _, place = address.partition("://")
+        if protocol != "tls" and not _is_loopback(place.rpartition(":")[0]):
+            text = "Dask at %s lets all who reach it run code there: use TLS, or --host 127.0.0.1 (docs/experiments.md)"
+            raise ExperimentError(text % address)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 def compute(

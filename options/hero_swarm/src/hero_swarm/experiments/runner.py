@@ -50,7 +50,8 @@ def _parse_part(text: str) -> Tuple[int, int]:
 
 def _parse_executor(text: str) -> str:
     if not text.startswith(DASK) or text == DASK:
-        raise argparse.ArgumentTypeError("%r must be dask:tcp://HOST:PORT or dask:SCHEDULER_FILE" % text)
+        allowed = "dask:tls://HOST:PORT, dask:tcp://127.0.0.1:PORT or dask:SCHEDULER_FILE"
+        raise argparse.ArgumentTypeError("%r must be %s" % (text, allowed))
     return text[len(DASK) :]
 
 
@@ -69,7 +70,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
         "--executor",
         type=_parse_executor,
         metavar="dask:ADDRESS",
-        help="a Dask cluster: tcp://HOST:PORT or scheduler file",
+        help="a Dask cluster: tls://HOST:PORT, tcp://127.0.0.1:PORT, or scheduler file",
     )
     parser.add_argument(
         "--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts"
@@ -144,7 +145,8 @@ def list_tasks(
         size = batch or min(share, choose_batch(experiment, cell))
         for start in range(0, len(seeds), size):
             chosen = tuple(seeds[start : start + size])
-            yield inputs, cell, chosen, folder.name_series(cell, chosen)
+            # Workers may have another working directory.
+            yield inputs, cell, chosen, os.path.abspath(folder.name_series(cell, chosen))
 
 
 def _choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor], int]:
@@ -202,7 +204,6 @@ def _run_missing(
     missing = [key for key in folder.list_missing(runs) if key in own]
     if missing:
         opener, workers = _choose_engine(options)
-        # Workers may have another working directory.
         inputs = Inputs(text, os.path.abspath(experiment.folder), experiment.sources, hash_suite())
         tasks = list_tasks(inputs, experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()

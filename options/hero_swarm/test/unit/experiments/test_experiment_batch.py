@@ -109,7 +109,7 @@ def test_a_batch_is_some_seconds_of_work_and_something_for_each_worker():
         tasks = list(runner.list_tasks("text", experiment, missing, batch, workers, Folder()))
         assert [len(task[2]) for task in tasks] == sizes
         assert [(task[1], seed) for task in tasks for seed in task[2]] == missing
-        assert tasks[-1][0] == "text" and tasks[0][3] == "0:11-%d" % (10 + sizes[0])
+        assert tasks[-1][0] == "text" and tasks[0][3] == os.getcwd() + "/" + "0:11-%d" % (10 + sizes[0])
 
 
 def test_options_of_run_have_their_limits(capsys):

@@ -103,6 +103,7 @@ class Cluster:
 
     threads = 0
     code = "abc"
+    scheduler, worker = "tcp://127.0.0.1:1", "tcp://127.0.0.1:2"
 
     def __init__(self, address, scheduler_file, timeout):
         pass
@@ -114,10 +115,13 @@ class Cluster:
     def run(self, check):
         if not self.code:
             raise Exception("ModuleNotFoundError(hero_swarm)")  # as Dask raises it
-        return {"tcp://b:2": self.code}
+        return {self.worker: self.code}
 
     def nthreads(self):
-        return {"tcp://b:2": self.threads}
+        return {self.worker: self.threads}
+
+    def scheduler_info(self):
+        return {"address": self.scheduler}
 
     def get_executor(self, **options):
         return "executor"
@@ -128,15 +132,30 @@ def test_dask_clusters_that_cannot_be_used_are_refused_with_the_remedy(monkeypat
     monkeypatch.setitem(sys.modules, "distributed", stub)
     with pytest.raises(ExperimentError, match="no Dask scheduler file no.json: start .* --scheduler-file no.json$"):
         engines.open_dask("no.json", lambda: "abc")
-    with pytest.raises(ExperimentError, match="workers at tcp://a:1 .Only 0/1 .*: start dask-scheduler and .*worker$"):
-        engines.open_dask("tcp://a:1", lambda: "abc")
+    with pytest.raises(ExperimentError, match="at tcp://127.0.0.1:1 .Only 0/1 .*: start dask-scheduler and .*worker$"):
+        engines.open_dask("tcp://127.0.0.1:1", lambda: "abc")
     monkeypatch.setattr(Cluster, "threads", 2)
-    with pytest.raises(ExperimentError, match="worker tcp://b:2 has 2 threads: start it with --nthreads 1$"):
-        engines.open_dask("tcp://a:1", lambda: "abc")
+    with pytest.raises(ExperimentError, match="worker tcp://127.0.0.1:2 has 2 threads: start it with --nthreads 1$"):
+        engines.open_dask("tcp://127.0.0.1:1", lambda: "abc")
     monkeypatch.setattr(Cluster, "threads", 1)
-    with pytest.raises(ExperimentError, match=r"worker tcp://b:2 runs other code \(abc, here abd\)"):
-        engines.open_dask("tcp://a:1", lambda: "abd")
-    assert engines.open_dask("tcp://a:1", lambda: "abc") == ("executor", 1)
+    with pytest.raises(ExperimentError, match=r"worker tcp://127.0.0.1:2 runs other code \(abc, here abd\)"):
+        engines.open_dask("tcp://127.0.0.1:1", lambda: "abd")
+    assert engines.open_dask("tcp://127.0.0.1:1", lambda: "abc") == ("executor", 1)
     monkeypatch.setattr(Cluster, "code", "")
-    with pytest.raises(ExperimentError, match=r"at tcp://a:1 cannot run this \(ModuleNotFoundError.*: start them"):
-        engines.open_dask("tcp://a:1", lambda: "abc")
+    with pytest.raises(ExperimentError, match=r"at tcp://127.0.0.1:1 cannot run this \(ModuleNotFound.*: start them"):
+        engines.open_dask("tcp://127.0.0.1:1", lambda: "abc")
+
+
+@pytest.mark.parametrize("wide", ["tcp://10.0.0.5:8786", "tcp://[2001:db8::5]:8786", "tcp://pc:8786", "ucx://10.0.0.5:1"])
+def test_a_cluster_that_other_pcs_reach_needs_tls(wide, monkeypatch):
+    stub = types.SimpleNamespace(Client=Cluster, TimeoutError=ArrivalError)
+    monkeypatch.setitem(sys.modules, "distributed", stub)
+    monkeypatch.setattr(Cluster, "threads", 1)
+    for own in ("tcp://127.0.0.1:1", "tcp://localhost:1", "tcp://[::1]:1", wide.replace(wide[:3], "tls")):
+        assert engines.open_dask(own, lambda: "abc")[1] == 1
+    with pytest.raises(ExperimentError, match="Dask at .* lets all who reach it run code there: use TLS"):
+        engines.open_dask(wide, lambda: "abc")
+    for name in ("scheduler", "worker"):
+        with monkeypatch.context() as patch, pytest.raises(ExperimentError, match="lets all who reach it run code"):
+            patch.setattr(Cluster, name, wide)
+            engines.open_dask("tcp://127.0.0.1:1", lambda: "abc")
