@@ -29,13 +29,15 @@ from hero_node.ros.master_watch import MasterWatch
 from hero_node.ros.ros_node import end_ros_node, init_ros_node
 
 from .config import FORMER_STOP, DriverConfig, read_config
-from .gateway import STOP_LIMIT_S, Gateway
+from .gateway import NS_PER_S, STOP_LIMIT_S, Gateway
 from .reports import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, tell_of_lost_log_lines
 from .ros.rospy_internals import (
+    LATEST_S,
     call_before_shutdown,
     keep_publishers_connected,
     leave_topics_out_of_rosout,
+    limit_clock,
 )
 from .ros.thread_watch import ThreadWatch
 from .ros.worker import Worker
@@ -69,7 +71,8 @@ def make_ros_clock() -> Callable[[], int]:
     """Return a function that gives ROS time in nanoseconds: simulated where /use_sim_time is set."""
     if rospy.get_param("/use_sim_time", False):
         return lambda: rospy.Time.now().to_nsec()
-    return time.time_ns
+    latest_ns = LATEST_S * NS_PER_S
+    return lambda: min(max(time.time_ns(), NS_PER_S), latest_ns)
 
 
 class DriverNode:
@@ -202,6 +205,9 @@ class DriverNode:
             return
         if is_periodic:
             reporter.measure_rates(status)
+            if not 1.0 <= time.time() <= LATEST_S:
+                text = "the clock of this PC is before 1970 or beyond 2106, unlike any stamp: set it (timedatectl)"
+                self._log.log_throttled("error", text, text)
         try:
             reporter.publish(status)
         except rospy.ROSException:
@@ -285,6 +291,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     keep_publishers_connected()
+    limit_clock()
     init_ros_node(NODE_NAME, arguments=argv)
     leave_topics_out_of_rosout()
     tell_of_lost_log_lines()
