@@ -24,11 +24,12 @@ class RosSession(Session):
         """Work with probes until program ends."""
         super().__init__(probes)
         self._program = program
+        self._start_s = rospy.get_time() - time.monotonic()
 
     @property
     def now_s(self) -> float:
-        """ROS time."""
-        return rospy.get_time()
+        """ROS time, as if the PC's clock were never set: motions are timed by it, and must not last longer for that."""
+        return self._start_s + time.monotonic() if rospy.rostime.is_wallclock() else float(rospy.get_time())
 
     def sleep(self, duration_s: float) -> bool:
         """Sleep by the clock of this computer; return whether the program is to continue."""
