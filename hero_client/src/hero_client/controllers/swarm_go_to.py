@@ -83,7 +83,8 @@ class SwarmGoToController:
             self._last_places = None  # what they drive until the next step is no speed
             return [STOP] * len(poses)
         commands = self._steer(known, ranges, elapsed_s)
-        return [self.lateness.slow(*item) for item in zip(commands, pose_ages_s or [0.0] * len(commands))]
+        ages_s = [0.0] * len(commands) if pose_ages_s is None else pose_ages_s  # which may be an array
+        return [self.lateness.slow(*item) for item in zip(commands, ages_s)]
 
     def _steer(
         self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]], elapsed_s: float

@@ -91,7 +91,8 @@ def drive_to(places, lost_s=(0.0, 0.0)):
         poses = rows.world.poses.copy()
         if lost_s[0] <= rows.now_ms / 1000.0 < lost_s[1]:
             poses[1] = math.nan
-        rows.send_velocity(np.arange(3), *start_drive.step(poses))
+        speeds = start_drive.step(poses, None, rows.now_ms / 1000.0, np.zeros(3))  # ages as PoseSource gives them
+        rows.send_velocity(np.arange(3), *speeds)
         rows.advance(rows.now_ms + round(1000.0 * PERIOD_S))
         assert METRICS["collisions"](rows.world.poses[None], None)[0] == 0.0
     return rows.world.poses.copy(), rows.now_ms / 1000.0
