@@ -210,7 +210,7 @@ def _drive(
             if late:
                 rospy.logwarn(late)
             if min(shares) == 0.0:
-                trial.remark = "commands too late for robots at %.1f s: %s" % (rospy.get_time() - start_s, late)
+                trial.remark = "commands or poses came too late at %.1f s" % (rospy.get_time() - start_s)
                 return True
             linear_m_s, angular_rad_s = np.array(speeds) * shares
             commands.send(linear_m_s, angular_rad_s, all_may_move)

@@ -124,6 +124,15 @@ def test_robots_have_arrived_when_all_were_there_for_half_a_second():
     assert drive.done and 10 * PERIOD_S == 0.5
 
 
+def test_robots_drive_to_their_starts_slower_while_poses_are_old():
+    speeds_m_s = []
+    for age_s in (0.0, 0.5, 1.0):
+        drive = StartDrive(STARTS + (0.5, 0.0, 0.0))
+        speeds_m_s.append(drive.step(STARTS, None, 100.0, np.full(3, age_s))[0].max())
+    usual_m_s, slow_m_s, stopped_m_s = speeds_m_s
+    assert 0.0 < slow_m_s < 0.5 * usual_m_s and stopped_m_s == 0.0
+
+
 def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
     monkeypatch.setitem(METRICS, "consensus_error", lambda poses, velocities, *rest: velocities[:, 0, 0])
     experiment = parse_experiment(FILE, "e.yaml")
