@@ -39,7 +39,7 @@ class ThreadWatch:
             if not self.note(arguments.exc_value):
                 report(arguments)
 
-        threading.Thread.start = start_or_tell  # type: ignore[method-assign]
+        threading.Thread.start = start_or_tell  # type: ignore[method-assign, assignment]
         threading.excepthook = report_thread
 
     def note(self, error: BaseException) -> bool:
