@@ -37,13 +37,15 @@ class Job(NamedTuple):
 
 
 # The shell stays, as the first process in there: it waits for those whose parents have ended.
-CONTAINER = ("unshare", "--net", "--pid", "--fork", "--kill-child", "--mount-proc", "sh", "-c")
+CONTAINER = ("unshare", "--pid", "--fork", "--kill-child", "--mount-proc")
 
 
 @functools.lru_cache(maxsize=None)
-def make_container():
-    """Return a command that gives a program a network and processes of its own; empty where that is not permitted."""
-    command = (*CONTAINER, 'ip link set lo up && "$@"; exit $?', "sh")
+def make_container(has_own_network=True):
+    """Return a command that gives a program processes of its own, and a network; empty where that is not permitted."""
+    command = (*CONTAINER, "sh", "-c", '"$@"; exit $?', "sh")
+    if has_own_network:
+        command = (*CONTAINER, "--net", "sh", "-c", 'ip link set lo up && "$@"; exit $?', "sh")
     try:
         subprocess.run([*command, "true"], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     except (OSError, subprocess.CalledProcessError):
@@ -53,14 +55,15 @@ def make_container():
 
 def run_command(job):
     """Run a job; return whether it ended well, and its CPU time (s), where it waited for what it started."""
-    prefix = make_container() if job.has_own_network else ()
+    prefix = make_container(job.has_own_network)
+    own_network = "yes" if prefix and job.has_own_network else "no"
     with open(job.results_dir / "log.txt", "wb") as log:
         process = subprocess.Popen(
             [*prefix, *job.command],
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
-            env={**os.environ, **job.environment, "HERO_OWN_NETWORK": "yes" if prefix else "no"},
+            env={**os.environ, **job.environment, "HERO_OWN_NETWORK": own_network},
             start_new_session=True,
         )
         _sessions.add(process.pid)
@@ -115,9 +118,13 @@ def run_and_judge(job):
 
 
 def run_jobs(jobs: List[Job], max_load: float) -> bool:
-    """Run all jobs in order, another one while those that run have less than this load; return whether all passed."""
+    """Run all jobs in order, another one while those that run have less than this load; return whether all passed.
+
+    Ctrl-C and SIGTERM end them, with all that they have started.
+    """
     # A background job of a shell ignores Ctrl-C, and so would all that it starts; the tests send Ctrl-C.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     waiting, running = list(jobs), {}
     passed = True
     with concurrent.futures.ThreadPoolExecutor(max(1, len(waiting))) as pool:

@@ -27,8 +27,10 @@ cat "$kept"
 
 def find_rostests(pattern):
     """All .test files of the suite whose path contains the pattern."""
-    paths = sources.find("test/rostest/*.test")
-    return [path for path in paths if pattern in str(path.relative_to(ROOT))]
+    found = [path for path in sources.find("test/rostest/*.test") if pattern in str(path.relative_to(ROOT))]
+    if not found:
+        sys.exit(f"test: no rostest matches {pattern!r}")
+    return found
 
 
 def write_program(path, script):

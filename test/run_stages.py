@@ -1,6 +1,6 @@
 """Runs the stages of script/test side by side, which starts it: tests that wait beside builds and checks that compute.
 
-Usage: run_stages.py RESULTS_DIR [STAGE ...] [--pattern PATTERN] [--paths PATH ...]
+Usage: run_stages.py RESULTS_DIR [STAGE[=PATTERN] ...] [--paths PATH ...]
 The workspace must be sourced. HERO_PYTHON38 is the interpreter of the stages noetic and noetic_rostest; without one,
 they are left out.
 """
@@ -80,8 +80,17 @@ def make_core_job(results_dir, selection):
     return make_pytest_job("core", arguments, results_dir)
 
 
-def make_jobs(stages, results, pattern, paths):
-    """Return all jobs of the stages and paths, in the order in which they begin."""
+def keep_matching(jobs, pattern, stage):
+    """Return the jobs whose names contain the pattern. Raises: ValueError if there are none."""
+    found = [job for job in jobs if pattern in job.name]
+    if not found:
+        names = " ".join(sorted(job.name for job in jobs))
+        raise ValueError(f"no {stage} matches {pattern!r}; there are: {names}")
+    return found
+
+
+def make_jobs(stages, results, paths):
+    """Return all jobs of the stages, which have patterns, and of the paths, in the order in which they begin."""
     jobs = []
     # What these install the first time comes from the network.
     if "noetic" in stages and os.environ.get("HERO_PYTHON38"):
@@ -95,7 +104,7 @@ def make_jobs(stages, results, pattern, paths):
     if "noetic_rostest" in stages and os.environ.get("HERO_PYTHON38"):
         own_results = results / "noetic_rostest"
         script = str(ROOT / "test" / "noetic" / "run_rostests")
-        command = (script, os.environ["HERO_PYTHON38"], str(own_results), pattern or "hero_driver/")
+        command = (script, os.environ["HERO_PYTHON38"], str(own_results), stages["noetic_rostest"] or "hero_driver/")
         jobs.append(Job("noetic_rostest", command, own_results, TIMEOUT_S, count_cores(), has_own_network=False))
     if "lint" in stages:
         own_results = results / "lint"
@@ -106,16 +115,17 @@ def make_jobs(stages, results, pattern, paths):
         documents = make_pytest_job("documents", tests, results / "documents")
         jobs.append(documents._replace(has_own_network=False))
     if "workspaces" in stages:
-        jobs += make_workspace_jobs(results / "workspaces")
+        found = make_workspace_jobs(results / "workspaces")
+        jobs += keep_matching(found, stages["workspaces"], "job of workspaces")
     if "core" in stages:
         jobs.append(make_core_job(results / "core", ""))
     if "unit" in stages:
         jobs += make_unit_jobs(results / "unit", find_unit_tests())
     if "faults" in stages:
-        families = [pattern] if pattern in faults.find_families() else faults.find_families()
-        jobs += faults.make_jobs(results / "faults", families, results / "faults.jsonl")
+        found = faults.make_jobs(results / "faults", faults.find_families(), results / "faults.jsonl")
+        jobs += keep_matching(found, stages["faults"], "family of faults")
     if "rostest" in stages:
-        jobs += run_rostests.make_jobs(results / "rostest", pattern)
+        jobs += keep_matching(run_rostests.make_jobs(results / "rostest"), stages["rostest"], "rostest")
     rostests = [path for path in paths if path.suffix == ".test"]
     if rostests:
         jobs += run_rostests.make_jobs(results / "rostest", paths=rostests)
@@ -144,14 +154,20 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("results", type=Path)
     parser.add_argument("stages", nargs="*")
-    parser.add_argument("--pattern", default="", help="of the paths of rostests, or a family of faults")
     parser.add_argument("--paths", type=Path, nargs="*", default=(), help="packages, or files of them")
     options = parser.parse_args()
-    jobs = make_jobs(options.stages, options.results, options.pattern, options.paths)
-    passed = run_jobs(jobs, 1.1 * count_cores())  # what runs beside it waits a little longer than was measured
-    if {"rostest", "faults"} & set(options.stages) or any(path.suffix == ".test" for path in options.paths):
+    stages = {stage: pattern for stage, _, pattern in (given.partition("=") for given in options.stages)}
+    try:
+        jobs = make_jobs(stages, options.results, options.paths)
+        passed = run_jobs(jobs, 1.1 * count_cores())  # what runs beside it waits a little longer than was measured
+    except ValueError as error:
+        print(f"test: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    if {"rostest", "faults"} & set(stages) or any(path.suffix == ".test" for path in options.paths):
         print("the robots of rostests and faults were drawn with HERO_SEED=%s" % os.environ.get("HERO_SEED", "0"))
-    if "faults" in options.stages:
+    if "faults" in stages:
         faults.print_table(faults.read_rows(options.results / "faults.jsonl"))
     return int(not passed)
 

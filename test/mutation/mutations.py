@@ -5,7 +5,7 @@ Left alone is what says rather than does: texts, logging, annotations.
 
 import ast
 import copy
-from typing import Callable, Iterator, List, NamedTuple, Tuple
+from typing import Callable, Iterator, List, NamedTuple, Optional, Tuple
 
 SWAPPED_COMPARISONS = {
     ast.Lt: ast.LtE,
@@ -23,6 +23,16 @@ SWAPPED_ARITHMETIC = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast
 LIMITING = ("min", "max", "minimum", "maximum")
 SHAPING = ("abs", "sorted", "reversed", "round", "clip", "clamp", "wrap", "limit")
 SAYING = "print debug info warn warning error exception logdebug loginfo logwarn logerr log format".split()
+OTHER_MODEL = {
+    "BODY_RADIUS_M": 0.060,
+    "WHEEL_SEPARATION_M": 0.065,
+    "body_radius_m": 0.036835,
+    "wheel_separation_m": 0.063,
+    "HERO_PLUS": "hero",
+    "STOCK": "hero_plus",
+}
+"""Of constants of one robot's model, and of fields of a model, what the other one has: HeRo+, or the stock robot."""
+
 NAMED = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 
@@ -62,8 +72,10 @@ def _visit(node: ast.AST, statement: ast.AST, scope: Tuple[str, ...], at_import:
             if not isinstance(child, ast.AST) or _only_says(child):
                 continue
             own = child if isinstance(child, ast.stmt) else statement
-            for replacement in _list_replacements(child, node, inner):
+            for replacement in _list_replacements(child, node, field, inner):
                 yield _make_mutation(holder, key, child, replacement, own, inner, child_at_import)
+            if isinstance(child, ast.stmt) and key + 1 < len(holder) and _may_matter_first(child, holder[key + 1]):
+                yield _make_swap(holder, key, inner, child_at_import)
             yield from _visit(child, own, inner, child_at_import)
 
 
@@ -86,17 +98,43 @@ def _make_mutation(holder, key, child, replacement, statement, scope, at_import)
     )
 
 
+def _make_swap(statements, index, scope, at_import) -> Mutation:
+    first, second = statements[index : index + 2]
+
+    def apply() -> None:
+        statements[index : index + 2] = [second, first]
+
+    before, after = f"{_to_text(first)}; {_to_text(second)}", f"{_to_text(second)}; {_to_text(first)}"
+    return Mutation(first.lineno, second.end_lineno, ".".join(scope), at_import, before, after, apply)
+
+
+def _may_matter_first(first: ast.stmt, second: ast.stmt) -> bool:
+    """Return whether the order of two statements may matter, and neither only names a value for the other."""
+    both = (first, second)
+    if not all(isinstance(node, (ast.Expr, ast.Assign, ast.AugAssign, ast.Delete)) for node in both):
+        return False
+    if not any(isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) for node in both):
+        return False
+    named = {node.id for node in ast.walk(first) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    read = {node.id for node in ast.walk(second) if isinstance(node, ast.Name)}
+    return not named & read and not any(_only_says(getattr(node, "value", None)) for node in both)
+
+
 def _to_text(node: ast.AST) -> str:
     return " ".join(ast.unparse(node).split())[:90]
 
 
 def _name_called(node: ast.AST) -> str:
     """The last part of the name that a call calls; empty for anything else."""
-    function = node.func if isinstance(node, ast.Call) else None
-    return getattr(function, "attr", getattr(function, "id", ""))
+    return _name_of(node.func) if isinstance(node, ast.Call) else ""
 
 
-def _only_says(node: ast.AST) -> bool:
+def _name_of(node: ast.AST) -> str:
+    """The last part of a dotted name; empty for anything else."""
+    return getattr(node, "attr", getattr(node, "id", ""))
+
+
+def _only_says(node: Optional[ast.AST]) -> bool:
     is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
     is_formatted = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and isinstance(node.left, ast.Constant)
     return is_text or is_formatted or isinstance(node, ast.JoinedStr) or _name_called(node) in SAYING
@@ -109,9 +147,14 @@ def _changed(node: ast.AST, **fields) -> ast.AST:
     return changed
 
 
-def _list_replacements(node: ast.AST, parent: ast.AST, scope: Tuple[str, ...]) -> List[ast.AST]:
+def _list_replacements(node: ast.AST, parent: ast.AST, field: str, scope: Tuple[str, ...]) -> List[ast.AST]:
     if isinstance(node, ast.stmt):
-        return _replace_statement(node, scope)
+        found = _replace_statement(node, scope)
+        cleans_up = field == "finalbody" or isinstance(parent, ast.ExceptHandler)
+        is_dropped = any(isinstance(replacement, ast.Pass) for replacement in found)
+        return [*found, ast.Pass()] if cleans_up and not is_dropped and _does_something(node) else found
+    if isinstance(node, ast.ExceptHandler):
+        return [_changed(node, type=wider) for wider in _widen(node.type)]
     found: List[ast.AST] = []
     if isinstance(node, ast.Compare):
         for index, operator in enumerate(node.ops):
@@ -132,6 +175,14 @@ def _list_replacements(node: ast.AST, parent: ast.AST, scope: Tuple[str, ...]) -
             found += node.args[:2]
         elif node.args and any(part in name for part in SHAPING):
             found.append(node.args[0])
+        if name == "suppress":
+            found += [_changed(node, args=[wider]) for wider in _widen(node.args[0])]
+        for index, keyword in enumerate(node.keywords):
+            if keyword.arg:
+                found.append(_changed(node, keywords=[*node.keywords[:index], *node.keywords[index + 1 :]]))
+    elif isinstance(node, (ast.Name, ast.Attribute)) and isinstance(node.ctx, ast.Load):
+        if _name_of(node) in OTHER_MODEL:
+            found.append(ast.Constant(value=OTHER_MODEL[_name_of(node)]))
     elif isinstance(node, ast.Constant):
         if isinstance(node.value, bool):
             found.append(ast.Constant(value=not node.value))
@@ -145,6 +196,15 @@ def _list_replacements(node: ast.AST, parent: ast.AST, scope: Tuple[str, ...]) -
     return found
 
 
+def _widen(caught: Optional[ast.AST]) -> List[ast.AST]:
+    """Return what to catch in place of this: every error; of BaseException, no longer Ctrl-C."""
+    return [] if caught is None or _name_of(caught) == "Exception" else [ast.Name(id="Exception", ctx=ast.Load())]
+
+
+def _does_something(node: ast.stmt) -> bool:
+    return not isinstance(node, ast.Pass) and not _only_says(getattr(node, "value", None))
+
+
 def _replace_statement(node: ast.stmt, scope: Tuple[str, ...]) -> List[ast.AST]:
     if isinstance(node, ast.AugAssign):
         swapped = SWAPPED_ARITHMETIC.get(type(node.op))
@@ -154,6 +214,8 @@ def _replace_statement(node: ast.stmt, scope: Tuple[str, ...]) -> List[ast.AST]:
         return [ast.Pass()] if kept and "__init__" not in scope else []
     if isinstance(node, ast.Expr):
         return [ast.Pass()] if isinstance(node.value, ast.Call) and not _only_says(node.value) else []
-    if isinstance(node, (ast.Raise, ast.Continue)):
+    if isinstance(node, ast.Raise):
         return [ast.Pass()]
+    if isinstance(node, ast.Continue):
+        return [ast.Pass(), ast.Break()]
     return [ast.Continue()] if isinstance(node, ast.Break) else []

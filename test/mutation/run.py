@@ -18,7 +18,6 @@ import importlib.machinery
 import json
 import os
 import random
-import re
 import resource
 import signal
 import sys
@@ -26,18 +25,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
-from mutations import list_mutations
-from reached import ReachedLines
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-EQUIVALENT = HERE / "equivalent.txt"
+ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test"))
 import sources  # noqa: E402
+from mutation import equivalents  # noqa: E402
+from mutation.mutations import list_mutations  # noqa: E402
+from mutation.reached import ReachedLines  # noqa: E402
 
 CPU_LIMIT_FACTOR, CPU_LIMIT_LEAST_S = 5.0, 10
 HANGS_S = 300
 KILLED, SURVIVED, NOT_REACHED = "killed", "survived", "not reached"
+NOTHING_FAILS, TESTS_FAIL = 0, 1  # exit codes of pytest
 
 
 class MutatedModule(importlib.machinery.SourceFileLoader):
@@ -171,19 +170,15 @@ def list_mutants(paths, reached):
     test_texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in set(files.values())}
     pure = set(sources.list_pure_modules())
     mutants = []
-    for path, text in texts.items():
+    for path in texts:
         users = [other for other, its_text in texts.items() if other == path or path.stem in its_text]
         importing = set().union(*(tests_by_path.get(str(user), ()) for user in users))
         # A test that only compares constants executes no line of the module.
         importing.update(test for test, file in files.items() if path.stem in test_texts[file])
-        keys = {}
-        for index, mutation in enumerate(list_mutations(ast.parse(text))):
+        for index, (key, mutation) in enumerate(equivalents.list_keys(path)):
             lines = range(mutation.first_line, mutation.last_line + 1)
             executing = set().union(*(tests_by_line.get((str(path), line), ()) for line in lines))
             tests = tuple(sorted(importing if mutation.at_import else executing, key=durations.get))
-            key = f"{path.relative_to(ROOT)} {mutation.describe()}"
-            keys[key] = keys.get(key, 0) + 1
-            key += f" #{keys[key]}"
             seconds = sum(map(durations.get, tests))
             if tests or path in pure:
                 mutants.append(Mutant(path, index, mutation.last_line, key, tests, seconds))
@@ -217,23 +212,24 @@ def try_all(mutants, note):
             if running:
                 child, status = os.wait()
                 kill_session(child)
-                note(running.pop(child), KILLED if status else SURVIVED)
+                note(running.pop(child), judge(status))
     finally:
         for child in running:
             kill_session(child)
+
+
+def judge(status):
+    """Return the verdict for the status of a child: killed only if a test failed; any other end is named."""
+    if os.WIFSIGNALED(status):
+        return "ended by " + signal.Signals(os.WTERMSIG(status)).name
+    code = os.WEXITSTATUS(status)
+    return {NOTHING_FAILS: SURVIVED, TESTS_FAIL: KILLED}.get(code, f"ended with status {code}")
 
 
 def kill_session(child):
     """Kill what a child left behind."""
     with contextlib.suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
-
-
-def compile_equivalent():
-    """Return a pattern of the keys of all changes that change no behavior, each with a reason behind a tab."""
-    lines = [line for line in EQUIVALENT.read_text(encoding="utf-8").splitlines() if line and not line.startswith("#")]
-    keys = [line.partition("\t")[0] for line in lines]
-    return re.compile("|".join(key[1:] if key.startswith("/") else re.escape(key) for key in keys) or "(?!)")
 
 
 def read_verdicts(path, tests_hash, hashes):
@@ -255,12 +251,12 @@ def try_package(package, work_dir, sample, seed):
     for name in reached["imported"]:
         with contextlib.suppress(Exception):  # only saves the children time
             importlib.import_module(name)
-    equivalent = compile_equivalent()
-    mutants = [mutant for mutant in list_mutants(paths, reached) if not equivalent.fullmatch(mutant.key)]
+    lines = equivalents.read_lines()
+    mutants = [mutant for mutant in list_mutants(paths, reached) if not any(line.hides(mutant.key) for line in lines)]
     chosen = random.Random(seed).sample(mutants, min(sample or len(mutants), len(mutants)))
     hashes = {path: hash_files([path]) for path in paths}
-    verdicts = read_verdicts(state / "verdicts.jsonl", reached["hash"], set(hashes.values()))
-    with open(state / "verdicts.jsonl", "a", encoding="utf-8") as kept:
+    verdicts = read_verdicts(state / "tried.jsonl", reached["hash"], set(hashes.values()))
+    with open(state / "tried.jsonl", "a", encoding="utf-8") as kept:
 
         def note(mutant, verdict):
             verdicts[mutant.key] = verdict
@@ -275,10 +271,11 @@ def try_package(package, work_dir, sample, seed):
 def print_package(package, total, results):
     """Print the row of a package, and what survived."""
     counts = {verdict: [found for _, found in results].count(verdict) for verdict in (KILLED, SURVIVED, NOT_REACHED)}
+    others = len(results) - sum(counts.values())
     score = 100.0 * counts[KILLED] / max(len(results), 1)
     print(
         f"| {package} | {len(results)} of {total} | {counts[KILLED]} | {counts[SURVIVED]}"
-        f" | {counts[NOT_REACHED]} | {score:.0f} % |"
+        f" | {counts[NOT_REACHED]} | {others} | {score:.0f} % |"
     )
     for mutant, verdict in sorted(results, key=lambda result: (result[0].path, result[0].line)):
         if verdict != KILLED:
@@ -289,6 +286,7 @@ def print_package(package, total, results):
 def main():
     """Run from the command line."""
     packages = list_packages()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its children are sessions of their own
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("work_dir", type=Path)
     parser.add_argument("packages", nargs="*", metavar="PACKAGE", help=", ".join(packages))
@@ -298,7 +296,7 @@ def main():
     unknown = sorted(set(options.packages) - set(packages))
     if unknown:
         parser.error("no unit tests in %s; there are: %s" % (", ".join(unknown), ", ".join(packages)))
-    print("| package | mutants tried | killed | survived | not reached | score |\n|---|---|---|---|---|---|")
+    print("| package | mutants tried | killed | survived | not reached | others | score |\n" + 7 * "|---" + "|")
     for package in options.packages or packages:
         print_package(package, *try_package(package, options.work_dir, options.sample, options.seed))
 
