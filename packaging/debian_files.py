@@ -64,9 +64,7 @@ override_dh_auto_test:
 override_dh_auto_install:
 """
 
-INSTALL = (
-    "\tDESTDIR=$(CURDIR)/debian/{name} cmake -P obj-$(DEB_HOST_GNU_TYPE)/{ros_name}/cmake_install.cmake\n"
-)
+INSTALL = "\tDESTDIR=$(CURDIR)/debian/{name} cmake -P obj-$(DEB_HOST_GNU_TYPE)/{ros_name}/cmake_install.cmake\n"
 
 
 def make_name(ros_name):
@@ -88,9 +86,7 @@ def find_known(key, *patterns):
 
 def find_packages(key, *patterns):
     """Return the Debian packages of a rosdep key; ends with one line if there are none."""
-    return find_known(key, *patterns) or sys.exit(
-        f"debian_files.py: Debian has no package for the dependency {key}"
-    )
+    return find_known(key, *patterns) or sys.exit(f"debian_files.py: Debian has no package for the dependency {key}")
 
 
 def find_relationships(package, own):
@@ -120,12 +116,8 @@ def write_debian_dir(sources, directory):
         for dependency in package.buildtool_depends + package.build_depends
         if dependency.name not in own
     }
-    build_depends = [
-        name for key in sorted(keys) for name in find_packages(key, "lib*-dev", "python3-*", "ros-*", "*")
-    ]
-    control = CONTROL.format(
-        maintainer=maintainer, build_depends=", ".join(build_depends), homepage=first.urls[0].url
-    )
+    build_depends = [name for key in sorted(keys) for name in find_packages(key, "lib*-dev", "python3-*", "ros-*", "*")]
+    control = CONTROL.format(maintainer=maintainer, build_depends=", ".join(build_depends), homepage=first.urls[0].url)
     rules = RULES
     for package in packages:
         name = make_name(package.name)

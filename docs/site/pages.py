@@ -32,12 +32,7 @@ def find_linked_files(page):
     text = re.sub(r"```.*?```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
     for target in LINK.findall(text):
         path = (ROOT / page.parent / target).resolve()
-        if (
-            not re.match("[a-z]+:", target)
-            and path.is_file()
-            and path.suffix != ".md"
-            and ROOT in path.parents
-        ):
+        if not re.match("[a-z]+:", target) and path.is_file() and path.suffix != ".md" and ROOT in path.parents:
             yield path.relative_to(ROOT)
 
 

@@ -13,9 +13,7 @@ def print_pose(message):
     position = message.pose.pose.position
     q = message.pose.pose.orientation
     _, _, yaw_rad = euler_from_quaternion([q.x, q.y, q.z, q.w])
-    rospy.loginfo_throttle(
-        1.0, "x %.3f m, y %.3f m, yaw %.1f deg" % (position.x, position.y, math.degrees(yaw_rad))
-    )
+    rospy.loginfo_throttle(1.0, "x %.3f m, y %.3f m, yaw %.1f deg" % (position.x, position.y, math.degrees(yaw_rad)))
 
 
 def main():

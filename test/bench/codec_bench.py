@@ -72,10 +72,7 @@ def main():
                 topic.receive(payload, start_ns + index * BURST_NS)
 
     print_machine(measure_machine_us())
-    print(
-        "bytes of a burst: %d (odom, 5 transforms, encoder), 29.4 bursts per robot and second"
-        % len(bursts[0])
-    )
+    print("bytes of a burst: %d (odom, 5 transforms, encoder), 29.4 bursts per robot and second" % len(bursts[0]))
     print("| layer | us per burst |")
     print("|---|---|")
     print("| packets written | %.1f |" % best_us(write, BURSTS))

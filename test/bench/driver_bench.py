@@ -221,9 +221,14 @@ def print_run(name, runs):
     run = runs[-1]
     print(
         "round %d: %d robots%s: CPU %.1f %%, p99 of odom %s, of cmd_vel %s, everything else %.2f cores"
-        % (len(runs), run["robots"], name and ", " + name, run["server_cpu_percent"],
-           *("-" if run[key] is None else "%.2f ms" % run[key] for key in ("odom_p99_ms", "command_p99_ms")),
-           run["other_cores"]),
+        % (
+            len(runs),
+            run["robots"],
+            name and ", " + name,
+            run["server_cpu_percent"],
+            *("-" if run[key] is None else "%.2f ms" % run[key] for key in ("odom_p99_ms", "command_p99_ms")),
+            run["other_cores"],
+        ),
         file=sys.stderr,
         flush=True,
     )
@@ -266,8 +271,7 @@ def measure_all(options, commands):
             runs: Dict[str, List[dict]] = {name: [] for name in commands}
             for _ in range(options.rounds):
                 together = {
-                    name: run_once(options, command, count, environments[name])
-                    for name, command in commands.items()
+                    name: run_once(options, command, count, environments[name]) for name, command in commands.items()
                 }
                 for name, result in run_together(together).items():
                     runs[name].append(result)
@@ -310,9 +314,7 @@ def main():
     parser.add_argument("--drivers", type=int, default=1, help="servers, each with its share of the robots")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
     parser.add_argument("--unheard", action="store_true", help="no subscribers or commands, but for /tf")
-    parser.add_argument(
-        "--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does"
-    )
+    parser.add_argument("--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does")
     parser.add_argument("--warn", action="store_true", help="each robot sends one warning per second")
     server = parser.add_mutually_exclusive_group()
     server.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} is replaced by the port")

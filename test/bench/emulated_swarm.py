@@ -74,9 +74,7 @@ class Templates:
         encoder_changes = slice(4, 12 + len(self._encoder_frame) + 16)
         no_header = b"\xff\xff\xff\xff" + bytes(8)
         self._odom = Packet(SENT["odom"], bytes(12) + odom_tail, slice(0, 12))
-        self._transforms = [
-            Packet(SENT["tf"], b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails
-        ]
+        self._transforms = [Packet(SENT["tf"], b"\x01" + bytes(15) + tail, slice(8, 16)) for tail in transform_tails]
         self._encoder = Packet(SENT["encoder"], no_header + encoder_tail, encoder_changes)
         self._laser = Packet(SENT["laser"], bytes(12) + laser_tail, slice(4, 12))
 
@@ -165,9 +163,7 @@ class EmulatedRobot:
         return is_new
 
 
-def run(
-    address, count, seconds, speed, first=0, nagle=False, keeps_times=True, is_ended=lambda: False, warns=False
-):
+def run(address, count, seconds, speed, first=0, nagle=False, keeps_times=True, is_ended=lambda: False, warns=False):
     """Return the result of count robots for seconds after all have joined, or until is_ended().
 
     warns: the log line that each robot sends every second is a warning.

@@ -171,10 +171,7 @@ def see_references(seed: int, lens: LabLens, height_m: float, **faults: float) -
         image = lab.render(tags, random)
         frames.append(detector.detect(image))
     errors_m = random.normal(0.0, TAPE_SD_M, (len(tags), 2))
-    places = {
-        tag.tag_id: Pose(tag.x_m + x_m, tag.y_m + y_m, 0.0)
-        for tag, (x_m, y_m) in zip(tags, errors_m)
-    }
+    places = {tag.tag_id: Pose(tag.x_m + x_m, tag.y_m + y_m, 0.0) for tag, (x_m, y_m) in zip(tags, errors_m)}
     return Scene(find_camera(lab), refine_corners(image, average_tags(frames), "36h11"), places)
 
 
@@ -182,9 +179,7 @@ def _move(places: Dict[int, Pose], change: Callable[[int, float, float], Tuple[f
     return {tag_id: Pose(*change(tag_id, pose.x_m, pose.y_m), 0.0) for tag_id, pose in places.items()}
 
 
-def list_mistakes(
-    places: Dict[int, Pose], random: np.random.RandomState
-) -> Iterator[Tuple[str, str, Dict[int, Pose]]]:
+def list_mistakes(places: Dict[int, Pose], random: np.random.RandomState) -> Iterator[Tuple[str, str, Dict[int, Pose]]]:
     """Yield mistakes of people, what a message must name, and the places with it; an empty one: nothing is wrong."""
     one, other = sorted(random.choice(sorted(places), 2, replace=False))
     yield "no mistake", "", places
@@ -237,9 +232,7 @@ class Lab:
     def __init__(self, seed: int) -> None:
         self.random = np.random.RandomState(seed)
         self.lab, self.now_s, self.lines = LabCamera(), 0.0, []  # type: LabCamera, float, List[str]
-        self.robots = [
-            LabTag(index, *place, self.random.uniform(-3, 3)) for index, place in enumerate(ROBOT_PLACES_M)
-        ]
+        self.robots = [LabTag(index, *place, self.random.uniform(-3, 3)) for index, place in enumerate(ROBOT_PLACES_M)]
         self.floor = [LabTag(100 + i, *place, 0.0, REFERENCE_M, 0.0) for i, place in enumerate(REFERENCES_M)]
         references = {tag.tag_id: Pose(tag.x_m, tag.y_m, 0.0) for tag in self.floor}
         settings = Settings(layout=TagLayout(references=references), seen_references=references)

@@ -93,9 +93,7 @@ class Scene:
         self.mounts = [PrintedTag(index, 0.04, 0.076, *error) for index, error in enumerate(errors)]
         floor = [PrintedTag(100 + index, 0.1, 0.0, *place) for index, place in enumerate(REFERENCES_M)]
         measured = [np.array((tag.x_m, tag.y_m)) + random.normal(0.0, tape_m, 2) for tag in floor]
-        self.references = {
-            tag.tag_id: Pose(float(x_m), float(y_m), 0.0) for tag, (x_m, y_m) in zip(floor, measured)
-        }
+        self.references = {tag.tag_id: Pose(float(x_m), float(y_m), 0.0) for tag, (x_m, y_m) in zip(floor, measured)}
         with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
             file.write(describe_arena())
             file.flush()
@@ -238,9 +236,7 @@ def measure_standing(
             if tag.tag_id < len(places):
                 for method in METHODS[2:]:
                     errors[method].add(stock.locate(method, tag), places[tag.tag_id])
-    print(
-        "standing: %d of %d tags found" % (len(errors["plane"].distances_m), PLACEMENTS * len(scene.mounts))
-    )
+    print("standing: %d of %d tags found" % (len(errors["plane"].distances_m), PLACEMENTS * len(scene.mounts)))
     return errors
 
 
@@ -248,9 +244,7 @@ def draw_places(random: np.random.RandomState, count: int) -> np.ndarray:
     """Return poses (N, 3) in the field, far enough apart that no robot hides another."""
     places: List[np.ndarray] = []
     while len(places) < count:
-        place = np.append(
-            random.uniform(-0.5, 0.5, 2) * (np.array(FIELD_M) - 0.1), random.uniform(-math.pi, math.pi)
-        )
+        place = np.append(random.uniform(-0.5, 0.5, 2) * (np.array(FIELD_M) - 0.1), random.uniform(-math.pi, math.pi))
         if all(math.hypot(*(place[:2] - other[:2])) > 0.16 for other in places):
             places.append(place)
     return np.array(places)
@@ -361,9 +355,7 @@ def measure_accuracy(seed: int, tape_m: float) -> None:
     scene = Scene(seed, tape_m)
     camera = find_camera(scene, find_lens(np.random.RandomState(seed)))
     layout, delay_s = find_layout(scene, camera)
-    stock = StockMethod(
-        scene, camera, create_detector(decimate=1.0).detect(scene.renderer.render(scene.true))
-    )
+    stock = StockMethod(scene, camera, create_detector(decimate=1.0).detect(scene.renderer.render(scene.true)))
     straight = ((1.0, 0.2, 0.0), (1.0, -0.2, 0.0)) * 3
     circles = ((3.0, 0.2, 2.0), (3.0, 0.2, -2.0))
     table = {

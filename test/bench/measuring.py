@@ -27,11 +27,7 @@ def read_all_cpu_s():
 
     /proc/stat would be shorter, but counts whole ticks of the clock: between them it sees nothing of short work.
     """
-    return {
-        int(entry.name): read_one_cpu_s(entry.name)
-        for entry in Path("/proc").iterdir()
-        if entry.name.isdigit()
-    }
+    return {int(entry.name): read_one_cpu_s(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()}
 
 
 def read_one_cpu_s(pid):
@@ -131,9 +127,7 @@ def start_master():
     """Start a ROS master that ends with the context; give the environment in which programs find it."""
     port = find_free_port()
     environment = dict(os.environ, ROS_MASTER_URI="http://localhost:%d" % port)
-    master = start(
-        ["roscore", "-p", str(port)], environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    master = start(["roscore", "-p", str(port)], environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
         wait_for_port(port, master)
         yield environment

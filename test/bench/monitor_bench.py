@@ -120,7 +120,11 @@ def main():
             return process
 
         run(
-            "roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=%d" % driver_port,
+            "roslaunch",
+            "hero_bringup",
+            "hero_bringup.launch",
+            "host:=127.0.0.1",
+            "port:=%d" % driver_port,
             "count:=%d" % options.count,
         )
         run("roslaunch", "hero_examples", "random_walk.launch", "robots:=0-%d" % (options.count - 1))

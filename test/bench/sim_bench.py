@@ -125,9 +125,7 @@ def measure(python: List[str], robots: int, seconds: float) -> Measurement:
             server.run(0.1)
         server.run(_SETTLE_S)
         if len(server.peers) < robots or process.poll() is not None:
-            raise RuntimeError(
-                "only %d of %d robots came within %g s" % (len(server.peers), robots, _ARRIVAL_S)
-            )
+            raise RuntimeError("only %d of %d robots came within %g s" % (len(server.peers), robots, _ARRIVAL_S))
         before = sum(peer.odoms for peer in server.peers)
         cpu_s, start_s = read_cpu_s(process.pid), time.monotonic()
         server.run(seconds)
@@ -148,9 +146,7 @@ def measure_fastest(robots: int, simulated_ms: int = 5000) -> float:
 
     CPU time, so that what else runs on the machine matters little.
     """
-    swarm = build_swarm(
-        build_parser().parse_args(["--count", str(robots)]), [""] * robots, lambda text: None
-    )
+    swarm = build_swarm(build_parser().parse_args(["--count", str(robots)]), [""] * robots, lambda text: None)
 
     def run(until_ms: int) -> None:
         while swarm.now_ms < until_ms:

@@ -239,9 +239,7 @@ def measure_mode(suite, mode, methods, rounds):
 def measure_method(suite, method, mode, commander, rounds):
     """Return the commander, which may be another one now, and the rows of one method."""
     spare = None
-    cells: Dict[Tuple[int, str], Dict[str, List[float]]] = {
-        cell: collections.defaultdict(list) for cell in suite.cells
-    }
+    cells: Dict[Tuple[int, str], Dict[str, List[float]]] = {cell: collections.defaultdict(list) for cell in suite.cells}
     repeated = kept = 0
     while kept < rounds:
         suite.move(method, commander)

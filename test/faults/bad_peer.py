@@ -178,9 +178,7 @@ def huge_packets(peer):
 def many_topics(peer):
     """Ten thousand topics, by new ids and by new names for old ids."""
     burst = [
-        declare_topic(
-            0, 200 + index % 300, "/hero_%d/topic_%d" % (OWN_NUMBER, index), "std_msgs/String", STRING_MD5
-        )
+        declare_topic(0, 200 + index % 300, "/hero_%d/topic_%d" % (OWN_NUMBER, index), "std_msgs/String", STRING_MD5)
         for index in range(10000)
     ]
     blocks = [b"".join(burst[start : start + 20]) for start in range(0, len(burst), 20)]

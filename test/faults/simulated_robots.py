@@ -29,9 +29,7 @@ class GroundTruth:
     def __init__(self, number, controller="velocity_controller"):
         self.name = "hero_%d" % number
         self.path = []
-        self._subscriber = rospy.Subscriber(
-            "/%s/ground_truth" % self.name, Odometry, self._receive, tcp_nodelay=True
-        )
+        self._subscriber = rospy.Subscriber("/%s/ground_truth" % self.name, Odometry, self._receive, tcp_nodelay=True)
         self.publisher = rospy.Publisher(
             "/%s/%s/cmd_vel" % (self.name, controller), Twist, queue_size=1, tcp_nodelay=True
         )

@@ -70,8 +70,7 @@ class Sample(NamedTuple):
     def describe(self):
         """Return one line."""
         return (
-            "%6.1f min: %.1f MB, %d threads, %d files, %d registrations, CPU %.1f %%, %d messages, %d lost,"
-            " p99 %.1f ms"
+            "%6.1f min: %.1f MB, %d threads, %d files, %d registrations, CPU %.1f %%, %d messages, %d lost, p99 %.1f ms"
         ) % (
             self.at_s / 60.0,
             self.holdings.memory_kb / 1000.0,
@@ -241,9 +240,7 @@ def judge(samples, is_long):
         "CPU": find_trend(samples, lambda sample: sample.cpu_percent),
     }
     units = {"memory": " MB", "CPU": " %"}
-    words = "; ".join(
-        "%s %s" % (name, trend.describe(units.get(name, ""), is_long)) for name, trend in held.items()
-    )
+    words = "; ".join("%s %s" % (name, trend.describe(units.get(name, ""), is_long)) for name, trend in held.items())
     memory_max = MEMORY_GROWTH_MB_PER_H * max(1.0, held["memory"].hours) if is_long else WARM_UP_MB
     assert held["memory"].growth <= memory_max, words
     assert max(held["threads"].growth, held["files"].growth) <= FLICKER, words

@@ -42,9 +42,7 @@ def test_garbled_robots_do_not_affect_the_driver_or_other_robots(start_driver, e
     for count in range(conversations):
         number = 10 + count % GARBLED
         burst = emulated_swarm.declare(number)
-        burst += (
-            b"".join(bytes(part) for part in emulated_swarm.Templates(number).make_burst(count, bytes(8))) * 3
-        )
+        burst += b"".join(bytes(part) for part in emulated_swarm.Templates(number).make_burst(count, bytes(8))) * 3
         robot = FakeRobot(number, declarations=STOCK_DECLARATIONS, source_host="127.0.0.%d" % number)
         robot.declares = False
         robot.connect(driver.address)
@@ -81,9 +79,7 @@ def test_invalid_service_requests_never_reach_a_robot(start_driver, record):
     assert rosservice.get_service_type("/hero_1/set_odom") == "hero_msgs/SetOdom"
     service.verify()
     robot.close()
-    record(
-        "service requests with NaN, inf and absurd PIDs", len(requests), refused, "nothing; each is refused"
-    )
+    record("service requests with NaN, inf and absurd PIDs", len(requests), refused, "nothing; each is refused")
 
 
 def test_coverage_guided_fuzzing_finds_no_bytes_that_raise(effort, record, tmp_path):

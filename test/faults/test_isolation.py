@@ -166,8 +166,7 @@ def test_all_robots_stayed_and_every_transform_arrived(scene, record):
     received = {stamp_s for stamp_s, _ in sent["commands_s"]}
     missing = [stamp_s for stamp_s in commanded if stamp_s not in received]
     record(
-        "all of the above: 20 robots stayed, %d transforms and %d commands"
-        % (sent["transforms"], len(commanded)),
+        "all of the above: 20 robots stayed, %d transforms and %d commands" % (sent["transforms"], len(commanded)),
         GOOD_ROBOTS,
         GOOD_ROBOTS - sent["thrown_out"],
         "%d transforms, %d commands whose place a newer one took"

@@ -69,9 +69,7 @@ def master():
     from rig import Master
 
     if os.environ.get("HERO_OWN_NETWORK") != "yes":
-        pytest.skip(
-            "this system lets no test have network namespaces of its own (unshare --net): run it as root"
-        )
+        pytest.skip("this system lets no test have network namespaces of its own (unshare --net): run it as root")
     hosts = [Host("robots", PC, ROBOT_NET), Host("second", "10.98.2.1", SECOND_PC)]
     hosts[1].run("ip route add default via 10.98.2.1")
     with Master(host=PC) as started:
@@ -162,9 +160,7 @@ def through_relay(lab):
         yield driver, relay, watch
         watch.close()
     relay.ask("clear")
-    wait_for(
-        lambda: not any(driver.fleet.find("/hero_%d" % n, Robot.READY) for n in range(ROBOTS)), "robots to go"
-    )
+    wait_for(lambda: not any(driver.fleet.find("/hero_%d" % n, Robot.READY) for n in range(ROBOTS)), "robots to go")
 
 
 @pytest.fixture
@@ -175,9 +171,7 @@ def by_cable(lab):
         watch.wait_all_heard("all robots")
         yield driver, robots, watch
         watch.close()
-    wait_for(
-        lambda: not any(driver.fleet.find("/hero_%d" % n, Robot.READY) for n in range(ROBOTS)), "robots to go"
-    )
+    wait_for(lambda: not any(driver.fleet.find("/hero_%d" % n, Robot.READY) for n in range(ROBOTS)), "robots to go")
 
 
 def count_returns(driver):
@@ -189,9 +183,7 @@ def test_jitter_of_200_ms_loses_nothing(through_relay, effort, record):
     returns, marks = count_returns(driver), watch.mark()
     relay.ask("jitter 0.2")
     count = effort.choose(60, 600)
-    wait_for(
-        lambda: all(len(r.messages) > marks[n] + count for n, r in watch.recorders.items()), "messages", 60.0
-    )
+    wait_for(lambda: all(len(r.messages) > marks[n] + count for n, r in watch.recorders.items()), "messages", 60.0)
     lost = watch.count_gaps(marks)
     bad = sum(robot.bad_packets for robot in driver.fleet.newest.robots)
     record(
@@ -263,14 +255,10 @@ def test_robots_keep_their_identity_when_their_address_changes(lab, record):
         back_s = time.monotonic() - start_s
     watch.close()
     robots.run("ip address add %s/24 dev robots1" % ROBOT_NET)
-    record(
-        "robots get another address", ROBOTS, ROBOTS, "what was sent meanwhile; back after %.1f s" % back_s
-    )
+    record("robots get another address", ROBOTS, ROBOTS, "what was sent meanwhile; back after %.1f s" % back_s)
 
 
-def test_killing_one_of_two_drivers_does_not_affect_the_other(
-    by_cable, master, record
-):
+def test_killing_one_of_two_drivers_does_not_affect_the_other(by_cable, master, record):
     from driver_case import DriverProcess
 
     driver, _, watch = by_cable
@@ -316,9 +304,7 @@ def test_running_out_of_ports_does_not_affect_connected_robots(by_cable, record)
             for _ in range(3):
                 rosgraph.Master("/faults").lookupNode(driver.node)
                 count_holdings(driver)
-        wait_for(
-            lambda: all(len(r.messages) > marks[n] + 60 for n, r in watch.recorders.items()), "messages"
-        )
+        wait_for(lambda: all(len(r.messages) > marks[n] + 60 for n, r in watch.recorders.items()), "messages")
     finally:
         ports.write_text(usual)
     wait_for(lambda: rosgraph.Master("/faults").lookupNode(driver.node), "the master to be reached again")

@@ -36,9 +36,7 @@ def field(master):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL], ids=lambda s: s.name)
-def test_robots_stop_when_the_driver_ends_and_can_be_driven_again(
-    field, start_driver, effort, record, number
-):
+def test_robots_stop_when_the_driver_ends_and_can_be_driven_again(field, start_driver, effort, record, number):
     """Before it ends in order, the driver has seen all wheels at rest; after SIGKILL robots stop by themselves."""
     port, ground_truths = field
     tries = effort.choose(1, 10)
@@ -222,9 +220,7 @@ def test_running_out_of_files_does_not_affect_connected_robots(start_driver, rec
 # Its own mistakes.
 
 
-def test_a_driver_bug_in_one_connection_closes_only_that_one(
-    start_driver, record, tmp_path
-):
+def test_a_driver_bug_in_one_connection_closes_only_that_one(start_driver, record, tmp_path):
     trigger = tmp_path / "break"
     driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "open_link", str(trigger)])
     robot = FakeRobot(1).connect(driver.address)

@@ -32,9 +32,7 @@ def served(start_driver):
 
 def start_reader(driver, topic):
     """Return a program that listens to a topic, once it is connected."""
-    reader = subprocess.Popen(
-        ["rostopic", "echo", topic], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+    reader = subprocess.Popen(["rostopic", "echo", topic], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     wait_for(lambda: has_connection(driver.node, topic, "rostopic"), "a reader of " + topic)
     return reader
 
@@ -67,9 +65,7 @@ def test_dying_subscribers_affect_no_other(served, effort, record):
         os.kill(reader.pid, signal.SIGKILL)
         service.verify(5)
         reader.wait()
-    wait_for(
-        lambda: not has_connection(driver.node, "/hero_1/encoder", "rostopic"), "the dead to be forgotten"
-    )
+    wait_for(lambda: not has_connection(driver.node, "/hero_1/encoder", "rostopic"), "the dead to be forgotten")
     record("a subscriber dies (SIGKILL)", deaths, deaths)
 
 
@@ -94,14 +90,11 @@ def test_subscribers_that_come_and_go_leak_nothing(served, effort, record):
     service.verify()
     # Python gives memory back late, and rospy ends its threads when it looks at its connections.
     wait_for(
-        lambda: count_holdings(driver).threads <= before.threads
-        and count_holdings(driver).files <= before.files,
+        lambda: count_holdings(driver).threads <= before.threads and count_holdings(driver).files <= before.files,
         lambda: count_holdings(driver).describe_growth(before),
     )
     growth = count_holdings(driver).describe_growth(before)
-    record(
-        "%d subscribers come and go" % (count * rounds), count * rounds, count * rounds, "nothing; " + growth
-    )
+    record("%d subscribers come and go" % (count * rounds), count * rounds, count * rounds, "nothing; " + growth)
 
 
 def test_a_publisher_at_1_khz_delays_no_other_and_its_stop_arrives(served, effort, record):

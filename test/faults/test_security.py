@@ -78,12 +78,8 @@ def test_addresses_outside_the_allow_list_get_no_byte(start_driver, record):
 
 def test_robots_cannot_escape_their_namespace_or_run_code(start_driver, record):
     driver = start_driver()
-    evil = [
-        Declaration(PUB, 150 + n, name, "std_msgs/String", STRING_MD5) for n, name in enumerate(EVIL_NAMES)
-    ]
-    evil += [
-        Declaration(PUB, 180 + n, "/hero_7/t%d" % n, kind, STRING_MD5) for n, kind in enumerate(EVIL_TYPES)
-    ]
+    evil = [Declaration(PUB, 150 + n, name, "std_msgs/String", STRING_MD5) for n, name in enumerate(EVIL_NAMES)]
+    evil += [Declaration(PUB, 180 + n, "/hero_7/t%d" % n, kind, STRING_MD5) for n, kind in enumerate(EVIL_TYPES)]
     # FakeRobot puts its own name into names with braces only.
     robot = FakeRobot(7, declarations=STOCK_DECLARATIONS)
     robot.declarations += evil
@@ -97,9 +93,7 @@ def test_robots_cannot_escape_their_namespace_or_run_code(start_driver, record):
     ]
     robot.close()
     assert not driver.find_lines("Traceback")
-    record(
-        "names and types made to break out", len(evil), len(evil) - len(outside), "nothing; each is refused"
-    )
+    record("names and types made to break out", len(evil), len(evil) - len(outside), "nothing; each is refused")
 
 
 def test_robots_cannot_forge_log_lines_of_others(start_driver, record):
@@ -123,11 +117,7 @@ def test_robots_cannot_forge_log_lines_of_others(start_driver, record):
     service.verify()
     robot.close()
     lines = list(driver.lines)
-    forged = [
-        line
-        for line in lines
-        if not re.match(r"\x1b?\[?\d*m?\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[\d{9,}", line)
-    ]
+    forged = [line for line in lines if not re.match(r"\x1b?\[?\d*m?\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[\d{9,}", line)]
     odd = [line for line in lines if re.search(r"[\x00-\x08\x0b-\x1a\x1c-\x1f\x7f\u2028\u202e\x85]", line)]
     assert not forged and not odd, (forged, odd)
     record(
@@ -150,21 +140,15 @@ def test_no_peer_exceeds_the_limits(start_driver, record, kind):
         sock.connect(driver.address)
         socks.append(sock)
         if kind == "a robot":
-            sock.sendall(
-                emulated_swarm.declare(100 + number) + declare_topic(0, 150, "/hero_1/x", "a/B", STRING_MD5)
-            )
+            sock.sendall(emulated_swarm.declare(100 + number) + declare_topic(0, 150, "/hero_1/x", "a/B", STRING_MD5))
     driver.wait_line("~max_connections_per_address")
     wait_for(lambda: driver.find_lines("refused"), "a refusal")
     service.verify()
-    taken = sum(
-        robot.namespace.startswith("/hero_1") and robot.id >= 100 for robot in driver.fleet.newest.robots
-    )
+    taken = sum(robot.namespace.startswith("/hero_1") and robot.id >= 100 for robot in driver.fleet.newest.robots)
     for sock in socks:
         sock.close()
     friend.close()
-    record(
-        "20 times %s from one address that may have 5" % kind, 1, int(taken <= 5), "what was beyond the limit"
-    )
+    record("20 times %s from one address that may have 5" % kind, 1, int(taken <= 5), "what was beyond the limit")
 
 
 def test_one_address_cannot_occupy_all_connections(start_driver, record):

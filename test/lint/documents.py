@@ -11,9 +11,7 @@ SHELLS = ("console", "bash", "sh", "shell")
 FENCE = re.compile(r"^( *)(`{3,}|~{3,}) *(\w*)")
 INLINE = re.compile(r"`([^`]+)`")
 # What a command of ROS or of ours begins with; other words in backticks are no commands.
-BEGINNINGS = re.compile(
-    r"^(roslaunch|rosrun|rostest|rostopic|rosservice|rosmsg|rossrv|(\S*/)?script/\w+|python3 -m)\b"
-)
+BEGINNINGS = re.compile(r"^(roslaunch|rosrun|rostest|rostopic|rosservice|rosmsg|rossrv|(\S*/)?script/\w+|python3 -m)\b")
 
 
 class Line(NamedTuple):

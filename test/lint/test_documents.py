@@ -24,9 +24,7 @@ TALKS_ABOUT_NAMES = {
 
 
 def strip_prefixes(words):
-    while words and (
-        words[0] in PREFIXES or re.match(r"^[A-Z_]+=", words[0]) or re.match(r"^[\d.]+s?$", words[0])
-    ):
+    while words and (words[0] in PREFIXES or re.match(r"^[A-Z_]+=", words[0]) or re.match(r"^[\d.]+s?$", words[0])):
         words = words[1:]
     return words
 

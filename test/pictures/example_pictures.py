@@ -110,7 +110,11 @@ def go_to_goal(picture):
             goals += round_goals
             recording.wait_until_all_are_at(round_goals, 0.25, 60.0)
         draw_paths(
-            picture, "go_to_goal: three goals each, all with heading 0", recording.arena, recording.paths(), goals,
+            picture,
+            "go_to_goal: three goals each, all with heading 0",
+            recording.arena,
+            recording.paths(),
+            goals,
             size_inch=(9, 4.2),
         )
 
@@ -138,8 +142,12 @@ def follow(picture):
         recording.wait_until_all_rest("followers that have caught up", 20.0)
         near = ((-0.65, 0.65), (-0.15, 1.0))
         draw_paths(
-            picture, "follow: hero_0 is driven, the others follow", recording.arena, recording.paths(),
-            only_m=near, size_inch=(6, 5),
+            picture,
+            "follow: hero_0 is driven, the others follow",
+            recording.arena,
+            recording.paths(),
+            only_m=near,
+            size_inch=(6, 5),
         )
 
 

@@ -43,8 +43,7 @@ class DriverRestartTest(unittest.TestCase):
     def wait_ready(self, numbers):
         wait_for(
             lambda: (
-                self.fleet
-                and {robot.id for robot in self.fleet.robots if robot.state == Robot.READY} == set(numbers)
+                self.fleet and {robot.id for robot in self.fleet.robots if robot.state == Robot.READY} == set(numbers)
             ),
             lambda: "robots %s, last: %s" % (numbers, self.fleet),
         )
@@ -88,9 +87,7 @@ class DriverRestartTest(unittest.TestCase):
         odoms = []
         subscriber = rospy.Subscriber("/hero_4/odom", Odometry, odoms.append)
         self.addCleanup(subscriber.unregister)
-        robots = Program(
-            sys.executable, "-m", "hero_sim", "--count", "2", "--first-id", "4", "--port", str(self.port)
-        )
+        robots = Program(sys.executable, "-m", "hero_sim", "--count", "2", "--first-id", "4", "--port", str(self.port))
         self.addCleanup(robots.end)
         for _ in range(2):
             program = self.launch()

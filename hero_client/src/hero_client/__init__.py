@@ -52,7 +52,12 @@ _NAMES = {
     "hero_client.values.background_motion": ["BackgroundMotion"],
     "hero_client.values.colors": ["COLORS"],
     "hero_client.values.errors": [
-        "FrameError", "GoalError", "RobotError", "RobotNotReadyError", "StaleDataError", "StoppedError",
+        "FrameError",
+        "GoalError",
+        "RobotError",
+        "RobotNotReadyError",
+        "StaleDataError",
+        "StoppedError",
     ],
     "hero_client.values.readings": ["Obstacle"],
     "hero_node.clock": ["Clock"],

@@ -66,9 +66,7 @@ class Swarm(BaseSwarm[Robot]):
             if ids and drivers.is_settled:
                 return cls(ids, odom, proximity)
         if report is None:
-            raise RobotNotReadyError(
-                "nothing on %s within %.3g s: is the driver running?" % (USUAL_TOPIC, timeout_s)
-            )
+            raise RobotNotReadyError("nothing on %s within %.3g s: is the driver running?" % (USUAL_TOPIC, timeout_s))
         raise RobotNotReadyError("no robot joined the driver within %.3g s: are they on?" % timeout_s)
 
     def emergency_stop(self) -> StopStatus:
@@ -99,9 +97,7 @@ def ready_ids(robots: RobotArray) -> List[int]:
     return sorted(robot.id for robot in robots.robots if robot.state == robot.READY and robot.id >= 0)
 
 
-def open_swarm(
-    program: Program, robot_ids: Optional[List[int]], odom: bool = True, proximity: bool = True
-) -> Swarm:
+def open_swarm(program: Program, robot_ids: Optional[List[int]], odom: bool = True, proximity: bool = True) -> Swarm:
     """Return the swarm of these robots; for None, of all that the drivers report, waiting for the first one.
 
     Raises: ProgramError if the program is to end before there is any robot.

@@ -75,9 +75,7 @@ def swap(count, radius_m, seed):
     """Return (least distance of two centers, poses, goals) of count robots that swap places across a circle."""
     rng = np.random.RandomState(seed)
     angles = 2.0 * math.pi * np.arange(count) / count
-    poses = [
-        Pose(radius_m * math.cos(a), radius_m * math.sin(a), rng.uniform(-math.pi, math.pi)) for a in angles
-    ]
+    poses = [Pose(radius_m * math.cos(a), radius_m * math.sin(a), rng.uniform(-math.pi, math.pi)) for a in angles]
     goals = [(-pose.x_m, -pose.y_m) for pose in poses]
     bodies = [Body(pose) for pose in poses]
     steering = SwarmGoToController(goals, AvoidanceLaw(), STEP_S, seed)

@@ -264,9 +264,7 @@ class Gateway(LinkHandler):
     def _resolve(self, peer: Peer, topic: Topic, identity: Identity) -> Optional[str]:
         """Return the ROS name of what a robot declared, None if it may not use it, which is logged."""
         info = topic.info
-        refusal = namespaces.find_refusal(
-            info.name, info.message_type, identity, self._node, topic.kind.is_from_robot
-        )
+        refusal = namespaces.find_refusal(info.name, info.message_type, identity, self._node, topic.kind.is_from_robot)
         if refusal is not None:
             self.warn_robot(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
             return None
@@ -300,9 +298,7 @@ class Gateway(LinkHandler):
         peer.record = decision.record
         if decision.verdict is Verdict.REFUSED:
             peer.refused = True
-            self._log.log_throttled(
-                "error", "duplicate " + identity.namespace + address.host, decision.reason
-            )
+            self._log.log_throttled("error", "duplicate " + identity.namespace + address.host, decision.reason)
             self.note_change()
             return
         self._join(peer, decision)

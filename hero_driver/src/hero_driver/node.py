@@ -324,9 +324,9 @@ def _read_private_parameters() -> Any:
 def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
     where = "~host %s, ~port %d" % (config.host, config.port)
     if error.errno == errno.EADDRINUSE:
-        return (
-            "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port"
-            % (where, config.port)
+        return "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port" % (
+            where,
+            config.port,
         )
     if error.errno == errno.EACCES:
         return "%s may not be used without privileges: choose a ~port above 1023" % where

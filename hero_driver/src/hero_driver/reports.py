@@ -158,9 +158,7 @@ def _assess(robot: RobotStatus) -> Tuple[int, str]:
     if robot.tunes:
         return DiagnosticStatus.WARN, "tunes itself (pid_calibration) and spins; ~stop ends that"
     if robot.foreign_frames:
-        return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(
-            robot.foreign_frames
-        )
+        return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(robot.foreign_frames)
     if abs(row.clock_offset) > LARGE_CLOCK_OFFSET_S:
         return DiagnosticStatus.WARN, "its clock is off by %.2f s" % row.clock_offset
     return DiagnosticStatus.OK, "ready"

@@ -120,9 +120,7 @@ class StopDelivery:
             return peer.stop.state
         return StopState.STOPPING if self._owner.stopped else StopState.NOT_STOPPED
 
-    def await_rest(
-        self, peers: Iterable[Peer], deadline_s: float, then: Callable[[List[Peer]], None]
-    ) -> None:
+    def await_rest(self, peers: Iterable[Peer], deadline_s: float, then: Callable[[List[Peer]], None]) -> None:
         """Call then(peers that are not known to be at rest) when all peers are at rest, or at deadline_s."""
         waiting = list(peers)
 
@@ -134,9 +132,7 @@ class StopDelivery:
 
         check()
 
-    def stop_without_loop(
-        self, peers: Iterable[Peer], deadline_s: float, read: Callable[[Peer], None]
-    ) -> List[Peer]:
+    def stop_without_loop(self, peers: Iterable[Peer], deadline_s: float, read: Callable[[Peer], None]) -> List[Peer]:
         """Stop all peers although the loop has broken; return those that are not known to be at rest.
 
         read(peer) takes what a robot has sent. Blocks until all are at rest, or until deadline_s.

@@ -55,9 +55,7 @@ class Recorder:
     def wait_connected(self):
         """Wait until a publisher sends to this recorder, and knows it: the two sides learn it one by one."""
         wait_for(
-            lambda: any(
-                has_connection(node, self.topic, rospy.get_name()) for node in list_publishers(self.topic)
-            ),
+            lambda: any(has_connection(node, self.topic, rospy.get_name()) for node in list_publishers(self.topic)),
             "a publisher of " + self.topic,
         )
 
@@ -111,9 +109,7 @@ def make_publisher(topic, message_class, connected=True):
 def list_driver_topics(namespace, node=NODE):
     """Return the topics and services below namespace that the driver offers, by the master."""
     state = rosgraph.Master("/test").getSystemState()
-    return sorted(
-        name for part in state for name, nodes in part if name.startswith(namespace + "/") and node in nodes
-    )
+    return sorted(name for part in state for name, nodes in part if name.startswith(namespace + "/") and node in nodes)
 
 
 class Fleet:
@@ -196,11 +192,7 @@ class DriverCase(unittest.TestCase):
 
     def find_logs(self, pattern):
         """Return the driver's log lines that match a pattern."""
-        return [
-            line
-            for line in list(self.rosout.messages)
-            if line.name == self.node and re.search(pattern, line.msg)
-        ]
+        return [line for line in list(self.rosout.messages) if line.name == self.node and re.search(pattern, line.msg)]
 
     def wait_log(self, pattern):
         """Return the first line of the driver's log that matches a pattern."""

@@ -76,8 +76,10 @@ class FakeMotors:
     @property
     def is_turning(self) -> bool:
         """Whether the wheels turn."""
-        return self.is_pushed or self._has_pulses or any(
-            controller.is_tuning or controller.is_driving for controller in list(self._controllers.values())
+        return (
+            self.is_pushed
+            or self._has_pulses
+            or any(controller.is_tuning or controller.is_driving for controller in list(self._controllers.values()))
         )
 
     def begin_read(self, now_s: float) -> None:

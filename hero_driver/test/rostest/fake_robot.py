@@ -72,9 +72,7 @@ STOCK_DECLARATIONS = (
     ),
     Declaration(REQUESTS, 103, "/{}/set_odom", "hero_common/SetOdom", "938fa65709584ad8e77d238529be13b8"),
     Declaration(SUB, 104, "/{}/cmd_motor", "hero_common/Motor", "44d4249d207ce6a89de3d72080e4d0b5"),
-    Declaration(
-        REQUESTS, 105, "/{}/motors_parameters", "hero_common/SetMotor", "44d4249d207ce6a89de3d72080e4d0b5"
-    ),
+    Declaration(REQUESTS, 105, "/{}/motors_parameters", "hero_common/SetMotor", "44d4249d207ce6a89de3d72080e4d0b5"),
     Declaration(SUB, 106, "/{}/position_controller/cmd_vel", "geometry_msgs/Twist", TWIST_MD5),
     Declaration(
         REQUESTS,

@@ -134,9 +134,7 @@ class TestDriverCommands(DriverCase):
         name = "/commander_of_" + robot.name
         command = "{linear: {x: %s}}" % linear_m_s
         topic = robot.namespace + "/cmd_vel"
-        program = Program(
-            "rostopic", "pub", "-r", "20", topic, "geometry_msgs/Twist", command, "__name:=" + name[1:]
-        )
+        program = Program("rostopic", "pub", "-r", "20", topic, "geometry_msgs/Twist", command, "__name:=" + name[1:])
         self.addCleanup(program.end)
         payload = struct.pack("<6d", linear_m_s, 0, 0, 0, 0, 0)
         wait_for(lambda: payload in robot.payloads_on(VELOCITY), "a command of " + name)
@@ -280,9 +278,7 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: other.velocities, "the other robot's command")
         drive.publish(make_command(0.15))
         stalled.is_stalled = False
-        wait_for(
-            lambda: stalled.velocities and stalled.velocities[-1].linear_m_s == 0.15, "the newest command"
-        )
+        wait_for(lambda: stalled.velocities and stalled.velocities[-1].linear_m_s == 0.15, "the newest command")
         # One may have been on its way, and no other follows before that one is acknowledged.
         self.assertLessEqual(len(stalled.velocities), 2)
 

@@ -79,9 +79,7 @@ class TestDriverEndurance(OwnDriverCase):
         )
         self.addCleanup(reader.wait)
         self.addCleanup(reader.kill)
-        wait_for(
-            lambda: has_connection(driver.node, "/hero_1/laser", "rostopic"), "the reader to be connected"
-        )
+        wait_for(lambda: has_connection(driver.node, "/hero_1/laser", "rostopic"), "the reader to be connected")
         encoders = Recorder("/hero_2/encoder", Encoder)
         # The socket buffers of the system hold some MB; this is more.
         payload = stock_messages.make_laser("hero_1", rospy.Time(3), [0.1] * 8) + bytes(3500)
@@ -120,8 +118,7 @@ class TestDriverEndurance(OwnDriverCase):
         wait_for(
             lambda: all(now <= then for now, then in zip(count_resources(driver.process.pid), before)),
             lambda: (
-                "no more than %s sockets and threads, there are %s"
-                % (before, count_resources(driver.process.pid))
+                "no more than %s sockets and threads, there are %s" % (before, count_resources(driver.process.pid))
             ),
         )
 
@@ -131,9 +128,7 @@ class TestDriverEndurance(OwnDriverCase):
         def come_and_go(numbers):
             for number in numbers:
                 robot = self.dial(driver, number)
-                wait_for(
-                    lambda n=robot.namespace: len(list_driver_topics(n, driver.node)) == 19, "its topics"
-                )
+                wait_for(lambda n=robot.namespace: len(list_driver_topics(n, driver.node)) == 19, "its topics")
                 robot.close()
                 driver.fleet.wait_gone(robot.namespace)
                 wait_for(lambda n=robot.namespace: not list_driver_topics(n, driver.node), "an empty place")
@@ -144,8 +139,7 @@ class TestDriverEndurance(OwnDriverCase):
         wait_for(
             lambda: all(now <= then for now, then in zip(count_resources(driver.process.pid), before)),
             lambda: (
-                "no more than %s sockets and threads, there are %s"
-                % (before, count_resources(driver.process.pid))
+                "no more than %s sockets and threads, there are %s" % (before, count_resources(driver.process.pid))
             ),
         )
 

@@ -91,9 +91,7 @@ class TestDriverLimits(OwnDriverCase):
 
         def look():
             robot = self.dial(driver, 1, ready=False)
-            wait_for(
-                lambda: robot.ended or driver.fleet.find("/hero_1", Robot.READY), "an end or a beginning"
-            )
+            wait_for(lambda: robot.ended or driver.fleet.find("/hero_1", Robot.READY), "an end or a beginning")
             return not robot.ended
 
         wait_for(look, "the place to be free")

@@ -121,9 +121,7 @@ class TestDriverMessages(DriverCase):
         messages = self.drive(robot, [(0.0, 0.0), (100.0, 300.0), (300.0, 300.0)])
         turn_rad = 200 * TICK_M / WHEEL_SEPARATION_M
         radius_m = 200 * TICK_M / turn_rad
-        self.assert_pose(
-            messages[1], radius_m * math.sin(turn_rad), radius_m * (1 - math.cos(turn_rad)), turn_rad
-        )
+        self.assert_pose(messages[1], radius_m * math.sin(turn_rad), radius_m * (1 - math.cos(turn_rad)), turn_rad)
         # Left and right have the same total, so it heads where it began; the path was an S.
         self.assertAlmostEqual(read_pose(messages[2])[2], 0.0, 9)
 
@@ -435,8 +433,7 @@ class TestDriverMessages(DriverCase):
             self.assertEqual([message.twist.covariance[index * 7] for index in range(6)], [6, 5, 4, 3, 2, 1])
             transforms.wait_message(
                 lambda m: any(
-                    t.child_frame_id == "hero_30/base_link" and t.transform.translation.x == 0.5
-                    for t in m.transforms
+                    t.child_frame_id == "hero_30/base_link" and t.transform.translation.x == 0.5 for t in m.transforms
                 ),
                 "the robot's own transform",
             )

@@ -81,19 +81,14 @@ class TestDriverPolicy(OwnDriverCase):
             driver.wait_line("hero_3: topic .* refused: .*" + text)
         self.assertEqual(driver.find_lines("^FATAL forged|\x1b\\[2J"), [])
         self.assertEqual(
-            [
-                name
-                for name in list_driver_topics("/hero_3", driver.node)
-                if name.split("/")[2] in ("type", "md5")
-            ],
+            [name for name in list_driver_topics("/hero_3", driver.node) if name.split("/")[2] in ("type", "md5")],
             [],
         )
 
     def test_a_wrong_md5_and_an_unknown_type_give_one_clear_error_each(self):
         changed = [
             entry._replace(md5sum=WRONG_MD5)
-            if entry.name in ("/{}/encoder", "/{}/led")
-            or (entry.kind == REQUESTS and "set_odom" in entry.name)
+            if entry.name in ("/{}/encoder", "/{}/led") or (entry.kind == REQUESTS and "set_odom" in entry.name)
             else entry
             for entry in STOCK_DECLARATIONS
         ]
@@ -122,9 +117,7 @@ class TestDriverPolicy(OwnDriverCase):
             "topic /hero_4/alien",
         ):
             self.assertEqual(len(driver.find_lines(name + " refused")), 1, name)
-        self.assertIn(
-            "refused", driver.fleet.wait("/hero_4", Robot.READY, "error", lambda e: e.last_error).last_error
-        )
+        self.assertIn("refused", driver.fleet.wait("/hero_4", Robot.READY, "error", lambda e: e.last_error).last_error)
 
     def declare_anew(self, driver, robot, **changes):
         """Let a robot come back with another declaration of its light, and of the service set_odom."""

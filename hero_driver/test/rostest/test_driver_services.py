@@ -73,9 +73,7 @@ class TestDriverServices(DriverCase):
 
     def test_an_answer_without_success_is_an_answer(self):
         robot = self.join(2)
-        robot.answers["velocity_controller/pid_calibration"] = lambda _: encode_answer(
-            False, "PID Autotuning!"
-        )
+        robot.answers["velocity_controller/pid_calibration"] = lambda _: encode_answer(False, "PID Autotuning!")
         answer = make_service(robot, "velocity_controller/pid_calibration", Trigger)()
         self.assertEqual((answer.success, answer.message), (False, "PID Autotuning!"))
 

@@ -71,9 +71,7 @@ class TestDriverStop(OwnDriverCase):
 
     def wait_at_rest(self, driver, robot):
         """Wait until the driver says that a robot is at rest, which must be true."""
-        driver.fleet.wait(
-            robot.namespace, Robot.READY, "at rest", lambda entry: entry.stop_state == Robot.AT_REST
-        )
+        driver.fleet.wait(robot.namespace, Robot.READY, "at rest", lambda entry: entry.stop_state == Robot.AT_REST)
         self.assertFalse(robot.motors.is_turning)
 
     def start_tuning(self, driver, robot, controller):
@@ -180,9 +178,7 @@ class TestDriverStop(OwnDriverCase):
         driver = self.share()
         robot = self.dial(driver, 56, read_cycle_s=READ_CYCLE_S)
         self.call_stop(driver, True)
-        driver.fleet.wait(
-            "/hero_56", Robot.READY, "unconfirmed", lambda entry: entry.stop_state == Robot.UNCONFIRMED
-        )
+        driver.fleet.wait("/hero_56", Robot.READY, "unconfirmed", lambda entry: entry.stop_state == Robot.UNCONFIRMED)
         self.assertTrue(all(velocity.is_zero for velocity in robot.velocities))
         self.assertGreaterEqual(len(robot.velocities), 2)
 
@@ -203,9 +199,7 @@ class TestDriverStop(OwnDriverCase):
         self.call_stop(driver, True)
         self.wait_at_rest(driver, robot)
         self.assertEqual(self.call_stop(driver, False), "robots may move")
-        driver.fleet.wait(
-            "/hero_58", Robot.READY, "free", lambda entry: entry.stop_state == Robot.NOT_STOPPED
-        )
+        driver.fleet.wait("/hero_58", Robot.READY, "free", lambda entry: entry.stop_state == Robot.NOT_STOPPED)
         self.drive(robot)
 
     def test_a_refused_robot_is_stopped_and_counted(self):

@@ -157,8 +157,7 @@ class TestDriverTopics(DriverCase):
 
     def test_a_command_that_does_not_fit_the_robots_buffer_is_not_sent(self):
         small = [
-            entry._replace(buffer_length=8) if entry.name.endswith("/led") else entry
-            for entry in STOCK_DECLARATIONS
+            entry._replace(buffer_length=8) if entry.name.endswith("/led") else entry for entry in STOCK_DECLARATIONS
         ]
         robot = self.join(7, declarations=small)
         make_publisher("/hero_7/led", ColorRGBA).publish(ColorRGBA())
@@ -226,9 +225,7 @@ class TestDriverTopics(DriverCase):
         robot.log(heartbeat_line("hero_13", 421.5))
         robot.log("after the heartbeat")
         self.wait_log("after the heartbeat")
-        self.assertEqual(
-            [line.msg for line in self.find_logs("onected at time") if line.level > RosLog.DEBUG], []
-        )
+        self.assertEqual([line.msg for line in self.find_logs("onected at time") if line.level > RosLog.DEBUG], [])
         self.fleet.wait("/hero_13", 1, "with uptime", lambda entry: 421 <= entry.uptime.to_sec() < 500)
 
     def test_an_early_boot_line_gives_versions_and_reaches_the_log(self):

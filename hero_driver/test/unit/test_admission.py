@@ -30,9 +30,7 @@ def test_addresses_of_the_allowed_networks_may_come(host):
     assert make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1").admit(host) is None
 
 
-@pytest.mark.parametrize(
-    "host", ["10.42.1.17", "192.168.4.2", "::ffff:10.42.1.17", "2001:db8::1", "127.0.0.1"]
-)
+@pytest.mark.parametrize("host", ["10.42.1.17", "192.168.4.2", "::ffff:10.42.1.17", "2001:db8::1", "127.0.0.1"])
 def test_other_addresses_are_refused_with_the_name_of_the_parameter(host):
     admission = make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1")
     assert "~allow" in admission.admit(host)

@@ -67,9 +67,7 @@ def test_every_stamp_of_a_recording_grows(read_capture):
 
 def test_recorded_ticks_give_the_distance_that_robot_odometry_lost(read_capture):
     _, outputs = clean(read_capture("A.robot_to_server.bin"), "/hero_0", START_NS)
-    x_m, y_m, yaw_rad = read_odometry([payload for name, payload in outputs if name == "/hero_0/odom"][-1])[
-        2:5
-    ]
+    x_m, y_m, yaw_rad = read_odometry([payload for name, payload in outputs if name == "/hero_0/odom"][-1])[2:5]
     # The counters ended at 415 and 421 ticks after set_odom(1, 2, 0.5): nearly one arc.
     tick_m = math.pi * 0.0492 / 288.0
     turn_rad, distance_m = 6.0 * tick_m / 0.063, 418.0 * tick_m
@@ -83,9 +81,7 @@ def test_recorded_ticks_give_the_distance_that_robot_odometry_lost(read_capture)
 def test_recorded_odometry_and_transforms_agree_in_stamp_and_pose(read_capture):
     _, outputs = clean(read_capture("A.robot_to_server.bin"), "/hero_0", START_NS)
     odometry = {
-        read_stamp_ns(payload): read_odometry(payload)[2:5]
-        for name, payload in outputs
-        if name == "/hero_0/odom"
+        read_stamp_ns(payload): read_odometry(payload)[2:5] for name, payload in outputs if name == "/hero_0/odom"
     }
     transforms = [read_transform(payload) for name, payload in outputs if name == TRANSFORMS]
     poses = {stamp_ns: pose for stamp_ns, _, child, *pose in transforms if child == "hero_0/base_link"}

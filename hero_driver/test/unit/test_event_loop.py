@@ -196,9 +196,7 @@ def test_the_last_files_are_kept_for_others_than_robots(still_loop, file_limit, 
     loop.call_later = lambda delay_s, call: later.append((delay_s, call))
     for number in (last, last + 1):
         sock = Stub(fileno=lambda number=number: number, close=lambda: closed.append("refused"))
-        loop._listener = Stub(
-            accept=lambda sock=sock: (sock, ("10.0.0.1", 5, 0, 0)), fileno=listener.fileno
-        )
+        loop._listener = Stub(accept=lambda sock=sock: (sock, ("10.0.0.1", 5, 0, 0)), fileno=listener.fileno)
         loop._accept()
     assert taken == [(last, "10.0.0.1:5")] and closed == ["refused"]
     assert handler.warnings == [

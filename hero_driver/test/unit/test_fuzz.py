@@ -30,9 +30,7 @@ changes = st.lists(
     max_size=12,
 )
 pieces = st.lists(
-    st.one_of(
-        st.binary(max_size=200), st.sampled_from([v.data for v in VECTORS] + [HANDSHAKE, ODOM_MESSAGE])
-    ),
+    st.one_of(st.binary(max_size=200), st.sampled_from([v.data for v in VECTORS] + [HANDSHAKE, ODOM_MESSAGE])),
     max_size=12,
 )
 
@@ -114,9 +112,7 @@ def test_good_packets_in_any_order_are_all_read(order, ids):
 
 values = st.recursive(
     st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=20)),
-    lambda inner: st.one_of(
-        st.lists(inner, max_size=7), st.dictionaries(st.text(max_size=8), inner, max_size=3)
-    ),
+    lambda inner: st.one_of(st.lists(inner, max_size=7), st.dictionaries(st.text(max_size=8), inner, max_size=3)),
     max_leaves=8,
 )
 names = st.sampled_from(sorted(DriverConfig.__dataclass_fields__))

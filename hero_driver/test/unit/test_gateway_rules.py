@@ -59,7 +59,8 @@ class Driver:
         self.lateness_s = 0.0
         loop = SimpleNamespace(
             find_lateness_s=lambda: self.lateness_s,
-            call_later=lambda delay_s, call: self.later.append((self.now_s + delay_s, call)), call_soon=self.soon.append
+            call_later=lambda delay_s, call: self.later.append((self.now_s + delay_s, call)),
+            call_soon=self.soon.append,
         )
         self.gateway = Gateway(
             read_config(parameters),

@@ -147,9 +147,7 @@ def test_any_bytes_are_odometry_or_none(payload):
 def test_transforms_are_read_one_by_one():
     tails = [struct.pack("<7d", *(float(number + index) for index in range(7))) for number in range(3)]
     transforms = [
-        build_transform(
-            NOW_NS + number, "hero_0/base_link", "hero_0/link_%d" % number, struct.unpack("<7d", tail)
-        )
+        build_transform(NOW_NS + number, "hero_0/base_link", "hero_0/link_%d" % number, struct.unpack("<7d", tail))
         for number, tail in enumerate(tails)
     ]
     read = message_layouts.read_transforms(build_transform_message(*transforms))
@@ -228,9 +226,7 @@ def test_proximity_has_eight_beams_at_the_true_angles():
     frame_id, numbers, ranges_m, intensities = read_scan(scan)
     assert frame_id == "hero_0/laser_link"
     assert (read_seq(scan), read_stamp_ns(scan)) == (3, NOW_NS + MS)
-    angle_min_rad, angle_max_rad, increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m = (
-        numbers
-    )
+    angle_min_rad, angle_max_rad, increment_rad, time_increment_s, scan_time_s, range_min_m, range_max_m = numbers
     assert angle_min_rad == pytest.approx(-math.pi)
     assert increment_rad == pytest.approx(math.pi / 4.0)
     assert angle_max_rad == pytest.approx(angle_min_rad + 7.0 * increment_rad, abs=1e-6)

@@ -93,9 +93,7 @@ class Bench:
         connection.header = {"callerid": "/publisher"}
         connection.set_endpoint_id("http://publisher:%d/" % theirs.fileno())
         assert self.impl.add_connection(connection)
-        thread = threading.Thread(
-            target=connection.receive_loop, args=(self.impl.receive_callback,), daemon=True
-        )
+        thread = threading.Thread(target=connection.receive_loop, args=(self.impl.receive_callback,), daemon=True)
         thread.start()
         return theirs, connection, thread
 

@@ -44,9 +44,7 @@ def test_odometry_and_its_transform_share_one_stamp_from_boot_on():
         stamp_ns = UPTIME_NS + number * 34 * MS if number < 4 else arrival_ns - 3 * MS
         outputs = robot.receive_burst(stamp_ns, (number, number), arrival_ns)
         stamps_ns = {read_stamp_ns(list_payloads(outputs, "/hero_0/odom")[0])}
-        stamps_ns |= {
-            stamp_ns for stamp_ns, _, child, *_ in list_transforms(outputs) if child == "hero_0/base_link"
-        }
+        stamps_ns |= {stamp_ns for stamp_ns, _, child, *_ in list_transforms(outputs) if child == "hero_0/base_link"}
         assert stamps_ns == {arrival_ns if number < 4 else stamp_ns}
 
 
@@ -119,9 +117,7 @@ def test_imu_messages_get_stamps_and_numbers_and_keep_their_data():
 
 def test_topics_that_nothing_is_known_of_pass_untouched():
     robot = CorrectedRobot({"/hero_0/battery": "std_msgs/Float32"})
-    assert robot.receive("/hero_0/battery", b"\x00\x00\x80\x3f", NOW_NS) == [
-        ("/hero_0/battery", b"\x00\x00\x80\x3f")
-    ]
+    assert robot.receive("/hero_0/battery", b"\x00\x00\x80\x3f", NOW_NS) == [("/hero_0/battery", b"\x00\x00\x80\x3f")]
     topics = list_topics(robot.corrections, "/hero_0/battery", "std_msgs/Float32")
     assert topics == {"/hero_0/battery": "std_msgs/Float32"}
 

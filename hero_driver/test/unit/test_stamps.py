@@ -89,9 +89,7 @@ def test_stamps_are_not_in_the_future_after_the_pcs_clock_is_set_back(step_s, us
 
 
 offsets_ms = st.one_of(st.integers(-6000, 200), st.sampled_from([-51, -50, 49, 50, 51, -(10**9), 10**9]))
-messages = st.lists(
-    st.tuples(st.sampled_from(["/a", "/b"]), st.integers(1, 3000), offsets_ms), min_size=1, max_size=50
-)
+messages = st.lists(st.tuples(st.sampled_from(["/a", "/b"]), st.integers(1, 3000), offsets_ms), min_size=1, max_size=50)
 
 
 @given(script=messages, use_arrival=st.booleans(), max_future_ms=st.integers(0, 100))

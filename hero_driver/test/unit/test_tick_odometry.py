@@ -296,11 +296,7 @@ def test_what_the_wheels_did_during_a_pause_of_the_connection_counts():
     assert (odometry.linear_m_s, odometry.angular_rad_s) == (0.0, 0.0)
 
 
-@given(
-    readings=st.lists(
-        st.tuples(st.floats(width=32), st.floats(width=32), st.integers(0, 4 * 10**12)), max_size=30
-    )
-)
+@given(readings=st.lists(st.tuples(st.floats(width=32), st.floats(width=32), st.integers(0, 4 * 10**12)), max_size=30))
 def test_any_readings_leave_a_finite_pose_and_velocity(readings):
     odometry = make_odometry()
     for left_ticks, right_ticks, stamp_ms in readings:

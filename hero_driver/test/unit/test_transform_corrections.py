@@ -22,9 +22,7 @@ def test_transforms_between_the_robots_own_frames_pass_as_they_are(child):
     transform = build_transform(NOW_NS, "hero_0/base_link", "hero_0/" + child)
     for number in range(3):
         stamped = build_transform(NOW_NS + number * MS, "hero_0/base_link", "hero_0/" + child)
-        assert robot.receive("/tf", build_transform_message(stamped), NOW_NS + number * MS) == [
-            ("/tf", stamped)
-        ]
+        assert robot.receive("/tf", build_transform_message(stamped), NOW_NS + number * MS) == [("/tf", stamped)]
     assert len(transform) == len(stamped)
     assert (robot.corrections.refused, robot.corrections.transforms.foreign_frames) == (0, set())
 

@@ -39,9 +39,7 @@ def test_a_command_within_the_limits_passes_as_it_is(clamp):
 def test_a_command_beyond_the_limits_passes_unless_it_is_to_be_clamped():
     assert check_twist(make_twist(0.5, -9.0), False) == make_twist(0.5, -9.0)
     assert check_twist(make_twist(0.5, -9.0), True) == make_twist(0.2, -8.0)
-    assert check_twist(make_twist(-0.5, 1.0, (5.0, 0.0, 0.0, 0.0)), True) == make_twist(
-        -0.2, 1.0, (5.0, 0.0, 0.0, 0.0)
-    )
+    assert check_twist(make_twist(-0.5, 1.0, (5.0, 0.0, 0.0, 0.0)), True) == make_twist(-0.2, 1.0, (5.0, 0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -168,9 +166,7 @@ def test_discarding_motion_keeps_stops():
 
 # Whatever is offered and whenever it is asked for. Times are whole milliseconds.
 
-steps = st.lists(
-    st.tuples(st.integers(0, 120), st.one_of(st.none(), st.just(0), st.integers(1, 9))), max_size=60
-)
+steps = st.lists(st.tuples(st.integers(0, 120), st.one_of(st.none(), st.just(0), st.integers(1, 9))), max_size=60)
 
 
 def run(script):

@@ -140,9 +140,7 @@ def test_closing_leaves_a_worker_that_hangs_behind():
 
 def test_every_call_of_many_threads_is_made_or_refused():
     calls = Calls(queue_length=50)
-    threads = [
-        threading.Thread(target=lambda: [calls.submit(number) for number in range(300)]) for _ in range(4)
-    ]
+    threads = [threading.Thread(target=lambda: [calls.submit(number) for number in range(300)]) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:

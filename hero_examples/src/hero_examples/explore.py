@@ -97,9 +97,7 @@ def main():
         with open_swarm(program, parameters["robots"]) as swarm:
             common.wait_for_poses(program, swarm)
             rospy.loginfo("%s explore", ", ".join(robot.name for robot in swarm))
-            explorers = [
-                Explorer(robot, common, None if seed < 0 else seed + robot.robot_id) for robot in swarm
-            ]
+            explorers = [Explorer(robot, common, None if seed < 0 else seed + robot.robot_id) for robot in swarm]
             busy_s = program.now_s
             for _ in program.rate(10):  # Hz
                 del newest[:-1]

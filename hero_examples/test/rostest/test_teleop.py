@@ -126,9 +126,7 @@ class TeleopTest(unittest.TestCase):
             ("s---W", lambda linear, turn: abs(linear - 0.08) < 1e-6),
             ("s>a", lambda linear, turn: abs(turn - 1.75) < 1e-6),
         ):
-            commands.wait_for_answer(
-                0, lambda keys=keys: terminal.type(keys), condition, "the command of %r" % keys
-            )
+            commands.wait_for_answer(0, lambda keys=keys: terminal.type(keys), condition, "the command of %r" % keys)
         terminal.type("7")
         wait_for(lambda: "hero_7 is not in this swarm" in terminal.text, "a word about a robot that is not there")
 

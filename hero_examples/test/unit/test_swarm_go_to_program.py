@@ -1,6 +1,5 @@
 """swarm_go_to in virtual time: robots whose odometry drifts swap places and form up without touching."""
 
-
 from pathlib import Path
 
 import numpy as np

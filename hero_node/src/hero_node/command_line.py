@@ -82,9 +82,7 @@ def run_named(package: str, programs: Mapping[str, str]) -> NoReturn:
     run(program.main)
 
 
-def check_node_arguments(
-    package: str, name: str, text: Optional[str], arguments: Sequence[str] = ()
-) -> None:
+def check_node_arguments(package: str, name: str, text: Optional[str], arguments: Sequence[str] = ()) -> None:
     """End the process for --help, which prints text, and for arguments other than these and remappings (_x:=1)."""
     usage = " ".join(arguments) or "[_PARAMETER:=VALUE ...] [TOPIC:=TOPIC ...]"
     parser = argparse.ArgumentParser(
@@ -119,6 +117,7 @@ def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
 def find_line(error: BaseException, script: Optional[str] = None) -> str:
     """Return where in the user's script an error was raised, for the end of a message; nothing for other programs."""
     from traceback import walk_tb  # a tenth of the start of small programs
+
     main = sys.modules["__main__"]
     if script is None and main.__spec__ is None:  # not python3 -m
         script = getattr(main, "__file__", None)

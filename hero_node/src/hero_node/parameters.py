@@ -205,9 +205,7 @@ def _parse_id_range(word: Any) -> Tuple[int, int]:
     return int(first), int(last if dash else first)
 
 
-def parse_poses(
-    name: str, text: Any, ids: Optional[Sequence[int]]
-) -> Dict[int, Tuple[float, float, Optional[float]]]:
+def parse_poses(name: str, text: Any, ids: Optional[Sequence[int]]) -> Dict[int, Tuple[float, float, Optional[float]]]:
     """Return id -> (x_m, y_m, yaw_rad) from text such as "0 0; 0.3 0 90" (m, degrees), in the order of the ids.
 
     Of "x y" alone yaw_rad is None. No text: no poses.

@@ -18,9 +18,7 @@ def run_python(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE):
     """Return exit status and what came on stderr."""
     # PYTHONUNBUFFERED: empty is off, so that a text stays in the buffer until the end.
     environment = dict(os.environ, PYTHONUNBUFFERED="", PYTHONPATH=os.pathsep.join(filter(None, sys.path)))
-    process = subprocess.Popen(
-        [sys.executable, "-c", HEADER + code], stdout=stdout, stderr=stderr, env=environment
-    )
+    process = subprocess.Popen([sys.executable, "-c", HEADER + code], stdout=stdout, stderr=stderr, env=environment)
     errors = process.communicate(timeout=60.0)[1]
     return process.returncode, (errors or b"").decode()
 

@@ -42,9 +42,7 @@ def run_script(options: argparse.Namespace) -> None:
     """Run the script on its robots, and print where these are at its end."""
     if not Path(options.script).is_file():
         raise ProgramError("%s: no such script" % options.script)
-    swarm = StepSwarm(
-        options.count, options.seed, options.arena, options.wifi, options.perfect, model=options.model
-    )
+    swarm = StepSwarm(options.count, options.seed, options.arena, options.wifi, options.perfect, model=options.model)
     replace_ros(swarm)
     if options.seconds is not None:
         StepMotion(swarm._clock, end_at(options.seconds))

@@ -114,9 +114,7 @@ def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[
 
 
 @contextlib.contextmanager
-def simulate(
-    options: argparse.Namespace, report: Callable[[str], None]
-) -> Iterator[Tuple[Simulator, FaultInjector]]:
+def simulate(options: argparse.Namespace, report: Callable[[str], None]) -> Iterator[Tuple[Simulator, FaultInjector]]:
     """Hand out a simulator, which a signal ends, and its faults; close its connections afterwards.
 
     Raises: OptionError for an option that cannot be used.

@@ -126,9 +126,7 @@ class Simulator(LinkHandler):
             self._send_up(index, robot.outbox)
             robot.outbox.clear()
         if robot.crash_reason is not None:
-            self._report(
-                "%s crashed: the server sent %s; the robot restarts" % (robot.name, robot.crash_reason)
-            )
+            self._report("%s crashed: the server sent %s; the robot restarts" % (robot.name, robot.crash_reason))
             self.reboot(index)
         elif robot.wants_connection:
             self._connect(index)

@@ -64,9 +64,7 @@ class SimulatorTest(unittest.TestCase):
         """Return the driver's entry of a robot that is let in, None if there is none."""
         if cls.fleet.message is None:
             return None
-        found = [
-            robot for robot in cls.fleet.message.robots if robot.id == number and robot.state != Robot.REFUSED
-        ]
+        found = [robot for robot in cls.fleet.message.robots if robot.id == number and robot.state != Robot.REFUSED]
         return found[0] if found else None
 
     @classmethod

@@ -100,16 +100,11 @@ class DriverSide:
 
     def list_packets(self, index, topic_id, since_ms=0):
         return [
-            arrival
-            for arrival in self.arrivals[index]
-            if arrival.topic_id == topic_id and arrival.at_ms >= since_ms
+            arrival for arrival in self.arrivals[index] if arrival.topic_id == topic_id and arrival.at_ms >= since_ms
         ]
 
     def list_logs(self, index):
-        return [
-            (arrival.at_ms, payloads.decode_log(arrival.payload).text)
-            for arrival in self.list_packets(index, 7)
-        ]
+        return [(arrival.at_ms, payloads.decode_log(arrival.payload).text) for arrival in self.list_packets(index, 7)]
 
     def true_pose(self, index):
         return self.swarm.world.poses[index].tolist()

@@ -56,9 +56,7 @@ def test_the_origin_of_a_polygon_is_its_center_of_area():
     assert Polygon([(5.0, 5.0), (5.3, 5.0), (5.0, 5.6)]).corners_m[0] == pytest.approx((-0.1, -0.2))
 
 
-@pytest.mark.parametrize(
-    "corners", [[(0, 0), (1, 0)], [(0, 0), (0, 1), (1, 0)], [(0, 0), (2, 0), (1, 0.1), (1, 2)]]
-)
+@pytest.mark.parametrize("corners", [[(0, 0), (1, 0)], [(0, 0), (0, 1), (1, 0)], [(0, 0), (2, 0), (1, 0.1), (1, 2)]])
 def test_what_is_no_convex_polygon_is_refused(corners):
     with pytest.raises(ValueError, match="convex"):
         Polygon(corners)
@@ -181,14 +179,9 @@ def test_in_a_pile_nothing_overlaps_or_outruns_its_pushers(seed):
         assert max(moved_m) <= 2.0 * STEP_M, seed
         for k, body in enumerate(bodies):
             touching = touch_walls(body, walls, 0.0)
+            touching += [contact for other in bodies[:k] for contact in find_contacts(other, body, 0.0)]
             touching += [
-                contact for other in bodies[:k] for contact in find_contacts(other, body, 0.0)
-            ]
-            touching += [
-                contact
-                for p in places_m
-                for contact in [touch_circle(*p, BODY_RADIUS_M, body)]
-                if contact.depth_m > 0
+                contact for p in places_m for contact in [touch_circle(*p, BODY_RADIUS_M, body)] if contact.depth_m > 0
             ]
             worst_m = max([worst_m, *(contact.depth_m for contact in touching)])
     assert worst_m < 5e-4, seed

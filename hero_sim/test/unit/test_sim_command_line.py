@@ -111,9 +111,7 @@ class Peer:
 
     def logs(self):
         return [
-            payloads.decode_log(packet.payload).text
-            for packet in self.packets
-            if packet.topic_id == packets.ID_LOG
+            payloads.decode_log(packet.payload).text for packet in self.packets if packet.topic_id == packets.ID_LOG
         ]
 
     def last(self, topic_id):

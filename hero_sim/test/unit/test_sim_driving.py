@@ -9,9 +9,7 @@ from hero_node.geometry import Pose, find_frame
 from hero_sim.robot.imu_hat import ImuHat
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 
-both_controllers = pytest.mark.parametrize(
-    "controller", [VELOCITY, POSITION], ids=["velocity", "position"]
-)
+both_controllers = pytest.mark.parametrize("controller", [VELOCITY, POSITION], ids=["velocity", "position"])
 
 
 def test_tx_stop_leaves_log_lines_and_a_moving_robot_runs_away():
@@ -151,9 +149,7 @@ def test_a_command_that_is_not_finite_is_reported_and_changes_nothing():
     ]
 
 
-@pytest.mark.parametrize(
-    "controller, least, most", [(VELOCITY, 0.38, 0.70), (POSITION, 0.97, 1.03)]
-)
+@pytest.mark.parametrize("controller, least, most", [(VELOCITY, 0.38, 0.70), (POSITION, 0.97, 1.03)])
 def test_odometry_loses_distance_while_the_velocity_controller_drives(controller, least, most):
     driver = DriverSide("--perfect")
     driver.start_streaming()

@@ -33,11 +33,7 @@ def test_a_request_is_answered_by_a_time_request_and_all_declarations():
     driver.run(2500)
     driver.send(0, packets.ID_PUBLISHER)
     driver.run(102)
-    burst = [
-        arrival
-        for arrival in driver.arrivals[0]
-        if arrival.topic_id < 7 or arrival.topic_id == packets.ID_TIME
-    ]
+    burst = [arrival for arrival in driver.arrivals[0] if arrival.topic_id < 7 or arrival.topic_id == packets.ID_TIME]
     assert [arrival.topic_id for arrival in burst[:25]] == [10, 0, 2, 0, 0, 0, 0] + [2] * 6 + STOCK_SUBSCRIPTIONS
     assert len({arrival.at_ms for arrival in burst[:25]}) == 1
 
@@ -75,9 +71,7 @@ def test_rates_are_the_stock_robots():
     driver.run(20000)
     rates = {
         topic_id: (len(got) - 1) / (got[-1].at_ms - got[0].at_ms) * 1000.0
-        for topic_id, got in (
-            (topic, driver.list_packets(0, topic, since_ms)) for topic in (7, 10, 125, 128, 129, 130)
-        )
+        for topic_id, got in ((topic, driver.list_packets(0, topic, since_ms)) for topic in (7, 10, 125, 128, 129, 130))
     }
     assert rates[130] == pytest.approx(29.27, abs=0.05)
     assert rates[128] == pytest.approx(29.27, abs=0.05)

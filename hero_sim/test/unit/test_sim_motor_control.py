@@ -266,9 +266,7 @@ tunings = st.tuples(
 @settings(max_examples=15)
 @given(
     seed=st.integers(0, 1000),
-    sent=st.lists(
-        st.tuples(st.integers(0, 4), st.one_of(twists, pulses, gains, tunings)), min_size=5, max_size=20
-    ),
+    sent=st.lists(st.tuples(st.integers(0, 4), st.one_of(twists, pulses, gains, tunings)), min_size=5, max_size=20),
 )
 def test_no_commands_drive_robots_into_walls_or_keep_them_from_stopping(seed, sent):
     driver = DriverSide("--count", "5", "--arena", "obstacles", "--seed", str(seed))

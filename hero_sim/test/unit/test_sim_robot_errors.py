@@ -26,9 +26,7 @@ def test_perfect_robots_are_all_alike():
 
 def test_a_known_error_of_one_robot_leaves_the_others_as_drawn():
     drawn = build("--count", "3", "--first-id", "5")
-    known = build(
-        "--count", "3", "--first-id", "5", "--error", "robot=6,left_center_us=1533", "--error", "slip=0.01"
-    )
+    known = build("--count", "3", "--first-id", "5", "--error", "robot=6,left_center_us=1533", "--error", "slip=0.01")
     assert known.servo_center_us[1].tolist() == [1533, drawn.servo_center_us[1, 1]]
     assert (known.servo_center_us[[0, 2]] == drawn.servo_center_us[[0, 2]]).all()
     assert known.slip.tolist() == [[0.01]] * 3

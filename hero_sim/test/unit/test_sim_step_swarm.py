@@ -366,8 +366,7 @@ def test_robots_change_places_around_each_other_and_around_one_that_stays(tmp_pa
 def test_a_bump_shield_is_kept_from_walls_and_from_other_robots(tmp_path):
     arena = tmp_path / "arena.yaml"
     arena.write_text(
-        "walls_m: [[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]]\n"
-        "starts_m_deg: [[-0.3, 0, 0], [0.3, 0, 180]]\n"
+        "walls_m: [[[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]]\nstarts_m_deg: [[-0.3, 0, 0], [0.3, 0, 180]]\n"
     )
     with StepSwarm(2, seed=3, arena=str(arena), model="hero_plus") as swarm:
         radius_m, log = swarm.max_body_radius_m, swarm.log()

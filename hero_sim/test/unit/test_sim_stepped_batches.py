@@ -27,9 +27,7 @@ def wander(robots, seconds, rows=None):
 
 @pytest.mark.parametrize("profile", [None, "hotspot"])
 def test_two_runs_give_the_same_bytes(profile):
-    logs = [
-        wander(RobotRows(build_world(4, 3), build_radios(profile, 4) if profile else ()), 10) for _ in range(2)
-    ]
+    logs = [wander(RobotRows(build_world(4, 3), build_radios(profile, 4) if profile else ()), 10) for _ in range(2)]
     assert logs[0] == logs[1]
 
 

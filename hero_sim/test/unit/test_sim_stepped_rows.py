@@ -65,9 +65,7 @@ class ScalarRobot:
         self.flash = flash = Flash(calibration.tolist(), np.rint(errors.servo_center_us[index]).tolist())
         self.sensing = Sensing(name, body, False, flash, model)
         rng = np.random.RandomState(0)
-        self.motors = MotorControl(
-            name, body, self.sensing.odometry, flash, ServoPins(CORE_2), rng, lambda text: None
-        )
+        self.motors = MotorControl(name, body, self.sensing.odometry, flash, ServoPins(CORE_2), rng, lambda text: None)
         self.table = CommandTable(name, self.sensing, self.motors, flash, lambda text: None, pytest.fail, model)
         self.model = model
         self.shapers = {

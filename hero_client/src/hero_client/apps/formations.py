@@ -1,11 +1,11 @@
 """Formations: read from YAML, placed in a frame, and assigned to robots. Pure.
 
-    shape: circle           # or line, grid, points
-    center: [0.0, 0.0]      # m, of the whole
-    spacing_m: 0.25         # between neighbors
-    turn_deg: 0.0           # of the whole, counter-clockwise
-    columns: 4              # grid only; default: as square as it gets
-    points: [[0, 0], [0.3, 0]]   # points only: m, relative to center
+shape: circle           # or line, grid, points
+center: [0.0, 0.0]      # m, of the whole
+spacing_m: 0.25         # between neighbors
+turn_deg: 0.0           # of the whole, counter-clockwise
+columns: 4              # grid only; default: as square as it gets
+points: [[0, 0], [0.3, 0]]   # points only: m, relative to center
 """
 
 import math

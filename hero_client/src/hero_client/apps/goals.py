@@ -227,6 +227,4 @@ class GoalQueue(ABC):
             interruption = self._find_interruption(request.handle)
             reason = interruption or str(error)
         elapsed_s = self.robot.now_s - start_s
-        self.end_goal(
-            request, GoalOutcome(self.reached, bool(interruption), reason, distance_m, elapsed_s)
-        )
+        self.end_goal(request, GoalOutcome(self.reached, bool(interruption), reason, distance_m, elapsed_s))

@@ -105,9 +105,7 @@ def half_plane(
     return normal, -float(velocity @ normal)
 
 
-def nearest_allowed(
-    wanted: np.ndarray, normals: np.ndarray, bounds: np.ndarray, max_speed_m_s: float
-) -> np.ndarray:
+def nearest_allowed(wanted: np.ndarray, normals: np.ndarray, bounds: np.ndarray, max_speed_m_s: float) -> np.ndarray:
     """Return the velocity nearest to wanted with normals @ v >= bounds and no faster than max_speed_m_s.
 
     Where there is none, all half planes are relaxed by the same, least amount. normals (N, 2), bounds (N,).
@@ -147,12 +145,15 @@ def _best_corner(
     cross = normals[first, 0] * normals[second, 1] - normals[first, 1] * normals[second, 0]
     meeting = np.abs(cross) > 1e-6
     first, second, cross = first[meeting], second[meeting], cross[meeting]
-    corners = np.column_stack(
-        (
-            bounds[first] * normals[second, 1] - bounds[second] * normals[first, 1],
-            bounds[second] * normals[first, 0] - bounds[first] * normals[second, 0],
+    corners = (
+        np.column_stack(
+            (
+                bounds[first] * normals[second, 1] - bounds[second] * normals[first, 1],
+                bounds[second] * normals[first, 0] - bounds[first] * normals[second, 0],
+            )
         )
-    ) / cross[:, None]
+        / cross[:, None]
+    )
     points = np.vstack((np.array(candidates), feet, middles + arms, middles - arms, corners))
     allowed = np.all(points @ normals.T >= bounds - _TINY, axis=1)
     allowed &= np.hypot(points[:, 0], points[:, 1]) <= max_speed_m_s + _TINY

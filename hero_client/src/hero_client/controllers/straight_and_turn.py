@@ -24,9 +24,7 @@ MIN_ANGULAR_RAD_S = 0.2
 class ForwardController(MotionController):
     """Drives by a distance on the heading that the robot has at the first pose, backwards if it is negative."""
 
-    def __init__(
-        self, length_m: float, now_s: float, linear_m_s: float, timeout_s: float = DEFAULT_TIMEOUT_S
-    ) -> None:
+    def __init__(self, length_m: float, now_s: float, linear_m_s: float, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
         """linear_m_s: the speed, also positive when driving backwards."""
         super().__init__(now_s, timeout_s)
         self._length_m = length_m

@@ -75,10 +75,13 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToLaw = GO_TO, at_goal: bool = Fal
     sight_rad = math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m)
     goal_off_rad = wrap_angle(goal.yaw_rad - sight_rad)  # theta of the paper
     own_off_rad = wrap_angle(pose.yaw_rad - sight_rad)  # delta of the paper
-    curvature_1_m = -(
-        K2 * (own_off_rad - math.atan(-K1 * goal_off_rad))
-        + (1.0 + K1 / (1.0 + (K1 * goal_off_rad) ** 2)) * math.sin(own_off_rad)
-    ) / distance_m
+    curvature_1_m = (
+        -(
+            K2 * (own_off_rad - math.atan(-K1 * goal_off_rad))
+            + (1.0 + K1 / (1.0 + (K1 * goal_off_rad) ** 2)) * math.sin(own_off_rad)
+        )
+        / distance_m
+    )
     linear_m_s = law.max_linear_m_s / (1.0 + SLOWING_M2 * curvature_1_m**2)
     linear_m_s = min(linear_m_s, law.linear_gain * distance_m)
     angular_rad_s = curvature_1_m * linear_m_s
@@ -110,6 +113,4 @@ def follow(pose: Pose, leader: Pose, law: FollowLaw = FOLLOW) -> Velocity:
     distance_m = measure_distance(pose, leader)
     off_rad = wrap_angle(math.atan2(leader.y_m - pose.y_m, leader.x_m - pose.x_m) - pose.yaw_rad)
     linear_m_s = max(0.0, law.linear_gain * (distance_m - law.gap_m)) * max(0.0, math.cos(off_rad))
-    return Velocity(
-        min(law.max_linear_m_s, linear_m_s), clamp(law.turn_gain * off_rad, law.max_angular_rad_s)
-    )
+    return Velocity(min(law.max_linear_m_s, linear_m_s), clamp(law.turn_gain * off_rad, law.max_angular_rad_s))

@@ -52,9 +52,7 @@ def read_ranges(scan: Any) -> Sequence[float]:
     angles_are_finite = math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)
     if not angles_are_finite or len(scan.ranges) > MAX_RANGES:
         return ()
-    return [
-        range_m if math.isinf(range_m) or 0.0 <= range_m <= MAX_POSITION_M else math.nan for range_m in scan.ranges
-    ]
+    return [range_m if math.isinf(range_m) or 0.0 <= range_m <= MAX_POSITION_M else math.nan for range_m in scan.ranges]
 
 
 def front_first(scan: Any) -> List[float]:

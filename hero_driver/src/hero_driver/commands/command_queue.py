@@ -72,9 +72,7 @@ class CommandQueue:
         self._offered_s.clear()
         self._resume_s = -math.inf
 
-    def take(
-        self, in_flight_length: int, motion_acknowledged: bool, stops_only: bool, now_s: float
-    ) -> List[Command]:
+    def take(self, in_flight_length: int, motion_acknowledged: bool, stops_only: bool, now_s: float) -> List[Command]:
         """Return what may be sent now.
 
         in_flight_length: bytes that the robot has not acknowledged; motion_acknowledged: whether the last

@@ -30,9 +30,7 @@ class CommandSettings:
             " stopped; 0: never",
         )
     )
-    service_timeout_s: float = declare(
-        number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call")
-    )
+    service_timeout_s: float = declare(number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call"))
     command_max_age_s: float = declare(
         number(2.0, 0.1, 60.0, "s", "age at which a motion command that could not be sent is dropped; stops are kept")
     )

@@ -98,9 +98,7 @@ class Commanders:
         self._looked_s = math.inf
         self._silent_from_s = -math.inf  # until then none can have been silent for long enough
 
-    def note_command(
-        self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float
-    ) -> Commander:
+    def note_command(self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float) -> Commander:
         """A command came on the motion topic called name; return its commander. The others are its attributes."""
         self._forgive_pause(now_s)
         commander = self._by_topic.get(name)

@@ -50,9 +50,7 @@ class CorrectionSettings:
             " without the Encoder message that identifies them",
         )
     )
-    wheel_diameter_m: float = declare(
-        number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel, except HeRo+'s")
-    )
+    wheel_diameter_m: float = declare(number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel, except HeRo+'s"))
     wheel_separation_m: float = declare(
         number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels, except HeRo+'s")
     )

@@ -205,9 +205,7 @@ def read_transforms(payload: bytes) -> Optional[List[Transform]]:
         if end > len(payload):
             return None
         frames_start = position + _SEQ_AND_STAMP.size
-        transforms.append(
-            Transform(secs * NS_PER_S + nsecs, payload[frames_start:frames_end], payload[frames_end:end])
-        )
+        transforms.append(Transform(secs * NS_PER_S + nsecs, payload[frames_start:frames_end], payload[frames_end:end]))
         position = end
     return transforms if position == len(payload) else None
 

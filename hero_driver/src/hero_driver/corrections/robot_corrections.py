@@ -100,9 +100,7 @@ class RobotCorrections:
         self._encoder_md5 = ""
         self._declared: Set[str] = set()
         self.odometry = TickOdometry(settings.find_geometry(namespace, self.model))
-        self.transforms = TransformCorrector(
-            namespace, self.stamps, add_transform, self._take_odom_transform
-        )
+        self.transforms = TransformCorrector(namespace, self.stamps, add_transform, self._take_odom_transform)
         self._refused = 0
         self._problem = ""
         self._packed_pose = self._pack_pose()
@@ -311,9 +309,7 @@ class RobotCorrections:
 
     def _write_odometry(self, stamp_ns: int, payload: bytes) -> None:
         odometry = self.odometry
-        estimate = (
-            (self._packed_pose, odometry.linear_m_s, odometry.angular_rad_s) if self._uses_estimate else None
-        )
+        estimate = (self._packed_pose, odometry.linear_m_s, odometry.angular_rad_s) if self._uses_estimate else None
         written = self._writer.rewrite(payload, next(self._odom_seqs), stamp_ns, estimate)
         if written is None:
             self._refuse("odom", payload)

@@ -50,9 +50,7 @@ class TransformCorrector:
         self._add_transform = add_transform
         self._take_odom_transform = take_odom_transform
         self._frame_prefix = namespace.lstrip("/").encode() + b"/"
-        self._odom_frames = message_layouts.join_frames(
-            self._frame_prefix + b"odom", self._frame_prefix + b"base_link"
-        )
+        self._odom_frames = message_layouts.join_frames(self._frame_prefix + b"odom", self._frame_prefix + b"base_link")
         self._last_ns = stamps.last_ns
         self._passed_start = b""  # of the message whose stamp passed last
         self._passed_ns = self._passed_arrival_ns = 0

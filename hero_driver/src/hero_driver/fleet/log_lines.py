@@ -54,9 +54,7 @@ def read_log_line(text: str) -> LogLine:
     boot = uptime_s = None
     match = _BOOT.search(body)
     if match is not None:
-        boot = BootLine(
-            *(part[:32] for part in (match["firmware"], match["hardware"], match["config"] or ""))
-        )
+        boot = BootLine(*(part[:32] for part in (match["firmware"], match["hardware"], match["config"] or "")))
     else:
         match = _HEARTBEAT.match(body)
         if match is not None:

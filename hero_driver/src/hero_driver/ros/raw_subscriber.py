@@ -80,9 +80,7 @@ class RawSubscriber:
         self._name = name
         if self.moves:
             self._earlier = list_publishers(name, raw_class._type)
-        self._subscriber = rospy.Subscriber(
-            name, raw_class, self._take, queue_size=queue_length, tcp_nodelay=True
-        )
+        self._subscriber = rospy.Subscriber(name, raw_class, self._take, queue_size=queue_length, tcp_nodelay=True)
 
     def close(self) -> None:
         """Unsubscribe; asks the ROS master. What the loop still reads is dropped, and ends by itself."""

@@ -58,9 +58,7 @@ class RobotBridge:
     def __init__(self, identity: Identity, context: BridgeContext) -> None:
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
-        self.commands = RobotCommands(
-            identity.namespace, context.owner, context.loop, context.log, context.commands
-        )
+        self.commands = RobotCommands(identity.namespace, context.owner, context.loop, context.log, context.commands)
         self._loop = context.loop
         self._service_timeout_s = context.commands.service_timeout_s
         self._max_names = context.max_names

@@ -58,8 +58,7 @@ class _Cursor:
         start, end = self._position, self._position + length
         if end > len(self._data):
             raise PayloadError(
-                "%s: field %s needs %d bytes, %d are left"
-                % (self._what, field, length, len(self._data) - start)
+                "%s: field %s needs %d bytes, %d are left" % (self._what, field, length, len(self._data) - start)
             )
         self._position = end
         return self._data[start:end]

@@ -122,9 +122,7 @@ class SessionLimits:
     max_payload_length: int = declare(
         whole_number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
     )
-    silence_timeout_s: float = declare(
-        number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed")
-    )
+    silence_timeout_s: float = declare(number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed"))
 
 
 class Session:
@@ -233,9 +231,7 @@ class Session:
             )
         return encode_packet(topic_id, payload)
 
-    def _receive_special(
-        self, topic_id: int, payload: bytes, now_s: float, time_of_day_s: float
-    ) -> Optional[Event]:
+    def _receive_special(self, topic_id: int, payload: bytes, now_s: float, time_of_day_s: float) -> Optional[Event]:
         if topic_id in _KIND_BY_PACKET_ID:
             return self._declare(_KIND_BY_PACKET_ID[topic_id], payload)
         if topic_id == packets.ID_TIME:
@@ -287,9 +283,7 @@ class Session:
         if self.topics.get(info.topic_id) == topic:
             return None
         if info.topic_id not in self.topics and len(self.topics) >= self._limits.max_topics:
-            return Problem(
-                "topic %s refused: more than %d topics (max_topics)" % (info.name, self._limits.max_topics)
-            )
+            return Problem("topic %s refused: more than %d topics (max_topics)" % (info.name, self._limits.max_topics))
         if info.topic_id in self.topics:
             # A robot with other topics is one that was restarted, and that dials again.
             self._changes += 1

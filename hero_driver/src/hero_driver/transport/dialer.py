@@ -28,9 +28,7 @@ def start_dialer(address: Address, hand_over: HandOver, warn: Callable[[str], No
     threading.Thread(target=_dial_until_end, args=arguments, name="dialer", daemon=True).start()
 
 
-def _dial_until_end(
-    address: Address, hand_over: HandOver, warn: Callable[[str], None], ended: threading.Event
-) -> None:
+def _dial_until_end(address: Address, hand_over: HandOver, warn: Callable[[str], None], ended: threading.Event) -> None:
     backoff_s = BACKOFF_FIRST_S
     reported = ""
     while not ended.is_set():

@@ -248,9 +248,7 @@ class EventLoop(LinkOwner):
         except OSError as error:
             # The peer may be gone already.
             link.discard()
-            self._handler.warn_network(
-                "connection of %s broke at once: %s" % (address, describe_error(error))
-            )
+            self._handler.warn_network("connection of %s broke at once: %s" % (address, describe_error(error)))
             on_close()
             return
         self._links[sock.fileno()] = link

@@ -135,9 +135,7 @@ def test_arbitrary_bytes_are_read_or_refused_with_a_payload_error(decode, data):
         assert str(error)
 
 
-@given(
-    topic_id=st.integers(0, 65535), name=texts, message_type=texts, md5sum=texts, buffer_length=int32s
-)
+@given(topic_id=st.integers(0, 65535), name=texts, message_type=texts, md5sum=texts, buffer_length=int32s)
 def test_any_declaration_is_read_back(topic_id, name, message_type, md5sum, buffer_length):
     info = TopicInfo(topic_id, name, message_type, md5sum, buffer_length)
     assert decode_topic_info(encode_topic_info(info)) == info

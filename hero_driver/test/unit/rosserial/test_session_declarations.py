@@ -150,9 +150,7 @@ BAD_DECLARATIONS = {
 def test_a_bad_declaration_is_a_problem_in_one_line_while_the_others_work(name):
     declaration, words = BAD_DECLARATIONS[name]
     session = open_session()
-    events = receive(
-        session, build_declaration(*ODOM) + declaration + build_declaration(*CMD_VEL) + ODOM_MESSAGE
-    )
+    events = receive(session, build_declaration(*ODOM) + declaration + build_declaration(*CMD_VEL) + ODOM_MESSAGE)
     assert [type(event) for event in events] == [Topic, Problem, Topic, MessagesReceived]
     assert words in events[1].text
     assert "refused" in events[1].text
@@ -226,9 +224,7 @@ def test_a_robot_that_claims_a_huge_buffer_does_not_break_the_packets():
 
 
 @given(
-    declared=st.dictionaries(
-        st.integers(0, 300), st.tuples(st.integers(0, 5), st.integers(-10, 60)), max_size=8
-    ),
+    declared=st.dictionaries(st.integers(0, 300), st.tuples(st.integers(0, 5), st.integers(-10, 60)), max_size=8),
     topic_id=st.integers(-5, 400),
     length=st.integers(0, 80),
 )
@@ -251,9 +247,7 @@ def test_only_declared_ids_of_the_right_direction_and_length_ever_leave(declared
     message_type=st.text(max_size=40),
     md5sum=st.text(max_size=40),
 )
-def test_arbitrary_declarations_are_taken_or_refused_in_one_line(
-    frame_id, topic_id, name, message_type, md5sum
-):
+def test_arbitrary_declarations_are_taken_or_refused_in_one_line(frame_id, topic_id, name, message_type, md5sum):
     session = open_session()
     texts = [text.encode("utf-8", "replace").decode() for text in (name, message_type, md5sum)]
     (event,) = receive(session, build_declaration(frame_id, topic_id, *texts))

@@ -75,8 +75,13 @@ VECTORS = [
         + b"94810edda583a504dfda3829e70d7eec"
         + bytes.fromhex("00100000 67"),
         0,
-        bytes.fromhex("8100 03000000") + b"/tf" + bytes.fromhex("0c000000") + b"tf/tfMessage"
-        + bytes.fromhex("20000000") + b"94810edda583a504dfda3829e70d7eec" + bytes.fromhex("00100000"),
+        bytes.fromhex("8100 03000000")
+        + b"/tf"
+        + bytes.fromhex("0c000000")
+        + b"tf/tfMessage"
+        + bytes.fromhex("20000000")
+        + b"94810edda583a504dfda3829e70d7eec"
+        + bytes.fromhex("00100000"),
     ),
     Vector(
         "log line",
@@ -84,11 +89,19 @@ VECTORS = [
         7,
         bytes.fromhex("01 0f000000") + b"Reseting PID...",
     ),
-    Vector("727 bytes of zeros, as long as odometry", bytes.fromhex("ff fe d7 02 26 82 00") + bytes(727) + b"\x7d",
-           130, bytes(727)),
+    Vector(
+        "727 bytes of zeros, as long as odometry",
+        bytes.fromhex("ff fe d7 02 26 82 00") + bytes(727) + b"\x7d",
+        130,
+        bytes(727),
+    ),
     Vector("300 times ff", bytes.fromhex("ff fe 2c 01 d2 82 00") + b"\xff" * 300 + b"\xa9", 130, b"\xff" * 300),
-    Vector("starts of packets inside", bytes.fromhex("ff fe 06 00 f9 80 00 fffe fffe fffe 88"), 128,
-           bytes.fromhex("fffefffefffe")),
+    Vector(
+        "starts of packets inside",
+        bytes.fromhex("ff fe 06 00 f9 80 00 fffe fffe fffe 88"),
+        128,
+        bytes.fromhex("fffefffefffe"),
+    ),
     Vector("length checksum of 00", bytes.fromhex("ff fe ff 00 00 80 00") + bytes(255) + b"\x7f", 128, bytes(255)),
     Vector("id above 255", bytes.fromhex("ff fe 01 00 fe 02 01 07 f5"), 258, b"\x07"),
 ]

@@ -1,6 +1,6 @@
 """Reads the private parameters of a node.
 
-    parameters = read_parameters({"robots": robot_ids("0"), "linear_m_s": number(0.1, 0.0, 0.2, "m/s")})
+parameters = read_parameters({"robots": robot_ids("0"), "linear_m_s": number(0.1, 0.0, 0.2, "m/s")})
 """
 
 import sys

@@ -63,9 +63,13 @@ class Flash:
         for key, length in _LENGTHS.items():
             values = content.get(key) if isinstance(content, dict) else None
             may_be_erased = key == "ir_calibration_counts_m2"  # then it is NaN
-            if not isinstance(values, list) or len(values) != length or not all(
-                is_number(value, -MAX_PARAMETER, MAX_PARAMETER) or (may_be_erased and value != value)
-                for value in values
+            if (
+                not isinstance(values, list)
+                or len(values) != length
+                or not all(
+                    is_number(value, -MAX_PARAMETER, MAX_PARAMETER) or (may_be_erased and value != value)
+                    for value in values
+                )
             ):
                 raise OptionError("flash file %s: %s must be a list of %d numbers; %s" % (path, key, length, _REMEDY))
             setattr(self, key, [float(value) for value in values])

@@ -116,8 +116,7 @@ class Controller:
         self._timeout_ms = timeout_ms
         # A proportional gain that is not above zero is one of an erased flash.
         self.pids = [
-            MotorPid(Gains(*gains) if gains[0] > 0.0 else default, limit_us)
-            for gains in (stored[:3], stored[3:])
+            MotorPid(Gains(*gains) if gains[0] > 0.0 else default, limit_us) for gains in (stored[:3], stored[3:])
         ]
         self.targets = [0.0, 0.0]
         self.tuning = False
@@ -208,12 +207,8 @@ class MotorControl:
         self._rng = rng
         self._log = log
         self.motors = motors = MotorDriver(body, flash.motor_centers_us, pins)
-        self.velocity = Controller(
-            motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS
-        )
-        self.position = Controller(
-            motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_WATCHDOG_MS
-        )
+        self.velocity = Controller(motors, VELOCITY_GAINS, flash.velocity_pid, VELOCITY_LIMIT_US, VELOCITY_WATCHDOG_MS)
+        self.position = Controller(motors, POSITION_GAINS, flash.position_pid, POSITION_LIMIT_US, POSITION_WATCHDOG_MS)
         self._start_ticks = [0, 0]
         self._tuning_start_ticks = [0, 0]
         self._relay = [1, 1]
@@ -284,9 +279,7 @@ class MotorControl:
                 self._relay[wheel] = -self._relay[wheel]
         self._tune(self.position, now_ms, moved_ticks, [_POSITION_TUNING_STEP_US * relay for relay in self._relay])
 
-    def _tune(
-        self, controller: Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]
-    ) -> None:
+    def _tune(self, controller: Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]) -> None:
         if controller.continue_tuning(now_ms):
             for side in ("Left", "Right"):
                 self._log("\x1b[92m %s Motor Tuning Failure! Using default values.\x1b[0m" % side)

@@ -53,9 +53,7 @@ class Sensing:
         odometry: the robot's own view of its wheels.
     """
 
-    def __init__(
-        self, name: str, body: Body, has_imu_hat: bool, flash: Flash, model: RobotModel = HERO
-    ) -> None:
+    def __init__(self, name: str, body: Body, has_imu_hat: bool, flash: Flash, model: RobotModel = HERO) -> None:
         """Build the sensors of the robot called name (hero_N)."""
         self.distance_due_ms = 0 if model.is_plus else NEVER_MS
         self._name = name

@@ -1,12 +1,12 @@
 """Simulated robots in process: the robots of hero_sim and the interface of hero_client's Swarm, in virtual time. Pure.
 
-    from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.stepped.swarm import StepSwarm
 
-    with StepSwarm(count=4, seed=1) as swarm:
-        for time_s in swarm.rate(10):
-            swarm[3].drive(0.1, 0.5)
-            if time_s > 5.0:
-                break
+with StepSwarm(count=4, seed=1) as swarm:
+    for time_s in swarm.rate(10):
+        swarm[3].drive(0.1, 0.5)
+        if time_s > 5.0:
+            break
 """
 
 import argparse

@@ -143,9 +143,7 @@ def _lies_inside(points_m: np.ndarray, corners_m: np.ndarray) -> np.ndarray:
     return (straddles & (points_m[:, 0, None] < cross_x_m)).sum(axis=1) % 2 == 1
 
 
-def place_robots(
-    arena: Arena, robots: int, rng: np.random.RandomState, radius_m: float = BODY_RADIUS_M
-) -> np.ndarray:
+def place_robots(arena: Arena, robots: int, rng: np.random.RandomState, radius_m: float = BODY_RADIUS_M) -> np.ndarray:
     """Return start poses, shape (robots, 3): the arena's own first, then free places drawn from rng.
 
     radius_m: of the largest robot. Raises: OptionError if no free place is left.
@@ -156,9 +154,7 @@ def place_robots(
     return np.array(poses, dtype=float)
 
 
-def _draw_place(
-    arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int, radius_m: float
-) -> Pose:
+def _draw_place(arena: Arena, poses: List[Pose], rng: np.random.RandomState, robots: int, radius_m: float) -> Pose:
     x_min, y_min, x_max, y_max = arena.bounds_m.tolist()
     for _ in range(_MAX_TRIES):
         # Not rng.uniform(): whether it rounds once or twice depends on how numpy was compiled.

@@ -53,9 +53,7 @@ def find_heading(theta_rad: Number) -> Tuple[np.ndarray, np.ndarray]:
     return sign * np.where(swapped, -sine, cosine), sign * np.where(swapped, cosine, sine)
 
 
-def follow_arcs(
-    heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray
-) -> Tuple[np.ndarray, np.ndarray]:
+def follow_arcs(heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return the displacements (K, 2, R), x and y in m, along K consecutive arcs, and the heading (2, R) after them.
 
     heading: cosine and sine (2, R) before them. It stays of length 1 whatever the number of arcs.

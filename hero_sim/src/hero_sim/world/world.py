@@ -69,7 +69,11 @@ class View(NamedTuple):
 
 
 def drive_servos(
-    pulses_us: Any, centers_us: Any, dead_zones_us: Any, gains_m_s_us: Any, least: Any = np.minimum,
+    pulses_us: Any,
+    centers_us: Any,
+    dead_zones_us: Any,
+    gains_m_s_us: Any,
+    least: Any = np.minimum,
     most: Any = np.maximum,
 ) -> Any:
     """Return the wheel speeds (m/s) that pulses stand for: arrays, or with Python's min and max single numbers."""

@@ -66,9 +66,7 @@ class CalibrateTest(unittest.TestCase):
         """Robot 42 is waited for 10 s: meanwhile the other tests run."""
         folder = tempfile.mkdtemp(dir=cls.folder)
         for robot_id in (2, 42):
-            keep(
-                folder, robot_id, motor_centers_us=CENTERS_US, velocity_gains=GAINS, infrared_counts_m2=COUNTS_M2
-            )
+            keep(folder, robot_id, motor_centers_us=CENTERS_US, velocity_gains=GAINS, infrared_counts_m2=COUNTS_M2)
         cls.restoring = Program(CALIBRATE, "restore", "--folder", folder)
 
     @classmethod

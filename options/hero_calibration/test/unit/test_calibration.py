@@ -105,9 +105,7 @@ class TestDeadZone:
     @pytest.mark.parametrize("center_us", [1440.0, 1478.5, 1500.0, 1533.0, 1560.0])
     def test_the_center_is_found_to_3_us_for_both_mountings_of_the_servo(self, center_us, sign):
         pulses_us = dead_zone.list_pulses()
-        zone = dead_zone.find_dead_zone(
-            pulses_us, servo_speeds(pulses_us, center_us, sign=sign, noise_m_s=0.001)
-        )
+        zone = dead_zone.find_dead_zone(pulses_us, servo_speeds(pulses_us, center_us, sign=sign, noise_m_s=0.001))
         assert zone.center_us == pytest.approx(center_us, abs=3.0)
         assert zone.high_us - zone.low_us == pytest.approx(60.0, abs=6.0)
 

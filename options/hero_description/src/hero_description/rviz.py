@@ -45,9 +45,7 @@ def main() -> None:
         )
         if parameters["hero_plus"]:
             rospy.set_param(PLUS_DESCRIPTION, make_hero_plus(str(rospy.get_param("robot_description"))))
-    names, plus_names = (
-        ["hero_%d" % robot_id for robot_id in parameters[name]] for name in ("robots", "hero_plus")
-    )
+    names, plus_names = (["hero_%d" % robot_id for robot_id in parameters[name]] for name in ("robots", "hero_plus"))
     with tempfile.NamedTemporaryFile("w", prefix="hero_", suffix=".rviz", delete=False) as file:
         settings = str(parameters["fixed_frame"]), parameters["view"], parameters["picture"]
         file.write(make_config(names, *settings, hero_plus=plus_names))

@@ -19,9 +19,7 @@ def robot():
     return ElementTree.parse(str(URDF)).getroot()
 
 
-@pytest.mark.skipif(
-    shutil.which("check_urdf") is None, reason="check_urdf (liburdfdom-tools) is not installed"
-)
+@pytest.mark.skipif(shutil.which("check_urdf") is None, reason="check_urdf (liburdfdom-tools) is not installed")
 def test_check_urdf_reads_it():
     subprocess.run(["check_urdf", str(URDF)], check=True, stdout=subprocess.DEVNULL)
 

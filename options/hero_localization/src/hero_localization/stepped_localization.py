@@ -1,8 +1,8 @@
 """Localization of robots that are stepped in process: the filter of localize on a model of a camera. Pure.
 
-    with StepSwarm(count=10, seed=1) as swarm:
-        StepLocalization(swarm)
-        swarm[3].go_to(0.2, 0.1, frame="map")
+with StepSwarm(count=10, seed=1) as swarm:
+    StepLocalization(swarm)
+    swarm[3].go_to(0.2, 0.1, frame="map")
 """
 
 from collections import deque

@@ -109,9 +109,7 @@ def test_prints_have_their_size_where_the_camera_brightens_or_darkens(cell_px, g
 
 @pytest.mark.parametrize("count", [4, 6])
 def test_camera_is_found_from_reference_tags(count):
-    found = calibrate_arena(
-        LENS, see_all(ids=tuple(PLACES)[:count]), {k: REFERENCES[k] for k in tuple(PLACES)[:count]}
-    )
+    found = calibrate_arena(LENS, see_all(ids=tuple(PLACES)[:count]), {k: REFERENCES[k] for k in tuple(PLACES)[:count]})
     assert found.problems == [] and found.left_out == []
     assert set(found.residuals_m) == set(tuple(PLACES)[:count])
     assert found.rms_m < 0.0005
@@ -135,11 +133,7 @@ def test_misplaced_tag_is_named_and_left_out():
     found = calibrate_arena(LENS, see_all({102: (0.03, -0.01)}), REFERENCES)
     assert found.left_out == [102]
     assert found.residuals_m[102] == pytest.approx(math.hypot(0.03, 0.01), abs=0.003)
-    assert (
-        len(found.problems) == 1
-        and "tag 102" in found.problems[0]
-        and "mm from its place" in found.problems[0]
-    )
+    assert len(found.problems) == 1 and "tag 102" in found.problems[0] and "mm from its place" in found.problems[0]
     assert place_error_m(found.camera) < 0.002
 
 
@@ -172,18 +166,13 @@ def test_a_wrong_place_of_five_is_named_alone_or_among_others(seed):
 
 @pytest.mark.parametrize("scale", [0.98, 0.992, 1.009, 1.02])
 def test_places_by_a_tape_that_is_wrong_are_refused_by_the_tags_size(scale):
-    wrong = {
-        tag_id: Pose(scale * pose.x_m, scale * pose.y_m, 0.0)
-        for tag_id, pose in REFERENCES.items()
-    }
+    wrong = {tag_id: Pose(scale * pose.x_m, scale * pose.y_m, 0.0) for tag_id, pose in REFERENCES.items()}
     with pytest.raises(CalibrationError, match=r"measure %.1f %% of their size.*reference_size_m" % (100.0 * scale)):
         calibrate_arena(LENS, see_all(), wrong)
 
 
 def test_places_in_millimeters_are_refused_as_such():
-    wrong = {
-        tag_id: Pose(1e3 * pose.x_m, 1e3 * pose.y_m, 0.0) for tag_id, pose in REFERENCES.items()
-    }
+    wrong = {tag_id: Pose(1e3 * pose.x_m, 1e3 * pose.y_m, 0.0) for tag_id, pose in REFERENCES.items()}
     with pytest.raises(CalibrationError, match="lie 2400 m apart: write their places in m, not in mm"):
         calibrate_arena(LENS, see_all(), wrong)
 
@@ -191,9 +180,7 @@ def test_places_in_millimeters_are_refused_as_such():
 @pytest.mark.parametrize("count", [4, 6])
 def test_y_the_wrong_way_is_named(count):
     ids = tuple(PLACES)[:count]
-    wrong = {
-        tag_id: Pose(PLACES[tag_id][0], -PLACES[tag_id][1], 0.0) for tag_id in ids
-    }
+    wrong = {tag_id: Pose(PLACES[tag_id][0], -PLACES[tag_id][1], 0.0) for tag_id in ids}
     with pytest.raises(CalibrationError, match="y the wrong way"):
         calibrate_arena(LENS, see_all(ids=ids), wrong)
 
@@ -333,9 +320,7 @@ def test_tags_may_measure_seven_thousandths_more_or_less(share, is_right):
 def test_a_camera_hangs_between_20_cm_and_20_m(height_m):
     camera = hang(tilt_rad=(0.05, -0.03, 0.1), position_m=(0.04, -0.02, height_m))
     size = height_m / 2.2
-    known = {
-        tag_id: Pose(size * x_m, size * y_m, 0.0) for tag_id, (x_m, y_m) in PLACES.items()
-    }
+    known = {tag_id: Pose(size * x_m, size * y_m, 0.0) for tag_id, (x_m, y_m) in PLACES.items()}
     seen = [see(tag_id, pose, 0.1 * size, camera) for tag_id, pose in known.items()]
     if height_m < 1.0:  # closer than tags may lie
         assert (_Image(LENS, seen, known, 0.1 * size).fit() is not None) == (height_m > 0.2)

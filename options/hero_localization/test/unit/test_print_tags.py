@@ -34,9 +34,7 @@ def scan(figure):
 
 def list_pages(*arguments, cells=8):
     options = print_tags.parse_options(arguments)
-    return list(
-        print_tags.split_pages(print_tags.list_sheets(options, cells), print_tags.PAPERS_MM[options.paper])
-    )
+    return list(print_tags.split_pages(print_tags.list_sheets(options, cells), print_tags.PAPERS_MM[options.paper]))
 
 
 @pytest.mark.slow

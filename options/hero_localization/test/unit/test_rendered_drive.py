@@ -111,6 +111,7 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
     cameras = [TrackedCamera(scene, 0.0, 100), TrackedCamera(scene, FIELD_M + gap_m, 110)]
     localizer, lines, seen_by = SwarmLocalizer(), [], []
     localizer.add_robots([0])
+
     def follow(stamp_s, pose):
         lines.extend(localizer.add_odometry(0, stamp_s, pose, stamp_s))
 

@@ -47,9 +47,7 @@ def drive(parts=FULL, mount=MOUNT, delay_s=0.08, seed=0, noise_m=0.0007, noise_r
                 Pose(tag.x_m + noise[0], tag.y_m + noise[1], wrap_angle(tag.yaw_rad + noise[2])),
             )
         )
-    odometry = [
-        (now_s, counted._replace(yaw_rad=wrap_angle(counted.yaw_rad))) for now_s, _, counted in ways[::4]
-    ]
+    odometry = [(now_s, counted._replace(yaw_rad=wrap_angle(counted.yaw_rad))) for now_s, _, counted in ways[::4]]
     return seen, odometry
 
 

@@ -122,8 +122,10 @@ def test_yaml_of_any_form_keeps_its_values(path, text):
         (LENS_TEXT.replace("[9, 0", "[%s, 0" % (400 * "9")), "lens is .*: calibrate the lens"),
         (LENS_TEXT.replace("10", 400 * "9", 1), "lens: images must have 1 to 20000 pixels .*: calibrate the lens"),
         (LENS_TEXT.replace("10", "-1920", 1), "lens: images must have 1 to 20000 pixels .* not -1920 x 10"),
-        (LENS_TEXT + "camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], position_m: [%s, 0, 0]}" % (400 * "9"),
-         "camera is .*: calibrate the arena"),
+        (
+            LENS_TEXT + "camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], position_m: [%s, 0, 0]}" % (400 * "9"),
+            "camera is .*: calibrate the arena",
+        ),
         ("references: {5: [0, 0, 0]}\nobjects: {5: box}", "tag 5 is named in references and in objects, but has one"),
         ("tag_robots: {5: 3}\nobjects: {5: box}", "tag 5 is named in objects and in tag_robots"),
         ("tag_robots: {7: 3, 5: 4}\nreferences: {5: [0, 0, 0]}", "tag 5 is named in references and in tag_robots"),

@@ -100,8 +100,7 @@ def test_picture_shows_every_cell_of_robots_tags_at_their_places():
 def test_tags_height_moves_it_away_from_the_axis_of_the_camera():
     view = SMALL._replace(tilt_rad=(0.0, 0.0, 0.0), position_m=(0.0, 0.0, 2.2), distortion=(0.0,) * 5).geometry
     high, low = (
-        view.project(tag_corners(TAG._replace(height_m=z), np.array([(1.0, 0.0, 0.0)])))[0]
-        for z in (0.076, 0)
+        view.project(tag_corners(TAG._replace(height_m=z), np.array([(1.0, 0.0, 0.0)])))[0] for z in (0.076, 0)
     )
     shift = (high - low).mean(axis=0)
     assert shift[0] == pytest.approx(463.0 * (1.0 / (2.2 - 0.076) - 1.0 / 2.2), abs=0.01)
@@ -144,8 +143,7 @@ def test_moving_robot_smears_along_its_motion_only():
         for speed in (0.0, 0.2)
     )
     steepest = [
-        [np.abs(np.diff(picture.astype(int), axis=axis)).max() for axis in (0, 1)]
-        for picture in (still, smeared)
+        [np.abs(np.diff(picture.astype(int), axis=axis)).max() for axis in (0, 1)] for picture in (still, smeared)
     ]
     (still_down, still_across), (smeared_down, smeared_across) = steepest
     assert smeared_across < 0.8 * still_across

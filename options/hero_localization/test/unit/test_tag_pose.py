@@ -32,8 +32,7 @@ def see(tag_id, pose, size_m=0.04, height_m=0.076, noise_px=None):
     """Return the corners of a tag whose print points along its pose's yaw."""
     half = size_m / 2.0
     corners = [
-        transform_pose(pose, Pose(x, y, 0.0))
-        for x, y in ((half, half), (half, -half), (-half, -half), (-half, half))
+        transform_pose(pose, Pose(x, y, 0.0)) for x, y in ((half, half), (half, -half), (-half, -half), (-half, half))
     ]
     pixels = CAMERA.project(np.array([(corner.x_m, corner.y_m, height_m) for corner in corners]))
     return TagCorners(tag_id, pixels if noise_px is None else pixels + noise_px)
@@ -72,9 +71,7 @@ def test_covariance_holds_what_noise_of_the_corners_does():
 
 def test_tag_off_the_robots_center_makes_its_place_depend_on_the_heading():
     near, far = (
-        locate(CAMERA, [see(1, Pose(0.0, 0.0, 0.0))], TagLayout(mounts={1: Pose(x_m, 0.0, 0.0)}))
-        .robots[1]
-        .covariance
+        locate(CAMERA, [see(1, Pose(0.0, 0.0, 0.0))], TagLayout(mounts={1: Pose(x_m, 0.0, 0.0)})).robots[1].covariance
         for x_m in (0.0, 0.1)
     )
     assert far[1, 1] - near[1, 1] == pytest.approx(0.1**2 * near[2, 2])
@@ -154,9 +151,7 @@ def drive(parts, heading_error_rad=0.0, speed=1.0):
             step = Pose(distance_m / 20.0, 0.0, turn_rad / 20.0)
             true, odometry = transform_pose(true, step), transform_pose(odometry, step)
             noise = random.normal(0.0, 0.0005, 2)
-            seen.append(
-                Pose(true.x_m + noise[0], true.y_m + noise[1], wrap_angle(true.yaw_rad + heading_error_rad))
-            )
+            seen.append(Pose(true.x_m + noise[0], true.y_m + noise[1], wrap_angle(true.yaw_rad + heading_error_rad)))
             counted.append(odometry)
     return seen, counted
 

@@ -17,9 +17,7 @@ CAMERA = Camera(
     np.array((0.0, 0.0, 2.2)),
 )
 REFERENCES = {100 + index: Pose(0.3 * index, 0.4, 0.0) for index in range(3)}
-LAYOUT = TagLayout(
-    tag_robots={5: 1}, mounts={5: Pose(0.01, 0.0, 0.0)}, objects={9: "box"}, references=REFERENCES
-)
+LAYOUT = TagLayout(tag_robots={5: 1}, mounts={5: Pose(0.01, 0.0, 0.0)}, objects={9: "box"}, references=REFERENCES)
 SQUARE = 0.5 * np.array(((-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)))
 
 

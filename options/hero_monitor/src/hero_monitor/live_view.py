@@ -118,4 +118,3 @@ class LiveView(ExitStack):
 
     def _take(self) -> List[TopicMessage]:
         return [self._waiting.popleft() for _ in range(len(self._waiting))]
-

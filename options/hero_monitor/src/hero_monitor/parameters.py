@@ -66,9 +66,7 @@ def read_token(host: str, file: str) -> Optional[str]:
     if not file:
         if is_loopback(host):
             return None
-        raise ProgramError(
-            "~host is %s, which other machines can reach: that needs a token; %s" % (host, TOKEN_REMEDY)
-        )
+        raise ProgramError("~host is %s, which other machines can reach: that needs a token; %s" % (host, TOKEN_REMEDY))
     path = os.path.expanduser(file)
     try:
         with open(path, encoding="utf-8") as opened:
@@ -79,7 +77,5 @@ def read_token(host: str, file: str) -> Optional[str]:
     if stat.S_ISREG(mode) and mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise ProgramError("~token_file %s can be read by others: chmod 600 %s" % (path, path))
     if len(token) < TOKEN_LENGTH_MIN:
-        raise ProgramError(
-            "~token_file %s holds less than %d characters: %s" % (path, TOKEN_LENGTH_MIN, TOKEN_REMEDY)
-        )
+        raise ProgramError("~token_file %s holds less than %d characters: %s" % (path, TOKEN_LENGTH_MIN, TOKEN_REMEDY))
     return token

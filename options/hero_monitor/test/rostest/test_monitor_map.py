@@ -59,9 +59,7 @@ for (let row = 0; row < height; row += step) for (let column = 0; column < width
 return [(count * step * step) / (width * height), x / (count || 1) / width, y / (count || 1) / height];
 """
 
-COUNT_FETCHES = (
-    "return performance.getEntriesByType('resource').filter((one) => one.name.includes('/picture/')).length"
-)
+COUNT_FETCHES = "return performance.getEntriesByType('resource').filter((one) => one.name.includes('/picture/')).length"
 
 
 def make_jpeg():

@@ -293,9 +293,7 @@ def test_an_occupancy_grid_becomes_runs_of_unknown_free_and_occupied_cells():
     assert grid == {"pose": [-500, 0, 0], "cell": 50.0, "columns": 4, "rows": 2, "runs": [0, 3, 1, 2, 2, 2, 0, 1]}
 
 
-@pytest.mark.parametrize(
-    "change", [{"frame": "odom"}, {"columns": 3}, {"data": []}, {"data": [0] * (MAX_CELLS + 4)}]
-)
+@pytest.mark.parametrize("change", [{"frame": "odom"}, {"columns": 3}, {"data": []}, {"data": [0] * (MAX_CELLS + 4)}])
 def test_an_occupancy_grid_without_a_place_or_of_another_size_is_not_drawn(change):
     assert encode_grid(make_grid(**{"data": [0] * 4, "columns": 4, **change}), "map") is None
 

@@ -216,9 +216,7 @@ def _make_option(name: str, value: object) -> List[str]:
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(
-        prog="record", description="Record all robots into bags.", allow_abbrev=False
-    )
+    parser = argparse.ArgumentParser(prog="record", description="Record all robots into bags.", allow_abbrev=False)
     parser.add_argument("--folder", default=".", help="folder of the bags (here); created if missing")
     parser.add_argument("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")

@@ -78,9 +78,7 @@ def make_origins(robot_ids):
 
 
 def make_fleet(robot_ids, state):
-    return RobotArray(
-        robots=[Robot(id=number, namespace="/hero_%d" % number, state=state) for number in robot_ids]
-    )
+    return RobotArray(robots=[Robot(id=number, namespace="/hero_%d" % number, state=state) for number in robot_ids])
 
 
 def write_bag(path, robot_ids=(0,), seconds=5.0, start_s=START_S, pause=None, compression="none"):
@@ -98,9 +96,7 @@ def write_bag(path, robot_ids=(0,), seconds=5.0, start_s=START_S, pause=None, co
             time_s = step * PERIOD_S
             away = pause is not None and pause[0] <= time_s < pause[1]
             if step % 15 == 0:
-                write(
-                    "/hero_driver/robots", make_fleet(robot_ids, Robot.AWAY if away else Robot.READY), time_s
-                )
+                write("/hero_driver/robots", make_fleet(robot_ids, Robot.AWAY if away else Robot.READY), time_s)
             if away:
                 continue
             driven_s = max(0.0, time_s - START_DELAY_S - MOTION_DELAY_S)

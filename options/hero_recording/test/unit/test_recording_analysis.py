@@ -48,11 +48,7 @@ def test_robots_that_join_later_are_recorded_and_other_topics_are_not():
         return any(re.fullmatch(pattern, topic) for pattern in patterns)
 
     for topic in (
-        *(
-            "/hero_%d/%s" % (number, name)
-            for number in (0, 7, 123)
-            for name in ("odom", "proximity", "imu", "led")
-        ),
+        *("/hero_%d/%s" % (number, name) for number in (0, 7, 123) for name in ("odom", "proximity", "imu", "led")),
         "/hero_4/velocity_controller/cmd_vel",
         "/hero_4/cmd_vel",
         "/hero_4/ground_truth",
@@ -248,9 +244,7 @@ def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_
     }
     for name, figure in figures.items():
         figure.savefig(str(tmp_path / (name + ".png")), dpi=30)
-        labels = [
-            text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title())
-        ]
+        labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title())]
         assert any("(m" in label or "(s)" in label for label in labels), name
         assert "fleet.bag" in "".join(text.get_text() for text in figure.texts)
     for name in ("delays", "connections"):

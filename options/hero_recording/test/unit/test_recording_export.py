@@ -35,9 +35,7 @@ def test_each_robot_has_a_folder_with_a_table_for_each_kind(bag, tmp_path, capsy
     output = run_export(capsys, bag, "--out", tmp_path / "out")
     kinds = {"odometry", "ground_truth", "encoder", "proximity", "velocity_command", "status"}
     for name in ("hero_0", "hero_3"):
-        assert {path.name for path in (tmp_path / "out" / name).iterdir()} == {
-            kind + ".csv" for kind in kinds
-        }
+        assert {path.name for path in (tmp_path / "out" / name).iterdir()} == {kind + ".csv" for kind in kinds}
     assert "2 robots, 12 tables" in output
     assert not (tmp_path / "out.part").exists()
 

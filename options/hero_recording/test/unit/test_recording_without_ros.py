@@ -56,4 +56,3 @@ def test_stepped_robots_record_what_ros_reads(tmp_path):
         assert bag.get_message_count(["/tf_static"]) == bag.get_message_count(["/hero_sim/arena"]) == 1
     assert odometry[-1].header.stamp.to_sec() == pytest.approx(1600000002.0, abs=0.04)
     assert odometry[-1].pose.pose.position.x > 0.1
-

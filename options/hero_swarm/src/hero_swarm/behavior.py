@@ -161,9 +161,7 @@ class Behavior:
         return None
 
 
-def sense(
-    behavior: Behavior, time_s: float, poses: np.ndarray, random: Random, things: Things = NO_OBJECTS
-) -> Sensed:
+def sense(behavior: Behavior, time_s: float, poses: np.ndarray, random: Random, things: Things = NO_OBJECTS) -> Sensed:
     """Return what the sensors of a behavior tell about things and poses (W, N, 3), NaN for unknown ones."""
     readings: Dict[str, Any] = {}
     for name, sensor in behavior.sensors().items():

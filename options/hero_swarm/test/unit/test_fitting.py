@@ -210,8 +210,9 @@ def make_recording(duration_s, yaw_rad=0.0, turn_rad_s=0.0, speed_m_s=0.1, perio
     """A recording without a command of a robot that drives an arc, whose poses lie elsewhere than its odometry."""
     times_s = np.arange(0.0, duration_s + 1e-9, period_s)
     turned_rad = turn_rad_s * times_s
-    forward_m = speed_m_s * np.array([math.sin(turn) / turn_rad_s if turn_rad_s else time_s * 1.0
-                                      for turn, time_s in zip(turned_rad, times_s)])
+    forward_m = speed_m_s * np.array(
+        [math.sin(turn) / turn_rad_s if turn_rad_s else time_s * 1.0 for turn, time_s in zip(turned_rad, times_s)]
+    )
     left_m = speed_m_s * np.array([(1.0 - math.cos(turn)) / turn_rad_s if turn_rad_s else 0.0 for turn in turned_rad])
     wrapped_rad = np.remainder(turned_rad + math.pi, math.tau) - math.pi
     odometry = np.column_stack((times_s, forward_m, left_m, wrapped_rad))

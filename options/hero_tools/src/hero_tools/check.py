@@ -71,9 +71,7 @@ def format_findings(findings: Dict[str, Finding]) -> List[str]:
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(
-        prog="check", description="Checks whether this PC can drive robots."
-    )
+    parser = argparse.ArgumentParser(prog="check", description="Checks whether this PC can drive robots.")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
     text = "TCP port that robots connect to (11411)"
     parser.add_argument("--port", type=within(1, 65535, int), default=11411, metavar="PORT", help=text)

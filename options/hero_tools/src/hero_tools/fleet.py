@@ -223,9 +223,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="fleet", description="The robots of all drivers, as a live table.")
     parser.add_argument("--once", action="store_true", help="print the fleet once and quit")
-    parser.add_argument(
-        "--json", action="store_true", help="print JSON, one line each time, instead of a table"
-    )
+    parser.add_argument("--json", action="store_true", help="print JSON, one line each time, instead of a table")
     parser.add_argument("--seconds", type=within(0.0, MAX_OPTION), metavar="S", help="quit after S seconds")
     parser.add_argument(
         "--expect",

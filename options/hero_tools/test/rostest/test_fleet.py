@@ -45,8 +45,7 @@ class FleetTest(unittest.TestCase):
 
     def test_robots_that_drive_are_not_named(self):
         publishers = [
-            rospy.Publisher("/hero_%d/velocity_controller/cmd_vel" % number, Twist, queue_size=1)
-            for number in range(2)
+            rospy.Publisher("/hero_%d/velocity_controller/cmd_vel" % number, Twist, queue_size=1) for number in range(2)
         ]
         command = Twist(angular=Vector3(0.0, 0.0, 2.0))  # on the spot: there is nothing to run into
 

@@ -20,9 +20,7 @@ for key, (code, output) in answers.items():
         sys.exit(code)
 """
 ONE_DEVICE = "wlan0:wifi:disconnected:\neth0:ethernet:connected:Wired connection 1\nlo:loopback:unmanaged:\n"
-ABLE = (
-    "WIFI-PROPERTIES.WPA2:yes\nWIFI-PROPERTIES.AP:yes\nWIFI-PROPERTIES.2GHZ:yes\nWIFI-PROPERTIES.5GHZ:yes\n"
-)
+ABLE = "WIFI-PROPERTIES.WPA2:yes\nWIFI-PROPERTIES.AP:yes\nWIFI-PROPERTIES.2GHZ:yes\nWIFI-PROPERTIES.5GHZ:yes\n"
 ON = (
     "802-11-wireless.ssid:swarm\n802-11-wireless.band:bg\nconnection.interface-name:wlan0\n"
     "ipv4.addresses:10.42.0.1/24\nGENERAL.STATE:activated\nIP4.ADDRESS[1]:10.42.0.1/24\n"

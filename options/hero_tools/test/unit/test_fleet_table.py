@@ -70,9 +70,7 @@ def test_the_title_counts_ready_robots_and_shows_a_stop():
 
 
 def test_json_has_no_infinity():
-    row = make_row(
-        0, nearest=Obstacle(-math.inf, 0.0), pose=Pose(math.nan, 1.0, 0.0), clock_offset=math.inf
-    )
+    row = make_row(0, nearest=Obstacle(-math.inf, 0.0), pose=Pose(math.nan, 1.0, 0.0), clock_offset=math.inf)
     (robot,) = json.loads(format_json([row], "", False))["robots"]
     assert robot["nearest"] == {"range_m": None, "bearing_rad": 0.0}
     assert robot["pose"] == {"x_m": None, "y_m": 1.0, "yaw_rad": 0.0}

@@ -38,9 +38,7 @@ def run(monkeypatch, capsys, *arguments, typed=PASSWORD + "\n"):
     return ended.value.code, captured.out, captured.err
 
 
-def test_create_makes_a_wpa2_access_point_at_2_4_ghz(
-    nmcli, monkeypatch, capsys
-):
+def test_create_makes_a_wpa2_access_point_at_2_4_ghz(nmcli, monkeypatch, capsys):
     code, output, errors = run(monkeypatch, capsys, "create", "--ssid", "swarm", "--password-stdin")
     assert code == 0, errors
     add, edit, up = [call for call in nmcli.read_calls() if {"add", "edit", "up"} & set(call.arguments)]
@@ -55,9 +53,7 @@ def test_create_makes_a_wpa2_access_point_at_2_4_ghz(
     assert "http://192.168.4.1" in output
 
 
-def test_the_password_is_on_no_command_line_nor_in_output_or_history(
-    nmcli, monkeypatch, capsys
-):
+def test_the_password_is_on_no_command_line_nor_in_output_or_history(nmcli, monkeypatch, capsys):
     _, output, errors = run(monkeypatch, capsys, "create", "--password-stdin")
     for call in nmcli.read_calls():
         assert PASSWORD not in " ".join(call.arguments)
@@ -74,9 +70,7 @@ def test_the_password_is_on_no_command_line_nor_in_output_or_history(
         (" begins so", "space"),
     ],
 )
-def test_a_password_that_wpa2_does_not_take_is_refused_and_not_repeated(
-    nmcli, monkeypatch, capsys, password, says
-):
+def test_a_password_that_wpa2_does_not_take_is_refused_and_not_repeated(nmcli, monkeypatch, capsys, password, says):
     code, _, errors = run(monkeypatch, capsys, "create", "--password-stdin", typed=password + "\n")
     assert code == 1
     assert says in errors

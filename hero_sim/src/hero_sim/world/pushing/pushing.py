@@ -84,9 +84,7 @@ class _Touch:
         along, across: pressure along the normal and the tangent.
     """
 
-    def __init__(
-        self, contact: Contact, ends: Ends, robot: Optional[int] = None, moved_m: Place = (0.0, 0.0)
-    ) -> None:
+    def __init__(self, contact: Contact, ends: Ends, robot: Optional[int] = None, moved_m: Place = (0.0, 0.0)) -> None:
         """moved_m: how far the robot moved in this step."""
         self.normal = _Axis(contact, contact.normal_x, contact.normal_y, ends)
         self.tangent = _Axis(contact, -contact.normal_y, contact.normal_x, ends)

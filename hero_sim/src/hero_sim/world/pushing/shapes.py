@@ -105,9 +105,7 @@ def _find_friction_radius(corners_m: Sequence[Point]) -> float:
         length_m = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
         height_m = (ax * by - bx * ay) / length_m
         ends = [((x * (bx - ax) + y * (by - ay)) / length_m) / height_m for x, y in ((ax, ay), (bx, by))]
-        integrals = [
-            (tangent * math.sqrt(1.0 + tangent * tangent) + math.asinh(tangent)) / 2.0 for tangent in ends
-        ]
+        integrals = [(tangent * math.sqrt(1.0 + tangent * tangent) + math.asinh(tangent)) / 2.0 for tangent in ends]
         moment += height_m**3 / 3.0 * (integrals[1] - integrals[0])
         area_m2 += height_m * length_m / 2.0
     return float("%.7g" % (moment / area_m2))
@@ -155,9 +153,7 @@ class PushedBody:
     def measure_work(self, motion: Motion) -> float:
         """Return the work (J) against the floor's friction of a motion."""
         x_m, y_m, rotation_rad = motion
-        return self.friction_n * math.sqrt(
-            x_m * x_m + y_m * y_m + self.radius_m2 * rotation_rad * rotation_rad
-        )
+        return self.friction_n * math.sqrt(x_m * x_m + y_m * y_m + self.radius_m2 * rotation_rad * rotation_rad)
 
     def move(self, motion: Motion) -> None:
         """Move by less than half a radian."""

@@ -97,8 +97,7 @@ def estimate_misalignment_rad(facing: Facing) -> float:
     left, right = (max(facing.counts[index], FAINT_COUNTS) for index in neighbors)
     if max(left, right) <= NO_WALL_COUNTS:
         raise CalibrationError(
-            "the sensors beside %s see no wall: is it wider than 30 cm, and white?"
-            % name_beam(facing.sensor)
+            "the sensors beside %s see no wall: is it wider than 30 cm, and white?" % name_beam(facing.sensor)
         )
     wall_m = WALL_M + BODY_RADIUS_M - facing.moved_m
     step_rad = math.radians(1.0)

@@ -62,9 +62,7 @@ class Session(Clock):
         """Robots that have not failed."""
         return [probe for probe in self.probes if probe.failure is None]
 
-    def for_each(
-        self, step: str, work: Callable[[Probe], T], probes: Optional[Sequence[Probe]] = None
-    ) -> Dict[int, T]:
+    def for_each(self, step: str, work: Callable[[Probe], T], probes: Optional[Sequence[Probe]] = None) -> Dict[int, T]:
         """Do work for robots (None: all active) side by side; return the results by robot.
 
         A CalibrationError fails that robot alone, which is stopped; one that has failed keeps its first reason.

@@ -225,9 +225,7 @@ def _judge(residuals_m: Mapping[int, float], left_out: Sequence[int], missing: S
     ]
     for tag_id, residual_m in sorted(residuals_m.items()):
         if tag_id not in left_out and residual_m > WORST_RESIDUAL_M:
-            problems.append(
-                "tag %d is seen %.0f mm from its place; measure that again" % (tag_id, 1e3 * residual_m)
-            )
+            problems.append("tag %d is seen %.0f mm from its place; measure that again" % (tag_id, 1e3 * residual_m))
     if missing:
         problems.append("not seen: reference tags %s" % ", ".join(map(str, missing)))
     rms_m = _compute_rms(residuals_m, left_out)
@@ -251,9 +249,7 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Pose]) ->
         raise CalibrationError("the reference tags lie %g m apart: write their places in m, not in mm or cm" % extent_m)
     spread_m = np.linalg.svd(places_m - places_m.mean(axis=0), compute_uv=False)
     if spread_m[1] < MIN_EXTENT_M:
-        raise CalibrationError(
-            "all reference tags lie in a row: spread them over the field, best into its corners"
-        )
+        raise CalibrationError("all reference tags lie in a row: spread them over the field, best into its corners")
 
 
 def fit_references(camera: Camera, tags: Sequence[TagCorners], references: Mapping[int, Pose]) -> List[TagPose]:
@@ -261,9 +257,7 @@ def fit_references(camera: Camera, tags: Sequence[TagCorners], references: Mappi
     return fit_squares(camera, [tag for tag in tags if tag.tag_id in references], 0.0)
 
 
-def measure_residuals(
-    camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, Pose]
-) -> Dict[int, float]:
+def measure_residuals(camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, Pose]) -> Dict[int, float]:
     """Return how far (m) from its place each reference tag is seen, by id."""
     fits = fit_references(camera, seen, references)
     return {fit.tag_id: measure_distance(fit.pose, references[fit.tag_id]) for fit in fits}

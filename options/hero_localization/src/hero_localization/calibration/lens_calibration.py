@@ -77,9 +77,7 @@ def find_board(gray: np.ndarray) -> Optional[BoardView]:
         _, pixels, ids = cv2.aruco.interpolateCornersCharuco(corners, markers, gray, made)
     if ids is None or len(ids) < MIN_CORNERS:
         return None
-    return BoardView(
-        np.asarray(ids).ravel(), _refine(gray, np.asarray(pixels, dtype=np.float32).reshape(-1, 2))
-    )
+    return BoardView(np.asarray(ids).ravel(), _refine(gray, np.asarray(pixels, dtype=np.float32).reshape(-1, 2)))
 
 
 def is_mirrored(gray: np.ndarray) -> bool:
@@ -107,8 +105,7 @@ def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) ->
     """
     if len(views) < MIN_VIEWS:
         raise CalibrationError(
-            "the board was found in %d images; it takes %d, from all sides and tilted"
-            % (len(views), MIN_VIEWS)
+            "the board was found in %d images; it takes %d, from all sides and tilted" % (len(views), MIN_VIEWS)
         )
     used = views
     fit = _fit(used, width_px, height_px)
@@ -122,8 +119,7 @@ def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) ->
     problems = []
     if fit.rms_px > GOOD_RMS_PX:
         problems.append(
-            "error %.2f px rms is above %.1f px: is the board flat, are the images sharp?"
-            % (fit.rms_px, GOOD_RMS_PX)
+            "error %.2f px rms is above %.1f px: is the board flat, are the images sharp?" % (fit.rms_px, GOOD_RMS_PX)
         )
     if (fit.tilts_rad > TILTED_RAD).sum() < MIN_TILTED:
         problems.append("the board is hardly tilted: take images with it tilted by 30 to 45 degrees")
@@ -145,9 +141,7 @@ class _Fit(NamedTuple):
     tilts_rad: np.ndarray
 
 
-def _fit(
-    views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics] = None
-) -> _Fit:
+def _fit(views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics] = None) -> _Fit:
     """Return the intrinsics that explain the views best, sought from a guess; None: from OpenCV's own."""
     corners_m = list_board_corners().astype(np.float32)
     # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
@@ -162,9 +156,7 @@ def _fit(
             flags=flags,
         )
     except cv2.error as error:
-        raise CalibrationError(
-            "no lens explains these images: %s" % str(error).strip().splitlines()[-1]
-        ) from None
+        raise CalibrationError("no lens explains these images: %s" % str(error).strip().splitlines()[-1]) from None
     if not np.isfinite(matrix).all() or not math.isfinite(rms_px):
         raise CalibrationError("no lens explains these images: take them again")
     lens = Intrinsics(width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[:5])
@@ -216,8 +208,6 @@ def load_lens(path: str) -> Intrinsics:
     except YamlError as error:
         raise CalibrationError("%s is no YAML file: %s" % (path, error)) from None
     except KeyError as error:
-        raise CalibrationError(
-            "%s: %s is missing; is it a file of camera_calibration?" % (path, error)
-        ) from None
+        raise CalibrationError("%s: %s is missing; is it a file of camera_calibration?" % (path, error)) from None
     except (AttributeError, OverflowError, TypeError, ValueError) as error:
         raise CalibrationError("%s is no file of camera_calibration: %s" % (path, one_line(error))) from None

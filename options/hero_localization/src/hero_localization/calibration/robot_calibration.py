@@ -58,9 +58,7 @@ class RobotCalibration(NamedTuple):
     problems: List[str]
 
 
-def calibrate_robot(
-    seen: Sequence[Tuple[float, Pose]], odometry: Sequence[Tuple[float, Pose]]
-) -> RobotCalibration:
+def calibrate_robot(seen: Sequence[Tuple[float, Pose]], odometry: Sequence[Tuple[float, Pose]]) -> RobotCalibration:
     """Return how the tag sits.
 
     Args:
@@ -87,9 +85,7 @@ def calibrate_robot(
             % (math.degrees(np.ptp(counted[:, 2])), math.degrees(MIN_TURN_RAD))
         )
     delay_s, delay_error_s = _find_delay(stamps_s, tags[:, 2], odometry_s, counted[:, 2])
-    at = np.column_stack(
-        [np.interp(stamps_s - delay_s, odometry_s, counted[:, column]) for column in range(3)]
-    )
+    at = np.column_stack([np.interp(stamps_s - delay_s, odometry_s, counted[:, column]) for column in range(3)])
     mount, rms_m = _fit_mount(tags, at)
     off_m = math.hypot(mount.x_m, mount.y_m)
     problems = []
@@ -99,9 +95,7 @@ def calibrate_robot(
             % (1e3 * rms_m, 1e3 * GOOD_RMS_M)
         )
     if delay_error_s > GOOD_DELAY_S:
-        problems.append(
-            "the delay is known to %.0f ms only: let the robot turn to and fro" % (1e3 * delay_error_s)
-        )
+        problems.append("the delay is known to %.0f ms only: let the robot turn to and fro" % (1e3 * delay_error_s))
     if off_m > CENTERED_M:
         problems.append("the tag sits %.0f mm from the robot's center" % (1e3 * off_m))
     if is_upside_down(mount.yaw_rad):

@@ -47,9 +47,7 @@ class Intrinsics(NamedTuple):
             raise ValueError("this camera is not calibrated: K is %s" % list(values))
         distortion = np.asarray(d, dtype=float).reshape(-1)
         if (distortion.any() and model != "plumb_bob") or len(distortion) not in (0, 4, 5):
-            raise ValueError(
-                "a lens must be plumb_bob with up to 5 numbers, not %r with %d" % (model, len(distortion))
-            )
+            raise ValueError("a lens must be plumb_bob with up to 5 numbers, not %r with %d" % (model, len(distortion)))
         if not np.isfinite(distortion).all():
             raise ValueError("the distortion of a lens must be finite, not %s" % list(distortion))
         padded = np.concatenate((distortion, np.zeros(5 - len(distortion))))

@@ -35,6 +35,7 @@ takes one away; one that agrees with the estimate, all."""
 MIN_MOVED_M, MIN_MOVED_RAD = 0.01, 0.1
 """No hand moves a robot by less: stamps of a busy computer are this far off while the robot drives."""
 
+
 class Outcome(enum.Enum):
     """Outcome of a measured pose."""
 

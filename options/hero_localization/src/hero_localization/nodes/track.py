@@ -162,9 +162,7 @@ PARAMETERS = {
     "image": words(
         "camera/image_raw", "sensor_msgs/Image or CompressedImage (`.../compressed`), with its camera_info beside it"
     ),
-    "device": words(
-        "", "instead: a V4L2 device such as `/dev/video0`, the URL of a network camera, or a video file"
-    ),
+    "device": words("", "instead: a V4L2 device such as `/dev/video0`, the URL of a network camera, or a video file"),
     "size_px": words("1920x1080", "of the images of a device"),
     "rate_hz": number(30.0, 1.0, 240.0, "Hz", "of a device"),
     "file": words(camera_file.DEFAULT_PATH, "[camera file](#camera-file)"),

@@ -61,9 +61,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     text = "side of the black square on robots, mm (%(default)g)"
     parser.add_argument("--size", type=float, default=1e3 * DEFAULT_SIZE_M, metavar="MM", help=text)
     text = "the same of reference tags, mm (%(default)g)"
-    parser.add_argument(
-        "--reference-size", type=float, default=1e3 * REFERENCE_SIZE_M, metavar="MM", help=text
-    )
+    parser.add_argument("--reference-size", type=float, default=1e3 * REFERENCE_SIZE_M, metavar="MM", help=text)
     parser.add_argument("--board", action="store_true", help="the chessboard for calibrating the intrinsics")
     parser.add_argument("--paper", choices=sorted(PAPERS_MM), default="a4", help="(%(default)s)")
     parser.add_argument("--out", default="tags.pdf", metavar="FILE.pdf", help="(%(default)s)")
@@ -96,9 +94,7 @@ def list_sheets(options: argparse.Namespace, cells: int) -> List[Sheet]:
     return sheets
 
 
-def split_pages(
-    sheets: Sequence[Sheet], paper_mm: Tuple[float, float]
-) -> Iterator[List[Tuple[Sheet, float, float]]]:
+def split_pages(sheets: Sequence[Sheet], paper_mm: Tuple[float, float]) -> Iterator[List[Tuple[Sheet, float, float]]]:
     """Yield for each page its sheets with their centers x, y (mm from the lower left)."""
     width_mm, height_mm = paper_mm
     page: List[Tuple[Sheet, float, float]] = []
@@ -162,9 +158,7 @@ def _open_page(paper_mm: Tuple[float, float]) -> Tuple[Any, Any]:
     return figure, axes
 
 
-def _draw_print(
-    axes: Any, image: np.ndarray, left_mm: float, low_mm: float, width_mm: float, height_mm: float
-) -> None:
+def _draw_print(axes: Any, image: np.ndarray, left_mm: float, low_mm: float, width_mm: float, height_mm: float) -> None:
     """Draw an image (H, W) of black and white as rectangles: a PDF rounds the size of an image to points."""
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Rectangle

@@ -55,16 +55,12 @@ class BoardRenderer:
         to_ray = np.column_stack((rotation[:, 0], rotation[:, 1], np.asarray(position_m, dtype=float)))
         scale = 1.0 / TEXEL_M
         height, width = self._texture.shape
-        to_texel = np.array(
-            ((scale, 0.0, (width - 1) / 2.0), (0.0, scale, (height - 1) / 2.0), (0.0, 0.0, 1.0))
-        )
+        to_texel = np.array(((scale, 0.0, (width - 1) / 2.0), (0.0, scale, (height - 1) / 2.0), (0.0, 0.0, 1.0)))
         pixel_texels = scale * float(position_m[2]) / options.focal_px[0]
         count = int(np.rint(pixel_texels)) | 1
         blurred = cv2.blur(self._texture, (count, count))
         smooth = cv2.GaussianBlur(blurred, (0, 0), max(options.blur_px, 0.1) * pixel_texels)
         texels = cv2.perspectiveTransform(self._rays, to_texel @ np.linalg.inv(to_ray))
-        image = cv2.remap(
-            smooth, texels, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=110.0
-        )
+        image = cv2.remap(smooth, texels, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=110.0)
         noisy = 20.0 + 0.8 * image + random.standard_normal(image.shape) * options.noise
         return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)

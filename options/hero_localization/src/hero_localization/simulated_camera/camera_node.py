@@ -96,9 +96,7 @@ class RobotScene:
         random = np.random.RandomState(options.seed)
         errors = np.array((MOUNT_ERROR_M, MOUNT_ERROR_M, MOUNT_ERROR_RAD)) * (not options.perfect)
         tags = [
-            PrintedTag(
-                robot_id, options.tag_size, 0.076, *(random.standard_normal(3) * errors), family=options.family
-            )
+            PrintedTag(robot_id, options.tag_size, 0.076, *(random.standard_normal(3) * errors), family=options.family)
             for robot_id in self._ids
         ]
         references = []
@@ -165,9 +163,7 @@ class CameraNode:
         arena = _load_arena(options)
         self._options = hang_above(camera, arena, list_references(arena, options.family), options.tag_size)
         self._matrix = self._options.geometry.lens.matrix
-        self._scene = (
-            BoardScene(options, self._options) if options.board else RobotScene(options, self._options, arena)
-        )
+        self._scene = BoardScene(options, self._options) if options.board else RobotScene(options, self._options, arena)
         self._stamps_arrival = options.stamps == "arrival"
         self._seed = options.seed
         self._image = rospy.Publisher("camera/image_raw", Image, queue_size=1)

@@ -82,9 +82,7 @@ def hang_above(
     raise SettingsError((text + " --width or --tag-size") % (height_m, *size_m, 1e3 * tag_size_m, MIN_SIDE_PX))
 
 
-def write_camera_file(
-    path: str, camera: Camera, tags: Sequence[PrintedTag], references: Sequence[PrintedTag]
-) -> None:
+def write_camera_file(path: str, camera: Camera, tags: Sequence[PrintedTag], references: Sequence[PrintedTag]) -> None:
     """Write a camera file as calibrations without any error would. Raises: SettingsError."""
     mounts, places = ({tag.tag_id: Pose(tag.x_m, tag.y_m, tag.yaw_rad) for tag in part} for part in (tags, references))
     parts = {

@@ -109,9 +109,7 @@ class CameraRenderer:
 
     def _draw_prism(self, image: np.ndarray, outline_m: np.ndarray, height_m: float, shade: float) -> None:
         """Draw what is seen of a solid with a convex outline (K, 2) on the floor."""
-        points_m = np.vstack(
-            [np.column_stack((outline_m, np.full(len(outline_m), z_m))) for z_m in (0.0, height_m)]
-        )
+        points_m = np.vstack([np.column_stack((outline_m, np.full(len(outline_m), z_m))) for z_m in (0.0, height_m)])
         self._fill(image, self.camera.project(points_m), shade)
 
     def _fill(self, image: np.ndarray, pixels: np.ndarray, shade: float) -> None:

@@ -63,9 +63,7 @@ class DetectorProcess:
             self.close()
             raise DetectorError(problem)
 
-    def search(
-        self, gray: np.ndarray, stamp_s: float, expected: Mapping[int, Tuple[float, float]]
-    ) -> List[TagCorners]:
+    def search(self, gray: np.ndarray, stamp_s: float, expected: Mapping[int, Tuple[float, float]]) -> List[TagCorners]:
         """Return the tags found in the next frame, as TagSearch.search() does.
 
         Raises: DetectorError if the process ended or does not answer; ValueError for a frame of another size.
@@ -73,9 +71,7 @@ class DetectorProcess:
         if gray.shape != self._shape:
             raise ValueError("a frame of %s pixels, but frames have %s" % (gray.shape, self._shape))
         self._frame[:] = gray
-        return [
-            TagCorners(tag_id, corners) for tag_id, corners in self._ask((stamp_s, dict(expected)))
-        ]
+        return [TagCorners(tag_id, corners) for tag_id, corners in self._ask((stamp_s, dict(expected)))]
 
     def _ask(self, question: Any) -> Any:
         if self._connection is None:

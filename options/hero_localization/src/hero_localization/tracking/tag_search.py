@@ -172,9 +172,7 @@ class TagSearch:
         self._previous_s = stamp_s
         return frame.found
 
-    def _look_for(
-        self, frame: _Frame, tag_id: int, center: np.ndarray, side_px: float, elapsed_s: float
-    ) -> bool:
+    def _look_for(self, frame: _Frame, tag_id: int, center: np.ndarray, side_px: float, elapsed_s: float) -> bool:
         """Search a window for a tag that was last seen elapsed_s ago, and return whether it is there."""
         slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
         half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX

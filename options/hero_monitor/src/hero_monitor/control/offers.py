@@ -194,4 +194,3 @@ def _describe_field(name: str, field: Parameter) -> Dict[str, Any]:
         "choices": field.choices,
         "on_map": name in _PLACE,
     }
-

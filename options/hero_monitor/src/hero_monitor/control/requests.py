@@ -81,6 +81,7 @@ its number. record: begin or end the recording. show: whether the page is visibl
 fleet.
 """
 
+
 def read_request(text: Union[str, bytes]) -> Dict[str, Any]:
     """Return the fields of the request in a text. Raises: RequestError."""
     if isinstance(text, bytes) or len(text) > MAX_TEXT_LENGTH:

@@ -58,9 +58,7 @@ class LocalizationWatch:
         return self._had_tracked and not self._has_tracked and now_s - self._heard_s <= SILENT_S
 
 
-def list_losses(
-    drivers: Dict[str, bool], master: str, localization: LocalizationWatch, now_s: float
-) -> List[Loss]:
+def list_losses(drivers: Dict[str, bool], master: str, localization: LocalizationWatch, now_s: float) -> List[Loss]:
     """Return what is lost, worst first.
 
     drivers: by name, whether they answer; empty if none was ever heard. master: why the ROS master is lost, or empty.

@@ -58,9 +58,7 @@ class Placement:
         """Place robots without a map transform side by side, in the order given."""
         unknown: List[str] = [robot for robot in robots if robot not in self._known]
         middle = (len(unknown) - 1) / 2.0
-        self._assumed = {
-            robot: Pose((index - middle) * APART_M, 0.0, 0.0) for index, robot in enumerate(unknown)
-        }
+        self._assumed = {robot: Pose((index - middle) * APART_M, 0.0, 0.0) for index, robot in enumerate(unknown)}
 
     def _anchor_of(self, robot: str) -> Pose:
         return self._known.get(robot) or self._assumed.get(robot, NOWHERE)

@@ -300,9 +300,7 @@ class LimitedServer(tornado.httpserver.HTTPServer):
 class Server:
     """The server, from its start to its end."""
 
-    def __init__(
-        self, access: Access, limits: ClientLimits, actions: Optional[Actions], *routes: Route
-    ) -> None:
+    def __init__(self, access: Access, limits: ClientLimits, actions: Optional[Actions], *routes: Route) -> None:
         """actions: of pages; None: there are no pages, only the routes."""
         # tornado logs each invalid request and cookie: any client could fill the disk.
         logging.getLogger("tornado.general").setLevel(logging.ERROR)

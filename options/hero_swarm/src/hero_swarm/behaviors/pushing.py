@@ -140,8 +140,9 @@ class BoxPushing(PushToGoal):
         lag_m = way.behind_m - row_m
         ready = (np.abs(off_m) < self.tolerance_m) & (np.abs(lag_m) < self.tolerance_m)
         holds = (np.abs(off_m) < 3.0 * self.tolerance_m) & (way.behind_m > 0.0)
-        pushes = self._agree(ready, sensed.count) | (memory & self._agree(holds, sensed.count) if memory is not None
-                                                     else False)
+        pushes = self._agree(ready, sensed.count) | (
+            memory & self._agree(holds, sensed.count) if memory is not None else False
+        )
         # A robot that is not behind the object yet goes around it; from there it drives to its place, or on.
         arrived = way.behind_m > 0.5 * row_m
         ahead_m_s = np.where(pushes, self.linear_m_s, 1.5 * lag_m)

@@ -133,8 +133,7 @@ def compute(
             new_pools += 1
             if new_pools > MAX_NEW_POOLS:
                 raise ExperimentError(
-                    "worker processes died %d times (out of memory?): use fewer --jobs or a smaller --batch"
-                    % new_pools
+                    "worker processes died %d times (out of memory?): use fewer --jobs or a smaller --batch" % new_pools
                 ) from error
             waiting.extendleft(running.values())
         except CancelledError as error:

@@ -70,9 +70,7 @@ class Entry(NamedTuple):
             self.refuse("a list such as [a, b]")
         return list(self.value)
 
-    def mapping(
-        self, allowed: Optional[Collection[str]] = None, required: Collection[str] = ()
-    ) -> Dict[str, "Entry"]:
+    def mapping(self, allowed: Optional[Collection[str]] = None, required: Collection[str] = ()) -> Dict[str, "Entry"]:
         """Return name -> entry of a mapping with only the allowed names (None: any), and all the required ones."""
         if not isinstance(self.value, dict):
             self.refuse("a mapping such as {%s: ...}" % next(iter(allowed or ("name",))))

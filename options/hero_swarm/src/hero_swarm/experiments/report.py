@@ -18,9 +18,7 @@ from .runner import read_results
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(
-        prog="report", description="Medians, intervals and plots of an experiment."
-    )
+    parser = argparse.ArgumentParser(prog="report", description="Medians, intervals and plots of an experiment.")
     parser.add_argument("folder", metavar="FOLDER", help="folder with the results of run")
     return parser.parse_args(arguments)
 

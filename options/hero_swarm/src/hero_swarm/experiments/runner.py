@@ -72,9 +72,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
         metavar="dask:ADDRESS",
         help="a Dask cluster: tls://HOST:PORT, tcp://127.0.0.1:PORT, or scheduler file",
     )
-    parser.add_argument(
-        "--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts"
-    )
+    parser.add_argument("--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts")
     parser.add_argument(
         "--robots", type=given_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9"
     )
@@ -101,9 +99,7 @@ def read_experiment(path: str, folder: Optional[str] = None) -> Tuple[str, Exper
     try:
         text = read_text(path)
     except (OSError, YamlError) as error:
-        raise ExperimentError(
-            "%s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)
-        ) from error
+        raise ExperimentError("%s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)) from error
     return text, parse_experiment(text, path, folder)
 
 

@@ -65,11 +65,7 @@ def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:
         side_m = math.sqrt(robots * math.pi * BODY_RADIUS_M * BODY_RADIUS_M / start.cover)
         return scatter(robots, side_m, side_m, seed, start.gap_m)
     spacing_m = _DIAMETER_M + start.gap_m
-    return (
-        _place_in_grid(robots, spacing_m, seed)
-        if start.kind == "grid"
-        else _place_in_circle(robots, spacing_m)
-    )
+    return _place_in_grid(robots, spacing_m, seed) if start.kind == "grid" else _place_in_circle(robots, spacing_m)
 
 
 def _place_in_grid(robots: int, spacing_m: float, seed: int) -> np.ndarray:

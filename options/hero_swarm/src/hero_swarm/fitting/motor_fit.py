@@ -45,10 +45,12 @@ def fit_motors(recordings: List[Recording]) -> List[Motors]:
     phases_s = np.zeros(len(recordings))
     for _ in range(_ITERATIONS):
         sloped = np.vstack((values, values + np.diag(steps)))
-        differences = np.hstack([
-            _compare(recording, [_build_motors(own, phase_s) for own in sloped])
-            for recording, phase_s in zip(recordings, phases_s)
-        ])
+        differences = np.hstack(
+            [
+                _compare(recording, [_build_motors(own, phase_s) for own in sloped])
+                for recording, phase_s in zip(recordings, phases_s)
+            ]
+        )
         slopes = (differences[1:] - differences[0]).T  # by steps
         square, gradient = slopes.T @ slopes, slopes.T @ differences[0]
         scale = np.diag(np.maximum(np.diag(square), 1e-12))

@@ -53,9 +53,9 @@ def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit
     seen = [recording.cut(share) for recording in recordings]
     body, motors = fit_body(seen), fit_motors(seen)
     drawn = Motors({}), np.ones(3)
-    ends_m = np.hstack([
-        predict_ends(recording, [drawn, (own, body)], share, PATH_S) for recording, own in zip(recordings, motors)
-    ])
+    ends_m = np.hstack(
+        [predict_ends(recording, [drawn, (own, body)], share, PATH_S) for recording, own in zip(recordings, motors)]
+    )
     if not ends_m.size:
         raise ValueError("too short: %.0f s hold no path that the fit has not seen" % recordings[0].time_s)
     before_m, after_m = np.median(ends_m, axis=1).tolist()

@@ -25,9 +25,7 @@ radii (N,); the last two may be left out where they do not count. Returns one nu
 METRICS: Dict[str, Metric] = {
     "algebraic_connectivity": lambda poses, *_: algebraic_connectivity(poses[..., :2], 0.5),
     "cluster_fraction": lambda poses, *_: cluster_fraction(poses[..., :2]),
-    "collisions": lambda poses, velocities, objects=None, radii_m=BODY_RADIUS_M: (
-        collisions(poses[..., :2], radii_m)
-    ),
+    "collisions": lambda poses, velocities, objects=None, radii_m=BODY_RADIUS_M: (collisions(poses[..., :2], radii_m)),
     "consensus_error": lambda poses, *_: consensus_error(poses[..., :2]),
     "dispersion": lambda poses, *_: dispersion(poses[..., :2]),
     "dispersion_ratio": lambda poses, *_: dispersion_ratio(poses[..., :2]),

@@ -146,7 +146,9 @@ def test_dask_clusters_that_cannot_be_used_are_refused_with_the_remedy(monkeypat
         engines.open_dask("tcp://127.0.0.1:1", lambda: "abc")
 
 
-@pytest.mark.parametrize("wide", ["tcp://10.0.0.5:8786", "tcp://[2001:db8::5]:8786", "tcp://pc:8786", "ucx://10.0.0.5:1"])
+@pytest.mark.parametrize(
+    "wide", ["tcp://10.0.0.5:8786", "tcp://[2001:db8::5]:8786", "tcp://pc:8786", "ucx://10.0.0.5:1"]
+)
 def test_a_cluster_that_other_pcs_reach_needs_tls(wide, monkeypatch):
     stub = types.SimpleNamespace(Client=Cluster, TimeoutError=ArrivalError)
     monkeypatch.setitem(sys.modules, "distributed", stub)

@@ -44,9 +44,7 @@ def test_all_parts_of_the_file_are_read():
 
 
 def test_parameters_of_the_behavior_can_vary():
-    experiment = parse(
-        FILE.replace("errors: [perfect, default]", "v0_m_s: [-0.1, -0.05]").replace("errors", "v0_m_s")
-    )
+    experiment = parse(FILE.replace("errors: [perfect, default]", "v0_m_s: [-0.1, -0.05]").replace("errors", "v0_m_s"))
     assert [cell.parameters for cell in experiment.cells] == [{"v0_m_s": -0.1}, {"v0_m_s": -0.05}] * 2
 
 
@@ -197,9 +195,9 @@ def test_metrics_that_rise_are_reached_from_below():
 
 
 def test_a_mean_of_the_last_seconds_is_a_column():
-    (metric,) = parse(
-        FILE.replace("{time_until: {dispersion: 1.15}}", "{mean_of_last_s: {dispersion: 60}}")
-    ).metrics[1:]
+    (metric,) = parse(FILE.replace("{time_until: {dispersion: 1.15}}", "{mean_of_last_s: {dispersion: 60}}")).metrics[
+        1:
+    ]
     assert (metric.name, metric.source, metric.last_s) == ("dispersion_mean_of_last_60_s", "dispersion", 60.0)
 
 

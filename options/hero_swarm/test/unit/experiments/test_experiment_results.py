@@ -87,9 +87,7 @@ def test_more_seeds_keep_the_runs_that_are_there(tmp_path):
         lambda text: text[: len(text) // 2],
         lambda text: text[: text.rindex('{"seed"')],
         lambda text: "",
-        lambda text: text.replace('"seeds": [5, 6, 7]', '"seeds": [5, 6, 8]').replace(
-            '"seed": 7', '"seed": 8'
-        ),
+        lambda text: text.replace('"seeds": [5, 6, 7]', '"seeds": [5, 6, 8]').replace('"seed": 7', '"seed": 8'),
         lambda text: text.replace('{"seed": 6', '{"sleep": 6'),
     ],
     ids=["cut", "a line less", "empty", "other seeds", "other names"],

@@ -146,15 +146,9 @@ def test_the_report_stands_alone_and_names_every_cell_and_remark(finished):
         summary = list(csv.DictReader(file))
     assert len(summary) == 12
     values = [
-        float(row["dispersion"])
-        for row in read_table(finished)
-        if (row["robots"], row["errors"]) == ("3", "perfect")
+        float(row["dispersion"]) for row in read_table(finished) if (row["robots"], row["errors"]) == ("3", "perfect")
     ]
-    (own,) = [
-        row
-        for row in summary
-        if (row["robots"], row["errors"], row["metric"]) == ("3", "perfect", "dispersion")
-    ]
+    (own,) = [row for row in summary if (row["robots"], row["errors"], row["metric"]) == ("3", "perfect", "dispersion")]
     assert float(own["median"]) == np.median(values)
 
 
@@ -394,9 +388,7 @@ def test_a_wrong_file_of_starts_is_refused_with_its_line(content, words, tmp_pat
     assert words in str(caught.value) and "starts.csv" in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "arguments", [["--part", "4/3"], ["--part", "x"], ["--jobs", "0"], ["--executor", "slurm"]]
-)
+@pytest.mark.parametrize("arguments", [["--part", "4/3"], ["--part", "x"], ["--jobs", "0"], ["--executor", "slurm"]])
 def test_a_wrong_option_is_refused_by_name(arguments, capsys):
     with pytest.raises(SystemExit) as caught:
         runner.parse_options(["e.yaml", *arguments])

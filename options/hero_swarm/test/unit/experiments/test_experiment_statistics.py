@@ -37,9 +37,7 @@ def test_no_value_and_nan_are_refused(values):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("draw", "median"), [("standard_normal", 0.0), ("standard_exponential", math.log(2.0))]
-)
+@pytest.mark.parametrize(("draw", "median"), [("standard_normal", 0.0), ("standard_exponential", math.log(2.0))])
 def test_intervals_cover_the_true_median_as_often_as_they_claim(draw, median):
     rng = np.random.RandomState(5)
     covered = 0

@@ -92,9 +92,7 @@ def compare_pairs(first: Sequence[float], second: Sequence[float]) -> Comparison
         raise ExperimentError("%d and %d values cannot be paired" % (len(ours), len(theirs)))
     differences = theirs - ours
     if not np.isfinite(differences).all():
-        raise ExperimentError(
-            "a value that is not finite cannot be compared: compare another metric, or longer runs"
-        )
+        raise ExperimentError("a value that is not finite cannot be compared: compare another metric, or longer runs")
     delta = cliffs_delta(ours.tolist(), theirs.tolist())
     return Comparison(len(differences), bootstrap_median(differences), _signed_rank(differences), delta)
 

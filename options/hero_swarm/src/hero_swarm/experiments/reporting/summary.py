@@ -81,8 +81,7 @@ def _remark(experiment: Experiment, runs: Sequence[Run]) -> List[str]:
         remarks.append("%d of %d runs are still missing" % (wanted - len(runs), wanted))
     if len(experiment.seeds) < FEW_SEEDS:
         remarks.append(
-            "%d seeds: intervals of fewer than %d are narrower than they claim"
-            % (len(experiment.seeds), FEW_SEEDS)
+            "%d seeds: intervals of fewer than %d are narrower than they claim" % (len(experiment.seeds), FEW_SEEDS)
         )
     if len(counted) < len(runs):
         remarks.append("%d runs are left out: see the column remark" % (len(runs) - len(counted)))
