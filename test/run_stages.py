@@ -166,7 +166,7 @@ def main():
     except KeyboardInterrupt:
         return 130
     if {"rostest", "faults"} & set(stages) or any(path.suffix == ".test" for path in options.paths):
-        print("the robots of rostests and faults were drawn with HERO_SEED=%s" % os.environ.get("HERO_SEED", "0"))
+        print(f"the robots of rostests and faults were drawn with HERO_SEED={os.environ.get('HERO_SEED', '0')}")
     if "faults" in stages:
         faults.print_table(faults.read_rows(options.results / "faults.jsonl"))
     return int(not passed)

@@ -72,13 +72,13 @@ def main():
                 topic.receive(payload, start_ns + index * BURST_NS)
 
     print_machine(measure_machine_us())
-    print("bytes of a burst: %d (odom, 5 transforms, encoder), 29.4 bursts per robot and second" % len(bursts[0]))
+    print(f"bytes of a burst: {len(bursts[0])} (odom, 5 transforms, encoder), 29.4 bursts per robot and second")
     print("| layer | us per burst |")
     print("|---|---|")
-    print("| packets written | %.1f |" % best_us(write, BURSTS))
-    print("| packets read | %.1f |" % best_us(read, BURSTS))
-    print("| session (with packets) | %.1f |" % best_us(receive, BURSTS))
-    print("| corrections, everything wanted | %.1f |" % best_us(correct, BURSTS))
+    print(f"| packets written | {best_us(write, BURSTS):.1f} |")
+    print(f"| packets read | {best_us(read, BURSTS):.1f} |")
+    print(f"| session (with packets) | {best_us(receive, BURSTS):.1f} |")
+    print(f"| corrections, everything wanted | {best_us(correct, BURSTS):.1f} |")
 
 
 if __name__ == "__main__":

@@ -57,7 +57,7 @@ def find_listener(port):
             for line in Path(table).read_text().splitlines()[1:]:
                 fields = line.split()
                 if fields[3] == LISTENING and int(fields[1].rpartition(":")[2], 16) == port:
-                    sockets.add("socket:[%s]" % fields[9])
+                    sockets.add(f"socket:[{fields[9]}]")
     for entry in Path("/proc").iterdir():
         # A process that ends, or that of another user, shows no files.
         with contextlib.suppress(OSError):
@@ -209,11 +209,11 @@ ROWS = (
 def print_table(results):
     """Print medians over the rounds, one column for each server and number of robots."""
     heads = ["%d robots%s" % (result["robots"], result["server"] and ", " + result["server"]) for result in results]
-    print("| | %s |" % " | ".join(heads))
-    print("|---|%s" % ("---|" * len(results)))
+    print(f"| | {' | '.join(heads)} |")
+    print(f"|---|{'---|' * len(results)}")
     for title, key, form in ROWS:
         cells = ["-" if result[key] is None else form % result[key] for result in results]
-        print("| %s | %s |" % (title, " | ".join(cells)))
+        print(f"| {title} | {' | '.join(cells)} |")
 
 
 def print_run(name, runs):
@@ -244,13 +244,13 @@ def append_history(path, results, machine_us):
         file.seek(0)
         known = next(csv.reader(file), None)
         if known is not None and known != columns:
-            raise SystemExit("bench: %s has other columns (%s); give another file" % (path, ", ".join(known)))
+            raise SystemExit(f"bench: {path} has other columns ({', '.join(known)}); give another file")
         writer = csv.writer(file, lineterminator="\n")
         if known is None:
             writer.writerow(columns)
         for result in results:
             cells = ["" if result[key] is None else form % result[key] for _, key, form in ROWS]
-            writer.writerow([commit, "%.2f" % machine_us, result["robots"], *cells])
+            writer.writerow([commit, f"{machine_us:.2f}", result["robots"], *cells])
 
 
 def take_medians(runs):
@@ -296,7 +296,7 @@ def refuse_robots():
     try:
         topics = rosgraph.Master("/driver_bench").getPublishedTopics("/")
     except OSError as error:
-        raise SystemExit("bench: no ROS master at %s (%s)" % (rosgraph.get_master_uri(), error)) from error
+        raise SystemExit(f"bench: no ROS master at {rosgraph.get_master_uri()} ({error})") from error
     robots = [name for name, _ in topics if name.endswith("/odom")]
     if robots:
         raise SystemExit(
@@ -340,8 +340,8 @@ def main():
     if options.against:
         # Both are started in the same way.
         commands = {
-            "this driver": "%s %s" % (find_environment(HERE.parent), DRIVER_COMMAND),
-            "the other": "%s %s" % (find_environment(options.against), DRIVER_COMMAND),
+            "this driver": f"{find_environment(HERE.parent)} {DRIVER_COMMAND}",
+            "the other": f"{find_environment(options.against)} {DRIVER_COMMAND}",
         }
     machine_us = measure_machine_us()
     print_machine(machine_us)

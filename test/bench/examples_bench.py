@@ -39,7 +39,7 @@ def list_cases(robots):
         "led_show": ("led_show", [everybody]),
         "teleop, all robots": ("teleop", [everybody]),
         "teleop_joy": ("teleop_joy", [everybody]),
-        "measure_delay": ("measure_delay", [everybody, "_turns:=1000", "_plot:=%s/delay.png" % tempfile.gettempdir()]),
+        "measure_delay": ("measure_delay", [everybody, "_turns:=1000", f"_plot:={tempfile.gettempdir()}/delay.png"]),
     }
 
 

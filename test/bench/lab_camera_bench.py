@@ -124,7 +124,7 @@ def measure_tags(seeds: int) -> None:
             results.append(run_search(lab, tags, [lab.render(tags, random) for _ in range(RENDERED)], FRAMES))
         share, cpu_ms = np.mean(results, axis=0)
         smallest_px = find_smallest_side(find_camera(lab), DEFAULT_SIZE_M, DEFAULT_HEIGHT_M)
-        print("  %-32s %6.2f %% %6.1f ms %5.0f px" % (name, 100.0 * share, cpu_ms, smallest_px), flush=True)
+        print(f"  {name:32} {100.0 * share:6.2f} % {cpu_ms:6.1f} ms {smallest_px:5.0f} px", flush=True)
 
 
 def measure_losses(seeds: int) -> None:
@@ -218,7 +218,7 @@ def measure_mistakes(seeds: int) -> None:
                     text = str(error)
                 counts.setdefault(mistake, []).append(words in text if words else not text)
         sides_px = [tag.side_px for tag in scene.seen]
-        print("mistakes named, %s (tags of %.0f to %.0f px)" % (name, min(sides_px), max(sides_px)))
+        print(f"mistakes named, {name} (tags of {min(sides_px):.0f} to {max(sides_px):.0f} px)")
         shares = ["%s %d/%d" % (what, sum(right), len(right)) for what, right in counts.items()]
         print("  " + ", ".join(shares), flush=True)
 
@@ -292,7 +292,7 @@ def measure_knocks(seeds: int) -> None:
                 if named_s is None and any("the camera moved" in problem.text for problem in problems):
                     named_s = lab.now_s - start_s
             text = "knock, %s: named after %s s; a pose over 6 mm off was TRACKED for %.2f s; lines on robots: %s"
-            print(text % (name, "%.2f" % named_s if named_s else "never", wrong, lab.lines or "none"), flush=True)
+            print(text % (name, f"{named_s:.2f}" if named_s else "never", wrong, lab.lines or "none"), flush=True)
 
 
 def measure_hands(seeds: int) -> None:

@@ -31,7 +31,7 @@ WIDE_M = 6.0
 
 def describe_wide_arena(count: int) -> str:
     """Return an arena in which no robot meets another one, or a wall."""
-    starts = ["  - [%g, %g, 40]" % (WIDE_M * (index % 5), WIDE_M * (index // 5)) for index in range(count)]
+    starts = [f"  - [{WIDE_M * (index % 5):g}, {WIDE_M * (index // 5):g}, 40]" for index in range(count)]
     return "bounds_m: [-5, -5, 35, 35]\nstarts_m_deg:\n" + "\n".join(starts)
 
 
@@ -111,12 +111,12 @@ def measure_ages() -> None:
                 errors.append(robots.list_errors()[:, :2])
         rms_mm = 1e3 * math.sqrt((np.array(errors) ** 2).sum(axis=2).mean())
         rejected = outcomes.count(Outcome.OUTLIER) / len(outcomes)
-        print("  %5.0f %6.2f mm, %.2f %% rejected" % (1e3 * age_s, rms_mm, 100.0 * rejected), flush=True)
+        print(f"  {1000.0 * age_s:5.0f} {rms_mm:6.2f} mm, {100.0 * rejected:.2f} % rejected", flush=True)
 
 
 def measure_uncertainty(seeds: int) -> None:
     """Print errors by the reported standard deviations, and robots that count as kidnapped after an occlusion."""
-    print("errors by reported standard deviations: position, yaw while tracked; after %g s of occlusion" % COVERED_S)
+    print(f"errors by reported standard deviations: position, yaw while tracked; after {COVERED_S:g} s of occlusion")
     kidnapped = covers = 0
     for name, drive in DRIVES.items():
         shares: List[List[np.ndarray]] = [[], []]

@@ -66,7 +66,7 @@ class Measured(NamedTuple):
         if not self.distances_m:
             return "%26s" % "-"
         distances_mm, yaws_deg = 1e3 * np.array(self.distances_m), np.degrees(self.yaws_rad)
-        return "%7.2f %7.1f %10.2f" % (_rms(distances_mm), distances_mm.max(), _rms(yaws_deg))
+        return f"{_rms(distances_mm):7.2f} {distances_mm.max():7.1f} {_rms(yaws_deg):10.2f}"
 
 
 def _rms(values: np.ndarray) -> float:
@@ -77,9 +77,9 @@ def describe_arena() -> str:
     """Return an arena whose robots start on a grid, far enough from each other for what they drive."""
     x_m, y_m = FIELD_M[0] / 2.0, FIELD_M[1] / 2.0
     corners = [[-x_m, -y_m], [x_m, -y_m], [x_m, y_m], [-x_m, y_m], [-x_m, -y_m]]
-    lines = ["walls_m: [%s]" % corners, "starts_m_deg:"]
+    lines = [f"walls_m: [{corners}]", "starts_m_deg:"]
     for row_m in np.linspace(-0.4, 0.35, GRID[1]):
-        lines += ["  - [%.3f, %.3f, 0]" % (column_m, row_m) for column_m in np.linspace(-0.7, 0.9, GRID[0])]
+        lines += [f"  - [{column_m:.3f}, {row_m:.3f}, 0]" for column_m in np.linspace(-0.7, 0.9, GRID[0])]
     return "\n".join(lines)
 
 
@@ -165,7 +165,7 @@ def find_camera(scene: Scene, lens: Intrinsics) -> Camera:
     result = calibrate_arena(lens, average_tags(frames), scene.references)
     off_mm = 1e3 * np.linalg.norm(result.camera.position_m - scene.renderer.camera.position_m)
     verdict = "; ".join(result.problems) or "good"
-    print("arena: %.2f mm rms, camera %.1f mm off; %s" % (1e3 * result.rms_m, off_mm, verdict))
+    print(f"arena: {1000.0 * result.rms_m:.2f} mm rms, camera {off_mm:.1f} mm off; {verdict}")
     return result.camera
 
 
@@ -188,7 +188,7 @@ def find_layout(scene: Scene, camera: Camera) -> Tuple[TagLayout, float]:
         if result.problems:
             print("hero_%d: %s" % (tag.tag_id, "; ".join(result.problems)))
     delay_s = float(np.median(delays_s))
-    print("robots: delay %.1f ms; tags off by (mm rms, worst, deg rms) %s" % (1e3 * delay_s, off.describe()))
+    print(f"robots: delay {1000.0 * delay_s:.1f} ms; tags off by (mm rms, worst, deg rms) {off.describe()}")
     return TagLayout(mounts=mounts, references=scene.references), delay_s
 
 
@@ -366,13 +366,13 @@ def measure_accuracy(seed: int, tape_m: float) -> None:
     print("\n%-22s %-18s %7s %7s %10s" % ("", "method", "mm rms", "worst", "deg rms"))
     for name, errors in table.items():
         for method in METHODS:
-            print("%-22s %-18s %s" % (name, method, errors[method].describe()))
-    print("\ncovered for %g s while driving 0.2 m/s" % COVERED_S)
+            print(f"{name:22} {method:18} {errors[method].describe()}")
+    print(f"\ncovered for {COVERED_S:g} s while driving 0.2 m/s")
     for name, speed in (("straight", (0.2, 0.0)), ("in circles", (0.2, 2.0))):
         covered, after, step_m = measure_occlusion(scene, camera, layout, delay_s, speed)
-        print("%-22s %-18s %s" % (name, "covered", covered.describe()))
+        print(f"{name:22} {'covered':18} {covered.describe()}")
         print("%-22s %-18s %s" % ("", "from %g s after" % FOUND_AGAIN_S, after.describe()))
-        print("%-22s largest step that is not reported: %.1f mm" % ("", 1e3 * step_m))
+        print(f"{'':22} largest step that is not reported: {1000.0 * step_m:.1f} mm")
 
 
 def main() -> None:

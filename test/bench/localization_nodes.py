@@ -159,7 +159,7 @@ def measure_round(source, pids, seconds):
     ages_ms = 1e3 * source.list_ages_s(from_s)
     sent = sum(stamp_ns * 1e-9 >= from_s for stamp_ns in source.arrivals_s)
     print("\n%d robots, load %.1f: used %d of %d images" % (source.tracked, os.getloadavg()[0], len(ages_ms), sent))
-    print("CPU of track %.0f %%, of localize %.0f %% of a core" % (100.0 * cpu[0], 100.0 * cpu[1]))
+    print(f"CPU of track {100.0 * cpu[0]:.0f} %, of localize {100.0 * cpu[1]:.0f} % of a core")
     for name, ages in zip(("track publishes", "localize publishes"), ages_ms.T):
         text = "from an image's arrival until %s: %.0f ms on average, 99 %% within %.0f ms, at most %.0f ms"
         print(text % (name, ages.mean(), np.percentile(ages, 99), ages.max()))

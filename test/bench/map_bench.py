@@ -145,9 +145,9 @@ def report_formations(seeds):
             worst_mm = np.array([off_mm.max() for off_mm, _ in runs])
             times_s = [took_s for _, took_s in runs]
             print("%s in %s: all within 10 mm in %d of %d seeds" % (shape, frame, (worst_mm < 10.0).sum(), len(seeds)))
-            print("  median %.1f mm, worst %.1f mm" % (np.median([off_mm for off_mm, _ in runs]), worst_mm.max()))
-            print("  in place after %.0f to %.0f s" % (min(times_s), max(times_s)))
-            figures["%s in %s" % (shape, frame)] = worst_mm.tolist()
+            print(f"  median {np.median([off_mm for off_mm, _ in runs]):.1f} mm, worst {worst_mm.max():.1f} mm")
+            print(f"  in place after {min(times_s):.0f} to {max(times_s):.0f} s")
+            figures[f"{shape} in {frame}"] = worst_mm.tolist()
     return figures
 
 
@@ -169,9 +169,9 @@ def report_maps(seeds):
     for program in ("explore", "random_walk"):
         runs = np.array([measure_map(program, seed, TIMES_S) for seed in seeds])
         for time_s, (walls, cells) in zip(TIMES_S, np.moveaxis(100.0 * runs, 0, -1)):
-            print("map by %s after %.0f s, mean and worst of the seeds:" % (program, time_s))
-            print("  %.1f and %.1f %% of the wall, " % (walls.mean(), walls.min()), end="")
-            print("%.1f and %.1f %% of the cells are wall" % (cells.mean(), cells.min()))
+            print(f"map by {program} after {time_s:.0f} s, mean and worst of the seeds:")
+            print(f"  {walls.mean():.1f} and {walls.min():.1f} % of the wall, ", end="")
+            print(f"{cells.mean():.1f} and {cells.min():.1f} % of the cells are wall")
         figures[program] = runs.tolist()
     return figures
 

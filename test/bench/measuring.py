@@ -33,7 +33,7 @@ def read_all_cpu_s():
 def read_one_cpu_s(pid):
     """Return the CPU seconds that one process has used, 0 if it has ended."""
     try:
-        fields = Path("/proc/%s/stat" % pid).read_text().rpartition(")")[2].split()
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / TICKS_PER_S
     except (OSError, IndexError):  # the second where it went while it was read
         return 0.0
@@ -96,7 +96,7 @@ def start(command, environment, **options):
     try:
         return subprocess.Popen(command, env=environment, start_new_session=True, text=True, **options)
     except OSError as error:
-        raise SystemExit("bench: %s cannot be started: %s" % (command[0], error.strerror)) from error
+        raise SystemExit(f"bench: {command[0]} cannot be started: {error.strerror}") from error
 
 
 def stop(process, number=signal.SIGINT):
@@ -119,7 +119,7 @@ def find_environment(workspace):
         environment = folder / "devel" / "env.sh"
         if environment.is_file():
             return str(environment.absolute())
-    raise SystemExit("bench: %s is not a built workspace; in a checkout, script/test unit builds one" % workspace)
+    raise SystemExit(f"bench: {workspace} is not a built workspace; in a checkout, script/test unit builds one")
 
 
 @contextlib.contextmanager
@@ -137,7 +137,7 @@ def start_master():
 
 def print_machine(machine_us):
     """Print the line by which tables of different machines and hours are compared."""
-    print("sum of 768 bytes: %.2f us, load of the last minute: %.2f" % (machine_us, os.getloadavg()[0]))
+    print(f"sum of 768 bytes: {machine_us:.2f} us, load of the last minute: {os.getloadavg()[0]:.2f}")
 
 
 def write_report(path, machine_us, **figures):

@@ -40,7 +40,7 @@ class Client:
 
     async def open(self, ground_truth=False):
         """Connect as a page does."""
-        request = HTTPRequest("ws://%s/live" % self.url, headers={"Origin": "http://" + self.url})
+        request = HTTPRequest(f"ws://{self.url}/live", headers={"Origin": "http://" + self.url})
         self.socket = await websocket_connect(request)
         shown = {"ground_truth": ground_truth, "picture": False, "visible": True}
         await self.socket.write_message(json.dumps({"do": "show", **shown}))
@@ -74,9 +74,9 @@ async def measure(title, monitor, clients, seconds):
     cpu = 100.0 * (read_cpu_s(monitor.pid) - begin[1]) / elapsed_s
     frames = [client.frames / elapsed_s for client in clients]
     length = sum(client.length for client in clients) / elapsed_s / max(1, len(clients))
-    updates = "%.1f" % min(frames) if frames else "-"
+    updates = f"{min(frames):.1f}" if frames else "-"
     memory_mb = read_memory_mb(monitor.pid)
-    print("| %s | %.1f %% | %s | %.1f kB/s | %.0f MB |" % (title, cpu, updates, length / 1e3, memory_mb), flush=True)
+    print(f"| {title} | {cpu:.1f} % | {updates} | {length / 1000.0:.1f} kB/s | {memory_mb:.0f} MB |", flush=True)
     return {"title": title, "cpu_percent": cpu, "updates_hz": frames, "bytes_per_s": length}
 
 

@@ -70,7 +70,7 @@ class Page:
 
     async def _open(self, port):
         url = "127.0.0.1:%d" % port
-        page = await websocket_connect(HTTPRequest("ws://%s/live" % url, headers={"Origin": "http://" + url}))
+        page = await websocket_connect(HTTPRequest(f"ws://{url}/live", headers={"Origin": "http://" + url}))
         self._clock_ms = 0
         self._reader = asyncio.ensure_future(self._drain(page))
         return page
@@ -142,7 +142,7 @@ class StopSuite(RunningSuite):
         os.environ["ROS_HOME"] = str(folder)  # the driver keeps there that its robots are stopped
         config = folder / "driver.yaml"
         config.write_text("{allow_self_tuning: true, start_stopped: never}\n")
-        super().__init__(0, "config:=%s" % config)
+        super().__init__(0, f"config:={config}")
 
     def add_robots(self, robots_each):
         """Start this many robots of each center and core."""
@@ -214,7 +214,7 @@ class StopSuite(RunningSuite):
         due_s = self.press(method, commander)
         while True:
             time.sleep(POLL_S)
-            answers = self.ask_swarms("read %r" % due_s)
+            answers = self.ask_swarms(f"read {due_s!r}")
             waited_s = time.monotonic() - due_s
             rests_s = [rest_s for answer in answers for rest_s in answer["rest_s"]]
             if waited_s > LIMIT_S or (waited_s > WATCH_S and None not in rests_s):

@@ -37,14 +37,14 @@ class Commander:
         self._moving = threading.Event()
         self._names = ["/hero_%d/" % number for number in range(count)]
         self._tuned = TUNINGS.get(mode)
-        topic, kind = ("cmd_motor", Motor) if mode == "cmd_motor" else ("%s_controller/cmd_vel" % mode, Twist)
+        topic, kind = ("cmd_motor", Motor) if mode == "cmd_motor" else (f"{mode}_controller/cmd_vel", Twist)
         self._command = Motor(*PULSES_US) if kind is Motor else Twist()
         if kind is Twist:
             self._command.linear.x, self._command.angular.z = SPEED_M_S, TURN_RAD_S
         self._zeros = self._advertise(VELOCITY + "/cmd_vel", Twist)
         self._publishers = [] if self._tuned else self._advertise(topic, kind)
         for name in self._names if self._tuned else ():
-            rospy.wait_for_service("%s%s/pid_calibration" % (name, self._tuned))
+            rospy.wait_for_service(f"{name}{self._tuned}/pid_calibration")
         threading.Thread(target=self._repeat, daemon=True).start()
 
     def _advertise(self, topic, kind):
@@ -81,7 +81,7 @@ class Commander:
     def _tune(self, name):
         for _ in range(CALLS):
             try:
-                rospy.ServiceProxy("%s%s/pid_calibration" % (name, self._tuned), Trigger)()
+                rospy.ServiceProxy(f"{name}{self._tuned}/pid_calibration", Trigger)()
                 return
             except rospy.ServiceException as error:
                 rospy.logwarn("%s", error)

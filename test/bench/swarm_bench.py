@@ -49,7 +49,7 @@ class _CrossRing(Behavior):
 
 def describe(values: np.ndarray) -> str:
     """Return least, median and greatest of values."""
-    return "%.2f to %.2f, median %.2f" % (np.min(values), np.max(values), np.median(values))
+    return f"{np.min(values):.2f} to {np.max(values):.2f}, median {np.median(values):.2f}"
 
 
 def measure_aggregation(seeds: Sequence[int], drive: Optional[str], robots: int) -> None:
@@ -65,9 +65,9 @@ def measure_aggregation(seeds: Sequence[int], drive: Optional[str], robots: int)
             clusters = cluster_fraction(poses[..., :2])
         overlap_m = max(overlap_m, 2.0 * BODY_RADIUS_M - float(measure_distances(poses[..., :2]).min()))
     print("aggregation, %d robots, %s: cluster after 120 s %s" % (robots, trial.behavior.drive, describe(clusters)))
-    print("  dispersion after 300 s, of the ideal: %s: %s" % (describe(ratios[-1]), np.round(ratios[-1], 3)))
-    print("  time until it is below 1.15: %s s" % describe(time_until(np.array(times_s), np.array(ratios), 1.15)))
-    print("  deepest overlap: %.2f mm" % (1e3 * overlap_m))
+    print(f"  dispersion after 300 s, of the ideal: {describe(ratios[-1])}: {np.round(ratios[-1], 3)}")
+    print(f"  time until it is below 1.15: {describe(time_until(np.array(times_s), np.array(ratios), 1.15))} s")
+    print(f"  deepest overlap: {1000.0 * overlap_m:.2f} mm")
 
 
 def measure_evolved(name: str, seeds: Sequence[int], drive: Optional[str]) -> None:
@@ -85,7 +85,7 @@ def measure_evolved(name: str, seeds: Sequence[int], drive: Optional[str]) -> No
             values.append(METRICS[trial.behavior.metric](poses, trial.velocities))
     # Near a wall counts over time; others by their median, which a moment does not decide.
     found = np.mean(values, axis=0) if name == "wall_following" else np.median(values, axis=0)
-    print("%s, %s: %s" % (name, trial.behavior.drive, describe(found)))
+    print(f"{name}, {trial.behavior.drive}: {describe(found)}")
 
 
 def start_ring(seeds: Sequence[int]) -> np.ndarray:
@@ -156,7 +156,7 @@ def measure_speed(worlds: int) -> None:
     for _ in range(200):
         filter_commands(poses, speeds, 0.0 * speeds)
     step_ms = 1e3 * (time.process_time() - began_s) / 200
-    print("filter, 100 robots: %.2f ms of CPU a step, %.1f %% of a core at 20 Hz" % (step_ms, 2.0 * step_ms))
+    print(f"filter, 100 robots: {step_ms:.2f} ms of CPU a step, {2.0 * step_ms:.1f} % of a core at 20 Hz")
 
 
 def main() -> None:

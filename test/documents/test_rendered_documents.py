@@ -54,7 +54,7 @@ def pages():
 @pytest.fixture(scope="module")
 def browser():
     if MISSING:
-        pytest.skip("not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+        pytest.skip(f"not installed: {', '.join(MISSING)} (script/bootstrap --test)")
     browser = open_browser(1366, 768)
     yield browser
     browser.quit()
@@ -105,7 +105,7 @@ def join_pages():
         (found[path],) = re.findall("<article .*?</article>", path.read_text(encoding="utf-8"), re.DOTALL)
     contents = ""
     for path, article in found.items():
-        contents += article.replace("<article", '<article data-page="%s"' % path.relative_to(RENDERED), 1)
+        contents += article.replace("<article", f'<article data-page="{path.relative_to(RENDERED)}"', 1)
     index = RENDERED / "index.html"
     return index.read_text(encoding="utf-8").replace(found[index], contents), len(found)
 
@@ -130,8 +130,8 @@ def test_blocks_name_their_terminal_where_there_are_several(pages, browser):
 
 def test_each_tutorial_leads_to_the_next(pages, browser):
     course = sorted((ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
-    browser.get("%s/docs/tutorial/hero/%s.html" % (pages, course[0].stem))
+    browser.get(f"{pages}/docs/tutorial/hero/{course[0].stem}.html")
     for page in course[1:]:
         browser.get(find(browser, NEXT_PAGE).get_attribute("href"))
-        end = "/%s.html" % page.stem
+        end = f"/{page.stem}.html"
         wait_for(lambda end=end: browser.current_url.endswith(end), lambda: browser.current_url)

@@ -30,7 +30,7 @@ def make_jobs(results_dir, families, table, long_minutes=0.0):
     jobs = []
     for family in families:
         own_results = results_dir / family
-        command = [sys.executable, "-m", "pytest", "-q", str(HERE / ("test_%s.py" % family)), "-s"]
+        command = [sys.executable, "-m", "pytest", "-q", str(HERE / (f"test_{family}.py")), "-s"]
         command += ["--junitxml", str(own_results / (family + ".xml"))]
         command += ["--table", str(table), "-p", "no:cacheprovider"]
         timeout_s = SHORT_TIMEOUT_S
@@ -75,7 +75,7 @@ def main():
     options = parser.parse_intermixed_args()
     unknown = sorted(set(options.families) - set(families))
     if unknown:
-        parser.error("no such family: %s; there are: %s" % (", ".join(unknown), ", ".join(families)))
+        parser.error(f"no such family: {', '.join(unknown)}; there are: {', '.join(families)}")
     chosen = options.families or families
     end_s = time.monotonic() + 60.0 * options.minutes
     round_number = 0

@@ -29,10 +29,8 @@ class GroundTruth:
     def __init__(self, number, controller="velocity_controller"):
         self.name = "hero_%d" % number
         self.path = []
-        self._subscriber = rospy.Subscriber("/%s/ground_truth" % self.name, Odometry, self._receive, tcp_nodelay=True)
-        self.publisher = rospy.Publisher(
-            "/%s/%s/cmd_vel" % (self.name, controller), Twist, queue_size=1, tcp_nodelay=True
-        )
+        self._subscriber = rospy.Subscriber(f"/{self.name}/ground_truth", Odometry, self._receive, tcp_nodelay=True)
+        self.publisher = rospy.Publisher(f"/{self.name}/{controller}/cmd_vel", Twist, queue_size=1, tcp_nodelay=True)
         self.command = Twist()
         self._timer = rospy.Timer(rospy.Duration(0.1), lambda _: self.publisher.publish(self.command))
 

@@ -178,7 +178,7 @@ class Trend(NamedTuple):
     def describe(self, unit, is_long):
         """Return it in words; minutes tell of an hour, seconds do not."""
         if not is_long:
-            return "%.1f%s, %+.1f" % (self.start, unit, round(self.growth, 1) + 0.0)
+            return f"{self.start:.1f}{unit}, {round(self.growth, 1) + 0.0:+.1f}"
         return "%.1f%s, %+.2f per hour (extrapolated to 24 h: %+.1f)" % (
             self.start,
             unit,
@@ -240,7 +240,7 @@ def judge(samples, is_long):
         "CPU": find_trend(samples, lambda sample: sample.cpu_percent),
     }
     units = {"memory": " MB", "CPU": " %"}
-    words = "; ".join("%s %s" % (name, trend.describe(units.get(name, ""), is_long)) for name, trend in held.items())
+    words = "; ".join(f"{name} {trend.describe(units.get(name, ''), is_long)}" for name, trend in held.items())
     memory_max = MEMORY_GROWTH_MB_PER_H * max(1.0, held["memory"].hours) if is_long else WARM_UP_MB
     assert held["memory"].growth <= memory_max, words
     assert max(held["threads"].growth, held["files"].growth) <= FLICKER, words
@@ -296,7 +296,7 @@ def test_nothing_is_lost_and_the_driver_does_not_grow(start_driver, effort, reco
         bustle.rounds,
     )
     record(
-        "what the driver holds and uses stays the same, by a line through %d samples" % len(samples),
+        f"what the driver holds and uses stays the same, by a line through {len(samples)} samples",
         1,
         1,
         judge(samples, effort.is_long),

@@ -144,14 +144,14 @@ def test_a_misbehaving_peer_costs_other_robots_no_message(scene, effort, record,
     assert (window["silent"], window["lost"], window["disordered"]) == ([], 0, 0), (window, did)
     wait_for(
         lambda: count_holdings(scene.driver).registrations <= before.registrations,
-        lambda: "the bad peer's topics to go: %s" % count_holdings(scene.driver).describe_growth(before),
+        lambda: f"the bad peer's topics to go: {count_holdings(scene.driver).describe_growth(before)}",
         REGISTRATIONS_S,
     )
     growth = count_holdings(scene.driver).describe_growth(before)
     lost = "nothing"
     if effort.is_long:
-        lost += "; p99 %.1f ms, without it %.1f ms" % (window["p99_ms"], scene.quiet_p99_ms)
-        lost += "; a new robot joined in %.1f s; at worst %s; after it %s" % (joined_s, worst, growth)
+        lost += f"; p99 {window['p99_ms']:.1f} ms, without it {scene.quiet_p99_ms:.1f} ms"
+        lost += f"; a new robot joined in {joined_s:.1f} s; at worst {worst}; after it {growth}"
     record("one of 21 peers " + BAD_PEERS[kind], 1, 1, lost)
 
 

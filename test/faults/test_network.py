@@ -37,13 +37,13 @@ class Host:
         own = os.readlink("/proc/self/ns/net")
         wait_for(lambda: os.readlink("/proc/%d/ns/net" % self._process.pid) != own, "a namespace")
         self.cable = cable
-        run("ip link add %s0 type veth peer name %s1" % (cable, cable))
+        run(f"ip link add {cable}0 type veth peer name {cable}1")
         run("ip link set %s1 netns %d" % (cable, self._process.pid))
-        run("ip address add %s/24 dev %s0" % (near, cable))
-        run("ip link set %s0 up" % cable)
+        run(f"ip address add {near}/24 dev {cable}0")
+        run(f"ip link set {cable}0 up")
         self.run("ip link set lo up")
-        self.run("ip address add %s/24 dev %s1" % (far, cable))
-        self.run("ip link set %s1 up" % cable)
+        self.run(f"ip address add {far}/24 dev {cable}1")
+        self.run(f"ip link set {cable}1 up")
         self.far = far
 
     def run(self, command):
@@ -52,10 +52,10 @@ class Host:
 
     def cut(self):
         """Pull the cable: nothing is answered any more, and nobody is told."""
-        run("ip link set %s0 down" % self.cable)
+        run(f"ip link set {self.cable}0 down")
 
     def restore(self):
-        run("ip link set %s0 up" % self.cable)
+        run(f"ip link set {self.cable}0 up")
 
     def end(self):
         self._process.kill()
@@ -207,7 +207,7 @@ def test_stalls_of_3_s_keep_every_connection(through_relay, effort, record):
         "nothing for 3 s, then all at once",
         tries,
         tries - (count_returns(driver) - returns),
-        "no connection; heard again %.1f s after the stall began" % max(back_s),
+        f"no connection; heard again {max(back_s):.1f} s after the stall began",
     )
 
 
@@ -228,7 +228,7 @@ def test_a_cut_cable_is_detected_and_all_robots_return(by_cable, effort, record)
         "the cable of %d robots is cut for %.0f s" % (ROBOTS, cut_s),
         ROBOTS,
         ROBOTS,
-        "what was sent meanwhile; away after %.1f s, back %.1f s after the end" % (noticed_s, back_s),
+        f"what was sent meanwhile; away after {noticed_s:.1f} s, back {back_s:.1f} s after the end",
     )
 
 
@@ -239,9 +239,9 @@ def test_robots_keep_their_identity_when_their_address_changes(lab, record):
         watch.wait_all_heard("all robots")
         robots.cut()
     # No word of the end came through; the same robots come with other addresses.
-    robots.run("ip address add %s/24 dev robots1" % OTHER_ROBOT_NET)
-    robots.run("ip address del %s/24 dev robots1" % ROBOT_NET)
-    robots.run("ip address replace %s/24 dev robots1" % OTHER_ROBOT_NET)
+    robots.run(f"ip address add {OTHER_ROBOT_NET}/24 dev robots1")
+    robots.run(f"ip address del {ROBOT_NET}/24 dev robots1")
+    robots.run(f"ip address replace {OTHER_ROBOT_NET}/24 dev robots1")
     robots.restore()
     start_s = time.monotonic()
     with start_robots(robots, PC, port):
@@ -250,12 +250,12 @@ def test_robots_keep_their_identity_when_their_address_changes(lab, record):
             found = [driver.fleet.find("/hero_%d" % number, Robot.READY) for number in range(ROBOTS)]
             return all(robot and robot.address.startswith(OTHER_ROBOT_NET + ":") for robot in found)
 
-        wait_for(have_moved, lambda: "all robots at their new address: %s" % driver.fleet.newest, 60.0)
+        wait_for(have_moved, lambda: f"all robots at their new address: {driver.fleet.newest}", 60.0)
         watch.wait_all_heard("all robots at their new address")
         back_s = time.monotonic() - start_s
     watch.close()
-    robots.run("ip address add %s/24 dev robots1" % ROBOT_NET)
-    record("robots get another address", ROBOTS, ROBOTS, "what was sent meanwhile; back after %.1f s" % back_s)
+    robots.run(f"ip address add {ROBOT_NET}/24 dev robots1")
+    record("robots get another address", ROBOTS, ROBOTS, f"what was sent meanwhile; back after {back_s:.1f} s")
 
 
 def test_killing_one_of_two_drivers_does_not_affect_the_other(by_cable, master, record):

@@ -58,7 +58,7 @@ def test_robots_stop_when_the_driver_ends_and_can_be_driven_again(field, start_d
         "%s while %d robots drive at 0.1 m/s" % (number.name, ROBOTS),
         len(distances_m),
         len(distances_m) - ROBOTS * len(doubts),
-        "at most %.3f m driven on" % max(distances_m),
+        f"at most {max(distances_m):.3f} m driven on",
     )
 
 

@@ -89,7 +89,7 @@ def test_robots_cannot_escape_their_namespace_or_run_code(start_driver, record):
     outside = [
         name
         for name in list_names(driver.node)
-        if not re.fullmatch(r"/hero_7/[a-z_/]+|/tf|/rosout|/clock|/diagnostics|%s/\w+" % driver.node, name)
+        if not re.fullmatch(rf"/hero_7/[a-z_/]+|/tf|/rosout|/clock|/diagnostics|{driver.node}/\w+", name)
     ]
     robot.close()
     assert not driver.find_lines("Traceback")
@@ -148,7 +148,7 @@ def test_no_peer_exceeds_the_limits(start_driver, record, kind):
     for sock in socks:
         sock.close()
     friend.close()
-    record("20 times %s from one address that may have 5" % kind, 1, int(taken <= 5), "what was beyond the limit")
+    record(f"20 times {kind} from one address that may have 5", 1, int(taken <= 5), "what was beyond the limit")
 
 
 def test_one_address_cannot_occupy_all_connections(start_driver, record):

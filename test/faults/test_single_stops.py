@@ -45,8 +45,8 @@ def test_a_single_stop_of_a_program_that_dies_or_hangs_then_is_enough(start_driv
         for program in programs:
             program.process.stdin.write("\n")
             program.process.stdin.flush()
-        wait_for(lambda: not list_moving(robots), lambda: "rest of the robots of %s" % list_moving(robots))
-    record("a program that gets SIG%s after it published a stop once" % end, len(PARTS), len(PARTS))
+        wait_for(lambda: not list_moving(robots), lambda: f"rest of the robots of {list_moving(robots)}")
+    record(f"a program that gets SIG{end} after it published a stop once", len(PARTS), len(PARTS))
 
 
 def test_a_single_stop_on_a_new_connection_arrives(start_driver, record):
@@ -58,5 +58,5 @@ def test_a_single_stop_on_a_new_connection_arrives(start_driver, record):
         wait_for(lambda: list_moving(robots) == list(robots), "all robots to move")
         for part, robot in robots.items():
             stack.enter_context(start_python("single_stop.py", part, robot.name, "CONT", "first"))
-        wait_for(lambda: not list_moving(robots), lambda: "rest of the robots of %s" % list_moving(robots))
+        wait_for(lambda: not list_moving(robots), lambda: f"rest of the robots of {list_moving(robots)}")
     record("a stop that is the first that a program publishes", 3, 3)

@@ -82,7 +82,7 @@ def is_confirmed(driver):
 def asking(drivers_known):
     """Yield the Drivers of a program that has just started, once it has found so many."""
     drivers = Drivers()
-    wait_for(lambda: len(drivers.names()) == drivers_known and drivers.read(), lambda: "%s" % drivers.names())
+    wait_for(lambda: len(drivers.names()) == drivers_known and drivers.read(), lambda: f"{drivers.names()}")
     yield drivers
     drivers.close()
 
@@ -145,7 +145,7 @@ def test_a_hung_driver_does_not_delay_stops_of_others(field, start_driver, recor
             wait_until_stopped(ground_truths)
             wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
             wait_for(lambda: drivers.stop_status().level == "error", "a verdict")
-            assert drivers.stop_status().text == "NOT STOPPED: driver %s does not answer" % hung.node[1:]
+            assert drivers.stop_status().text == f"NOT STOPPED: driver {hung.node[1:]} does not answer"
             drivers.request_stop(False)
             wait_for(lambda: not driver.fleet.newest.stopped, "the release")
             drive(ground_truths)
@@ -162,14 +162,14 @@ def test_robots_stop_when_their_commander_is_killed(start_driver, record, contro
     driver = start_driver()
     robot = FakeRobot(91, read_cycle_s=READ_CYCLE_S, has_motors=True).connect(driver.address)
     driver.fleet.wait_ready("/hero_91")
-    topic = "/hero_91/%s/cmd_vel" % controller
+    topic = f"/hero_91/{controller}/cmd_vel"
     commander = subprocess.Popen([sys.executable, "-c", COMMANDER % (SPEED_M_S, topic)])
     wait_for(lambda: robot.motors.is_turning, "the robot to move")
     commander.kill()
     commander.wait()
     wait_for(lambda: not robot.motors.is_turning, "the robot to stop")
     robot.close()
-    record("the program that commands the %s is killed" % controller, 1, 1)
+    record(f"the program that commands the {controller} is killed", 1, 1)
 
 
 def test_a_stop_during_a_radio_pause_arrives(field, record):
@@ -206,7 +206,7 @@ def test_a_stop_ends_the_self_tuning_of_simulated_robots(field, record, controll
     driver, ground_truths = field
     for ground_truth in ground_truths:
         ground_truth.close()
-        name = "/%s/%s/pid_calibration" % (ground_truth.name, controller)
+        name = f"/{ground_truth.name}/{controller}/pid_calibration"
         rospy.wait_for_service(name, 60.0)
         rospy.ServiceProxy(name, Trigger)()
     watchers = [GroundTruth(number) for number in range(ROBOTS)]
@@ -216,7 +216,7 @@ def test_a_stop_ends_the_self_tuning_of_simulated_robots(field, record, controll
     wait_until_stopped(watchers)
     for watcher in watchers:
         watcher.close()
-    record("simulated robots that tune the %s, then a stop" % controller, ROBOTS, ROBOTS)
+    record(f"simulated robots that tune the {controller}, then a stop", ROBOTS, ROBOTS)
 
 
 def test_a_broken_event_loop_ends_a_self_tuning(start_driver, record, tmp_path):

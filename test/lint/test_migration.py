@@ -39,7 +39,7 @@ def test_each_row_is_of_names_of_the_stock_packages():
 
 @pytest.mark.parametrize("name", NAMES["same"]["launch"])
 def test_launch_files_that_are_the_same_exist(name):
-    assert sources.find("launch/%s.launch" % name)
+    assert sources.find(f"launch/{name}.launch")
 
 
 @pytest.mark.parametrize("name", NAMES["same"]["topics"])
@@ -47,10 +47,10 @@ def test_topics_and_services_that_are_the_same_are_those_of_the_robots(name):
     robot = sources.ROOT / "hero_sim" / "src" / "hero_sim" / "robot"
     declared = (robot / "declarations.py").read_text() + (robot / "models.py").read_text()
     controller, _, last = name.rpartition("/")
-    parts = ['%%s/%s/"' % controller, '+ "%s"' % last] if controller else ['%%s/%s"' % name]  # of both controllers
+    parts = ['%%s/%s/"' % controller, f'+ "{last}"'] if controller else ['%%s/%s"' % name]  # of both controllers
     assert all(part in declared for part in parts)
 
 
 @pytest.mark.parametrize("name", NAMES["other"]["types"])
 def test_types_of_the_stock_packages_are_in_hero_msgs(name):
-    assert list((sources.ROOT / "hero_msgs").glob("*/%s.*" % name))
+    assert list((sources.ROOT / "hero_msgs").glob(f"*/{name}.*"))

@@ -60,9 +60,9 @@ def test_every_module_and_data_file_is_in_the_package(built):
 
 def test_the_package_works_where_there_is_no_ros(built):
     command = [sys.executable, "-I", "-c", WITHOUT_ROS, str(built)]
-    assert subprocess.check_output(command, universal_newlines=True).startswith("True %s" % built)
+    assert subprocess.check_output(command, universal_newlines=True).startswith(f"True {built}")
 
 
 def test_its_version_is_that_of_the_suite():
     text = (sources.ROOT / "pyproject.toml").read_text()
-    assert '\nversion = "%s"\n' % parse_package(str(sources.ROOT / "hero")).version in text
+    assert f'\nversion = "{parse_package(str(sources.ROOT / "hero")).version}"\n' in text

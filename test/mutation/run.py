@@ -295,7 +295,7 @@ def main():
     options = parser.parse_intermixed_args()
     unknown = sorted(set(options.packages) - set(packages))
     if unknown:
-        parser.error("no unit tests in %s; there are: %s" % (", ".join(unknown), ", ".join(packages)))
+        parser.error(f"no unit tests in {', '.join(unknown)}; there are: {', '.join(packages)}")
     print("| package | mutants tried | killed | survived | not reached | others | score |\n" + 7 * "|---" + "|")
     for package in options.packages or packages:
         print_package(package, *try_package(package, options.work_dir, options.sample, options.seed))

@@ -28,7 +28,7 @@ DOCS = ROOT / "hero_examples" / "docs"
 
 def arena_file(name):
     """Return the path of an arena of the tests."""
-    return str(ROOT / "test" / "hero_test" / "arenas" / ("%s_arena.yaml" % name))
+    return str(ROOT / "test" / "hero_test" / "arenas" / (f"{name}_arena.yaml"))
 
 
 class Recording:
@@ -56,7 +56,7 @@ class Recording:
         """Return when the robots have had so much more time."""
         rows = self.watch.rows[0]
         end_s = rows[-1][0] + seconds
-        self.stage.wait_for(lambda: rows[-1][0] >= end_s, "%g s of robots" % seconds, 2.0 * seconds + 10.0)
+        self.stage.wait_for(lambda: rows[-1][0] >= end_s, f"{seconds:g} s of robots", 2.0 * seconds + 10.0)
 
     def wait_until_all_rest(self, what, timeout_s):
         """Wait until nobody has moved or turned for a second."""
@@ -179,7 +179,7 @@ def count_reddened(lights):
 def measure_delay(picture):
     """The program's own plot, for four robots in a router's network."""
     with Recording(4, "empty", "wifi:=router") as recording:
-        program = recording.stage.start_example("measure_delay", "_turns:=10", "_plot:=%s" % picture)
+        program = recording.stage.start_example("measure_delay", "_turns:=10", f"_plot:={picture}")
         if program.wait(180.0):
             raise SystemExit("measure_delay ended with %d" % program.returncode)
 

@@ -15,7 +15,7 @@ def make_pictures(pictures, folder, description):
     names = options.names or list(pictures)
     if len(names) == 1:
         pictures[names[0]](Path(options.folder) / (names[0] + ".png"))
-        print("%s/%s.png" % (options.folder, names[0]), flush=True)
+        print(f"{options.folder}/{names[0]}.png", flush=True)
         return
     for name in names:
         subprocess.run([sys.executable, sys.argv[0], name, "--folder", options.folder], check=True)

@@ -97,5 +97,5 @@ PICTURES = {
 
 if __name__ == "__main__":
     if MISSING or NO_BROWSER:
-        sys.exit("screen_pictures: not installed: %s (script/bootstrap --test)" % ", ".join([*MISSING, *NO_BROWSER]))
+        sys.exit(f"screen_pictures: not installed: {', '.join([*MISSING, *NO_BROWSER])} (script/bootstrap --test)")
     make_pictures(PICTURES, PICTURES_FOLDER, __doc__)

@@ -32,7 +32,7 @@ def start_script(stage, name, *arguments):
 def odometry(picture):
     """The window of RViz, when the square is three and a half sides long."""
     if MISSING:
-        sys.exit("tutorial_pictures: not installed: %s (script/bootstrap --test)" % ", ".join(MISSING))
+        sys.exit(f"tutorial_pictures: not installed: {', '.join(MISSING)} (script/bootstrap --test)")
     screen = VirtualScreen(*SCREEN)
     os.environ.update(screen.environment())
     try:

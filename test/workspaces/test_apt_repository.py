@@ -42,7 +42,7 @@ def ask_apt(folder, key, *command):
     for name in ("state/partial", "cache/archives/partial"):
         (lists / name).mkdir(parents=True)
     (release,) = [path.parent for path in folder.glob("*/InRelease")]
-    (lists / "sources.list").write_text("deb [signed-by=%s] file:%s ./\n" % (key, release))
+    (lists / "sources.list").write_text(f"deb [signed-by={key}] file:{release} ./\n")
     settings = {
         "Dir::State::lists": lists / "state",
         "Dir::Cache": lists / "cache",

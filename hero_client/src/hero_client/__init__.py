@@ -75,7 +75,7 @@ __all__ = list(_MODULES)
 
 def __getattr__(name: str) -> Any:
     if name not in _MODULES:
-        raise AttributeError("hero_client has no attribute %r" % name)
+        raise AttributeError(f"hero_client has no attribute {name!r}")
     try:
         module = import_module(_MODULES[name])
     except ModuleNotFoundError as error:

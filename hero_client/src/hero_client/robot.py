@@ -89,5 +89,5 @@ class Robot(BaseRobot):
         try:
             self._check_asked("imu")
         except StaleDataError as error:
-            raise StaleDataError("%s: only robots with the IMU hat publish it" % error) from None
+            raise StaleDataError(f"{error}: only robots with the IMU hat publish it") from None
         return self._link.read("imu")

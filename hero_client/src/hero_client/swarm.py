@@ -38,7 +38,7 @@ class Swarm(BaseSwarm[Robot]):
         Raises: ValueError for an invalid or repeated id. NodeError if no ROS master answers within 3 s.
         """
         if isinstance(robot_ids, str) or not isinstance(robot_ids, Iterable):
-            raise ValueError("a swarm is named by numbers, such as [0, 1, 2] or range(3), not by %r" % (robot_ids,))
+            raise ValueError(f"a swarm is named by numbers, such as [0, 1, 2] or range(3), not by {robot_ids!r}")
         numbers = [check_robot_id(number) for number in robot_ids]
         for number in numbers:
             if numbers.count(number) > 1:
@@ -66,8 +66,8 @@ class Swarm(BaseSwarm[Robot]):
             if ids and drivers.is_settled:
                 return cls(ids, odom, proximity)
         if report is None:
-            raise RobotNotReadyError("nothing on %s within %.3g s: is the driver running?" % (USUAL_TOPIC, timeout_s))
-        raise RobotNotReadyError("no robot joined the driver within %.3g s: are they on?" % timeout_s)
+            raise RobotNotReadyError(f"nothing on {USUAL_TOPIC} within {timeout_s:.3g} s: is the driver running?")
+        raise RobotNotReadyError(f"no robot joined the driver within {timeout_s:.3g} s: are they on?")
 
     def emergency_stop(self) -> StopStatus:
         """Stop all robots of all drivers, not only those of this swarm, until release_stop().

@@ -110,6 +110,6 @@ def _convert_wheels(lengths: Any, content: Dict[str, Any]) -> OwnWheels:
         raise ValueError("ticks_per_turn must be 1 or more")
     model = content.get("model", "")
     if model not in ("", STOCK, HERO_PLUS):
-        raise ValueError("model must be %s or %s, not %r" % (STOCK, HERO_PLUS, model))
+        raise ValueError(f"model must be {STOCK} or {HERO_PLUS}, not {model!r}")
     diameter_m, ratio = (left_m + right_m) / 2.0, right_m / left_m
     return OwnWheels(diameter_m, separation_m, ratio, ticks_per_turn and float(ticks_per_turn), model)

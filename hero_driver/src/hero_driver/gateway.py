@@ -105,7 +105,7 @@ class Gateway(LinkHandler):
         peers = [peer for peer in self.peers.values() if peer.link.address.host == largest]
         peer = next((peer for peer in peers if peer.record is None), peers[-1])
         self._stops.begin(peer)
-        peer.link.close("its address has the most of too many connections (%s)" % parameter)
+        peer.link.close(f"its address has the most of too many connections ({parameter})")
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
         """Pass bytes to the session and its events on; the hot path of the driver."""
@@ -143,7 +143,7 @@ class Gateway(LinkHandler):
             bridge.commands.watch_commanders(now_s)
             problem = bridge.corrections.take_problem()
             if problem:
-                line = "%s: %s" % (bridge.label, problem)
+                line = f"{bridge.label}: {problem}"
                 self._log.log_throttled("warn", bridge.label + problem.split(" ", 1)[0], line, bridge.label)
         self._collect_expired(now_s)
 
@@ -153,7 +153,7 @@ class Gateway(LinkHandler):
         for event in peer.session.poll(now_s):
             self._receive_event(peer, event, now_s)
         if peer.record is None and now_s - peer.session.opened_s > self._config.declare_timeout_s:
-            link.close("did not identify itself as a robot within %.1f s" % self._config.declare_timeout_s)
+            link.close(f"did not identify itself as a robot within {self._config.declare_timeout_s:.1f} s")
         if peer.session.outgoing and not link.closed:
             self._send_outgoing(peer)
 
@@ -175,21 +175,21 @@ class Gateway(LinkHandler):
         """Note a departure; the robot's endpoints stay up for the grace period."""
         peer: Optional[Peer] = self.peers.pop(link, None)
         if peer is None:
-            self.last_refusal = "%s: %s" % (link.address, reason)
+            self.last_refusal = f"{link.address}: {reason}"
             self._log.log_throttled(
                 "warn",
                 "refused " + link.address.host,
-                "connection of %s refused: %s" % (link.address, reason),
+                f"connection of {link.address} refused: {reason}",
             )
             return
         self._admission.release(link.address.host)
         if peer.record is None:
             self._admission.note_identified(link.address.host)
-            self.last_refusal = "%s: %s" % (link.address, reason)
+            self.last_refusal = f"{link.address}: {reason}"
             self._log.log_throttled(
                 "debug" if reason == THE_DRIVER_ENDS else "warn",
                 "unidentified " + link.address.host + reason[:12],
-                "unidentified connection of %s ended: %s" % (link.address, reason),
+                f"unidentified connection of {link.address} ended: {reason}",
             )
             return
         if peer.refused:
@@ -206,7 +206,7 @@ class Gateway(LinkHandler):
             self._log.log_throttled(
                 "debug" if reason == THE_DRIVER_ENDS else "warn",
                 "left " + record.identity.namespace,
-                "%s left (%s): %s" % (peer.label, link.address, reason),
+                f"{peer.label} left ({link.address}): {reason}",
                 host=link.address.host,
             )
             self.note_change()
@@ -220,7 +220,7 @@ class Gateway(LinkHandler):
         self._log.log_throttled(
             "fatal",
             "fault " + type(error).__name__,
-            "bug in the driver, please report it: %s: %s; %s" % (type(error).__name__, error, place),
+            f"bug in the driver, please report it: {type(error).__name__}: {error}; {place}",
         )
 
     def warn_network(self, text: str) -> None:
@@ -266,7 +266,7 @@ class Gateway(LinkHandler):
         info = topic.info
         refusal = namespaces.find_refusal(info.name, info.message_type, identity, self._node, topic.kind.is_from_robot)
         if refusal is not None:
-            self.warn_robot(peer, "topic %s refused: %s" % (ascii(info.name), refusal))
+            self.warn_robot(peer, f"topic {info.name!a} refused: {refusal}")
             return None
         return namespaces.resolve(info.name, identity)
 
@@ -278,7 +278,7 @@ class Gateway(LinkHandler):
             if topic.info.name in namespaces.TF_TOPICS:
                 peer.early_topics = [*peer.early_topics[-7:], topic]
             else:
-                self.warn_robot(peer, "topic %s refused: not a name below /hero_N" % ascii(topic.info.name))
+                self.warn_robot(peer, f"topic {topic.info.name!a} refused: not a name below /hero_N")
             return
         if self._resolve(peer, topic, identity) is None:
             return
@@ -308,7 +308,7 @@ class Gateway(LinkHandler):
         identity = record.identity
         if decision.old_link is not None and not decision.old_link.closed:
             # The record belongs to the new connection already, so the old one's end changes nothing.
-            decision.old_link.close("the robot connected again from %s" % (peer.link.address,))
+            decision.old_link.close(f"the robot connected again from {peer.link.address}")
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
             bridge = RobotBridge(identity, self._context)
@@ -317,7 +317,7 @@ class Gateway(LinkHandler):
         rebooted = peer.boot is not None
         bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED, peer.wheels)
         bridge.attach()
-        text = "%s %s (%s)" % (bridge.label, decision.verdict.value, peer.link.address)
+        text = f"{bridge.label} {decision.verdict.value} ({peer.link.address})"
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
         self.note_change()
         early_topics, peer.early_topics = peer.early_topics, []
@@ -389,8 +389,8 @@ class Gateway(LinkHandler):
     def _report_doubtful(self, peers: List[Peer]) -> None:
         """Say which robots may still move when the driver ends."""
         if peers:
-            names = ", ".join("%s (%s)" % (peer.label, describe_doubt(peer)) for peer in peers)
-            self._log.log("error", "the driver ends, and these robots are not known to be at rest: %s" % names)
+            names = ", ".join(f"{peer.label} ({describe_doubt(peer)})" for peer in peers)
+            self._log.log("error", f"the driver ends, and these robots are not known to be at rest: {names}")
 
     def _list_stoppable(self) -> List[Peer]:
         return [peer for peer in self.peers.values() if can_move(peer)]
@@ -410,7 +410,7 @@ class Gateway(LinkHandler):
             peer.record.dropped_messages += 1
             peer.record.last_error = text
         group = peer.label if peer.bridge is not None else peer.link.address.host
-        line = "%s: %s" % (peer.label, text)
+        line = f"{peer.label}: {text}"
         self._log.log_throttled("error", peer.label + text[:80], line, group, peer.link.address.host)
 
     def warn_late(self) -> None:
@@ -452,7 +452,7 @@ class Gateway(LinkHandler):
             bridge = self.bridges.pop(record.identity.namespace, None)
             if bridge is not None:
                 bridge.close()
-                text = "%s has left; its topics and services are unregistered" % bridge.label
+                text = f"{bridge.label} has left; its topics and services are unregistered"
                 self._log.log_throttled("info", "gone " + bridge.label, text, host=record.host)
             self._admit_duplicates(record, lambda host: True)
             self.note_change()

@@ -89,7 +89,7 @@ class DriverNode:
             "registrar",
             REGISTRAR_QUEUE_LENGTH,
             lambda error: self._log.log(
-                "error", "a topic or service could not be set up: %s: %s" % (type(error).__name__, error)
+                "error", f"a topic or service could not be set up: {type(error).__name__}: {error}"
             ),
         )
         self._loop = EventLoop(config.host, config.port, config.robots, config.silence_timeout_s)
@@ -193,10 +193,10 @@ class DriverNode:
     def _describe_start(self) -> str:
         parts = []
         if self._loop.listening is not None:
-            parts.append("listening on %s" % (self._loop.listening,))
+            parts.append(f"listening on {self._loop.listening}")
         if self._config.robots:
-            parts.append("dialling %s" % ", ".join(str(address) for address in self._config.robots))
-        return "hero_driver: %s" % "; ".join(parts)
+            parts.append(f"dialling {', '.join(str(address) for address in self._config.robots)}")
+        return f"hero_driver: {'; '.join(parts)}"
 
     def _report(self, reporter: Reporter, is_periodic: bool) -> None:
         try:
@@ -244,7 +244,7 @@ def main(argv: Optional[List[str]] = None) -> int:
     except (MemoryError, RuntimeError, ProgramError) as error:
         if not threads.note(error) and not threads.failure:
             raise
-        print_error("cannot run: %s" % threads.failure)
+        print_error(f"cannot run: {threads.failure}")
         code = 1
     if threads.failure:
         os._exit(code)  # Python would wait for rospy's threads, which wait for what could not start
@@ -302,7 +302,7 @@ def _wait_for_master(uri: str) -> None:
     if rosgraph.is_master_online():
         return
     sys.stderr.write(
-        "hero_driver: no ROS master at %s yet, waiting; start one with roscore, or set ROS_MASTER_URI\n" % uri
+        f"hero_driver: no ROS master at {uri} yet, waiting; start one with roscore, or set ROS_MASTER_URI\n"
     )
     while not rosgraph.is_master_online():
         time.sleep(MASTER_CHECK_S)
@@ -312,7 +312,7 @@ def _read_private_parameters() -> Any:
     try:
         parameters = rospy.get_param("~", {})
     except (rosgraph.MasterException, OSError) as error:
-        raise ProgramError("the ROS master cannot be asked for parameters: %s" % error) from error
+        raise ProgramError(f"the ROS master cannot be asked for parameters: {error}") from error
     if not isinstance(parameters, dict):
         return {}
     if FORMER_STOP in parameters:
@@ -329,9 +329,9 @@ def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
             config.port,
         )
     if error.errno == errno.EACCES:
-        return "%s may not be used without privileges: choose a ~port above 1023" % where
+        return f"{where} may not be used without privileges: choose a ~port above 1023"
     if error.errno == errno.EADDRNOTAVAIL:
-        return "%s is not an address of this machine: use one that `ip address` shows, or 0.0.0.0" % where
+        return f"{where} is not an address of this machine: use one that `ip address` shows, or 0.0.0.0"
     if isinstance(error, HostNotFoundError):
-        return "%s: %s; use an address that `ip address` shows, or 0.0.0.0" % (where, error)
-    return "%s cannot be listened on: %s" % (where, os.strerror(error.errno) if error.errno else error)
+        return f"{where}: {error}; use an address that `ip address` shows, or 0.0.0.0"
+    return f"{where} cannot be listened on: {os.strerror(error.errno) if error.errno else error}"

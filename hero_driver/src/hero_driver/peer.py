@@ -45,7 +45,7 @@ class Peer:
         if self.bridge is not None:
             return self.bridge.label
         if self.record is not None:
-            return "%s at %s (refused)" % (self.record.identity.namespace.lstrip("/"), self.link.address)
+            return f"{self.record.identity.namespace.lstrip('/')} at {self.link.address} (refused)"
         return str(self.link.address)
 
     def watch_wheels(self, topic: Topic) -> None:

@@ -103,7 +103,7 @@ class Reporter:
         text = "%d of %d robots ready" % (ready, len(status.robots))
         moving = [robot.name for robot in status.robots if robot.message.stop_state == Robot.MOVING]
         if moving:
-            stat.summary(DiagnosticStatus.ERROR, "%s; moving though stopped: %s" % (text, ", ".join(moving)))
+            stat.summary(DiagnosticStatus.ERROR, f"{text}; moving though stopped: {', '.join(moving)}")
         elif status.stopped:
             stat.summary(DiagnosticStatus.WARN, text + "; all robots are stopped (~stop)")
         else:
@@ -125,13 +125,13 @@ class Reporter:
             ("firmware", row.firmware),
             ("hardware", row.hardware),
             ("config", row.config),
-            ("uptime (s)", "%.0f" % row.uptime.to_sec()),
+            ("uptime (s)", f"{row.uptime.to_sec():.0f}"),
             ("reconnects", row.reconnects),
-            ("packets per second", "%.1f" % row.packets_per_s),
-            ("bytes per second", "%.0f" % row.bytes_per_s),
+            ("packets per second", f"{row.packets_per_s:.1f}"),
+            ("bytes per second", f"{row.bytes_per_s:.0f}"),
             ("dropped messages", row.dropped_messages),
             ("bad packets", row.bad_packets),
-            ("clock offset (s)", "%.4f" % row.clock_offset),
+            ("clock offset (s)", f"{row.clock_offset:.4f}"),
             ("corrected stamps", robot.corrected_stamps),
             ("odometry resets", robot.odometry_resets),
             ("refused transforms", ", ".join(robot.foreign_frames)),
@@ -152,13 +152,13 @@ def _assess(robot: RobotStatus) -> Tuple[int, str]:
     if robot.problem:
         return DiagnosticStatus.ERROR, robot.problem
     if row.state == Robot.AWAY:
-        return DiagnosticStatus.ERROR, "away: %s" % row.last_error
+        return DiagnosticStatus.ERROR, f"away: {row.last_error}"
     if row.state == Robot.JOINING:
         return DiagnosticStatus.WARN, "joining"
     if robot.tunes:
         return DiagnosticStatus.WARN, "tunes itself (pid_calibration) and spins; ~stop ends that"
     if robot.foreign_frames:
-        return DiagnosticStatus.WARN, "sends transforms that are not its own: %s" % ", ".join(robot.foreign_frames)
+        return DiagnosticStatus.WARN, f"sends transforms that are not its own: {', '.join(robot.foreign_frames)}"
     if abs(row.clock_offset) > LARGE_CLOCK_OFFSET_S:
-        return DiagnosticStatus.WARN, "its clock is off by %.2f s" % row.clock_offset
+        return DiagnosticStatus.WARN, f"its clock is off by {row.clock_offset:.2f} s"
     return DiagnosticStatus.OK, "ready"

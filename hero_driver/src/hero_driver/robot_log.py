@@ -54,7 +54,7 @@ class RobotLog:
             record.dropped_messages += 1
             return
         level = "debug" if line.is_routine else LEVELS.get(log.level, "error")
-        self._log.log(level, "%s: %s" % (peer.label, line.text))
+        self._log.log(level, f"{peer.label}: {line.text}")
 
     def _receive_unrequested_tuning(self, peer: Peer) -> None:
         if peer.wheels.is_late:
@@ -62,7 +62,7 @@ class RobotLog:
             self._warn_late()
             return
         # Left by an earlier driver or connection: nothing else would end it.
-        self._log.log("warn", "%s tunes itself, without a request from this driver: stopped" % peer.label)
+        self._log.log("warn", f"{peer.label} tunes itself, without a request from this driver: stopped")
         self._stop(peer)
 
     def _receive_uptime(self, peer: Peer, record: RobotRecord, uptime_s: float, now_s: float) -> None:
@@ -70,7 +70,7 @@ class RobotLog:
         has_rebooted = uptime_s < record.heard_uptime_s
         record.heard_uptime_s = uptime_s
         if has_rebooted:
-            text = "%s rebooted %.1f s ago" % (peer.label, uptime_s)
+            text = f"{peer.label} rebooted {uptime_s:.1f} s ago"
             self._log.log_throttled("warn", "rebooted " + peer.label, text, host=peer.link.address.host)
             if peer.bridge is not None and peer.boot is None:
                 peer.bridge.corrections.note_reboot()

@@ -78,8 +78,8 @@ class StopInterface:
             self._store.write(stopped)
         except OSError as error:
             lost = "the stop will not survive" if stopped else "whether robots are stopped may not survive"
-            reason = "%s cannot be written (%s)" % (self._store.path, error.strerror)
-            text = "%s a restart of the driver: %s" % (lost, reason)
+            reason = f"{self._store.path} cannot be written ({error.strerror})"
+            text = f"{lost} a restart of the driver: {reason}"
             self._log.log_throttled("warn", text, text + "; make it writable, or set ROS_HOME to another folder")
             return text
         return ""
@@ -91,7 +91,7 @@ class StopInterface:
         try:
             return outcomes.get(timeout=KEEP_WAIT_S)
         except queue.Empty:
-            text = "not yet written to %s, which hangs: a restart of the driver may lose it" % self._store.path
+            text = f"not yet written to {self._store.path}, which hangs: a restart of the driver may lose it"
             self._log.log_throttled("warn", text, text)
             return text
 
@@ -139,7 +139,7 @@ class StopInterface:
             self._log.log("warn", "stopping all robots" if stopped else "robots may move")
 
     def _report_bug(self, error: BaseException) -> None:
-        self._log.log("error", "~stopped was not published: %s: %s" % (type(error).__name__, error))
+        self._log.log("error", f"~stopped was not published: {type(error).__name__}: {error}")
 
 
 def describe_stop(stops: Stops) -> str:
@@ -153,5 +153,5 @@ def describe_stop(stops: Stops) -> str:
     ):
         names = [name for name, its_state in stops if its_state is state]
         if names:
-            parts.append("%d %s: %s" % (len(names), text, ", ".join(names)))
+            parts.append(f"{len(names)} {text}: {', '.join(names)}")
     return "; ".join(parts)

@@ -21,7 +21,7 @@ class StopStore:
 
     def __init__(self, node: str, master_uri: str) -> None:
         """Take the driver's name in ROS, in which a point cannot occur, and the address of its master."""
-        name = "%s.%s" % (node.strip("/").replace("/", "."), _name_master(master_uri))
+        name = f"{node.strip('/').replace('/', '.')}.{_name_master(master_uri)}"
         self._folder = os.path.join(rospkg.get_ros_home(), FOLDER)
         self._released_path = os.path.join(self._folder, name + ".released")
         self.path = os.path.join(self._folder, name + ".stopped")
@@ -63,4 +63,4 @@ def _name_master(uri: str) -> str:
     host = parts.hostname or ""
     if host in ("::1", platform.node().lower()) or host.startswith("127."):
         host = "localhost"
-    return "%s_%s" % (host, parts.port)
+    return f"{host}_{parts.port}"

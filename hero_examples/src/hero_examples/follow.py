@@ -34,7 +34,7 @@ def main():
         )
         ids = parameters["robots"]
         if ids is None or len(ids) < 2:
-            raise ProgramError("~robots is %r, but must name a leader and at least one follower" % (ids or "all",))
+            raise ProgramError(f"~robots is {ids or 'all'!r}, but must name a leader and at least one follower")
         law = FollowLaw(gap_m=parameters["gap_m"], max_linear_m_s=parameters["linear_m_s"])
         common, lateness = CommonFrame(parameters["frame"]), Lateness()
 

@@ -6,7 +6,7 @@ from hero_client import BaseRobot, Robot, rate
 def step(robot: BaseRobot) -> None:
     robot.drive(0.0, 0.6)  # the robot obeys one command for about 2 s
     print("pose: x %.2f m, y %.2f m, yaw %.2f rad" % robot.pose)
-    print("ranges from the front, counter-clockwise, m:", ["%.2f" % range_m for range_m in robot.proximity])
+    print("ranges from the front, counter-clockwise, m:", [f"{range_m:.2f}" for range_m in robot.proximity])
     print("nearest:", robot.nearest())
 
 

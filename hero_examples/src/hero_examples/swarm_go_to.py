@@ -41,7 +41,7 @@ class Formation:
             self.done = True
             rospy.loginfo("formation complete after %.1f s", elapsed_s)
         if not self.done and elapsed_s > self.timeout_s:
-            raise ProgramError("after %g s not in place: %s" % (self.timeout_s, ", ".join(late)))
+            raise ProgramError(f"after {self.timeout_s:g} s not in place: {', '.join(late)}")
 
 
 def main():

@@ -27,7 +27,7 @@ class Clock(ABC):
         Raises: ValueError unless hz is more than 0.
         """
         if not hz > 0.0:
-            raise ValueError("a rate must be more than 0 Hz, not %r" % (hz,))
+            raise ValueError(f"a rate must be more than 0 Hz, not {hz!r}")
         start_s = due_s = self.now_s
         while self.sleep(due_s - self.now_s):
             yield self.now_s - start_s

@@ -73,12 +73,12 @@ def run_named(package: str, programs: Mapping[str, str]) -> NoReturn:
     """Run the program that the first argument names: python3 -m PACKAGE NAME ...; programs: their modules by name."""
     command = "python3 -m " + package
     if len(sys.argv) < 2 or sys.argv[1] not in programs:
-        sys.exit("%s: the first argument must be one of: %s" % (command, ", ".join(programs)))
+        sys.exit(f"{command}: the first argument must be one of: {', '.join(programs)}")
     name = sys.argv.pop(1)
     try:
-        program = import_module("%s.%s" % (package, programs[name]))
+        program = import_module(f"{package}.{programs[name]}")
     except ModuleNotFoundError as error:
-        sys.exit("%s %s: %s is missing; install python3-%s" % (command, name, error.name, error.name))
+        sys.exit(f"{command} {name}: {error.name} is missing; install python3-{error.name}")
     run(program.main)
 
 
@@ -87,9 +87,9 @@ def check_node_arguments(package: str, name: str, text: Optional[str], arguments
     usage = " ".join(arguments) or "[_PARAMETER:=VALUE ...] [TOPIC:=TOPIC ...]"
     parser = argparse.ArgumentParser(
         prog=name,
-        usage="rosrun %s %s %s" % (package, name, usage),
+        usage=f"rosrun {package} {name} {usage}",
         description=text,
-        epilog="" if arguments else "Parameters and topics: %s/README.md" % package,
+        epilog="" if arguments else f"Parameters and topics: {package}/README.md",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     for argument in arguments:
@@ -130,14 +130,14 @@ def print_error(text: str) -> None:
     folder, name = os.path.split(sys.argv[0])
     program = os.path.basename(folder) if name == "__main__.py" else name  # python3 -m PACKAGE
     with suppress(OSError):
-        print("%s: %s" % (program, make_printable(text)), file=sys.stderr, flush=True)
+        print(f"{program}: {make_printable(text)}", file=sys.stderr, flush=True)
 
 
 def _report(failure: OSError) -> int:
     """Print why the output is lost, unless it is a pipe whose reader has ended; return the exit status."""
     if isinstance(failure, BrokenPipeError):
         return PIPE_CLOSED
-    print_error("the output cannot be written: %s" % failure.strerror)
+    print_error(f"the output cannot be written: {failure.strerror}")
     return FAILED
 
 

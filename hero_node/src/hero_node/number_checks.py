@@ -31,10 +31,10 @@ def is_finite(value: object) -> bool:
 def check_finite(what: str, *values: object) -> None:
     """Check that all are finite numbers. Raises: ValueError."""
     if not all(map(is_finite, values)):
-        raise ValueError("%s must be finite numbers, not %s" % (what, ", ".join(map(repr, values))))
+        raise ValueError(f"{what} must be finite numbers, not {', '.join(map(repr, values))}")
 
 
 def check_speed(distance: float, speed: float) -> None:
     """Check that a distance or angle is finite, and a speed positive. Raises: ValueError."""
     if not (is_finite(distance) and is_finite(speed) and speed > 0.0):
-        raise ValueError("distance or angle must be finite, the speed positive, not %r and %r" % (distance, speed))
+        raise ValueError(f"distance or angle must be finite, the speed positive, not {distance!r} and {speed!r}")

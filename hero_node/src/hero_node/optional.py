@@ -12,6 +12,6 @@ def import_optional(module: str, package: str) -> ModuleType:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        pip = "%s -m pip install '%s'" % (sys.executable, package)
+        pip = f"{sys.executable} -m pip install '{package}'"
         command = "apt install " + package if package.startswith("python3-") else pip
-        raise ProgramError("%s is missing (%s); install it: %s" % (module, error, command)) from None
+        raise ProgramError(f"{module} is missing ({error}); install it: {command}") from None

@@ -119,12 +119,12 @@ def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> D
 
 
 def _describe_limits(kind: str, low: float, high: float, unit: str) -> str:
-    return "%s from %.15g to %.15g%s" % (kind, low, high, " " + unit if unit else "")
+    return f"{kind} from {low:.15g} to {high:.15g}{' ' + unit if unit else ''}"
 
 
 def make_error(name: str, value: Any, allowed: str) -> ProgramError:
     """Return the error about a value that is not allowed; allowed: what it must be."""
-    return ProgramError("~%s is %r, but must be %s" % (name, value, allowed))
+    return ProgramError(f"~{name} is {value!r}, but must be {allowed}")
 
 
 def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
@@ -144,10 +144,10 @@ def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
     for word in words:
         first, last = _parse_id_range(word)
         if first < 0 or last < first or last - first >= MAX_ROBOTS_IN_RANGE:
-            raise ProgramError("~%s holds %r, but must hold robot %s" % (name, word, example))
+            raise ProgramError(f"~{name} holds {word!r}, but must hold robot {example}")
         ids.extend(range(first, last + 1))
     if not ids:
-        raise ProgramError("~%s is empty, but must hold robot %s" % (name, example))
+        raise ProgramError(f"~{name} is empty, but must hold robot {example}")
     for robot_id in ids:
         if ids.count(robot_id) > 1:
             raise ProgramError("~%s names robot %d more than once" % (name, robot_id))
@@ -188,7 +188,7 @@ def within(low: float, high: float, kind: Type[Any] = float) -> Callable[[str], 
         except ValueError:
             value = math.nan
         if not low <= value <= high:
-            text = "%s must be a %snumber from %.15g to %.15g" % (text, "whole " if kind is int else "", low, high)
+            text = f"{text} must be a {'whole ' if kind is int else ''}number from {low:.15g} to {high:.15g}"
             raise argparse.ArgumentTypeError(text)
         return value
 
@@ -217,7 +217,7 @@ def parse_poses(name: str, text: Any, ids: Optional[Sequence[int]]) -> Dict[int,
     remedy = 'must hold "x y" or "x y heading" for each robot, in m and degrees, separated by ";"'
     if ids is None or len(parts) != len(ids):
         count = ALL_ROBOTS if ids is None else str(len(ids))
-        raise ProgramError("~%s has %d poses for %s robots, but %s" % (name, len(parts), count, remedy))
+        raise ProgramError(f"~{name} has {len(parts)} poses for {count} robots, but {remedy}")
     poses: Dict[int, Tuple[float, float, Optional[float]]] = {}
     for robot_id, part in zip(ids, parts):
         try:
@@ -225,7 +225,7 @@ def parse_poses(name: str, text: Any, ids: Optional[Sequence[int]]) -> Dict[int,
         except ValueError:
             numbers = []
         if len(numbers) not in (2, 3) or not all(abs(entry) <= MAX_COORDINATE_M for entry in numbers):
-            raise ProgramError("~%s holds %r, but %s" % (name, " ".join(part), remedy))
+            raise ProgramError(f"~{name} holds {' '.join(part)!r}, but {remedy}")
         yaw_rad = math.radians(numbers[2]) if len(numbers) == 3 else None
         poses[robot_id] = (numbers[0], numbers[1], yaw_rad)
     return poses

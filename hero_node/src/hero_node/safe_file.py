@@ -144,7 +144,7 @@ def replace_file(path: str) -> Iterator[IO[bytes]]:
 
 def make_new_name(path: str) -> str:
     """Return a name beside path, for what will replace it, that no other writer takes."""
-    return "%s.%s%s" % (path, secrets.token_hex(4), NEW_ENDING)
+    return f"{path}.{secrets.token_hex(4)}{NEW_ENDING}"
 
 
 def write_file(path: str, content: bytes) -> None:

@@ -76,6 +76,6 @@ def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simula
         link.close_all()
         raise
     names = [robot.name for robot in simulator.swarm.robots]
-    who = names[0] if len(names) == 1 else "%s .. %s" % (names[0], names[-1])
+    who = names[0] if len(names) == 1 else f"{names[0]} .. {names[-1]}"
     report("%s: connecting to %s:%d" % (who, options.host, options.port))
     return simulator, injector

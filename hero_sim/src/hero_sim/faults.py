@@ -110,12 +110,12 @@ def parse_fault(text: str) -> Fault:
 
     Raises: OptionError that names what is wrong and what would do.
     """
-    name = "fault %r" % text
+    name = f"fault {text!r}"
     head, _, tail = text.partition(":")
     kind_name, _, at_s = head.partition("@")
     kind = KINDS.get(kind_name)
     if kind is None:
-        raise OptionError("%s: unknown kind %r; known are %s" % (name, kind_name, ", ".join(KINDS)))
+        raise OptionError(f"{name}: unknown kind {kind_name!r}; known are {', '.join(KINDS)}")
     at = parse_values(name, "SECONDS=" + at_s if at_s else "", {"SECONDS": (0, MAX_DURATION_S)})
     values = parse_values(name, tail, {key: _LIMITS[key] for key in ("robot", kind.key) if key is not None})
     robot_id = int(values["robot"]) if "robot" in values else None
@@ -141,14 +141,14 @@ class FaultInjector:
         indices = [index for index, robot in enumerate(robots) if fault.robot_id in (None, robot.robot_id)]
         if not indices:
             here = ", ".join(str(robot.robot_id) for robot in robots)
-            raise OptionError("fault %s: robot %s is not simulated here (%s)" % (fault.kind, fault.robot_id, here))
+            raise OptionError(f"fault {fault.kind}: robot {fault.robot_id} is not simulated here ({here})")
         self._waiting += [(int(fault.at_s * 1000), index, fault) for index in indices]
         self._waiting.sort(key=lambda waiting: waiting[0])
-        return "%s: %s" % (", ".join(robots[index].name for index in indices), KINDS[fault.kind].meaning)
+        return f"{', '.join(robots[index].name for index in indices)}: {KINDS[fault.kind].meaning}"
 
     def run(self, now_ms: int) -> None:
         """Inject what is due."""
         while self._waiting and self._waiting[0][0] <= now_ms:
             _, index, fault = self._waiting.pop(0)
-            self._report("fault %s for %s" % (fault.kind, self._simulator.swarm.robots[index].name))
+            self._report(f"fault {fault.kind} for {self._simulator.swarm.robots[index].name}")
             KINDS[fault.kind].act(self._simulator, index, fault.value)

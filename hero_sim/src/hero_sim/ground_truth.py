@@ -38,7 +38,7 @@ class GroundTruth:
         self._drawn: List[List[float]] = []
         self._static = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True) if with_tf else None
         self._poses = [
-            rospy.Publisher("/%s/ground_truth" % robot.name, Odometry, queue_size=2) for robot in self._swarm.robots
+            rospy.Publisher(f"/{robot.name}/ground_truth", Odometry, queue_size=2) for robot in self._swarm.robots
         ]
         self._odom_origins: List[Tuple[str, str, Pose]] = []
         self._arena.publish(make_markers(draw_arena(self._swarm.world.arena)))

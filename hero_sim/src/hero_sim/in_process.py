@@ -41,7 +41,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 def run_script(options: argparse.Namespace) -> None:
     """Run the script on its robots, and print where these are at its end."""
     if not Path(options.script).is_file():
-        raise ProgramError("%s: no such script" % options.script)
+        raise ProgramError(f"{options.script}: no such script")
     swarm = StepSwarm(options.count, options.seed, options.arena, options.wifi, options.perfect, model=options.model)
     replace_ros(swarm)
     if options.seconds is not None:
@@ -54,7 +54,7 @@ def run_script(options: argparse.Namespace) -> None:
         raise ProgramError(str(error) + find_line(error, options.script)) from None
     finally:
         places = ["%s at (%.3f, %.3f) m" % (robot.name, *robot.true_pose[:2]) for robot in swarm if robot.driven]
-        say("; ".join(["%.1f s simulated" % swarm.now_s, *places]), sys.stderr)
+        say("; ".join([f"{swarm.now_s:.1f} s simulated", *places]), sys.stderr)
 
 
 def end_at(duration_s: float) -> Steps:
@@ -68,7 +68,7 @@ def replace_ros(swarm: StepSwarm) -> None:
 
     def find_robot(robot_id: int, odom: bool = True, proximity: bool = True) -> StepRobot:
         if robot_id not in swarm._by_id:
-            raise RobotNotReadyError("hero_%s is not there: --count %d simulates fewer" % (robot_id, len(swarm)))
+            raise RobotNotReadyError(f"hero_{robot_id} is not there: --count {len(swarm)} simulates fewer")
         return swarm[robot_id]
 
     class SimulatedSwarm(StepWorld):

@@ -14,14 +14,14 @@ def parse_values(name: str, text: str, limits: Mapping[str, Tuple[float, float]]
     for pair in filter(None, text.split(",")):
         key, equals, number = (part.strip() for part in pair.partition("="))
         if not equals:
-            raise OptionError("%s: %r is not KEY=VALUE" % (name, pair))
+            raise OptionError(f"{name}: {pair!r} is not KEY=VALUE")
         if key not in limits:
-            raise OptionError("%s: unknown key %r; known are %s" % (name, key, ", ".join(limits)))
+            raise OptionError(f"{name}: unknown key {key!r}; known are {', '.join(limits)}")
         try:
             values[key] = float(number)
         except ValueError as error:
-            raise OptionError("%s: %s must be a number, not %r" % (name, key, number)) from error
+            raise OptionError(f"{name}: {key} must be a number, not {number!r}") from error
         least, most = limits[key]
         if not least <= values[key] <= most:
-            raise OptionError("%s: %s must be %.10g..%.10g, not %s" % (name, key, least, most, number))
+            raise OptionError(f"{name}: {key} must be {least:.10g}..{most:.10g}, not {number}")
     return values

@@ -90,9 +90,9 @@ def check_options(options: argparse.Namespace) -> None:
     if not 1 <= options.port <= 65535:
         raise OptionError("--port %d: must be 1..65535" % options.port)
     if options.seconds is not None and not 0 < options.seconds <= MAX_DURATION_S:
-        raise OptionError("--seconds %g: must be more than 0, and at most %g" % (options.seconds, MAX_DURATION_S))
+        raise OptionError(f"--seconds {options.seconds:g}: must be more than 0, and at most {MAX_DURATION_S:g}")
     if not 0.01 <= options.speed <= 100:
-        raise OptionError("--speed %g: must be 0.01..100" % options.speed)
+        raise OptionError(f"--speed {options.speed:g}: must be 0.01..100")
     for text in options.fault:
         parse_fault(text)
 
@@ -106,7 +106,7 @@ def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[
     try:
         check_options(options)
     except OptionError as error:
-        parser.exit(WRONG_ARGUMENTS, "hero_sim: %s\n" % error)
+        parser.exit(WRONG_ARGUMENTS, f"hero_sim: {error}\n")
     if options.print_errors:
         print("\n".join(describe_errors(build_errors(options), options.first_id)))
         parser.exit()

@@ -71,7 +71,7 @@ class FaultService:
             self._requests.put_nowait((request.fault, answer))
             return answer.get(timeout=SERVICE_LIMIT_S)
         except (queue.Empty, queue.Full):
-            return InjectFaultResponse(False, "the simulator did not answer within %g s" % SERVICE_LIMIT_S)
+            return InjectFaultResponse(False, f"the simulator did not answer within {SERVICE_LIMIT_S:g} s")
 
 
 def wait_for_driver(name: str) -> bool:
@@ -115,7 +115,7 @@ def _run() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     running = find_running_node(NODE_NAME)
     if running:
-        raise OptionError("simulated robots already run as %s: end them, or give these another name:=" % running)
+        raise OptionError(f"simulated robots already run as {running}: end them, or give these another name:=")
     init_ros_node(NODE_NAME)
     if options.driver and not wait_for_driver(options.driver):
         return

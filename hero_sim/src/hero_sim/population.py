@@ -66,7 +66,7 @@ def check_population(options: argparse.Namespace, worlds: int = 1) -> None:
     given = {"--count": options.count, "--first-id": options.first_id, "--seed": options.seed, "worlds": worlds}
     for name, value in given.items():
         if not isinstance(value, numbers.Integral) or isinstance(value, bool):
-            raise OptionError("%s %r: must be a whole number" % (name, value))
+            raise OptionError(f"{name} {value!r}: must be a whole number")
     count = options.count
     if not 1 <= count <= MAX_ROBOTS:
         raise OptionError("--count %d: must be 1..%d" % (count, MAX_ROBOTS))

@@ -126,7 +126,7 @@ class Simulator(LinkHandler):
             self._send_up(index, robot.outbox)
             robot.outbox.clear()
         if robot.crash_reason is not None:
-            self._report("%s crashed: the server sent %s; the robot restarts" % (robot.name, robot.crash_reason))
+            self._report(f"{robot.name} crashed: the server sent {robot.crash_reason}; the robot restarts")
             self.reboot(index)
         elif robot.wants_connection:
             self._connect(index)
@@ -211,7 +211,7 @@ class Simulator(LinkHandler):
         self._reported_unreachable = False
         if not self._reported_connected[index]:
             self._reported_connected[index] = True
-            self._report("%s connected" % self.swarm.robots[index].name)
+            self._report(f"{self.swarm.robots[index].name} connected")
 
     def connection_failed(self, index: int, reason: str) -> None:
         self._report_failure(reason)
@@ -224,7 +224,7 @@ class Simulator(LinkHandler):
         if self.swarm.now_ms >= self._quiet_until_ms[index]:
             self._reported_connected[index] = False
             self._quiet_until_ms[index] = self.swarm.now_ms + _FLAPPING_MS
-            self._report("%s lost its connection: %s" % (self.swarm.robots[index].name, reason))
+            self._report(f"{self.swarm.robots[index].name} lost its connection: {reason}")
 
     def receive_bytes(self, index: int, data: bytes) -> None:
         radio, now_ms = self.radios[index], self.swarm.now_ms

@@ -44,15 +44,15 @@ def place_formation(formation: Any, count: int, min_spacing_m: float) -> List[Po
         try:
             formation = parse_yaml(formation)
         except YamlError as error:
-            raise FormationError("formation: not YAML: %s" % error) from None
+            raise FormationError(f"formation: not YAML: {error}") from None
     if not isinstance(formation, dict):
-        raise FormationError("formation: must be a table with %s, not %s" % (", ".join(KEYS), shorten(formation)))
+        raise FormationError(f"formation: must be a table with {', '.join(KEYS)}, not {shorten(formation)}")
     unknown = sorted(set(formation) - set(KEYS), key=str)
     if unknown:
-        raise FormationError("formation: unknown key %s; known are: %s" % (shorten(unknown[0]), ", ".join(KEYS)))
+        raise FormationError(f"formation: unknown key {shorten(unknown[0])}; known are: {', '.join(KEYS)}")
     shape = formation.get("shape", "circle")
     if shape not in SHAPES:
-        raise FormationError("formation: shape is %s, but must be one of: %s" % (shorten(shape), ", ".join(SHAPES)))
+        raise FormationError(f"formation: shape is {shorten(shape)}, but must be one of: {', '.join(SHAPES)}")
     center = _read_point("center", formation.get("center", [0.0, 0.0]))
     spacing_m = _read_number("spacing_m", formation.get("spacing_m", DEFAULT_SPACING_M))
     angle_rad = math.radians(_read_number("turn_deg", formation.get("turn_deg", 0.0)))
@@ -81,7 +81,7 @@ def _circle(count: int, spacing_m: float) -> List[Point]:
 def _grid(count: int, spacing_m: float, formation: Dict[str, Any]) -> List[Point]:
     columns = formation.get("columns", math.ceil(math.sqrt(count)))
     if not is_whole_number(columns, low=1):
-        raise FormationError("formation: columns is %s, but must be a whole number, 1 or more" % shorten(columns))
+        raise FormationError(f"formation: columns is {shorten(columns)}, but must be a whole number, 1 or more")
     rows = math.ceil(count / columns)
     return [
         (
@@ -108,13 +108,13 @@ def _check_spacing(places: List[Point], min_spacing_m: float) -> None:
 
 def _read_number(key: str, value: Any) -> float:
     if not is_number(value):
-        raise FormationError("formation: %s is %s, but must be a number" % (key, shorten(value)))
+        raise FormationError(f"formation: {key} is {shorten(value)}, but must be a number")
     return float(value)
 
 
 def _read_point(key: str, value: Any) -> Point:
     if not isinstance(value, (list, tuple)) or len(value) != 2:
-        raise FormationError("formation: %s holds %s, but must hold [x, y] in m" % (key, shorten(value)))
+        raise FormationError(f"formation: {key} holds {shorten(value)}, but must hold [x, y] in m")
     return _read_number(key, value[0]), _read_number(key, value[1])
 
 
@@ -124,7 +124,7 @@ def assign_goals(starts: Sequence[Point], goals: Sequence[Point]) -> List[int]:
     Then paths that are straight do not cross. Raises: ValueError if there are more starts than goals.
     """
     if len(starts) > len(goals):
-        raise ValueError("%d robots cannot take %d goals, one each" % (len(starts), len(goals)))
+        raise ValueError(f"{len(starts)} robots cannot take {len(goals)} goals, one each")
     if not starts:
         return []
     between_m = np.asarray(starts, dtype=float)[:, np.newaxis] - np.asarray(goals, dtype=float)

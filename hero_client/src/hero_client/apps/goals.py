@@ -52,7 +52,7 @@ def read_goal(message: Any, use_heading: bool) -> Tuple[Goal, str]:
     position, orientation = message.pose.position, message.pose.orientation
     if not (abs(position.x) <= MAX_COORDINATE_M and abs(position.y) <= MAX_COORDINATE_M):
         raise InvalidGoalError(
-            "a goal must be finite, not (%g, %g), and within %g m" % (position.x, position.y, MAX_COORDINATE_M)
+            f"a goal must be finite, not ({position.x:g}, {position.y:g}), and within {MAX_COORDINATE_M:g} m"
         )
     if not use_heading:
         return Goal(position.x, position.y), frame
@@ -67,7 +67,7 @@ def check_limits(tolerance_m: float, timeout_s: float) -> None:
     """Raises: InvalidGoalError unless both are more than 0 and finite."""
     if not (0.0 < tolerance_m < math.inf and 0.0 < timeout_s < math.inf):
         raise InvalidGoalError(
-            "tolerance and timeout must be finite and not negative, not %g m, %g s" % (tolerance_m, timeout_s)
+            f"tolerance and timeout must be finite and not negative, not {tolerance_m:g} m, {timeout_s:g} s"
         )
 
 

@@ -167,7 +167,7 @@ class KeyboardTeleop:
             try:
                 self._choose([self._swarm[int(key)]])
             except KeyError as error:
-                show_text("%s\n" % error.args[0])
+                show_text(f"{error.args[0]}\n")
         else:
             self._drive.press(key, now_s)
             if key in STOP_KEYS:
@@ -199,12 +199,12 @@ class KeyboardTeleop:
             self._has_reported_stopped = False
         elif command != STOP and not self._has_reported_stopped:
             self._has_reported_stopped = True
-            show_text("%s\n" % self._find_stopped())
+            show_text(f"{self._find_stopped()}\n")
 
     def _find_stopped(self) -> str:
         """Return a line with the chosen robots that cannot move because all robots are stopped; empty if none."""
         stopped = [robot.name for robot in self._chosen if robot.is_stopped]
-        return "all robots are stopped, so %s cannot move: r releases them" % ", ".join(stopped) if stopped else ""
+        return f"all robots are stopped, so {', '.join(stopped)} cannot move: r releases them" if stopped else ""
 
     def _describe_stop(self) -> Tuple[str, str]:
         """Return level and text about a stop of all robots; no text if there is nothing to say."""
@@ -215,7 +215,7 @@ class KeyboardTeleop:
 
     def describe(self) -> Tuple[str, str]:
         """Return level and text of the live line: robot, command, pose, nearest obstacle, or the outcome of a stop."""
-        robots = "all %d robots" % len(self._swarm) if len(self._chosen) > 1 else self._chosen[0].name
+        robots = f"all {len(self._swarm)} robots" if len(self._chosen) > 1 else self._chosen[0].name
         speeds = "%+.2f m/s %+.2f rad/s (keys: %.2f, %.2f)" % (
             *self._sent,
             self._drive.linear_m_s,
@@ -223,17 +223,17 @@ class KeyboardTeleop:
         )
         level, stop = self._describe_stop()
         if stop:
-            return level, "%s | %s" % (robots, stop)
+            return level, f"{robots} | {stop}"
         robot = self._chosen[0]
         missing = robot.missing()
         if missing is not None:
-            return "info", "%s | waiting: %s" % (robots, missing)
+            return "info", f"{robots} | waiting: {missing}"
         try:
             pose, near = robot.pose, _describe_nearest(robot)
         except StaleDataError as error:
-            return "info", "%s | waiting: %s" % (robots, error)
-        where = "x %.2f y %.2f m %.0f deg" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
-        return "info", "%s | %s | %s | near: %s" % (robots, speeds, where, near)
+            return "info", f"{robots} | waiting: {error}"
+        where = f"x {pose.x_m:.2f} y {pose.y_m:.2f} m {math.degrees(pose.yaw_rad):.0f} deg"
+        return "info", f"{robots} | {speeds} | {where} | near: {near}"
 
 
 def _describe_nearest(robot: Robot) -> str:
@@ -243,7 +243,7 @@ def _describe_nearest(robot: Robot) -> str:
         return "not calibrated"
     if nearest is None:
         return "free"
-    return "%.2f m at %+.0f deg" % (nearest.range_m, math.degrees(nearest.bearing_rad))
+    return f"{nearest.range_m:.2f} m at {math.degrees(nearest.bearing_rad):+.0f} deg"
 
 
 def read_stops(keyboard: Keyboard) -> Optional[List[str]]:

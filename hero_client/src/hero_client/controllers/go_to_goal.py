@@ -108,5 +108,5 @@ class GoToGoalController(MotionController):
         if self.distance_m < self._min_distance_m - PROGRESS_M:
             self._min_distance_m, self._progress_s = self.distance_m, seen_s
         elif seen_s - self._progress_s > PROGRESS_S:
-            self._fail("no nearer for %g s%s; %s" % (PROGRESS_S, self._describe_distance(), self._describe_obstacle()))
+            self._fail(f"no nearer for {PROGRESS_S:g} s{self._describe_distance()}; {self._describe_obstacle()}")
         return bent

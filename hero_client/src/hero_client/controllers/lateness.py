@@ -68,10 +68,10 @@ class Lateness:
         if late_s <= COVERED_S or self._now_s < self._next_report_s:
             return ""
         self._next_report_s = self._now_s + REPORT_PERIOD_S
-        cause = "commands are late by %.1f s: this PC is busy" % late_s
+        cause = f"commands are late by {late_s:.1f} s: this PC is busy"
         if age_s > late_s / 2.0:
-            cause = "poses are %.1f s old: is Wi-Fi or this PC overloaded?" % age_s
+            cause = f"poses are {age_s:.1f} s old: is Wi-Fi or this PC overloaded?"
         if late_s > STOP_S:
             return cause + "; robots are stopped meanwhile"
         share = (self._planned_s + COVERED_S) / (self._planned_s + late_s)
-        return "%s; robots drive at %.0f percent meanwhile" % (cause, 100.0 * share)
+        return f"{cause}; robots drive at {100.0 * share:.0f} percent meanwhile"

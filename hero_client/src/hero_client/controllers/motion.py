@@ -194,10 +194,10 @@ class MotionController:
         return STOP
 
     def _describe_distance(self) -> str:
-        return "" if math.isnan(self.distance_m) else ", %.3f m are left" % self.distance_m
+        return "" if math.isnan(self.distance_m) else f", {self.distance_m:.3f} m are left"
 
     def _describe_timeout(self) -> str:
-        text = "not there after %g s" % self._timeout_s + self._describe_distance()
+        text = f"not there after {self._timeout_s:g} s" + self._describe_distance()
         return text + ("; " + self._describe_obstacle() if self._obstacle else "")
 
     def _describe_obstacle(self) -> str:
@@ -206,8 +206,8 @@ class MotionController:
             return ""
         range_m, bearing_rad = self._obstacle
         from_center_m = range_m + self.body_radius_m - BODY_RADIUS_M
-        place = "%.2f m from the robot's center" % from_center_m if range_m > 0.0 else "too close to measure"
-        return "an obstacle is in the way, %s, at %+.0f degrees" % (place, math.degrees(bearing_rad))
+        place = f"{from_center_m:.2f} m from the robot's center" if range_m > 0.0 else "too close to measure"
+        return f"an obstacle is in the way, {place}, at {math.degrees(bearing_rad):+.0f} degrees"
 
 
 def _has_moved(last: Optional[Pose], pose: Pose) -> bool:

@@ -69,4 +69,4 @@ class TurnController(MotionController):
         return Velocity(0.0, math.copysign(speed_rad_s, self._remaining_rad))
 
     def _describe_distance(self) -> str:
-        return ", %.2f rad are left" % abs(self._remaining_rad)
+        return f", {abs(self._remaining_rad):.2f} rad are left"

@@ -33,7 +33,7 @@ def check_robot_id(robot_id: SupportsIndex) -> int:
         number = index(robot_id)
         if number >= 0 and not isinstance(robot_id, bool):
             return number
-    raise ValueError("a robot is named by its number, 0 or more, not by %r" % (robot_id,))
+    raise ValueError(f"a robot is named by its number, 0 or more, not by {robot_id!r}")
 
 
 class Member(Protocol):
@@ -69,7 +69,7 @@ def wait_for_all(robots: Sequence[Member], timeout_s: float = READY_TIMEOUT_S) -
         if polls <= 0 or not is_to_continue:
             names = list_names([robot.name for robot in late])
             verb = "is" if len(late) == 1 else "are"
-            raise RobotNotReadyError("%s %s not ready after %.3g s: %s" % (names, verb, timeout_s, late[0].missing()))
+            raise RobotNotReadyError(f"{names} {verb} not ready after {timeout_s:.3g} s: {late[0].missing()}")
         polls -= 1
         is_to_continue = yield POLL_PERIOD_S
 
@@ -132,7 +132,7 @@ class Group(Clock):
 
     def _drive_for(self, linear_m_s: float, angular_rad_s: float, duration_s: float) -> None:
         if not (isinstance(duration_s, Real) and duration_s >= 0.0):
-            raise ValueError("a duration must be 0 s or more, not %r" % (duration_s,))
+            raise ValueError(f"a duration must be 0 s or more, not {duration_s!r}")
         for robot in self._members:
             robot._end_motion()
         self._run(carry_out(self._drive_steps(linear_m_s, angular_rad_s, duration_s), self._members))

@@ -43,7 +43,7 @@ class Light:
         """Show the color for half of each period, in the background, until another color is asked for."""
         rgb = parse_color(color)
         if not period_s >= MIN_BLINK_PERIOD_S:
-            raise ValueError("a period must be at least %g s, not %r" % (MIN_BLINK_PERIOD_S, period_s))
+            raise ValueError(f"a period must be at least {MIN_BLINK_PERIOD_S:g} s, not {period_s!r}")
         self._end_motion()
         self._motion, self._is_blinking = self._link.start(self._alternate(rgb, period_s)), True
 

@@ -116,11 +116,11 @@ class BaseRobot(RobotReadings):
         if not is_blind(self.proximity):
             return False
         self.drive(0.0, 0.0)
-        self._warn("%s waits: %s" % (self.name, NOT_CALIBRATED))
+        self._warn(f"{self.name} waits: {NOT_CALIBRATED}")
         return True
 
     def _describe_stop(self) -> str:
-        return "%s does not move: %s" % (self.name, self._link.describe_stop())
+        return f"{self.name} does not move: {self._link.describe_stop()}"
 
     def check_not_stopped(self) -> None:
         """Check that the driver lets the robot move: see is_stopped. Raises: StoppedError with how to release it."""
@@ -154,7 +154,7 @@ class BaseRobot(RobotReadings):
         """Return forward() as steps. Raises: ValueError for a speed that is not positive."""
         check_speed(distance_m, linear_m_s)
         controller = ForwardController(distance_m, self.now_s, linear_m_s)
-        return carry_out(self._follow(controller, lambda: "drive %g m" % distance_m), self._members)
+        return carry_out(self._follow(controller, lambda: f"drive {distance_m:g} m"), self._members)
 
     def turn_steps(self, angle_rad: float, angular_rad_s: float) -> Steps:
         """Return turn() as steps. Raises: ValueError for a speed that is not positive."""
@@ -163,7 +163,7 @@ class BaseRobot(RobotReadings):
             text = "%s turns by %g rad, %.1f full turns: for degrees, turn(math.radians(%g))"
             self._link.log_warning(text % (self.name, angle_rad, abs(angle_rad) / math.tau, angle_rad))
         controller = TurnController(angle_rad, self.now_s, angular_rad_s)
-        return carry_out(self._follow(controller, lambda: "turn %g rad" % angle_rad), self._members)
+        return carry_out(self._follow(controller, lambda: f"turn {angle_rad:g} rad"), self._members)
 
     def start_motion(self, steps: Steps) -> BackgroundMotion:
         """Take the steps of a motion in the background, in place of the present one; return the motion."""
@@ -278,7 +278,7 @@ class BaseRobot(RobotReadings):
                 pose = read_pose() if read_pose else self.pose
                 odometry = self.fresh_pose() if read_pose else None
             except StaleDataError as error:
-                absence = ": %s" % error
+                absence = f": {error}"
             age_s = self.age_s("odom")
             self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s, odometry, age_s))
             self._warn(controller.lateness.take_warning())
@@ -286,9 +286,9 @@ class BaseRobot(RobotReadings):
             if controller.state is State.REACHED:
                 return
             if controller.state is State.FAILED:
-                raise GoalError("%s did not %s: %s%s" % (self.name, describe(), controller.reason, absence))
+                raise GoalError(f"{self.name} did not {describe()}: {controller.reason}{absence}")
             if not (yield REPEAT_PERIOD_S):
-                raise GoalError("%s did not %s: cancelled" % (self.name, describe()))
+                raise GoalError(f"{self.name} did not {describe()}: cancelled")
 
     def _end_motion(self) -> None:
         """Cancel a motion in the background and wait until it has sent its stops."""

@@ -48,10 +48,10 @@ class RobotReadings(Group):
             age_s = self._link.age_s(topic)
         if age_s <= FRESH_S:
             return
-        name = "%s/%s" % (self.namespace, topic)
+        name = f"{self.namespace}/{topic}"
         if age_s == math.inf:
-            raise StaleDataError("no message on %s yet: is the robot on, and does the driver run?" % name)
-        raise StaleDataError("the last message on %s came %.1f s ago: has the robot gone?" % (name, age_s))
+            raise StaleDataError(f"no message on {name} yet: is the robot on, and does the driver run?")
+        raise StaleDataError(f"the last message on {name} came {age_s:.1f} s ago: has the robot gone?")
 
     def _check_asked(self, topic: str) -> None:
         """Check that a topic, which only its readers subscribe to, has fresh data. Raises: StaleDataError."""
@@ -138,7 +138,7 @@ class RobotReadings(Group):
         try:
             self._check_asked("neighbors")
         except StaleDataError as error:
-            raise StaleDataError("%s: does `rosrun hero_swarm neighbors` run?" % str(error).split(":")[0]) from None
+            raise StaleDataError(f"{str(error).split(':')[0]}: does `rosrun hero_swarm neighbors` run?") from None
         return self._link.read_neighbors()
 
     def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:
@@ -170,7 +170,7 @@ class RobotReadings(Group):
         ranges = self.proximity
         nearest = find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
         if nearest is None and not is_free(ranges):
-            raise NotCalibratedError("what is near %s is not known: %s" % (self.name, NOT_CALIBRATED))
+            raise NotCalibratedError(f"what is near {self.name} is not known: {NOT_CALIBRATED}")
         return nearest
 
     def missing_ranges(self) -> Optional[str]:

@@ -149,8 +149,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         """
         for robot_id, goal in goals.items():
             if np.shape(goal) != (2,):
-                raise TypeError("the goal of hero_%s must be (x m, y m), not %r" % (robot_id, goal))
-            check_finite("x and y of the goal of hero_%s" % (robot_id,), *goal)
+                raise TypeError(f"the goal of hero_{robot_id} must be (x m, y m), not {goal!r}")
+            check_finite(f"x and y of the goal of hero_{robot_id}", *goal)
             self[robot_id]._end_motion()
         self._run(stop_after(self._go_to_each(goals, frame, timeout_s, tolerance_m), self._members))
 
@@ -178,13 +178,13 @@ class BaseSwarm(Group, Generic[AnyRobot]):
                     pose = robot.pose_in(frame, timeout_s=0.0)
                 except StaleDataError as error:
                     poses.append(None)
-                    absence, missing[robot.name] = "; %s" % error, str(error)
+                    absence, missing[robot.name] = f"; {error}", str(error)
                     continue
                 poses.append(pose)
                 odometry = robot.fresh_pose()
                 problem = check.add(pose, odometry, self.now_s) if odometry else ""
                 if problem:
-                    raise GoalError("no goal is reached: %s: %s" % (robot.name, problem))
+                    raise GoalError(f"no goal is reached: {robot.name}: {problem}")
             self.report_missing(missing)
             ranges = [robot.fresh_proximity() for robot in self.robots]
             ages_s = [robot.age_s("odom") for robot in self.robots]
@@ -197,8 +197,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
                 robot._send_velocity(*command)
             if self.now_s > end_s or not (yield REPEAT_PERIOD_S):
                 late = [robot.name for robot, arrived in zip(self.robots, controller.arrived) if not arrived]
-                why = "cancelled" if self.now_s <= end_s else "not there after %g s" % timeout_s
-                raise GoalError("no goal is reached by %s: %s%s" % (", ".join(late), why, absence))
+                why = "cancelled" if self.now_s <= end_s else f"not there after {timeout_s:g} s"
+                raise GoalError(f"no goal is reached by {', '.join(late)}: {why}{absence}")
 
     @staticmethod
     def _wait_for(motions: Sequence[BackgroundMotion]) -> None:
@@ -232,14 +232,14 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         if missing is None:
             missing = {robot.name: robot.missing() for robot in self.robots}
         for name in [name for name in self._reported if missing.get(name) is None]:
-            self._log("info", "%s answers" % name)
+            self._log("info", f"{name} answers")
             del self._reported[name]
         if self.now_s < self._next_report_s:
             return
         self._next_report_s = self.now_s + REPORT_PERIOD_S
         for name, reason in missing.items():
             if reason is not None:
-                self._log("warn", "%s: waiting: %s" % (name, reason))
+                self._log("warn", f"{name}: waiting: {reason}")
                 self._reported[name] = reason
 
     @abstractmethod
@@ -258,7 +258,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             raise TypeError(text % (robot_id,))
         if robot_id not in self._by_id:
             names = ", ".join(robot.name for robot in self.robots)
-            raise KeyError("hero_%s is not in this swarm: %s" % (robot_id, names or "it has no robots"))
+            raise KeyError(f"hero_{robot_id} is not in this swarm: {names or 'it has no robots'}")
         return self._by_id[robot_id]
 
     def __contains__(self, robot: object) -> bool:

@@ -91,7 +91,7 @@ def merge(reports: Sequence[RobotArray]) -> RobotArray:
     for robot in (robot for report in reports for robot in report.robots):
         # A refused or still unnamed robot is not the robot of that name.
         own = robot.namespace if robot.namespace and robot.state in PREFERENCE else None
-        key = own or "%s at %s" % (robot.namespace, robot.address)
+        key = own or f"{robot.namespace} at {robot.address}"
         known = by_name.get(key)
         if known is None or own is None or PREFERENCE.index(robot.state) < PREFERENCE.index(known.state):
             by_name[key] = robot
@@ -328,7 +328,7 @@ class Drivers:
         for robot in report.robots:
             if robot.namespace == namespace:
                 reason = ": " + robot.last_error if robot.last_error else ""
-                return "the driver reports %s as %s%s" % (namespace.strip("/"), STATES[robot.state], reason)
+                return f"the driver reports {namespace.strip('/')} as {STATES[robot.state]}{reason}"
         names = [robot.namespace.strip("/") for robot in report.robots if robot.state == Robot.READY]
         return "connected are %s: is the robot on, and its id right?" % (list_names(names) or "no robots")
 

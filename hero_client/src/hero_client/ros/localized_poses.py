@@ -48,11 +48,9 @@ class PoseReport(NamedTuple):
         stale = "the pose of hero_%d in the frame %s is " % (robot_id, self.frame)
         silent_s, age_s = now_s - self.arrived_s, self.age_s(robot_id, now_s)
         if silent_s > FRESH_S:
-            raise StaleDataError(
-                stale + "old: no message on %s for %.1f s: does localize still run?" % (TOPIC, silent_s)
-            )
+            raise StaleDataError(stale + f"old: no message on {TOPIC} for {silent_s:.1f} s: does localize still run?")
         if age_s > FRESH_S:
-            raise StaleDataError(stale + "%.1f s old, as is its odometry: is the robot on and in reach?" % age_s)
+            raise StaleDataError(stale + f"{age_s:.1f} s old, as is its odometry: is the robot on and in reach?")
         if age_s < -FRESH_S:
             raise StaleDataError(
                 stale + "stamped %.1f s ahead: do the clocks of all that measures poses agree?" % -age_s

@@ -33,7 +33,7 @@ class NewestMessages:
         """Subscribe to a topic, unless that was done before."""
         if topic not in self._subscribers:
             self._subscribers[topic] = rospy.Subscriber(
-                "%s/%s" % (self._namespace, topic),
+                f"{self._namespace}/{topic}",
                 self._classes[topic],
                 self._receive_message,
                 callback_args=topic,
@@ -61,7 +61,7 @@ class NewestMessages:
         with self._arrival:
             wanted = self._counts.get(topic, 0) + count
             if not self._arrival.wait_for(lambda: self._counts.get(topic, 0) >= wanted, timeout_s):
-                raise StaleDataError("no message on %s/%s within %.1f s" % (self._namespace, topic, timeout_s))
+                raise StaleDataError(f"no message on {self._namespace}/{topic} within {timeout_s:.1f} s")
 
     def find_silent(self, topics: Iterable[str], limit_s: float) -> Optional[str]:
         """Return the first of the subscribed topics without a message in the last limit_s; None if all have one."""
@@ -151,4 +151,4 @@ class CommandTopic(rospy.SubscribeListener):
 
     def describe_absence(self) -> str:
         """Return why there is no subscriber, for users."""
-        return "nothing subscribes to %s: %s" % (self.name, self._explain_absence())
+        return f"nothing subscribes to {self.name}: {self._explain_absence()}"

@@ -108,7 +108,7 @@ class RosLink(NewestMessages, RobotLink):
             return self._cmd_vel.describe_absence()
         silent = self.find_silent(NEEDED, FRESH_S)
         if silent is not None:
-            return "no message on %s/%s: is the robot on and in reach?" % (self._namespace, silent)
+            return f"no message on {self._namespace}/{silent}: is the robot on and in reach?"
         if not self._drivers.knows(self._namespace):
             return "no driver has reported it yet, so whether it is stopped is not known"
         return None
@@ -166,9 +166,9 @@ class RosLink(NewestMessages, RobotLink):
             rospy.wait_for_service(name, SERVICE_TIMEOUT_S)
             answer = rospy.ServiceProxy(name, SetOdom)(*pose)
         except (rospy.ServiceException, rospy.ROSException) as error:
-            raise RobotError("%s: %s" % (name, one_line(error))) from None
+            raise RobotError(f"{name}: {one_line(error)}") from None
         if not answer.success:
-            raise RobotError("%s: the robot answers: %s" % (name, answer.message))
+            raise RobotError(f"{name}: the robot answers: {answer.message}")
 
     @property
     def is_stopped(self) -> bool:

@@ -82,7 +82,7 @@ class StopRequest:
         """Return the status now; robots: those of all replies, each once."""
         if now_s - self.made_s < CROSSING_S:
             return StopStatus("warn", "stopping" if self.stopped else "releasing", False)
-        failures = ["driver %s does not answer" % _show(driver) for driver, report in replies.items() if not report]
+        failures = [f"driver {_show(driver)} does not answer" for driver, report in replies.items() if not report]
         refusing: List[str] = []
         changed: List[str] = []
         for driver, report in replies.items():
@@ -90,13 +90,13 @@ class StopRequest:
                 (changed if driver in self._taken else refusing).append(_show(driver))
         if changed:
             how = "released" if self.stopped else "stopped"
-            return StopStatus("warn", "another program has %s the robots of %s" % (how, ", ".join(changed)), True)
+            return StopStatus("warn", f"another program has {how} the robots of {', '.join(changed)}", True)
         if not self.stopped:
             return self._describe_release(failures, refusing, now_s)
         return self._describe_stop(failures, refusing, robots, now_s)
 
     def _describe_release(self, failures: List[str], refusing: List[str], now_s: float) -> StopStatus:
-        failures = failures + ["driver %s is still stopped" % name for name in refusing]
+        failures = failures + [f"driver {name} is still stopped" for name in refusing]
         if not failures:
             return StopStatus("info", "released: robots may move again", True)
         if not self._is_late(now_s):
@@ -114,7 +114,7 @@ class StopRequest:
         failures = [
             *_tell(moving, "moves", "move"),
             *failures,
-            *("driver %s is not stopped" % name for name in refusing),
+            *(f"driver {name} is not stopped" for name in refusing),
             *_tell(stopping, "is not at rest yet", "are not at rest yet"),
         ]
         notes = [
@@ -140,7 +140,7 @@ def _tell(robots: Sequence[Robot], one: str, many: str) -> List[str]:
     if not robots:
         return []
     names = [robot.namespace.strip("/") or robot.address for robot in robots]
-    return ["%s %s" % (list_names(names, NAMES_SHOWN), one if len(names) == 1 else many)]
+    return [f"{list_names(names, NAMES_SHOWN)} {one if len(names) == 1 else many}"]
 
 
 def paint(level: str, text: str) -> str:

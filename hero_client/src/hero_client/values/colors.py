@@ -25,10 +25,10 @@ def parse_color(color: Color) -> Tuple[float, float, float]:
     """
     if isinstance(color, str):
         if color not in COLORS:
-            raise ValueError("no color %r; there are: %s" % (color, ", ".join(COLORS)))
+            raise ValueError(f"no color {color!r}; there are: {', '.join(COLORS)}")
         return COLORS[color]
     with suppress(TypeError, ValueError):
         red, green, blue = map(float, color)
         if all(0.0 <= value <= 1.0 for value in (red, green, blue)):
             return red, green, blue
-    raise ValueError("a color is a name or three numbers 0..1, not %r" % (color,))
+    raise ValueError(f"a color is a name or three numbers 0..1, not {color!r}")

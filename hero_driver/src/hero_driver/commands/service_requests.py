@@ -43,7 +43,7 @@ def find_request_error(service_type: str, request: bytes) -> Optional[str]:
     if rule is None:
         return None
     if len(request) != rule.layout.size:
-        return "a request of %d bytes is not a %s" % (len(request), service_type)
+        return f"a request of {len(request)} bytes is not a {service_type}"
     values = rule.layout.unpack(request)
     if not all(math.isfinite(value) and rule.low <= value <= rule.high for value in values):
         return "%s: %s" % (", ".join("%g" % value for value in values), rule.text)

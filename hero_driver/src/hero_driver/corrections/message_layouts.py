@@ -163,7 +163,7 @@ def _is_possible(pose: Sequence[float], twist: Sequence[float]) -> bool:
 def describe_odometry(payload: bytes) -> str:
     """Return position and velocity in a nav_msgs/Odometry, for users; its length if it is too short."""
     if len(payload) < ODOMETRY_TAIL_LENGTH:
-        return "%d bytes" % len(payload)
+        return f"{len(payload)} bytes"
     pose, twist = _POSE.unpack(payload[_ODOMETRY_POSE]), _TWIST.unpack(payload[_ODOMETRY_TWIST])
     return "x %.4g m, y %.4g m, %.4g m/s, %.4g rad/s" % (*pose[:2], twist[0], twist[5])
 

@@ -166,8 +166,8 @@ class RobotCorrections:
 
     def _refuse(self, topic: str, payload: bytes) -> None:
         self._refused += 1
-        what = message_layouts.describe_odometry(payload) if topic == "odom" else "%d bytes" % len(payload)
-        self._problem = "%s refused, it cannot be true (%s): reboot the robot, or flash its firmware" % (topic, what)
+        what = message_layouts.describe_odometry(payload) if topic == "odom" else f"{len(payload)} bytes"
+        self._problem = f"{topic} refused, it cannot be true ({what}): reboot the robot, or flash its firmware"
 
     def note_encoder(self, md5sum: str) -> None:
         """The robot declares an Encoder message of this md5, which tells its model."""

@@ -112,7 +112,7 @@ class TransformCorrector:
             self.refused += 1
             if len(self._known_foreign) < FRAMES_MAX:
                 self._known_foreign.add(frames)
-                self.foreign_frames.add("%s -> %s" % (_show_name(parent), _show_name(child)))
+                self.foreign_frames.add(f"{_show_name(parent)} -> {_show_name(child)}")
             return False
         self._own_frames.add(frames)
         return True

@@ -31,7 +31,7 @@ def _read_networks(name: str, value: Any) -> Tuple[Network, ...]:
         try:
             networks.append(ipaddress.ip_network(entry))
         except ValueError as error:
-            raise make_error(name, entry, "%s (%s)" % (allowed, error)) from error
+            raise make_error(name, entry, f"{allowed} ({error})") from error
     return tuple(networks)
 
 

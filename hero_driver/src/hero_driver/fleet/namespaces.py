@@ -53,7 +53,7 @@ def find_refusal(
     """Return why the HeRo identity may not declare a topic or service to the driver called node, None if it may."""
     name = resolve(topic_name, identity)
     if name is None:
-        return "outside %s" % identity.namespace
+        return f"outside {identity.namespace}"
     if message_type in DRIVER_TYPES or name == node or name.startswith(node + "/"):
         return RESERVED
     if is_from_robot and name[len(identity.namespace) + 1 :] in NOT_FROM_ROBOTS:

@@ -48,7 +48,7 @@ class Endpoints:
         if self._errors.get(name) != text:
             self._errors.pop(name, None)
             self._errors[name] = text
-            self._log("error", self._label + name + text, "%s: %s" % (self._label, text))
+            self._log("error", self._label + name + text, f"{self._label}: {text}")
 
     def end(self) -> None:
         """Register nothing more (thread of the sockets); close() has to follow."""
@@ -136,7 +136,7 @@ class Endpoints:
         try:
             found = find(layout.message_type, *layout.md5sums)
         except MessageTypeError as error:
-            self.report_error(name, "%s %s refused: %s" % (kind, name, error))
+            self.report_error(name, f"{kind} {name} refused: {error}")
             return None
         self._errors.pop(name, None)
         return found

@@ -71,7 +71,7 @@ class LogRelay:
         # What is said again and again takes nothing of what else may be said.
         for name, buckets in ((robot, self._robots), (host, self._hosts)):
             if name and not buckets.take(name, 1.0, now_s):
-                text = "%s: too many different messages; further ones are suppressed" % name
+                text = f"{name}: too many different messages; further ones are suppressed"
                 self.log_throttled("warn", "suppressed " + name, text)
                 return
         if len(self._last) >= KNOWN_KEYS_MAX:
@@ -102,4 +102,4 @@ def tell_of_lost_log_lines() -> None:
 
 
 def _report_lost_line(error: BaseException) -> None:
-    print_error("a log line was lost: %s: %s" % (type(error).__name__, error))
+    print_error(f"a log line was lost: {type(error).__name__}: {error}")

@@ -25,7 +25,7 @@ def apply_aliases(type_name: str) -> str:
     if type_name in TYPE_ALIASES:
         return TYPE_ALIASES[type_name]
     package, _, name = type_name.partition("/")
-    return "%s/%s" % (PACKAGE_ALIASES.get(package, package), name)
+    return f"{PACKAGE_ALIASES.get(package, package)}/{name}"
 
 
 class RawMessage(genpy.Message):
@@ -125,7 +125,7 @@ def _is_generated(package: str, kind: str, name: str) -> bool:
     except (ImportError, ValueError):
         return False
     places = [] if spec is None else spec.submodule_search_locations or []
-    return any(os.path.isfile(os.path.join(place, kind, "_%s.py" % name)) for place in places)
+    return any(os.path.isfile(os.path.join(place, kind, f"_{name}.py")) for place in places)
 
 
 def _check_md5sum(what: str, type_name: str, ros_type: str, theirs: str, ours: str) -> None:

@@ -113,7 +113,7 @@ class RawSubscriber:
         self._loop.add_reader(stream)
         stream.ended.wait()
         if stream.error is not None:
-            raise TransportException("read failed: %s" % stream.error)
+            raise TransportException(f"read failed: {stream.error}")
         # rospy 1.15.9 (Debian 11) would for ever try to connect again to a publisher that has ended.
         connection.close()
         raise TransportTerminated("closed")

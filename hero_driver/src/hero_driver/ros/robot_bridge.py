@@ -118,7 +118,7 @@ class RobotBridge:
         info, kind = topic.info, topic.kind
         if name not in self._names:
             if len(self._names) >= self._max_names:
-                text = "topic %s refused: more than %d names (2 * max_topics)" % (name, len(self._names))
+                text = f"topic {name} refused: more than {len(self._names)} names (2 * max_topics)"
                 self._endpoints.report_error("names", text)
                 return
             self._names.add(name)
@@ -197,7 +197,7 @@ class RobotBridge:
             self._endpoints.report_error(name, text % (name, topic.info.message_type, layout.md5sums[0], md5sums))
             return []
         if name == TRANSFORMS and ros_type != TRANSFORM_TYPE:
-            text = "topic /tf refused: its type is %s, not %s" % (ros_type, TRANSFORM_TYPE)
+            text = f"topic /tf refused: its type is {ros_type}, not {TRANSFORM_TYPE}"
             self._endpoints.report_error(name, text)
             return []
         publishers: List[Tuple[str, str, RawPublisher]] = []

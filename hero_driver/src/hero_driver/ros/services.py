@@ -68,10 +68,10 @@ class RobotService:
         try:
             answer: Answer = self._loop.ask(functools.partial(self._begin, request), limit_s)
         except NoAnswerError as error:
-            answer = (b"", "was not answered: %s" % error)
+            answer = (b"", f"was not answered: {error}")
         payload, failure = answer
         if failure:
-            raise rospy.ServiceException("%s %s" % (self.name, failure))
+            raise rospy.ServiceException(f"{self.name} {failure}")
         return payload
 
     def receive_answer(self, payload: bytes) -> Optional[bytes]:
@@ -89,7 +89,7 @@ class RobotService:
         self._late_request = None
         call, self._current = self._current, None
         if call is not None:
-            call.fail("was not answered: %s" % reason)
+            call.fail(f"was not answered: {reason}")
             self._send_next()
 
     def _begin(self, request: bytes, answer: Callable[[Answer], None]) -> None:
@@ -115,13 +115,13 @@ class RobotService:
             refusal = self._send(self, call.request)
             if refusal is not None:
                 self._current = None
-                call.fail("cannot be called: %s" % refusal)
+                call.fail(f"cannot be called: {refusal}")
 
     def _expire(self, call: _Call) -> None:
-        limit = "%.1f s (~service_timeout_s)" % self._timeout_s
+        limit = f"{self._timeout_s:.1f} s (~service_timeout_s)"
         if call in self._waiting:
             self._waiting.remove(call)
-            call.fail("is busy: earlier calls took longer than %s" % limit)
+            call.fail(f"is busy: earlier calls took longer than {limit}")
         elif call is self._current:
             now_s = time.monotonic()
             if now_s < call.due_s:
@@ -130,5 +130,5 @@ class RobotService:
             self._current = None
             self._late_request = call.request
             self._late_until_s = now_s + max(self._timeout_s, LATE_ANSWER_S)
-            call.fail("was not answered within %s" % limit)
+            call.fail(f"was not answered within {limit}")
             self._send_next()

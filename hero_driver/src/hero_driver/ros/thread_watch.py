@@ -50,5 +50,5 @@ class ThreadWatch:
             lack = "there is no memory"
         else:
             return False
-        self.failure = self.failure or "%s: %s" % (lack, REMEDY)
+        self.failure = self.failure or f"{lack}: {REMEDY}"
         return True

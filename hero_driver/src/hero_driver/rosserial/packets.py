@@ -90,7 +90,7 @@ def encode_packet(topic_id: int, payload: Bytes) -> bytes:
     Raises: RosserialError for an id outside 0..65535, or more than 65535 bytes of payload.
     """
     if not 0 <= topic_id <= 0xFFFF:
-        raise RosserialError("topic id %r is outside 0..65535" % (topic_id,))
+        raise RosserialError(f"topic id {topic_id!r} is outside 0..65535")
     length = len(payload)
     if length > MAX_PAYLOAD_LENGTH:
         raise RosserialError("a payload of %d bytes does not fit a packet (at most 65535)" % length)

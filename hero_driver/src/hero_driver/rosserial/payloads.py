@@ -137,7 +137,7 @@ def encode_time(time: WireTime) -> bytes:
     try:
         return _TIME.pack(time.secs, time.nsecs)
     except struct.error as error:
-        raise PayloadError("Time: %r does not fit two 32-bit numbers (%s)" % (time, error)) from error
+        raise PayloadError(f"Time: {time!r} does not fit two 32-bit numbers ({error})") from error
 
 
 def decode_time(payload: Bytes) -> WireTime:
@@ -146,7 +146,7 @@ def decode_time(payload: Bytes) -> WireTime:
     Raises: PayloadError unless payload has eight bytes.
     """
     if len(payload) != _TIME.size:
-        raise PayloadError("Time: has %d bytes instead of 8" % len(payload))
+        raise PayloadError(f"Time: has {len(payload)} bytes instead of 8")
     return WireTime(*_TIME.unpack(payload))
 
 

@@ -196,7 +196,7 @@ class Session:
         """Do what is due by now_s; call it at least a few times per second."""
         silent_s = now_s - max(self.last_receive_s, self._listening_s)
         if silent_s > self._limits.silence_timeout_s:
-            return [SessionEnded("silent for %.1f s: no whole packet came" % silent_s)]
+            return [SessionEnded(f"silent for {silent_s:.1f} s: no whole packet came")]
         if (self._asks_again or not self.topics) and now_s >= self._request_due_s:
             self.outgoing.append(encode_packet(packets.ID_PUBLISHER, b""))
             self._last_request_s = now_s
@@ -278,7 +278,7 @@ class Session:
         info = payloads.decode_topic_info(payload)
         fault = self._find_error(info)
         if fault is not None:
-            return Problem("topic %s refused: %s" % (_shorten(info.name), fault))
+            return Problem(f"topic {_shorten(info.name)} refused: {fault}")
         topic = Topic(info, kind)
         if self.topics.get(info.topic_id) == topic:
             return None
@@ -309,9 +309,9 @@ class Session:
         if not _NAME.match(info.name) or "//" in info.name or info.name.endswith("/"):
             return "its name is not a ROS name"
         if len(info.message_type) > NAME_LENGTH_MAX or not _MESSAGE_TYPE.match(info.message_type):
-            return "its type %s is not of the form package/Type" % _shorten(info.message_type)
+            return f"its type {_shorten(info.message_type)} is not of the form package/Type"
         if not _MD5SUM.match(info.md5sum):
-            return "its md5 %s is not 32 hexadecimal digits" % _shorten(info.md5sum)
+            return f"its md5 {_shorten(info.md5sum)} is not 32 hexadecimal digits"
         if info.topic_id < packets.FIRST_TOPIC_ID:
             return "its id %d is below %d" % (info.topic_id, packets.FIRST_TOPIC_ID)
         if info.buffer_length < BUFFER_LENGTH_MIN:

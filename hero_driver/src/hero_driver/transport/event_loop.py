@@ -205,7 +205,7 @@ class EventLoop(LinkOwner):
         try:
             return answers.get(timeout=timeout_s)
         except queue.Empty:
-            raise NoAnswerError("the driver did not answer within %.1f s" % timeout_s) from None
+            raise NoAnswerError(f"the driver did not answer within {timeout_s:.1f} s") from None
 
     def _wake(self) -> None:
         # The loop looks at its calls before it waits again.
@@ -248,7 +248,7 @@ class EventLoop(LinkOwner):
         except OSError as error:
             # The peer may be gone already.
             link.discard()
-            self._handler.warn_network("connection of %s broke at once: %s" % (address, describe_error(error)))
+            self._handler.warn_network(f"connection of {address} broke at once: {describe_error(error)}")
             on_close()
             return
         self._links[sock.fileno()] = link
@@ -349,7 +349,7 @@ class EventLoop(LinkOwner):
         if error.errno in (errno.EMFILE, errno.ENFILE):
             remedy = "; raise the limit of open files (ulimit -n) and start again"
         self._handler.warn_network(
-            "cannot take more connections (%s)%s; connected robots are not affected" % (describe_error(error), remedy)
+            f"cannot take more connections ({describe_error(error)}){remedy}; connected robots are not affected"
         )
         self._unregister(listener.fileno())
 

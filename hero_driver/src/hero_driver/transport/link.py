@@ -40,7 +40,7 @@ def find_socket_address(address: Address, flags: int = 0) -> Any:
     except (OSError, ValueError) as error:
         # What is no name at all ("10.42.0..1") is a UnicodeError of the codec for names.
         reason = describe_error(error) if isinstance(error, OSError) else "not a host's name"
-        raise HostNotFoundError("%s cannot be found (%s)" % (ascii(address.host), reason)) from error
+        raise HostNotFoundError(f"{address.host!a} cannot be found ({reason})") from error
 
 
 class LinkHandler:
@@ -166,7 +166,7 @@ class Link:
         except (BlockingIOError, InterruptedError):
             return b""
         except OSError as error:
-            self.close("read failed: %s" % describe_error(error))
+            self.close(f"read failed: {describe_error(error)}")
             return b""
         if not data:
             self.close("closed by the robot")
@@ -209,7 +209,7 @@ class Link:
         except (BlockingIOError, InterruptedError):
             return data
         except OSError as error:
-            self._close_soon("write failed: %s" % describe_error(error))
+            self._close_soon(f"write failed: {describe_error(error)}")
             return b""
         return data[sent:]
 

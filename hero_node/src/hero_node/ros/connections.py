@@ -62,7 +62,7 @@ def open_tcpros_server(warn: Callable[[str, str], None]) -> None:
     def serve(sock: socket.socket, address: Any, data: bytes) -> None:
         reason = _serve_connection(server, sock, address, data)
         if reason:
-            warn(address[0], "connection of %s to a topic or service refused: %s" % (address[0], reason))
+            warn(address[0], f"connection of {address[0]} to a topic or service refused: {reason}")
 
     server._tcp_server_callback = HandshakeReader(serve).add
     tcpros_base.start_tcpros_server()
@@ -85,6 +85,6 @@ def _serve_connection(server: Any, sock: socket.socket, address: Any, data: byte
         reason = str(refusal)[:REASON_LENGTH_MAX]
         write_ros_handshake_header(sock, {"error": reason})
     except Exception as error:  # noqa: BLE001 - whatever the header does to rospy, only this connection is lost
-        reason = "%s: %s" % (type(error).__name__, str(error)[:REASON_LENGTH_MAX])
+        reason = f"{type(error).__name__}: {str(error)[:REASON_LENGTH_MAX]}"
     sock.close()
     return "" if rospy.core.is_shutdown_requested() else ascii(reason)[1:-1]

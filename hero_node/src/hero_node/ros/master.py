@@ -46,7 +46,7 @@ class LimitedTransport(xmlrpc.client.Transport):
         except OSError as error:
             if error.errno is not None:
                 raise
-            raise OSError(errno.ETIMEDOUT, "no answer within %g s" % MASTER_TIMEOUT_S) from None
+            raise OSError(errno.ETIMEDOUT, f"no answer within {MASTER_TIMEOUT_S:g} s") from None
 
 
 def read_master_uri() -> str:
@@ -61,7 +61,7 @@ def read_master_uri() -> str:
             return uri
     except ValueError:  # a port beyond 65535, half an IPv6 address, a host with two dots
         pass
-    raise NodeError("ROS_MASTER_URI is %s, but must be like http://localhost:11311" % ascii(uri))
+    raise NodeError(f"ROS_MASTER_URI is {uri!a}, but must be like http://localhost:11311")
 
 
 def ask_master(method: str, *arguments: Any) -> Any:
@@ -74,9 +74,9 @@ def ask_master(method: str, *arguments: Any) -> Any:
         with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as master:
             code, text, value = getattr(master, method)(rospy.get_name(), *arguments)
     except CALL_ERRORS as error:
-        raise NodeError("no ROS master at %r (%s)" % (uri, error)) from None
+        raise NodeError(f"no ROS master at {uri!r} ({error})") from None
     if code != SUCCESS:
-        raise MasterRefusalError("the ROS master refuses %s: %s" % (method, text))
+        raise MasterRefusalError(f"the ROS master refuses {method}: {text}")
     return value
 
 

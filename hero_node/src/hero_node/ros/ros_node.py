@@ -43,7 +43,7 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
     check_master()
     running = "" if anonymous else find_running_node(name)
     if running:
-        raise NodeError("%s already runs: end it, or start this one with another __name:=" % running)
+        raise NodeError(f"{running} already runs: end it, or start this one with another __name:=")
     limit_master_calls()
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: rospy.logwarn(text))
@@ -60,7 +60,7 @@ def init_ros_node(name: str, anonymous: bool = False, arguments: Optional[List[s
     try:
         rospy.init_node(name, argv=arguments, anonymous=anonymous, disable_signals=True)
     except (rosgraph.roslogging.LoggingException, NotADirectoryError, PermissionError) as error:
-        raise NodeError("no log can be written (%s): set ROS_LOG_DIR to a directory" % one_line(error)) from None
+        raise NodeError(f"no log can be written ({one_line(error)}): set ROS_LOG_DIR to a directory") from None
     except TypeError:  # of the parameter server, which takes no nil: _x:= and _x:=~ hold none, nor does _x:=::
         raise NodeError(
             "a private parameter (_name:=value) has no value for YAML: quote it twice, as in _host:='\"::\"'"

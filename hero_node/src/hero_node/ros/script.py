@@ -61,7 +61,7 @@ def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
         try:
             runpy.run_path(path, run_name="__main__")
         except ModuleNotFoundError as error:
-            raise ProgramError("%s; script/bootstrap (or rosdep) installs what all programs need" % error) from error
+            raise ProgramError(f"{error}; script/bootstrap (or rosdep) installs what all programs need") from error
 
     run(main)
 

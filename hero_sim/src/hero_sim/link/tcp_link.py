@@ -289,7 +289,7 @@ def _resolve(host: str, port: int) -> Tuple[int, Tuple]:
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
     except (OSError, UnicodeError) as error:
-        raise OptionError("host %r cannot be resolved: %s; give a name or an address" % (host, error)) from error
+        raise OptionError(f"host {host!r} cannot be resolved: {error}; give a name or an address") from error
     # IPv4 first: robots use nothing else.
     found.sort(key=lambda entry: entry[0] != socket.AF_INET)
     return found[0][0], found[0][4]

@@ -155,7 +155,7 @@ class CommandTable:
             self._warn(str(error))
 
     def _log_green(self, text: str) -> None:
-        self._log("\x1b[92m[/%s] %s\x1b[0m" % (self._name, text))
+        self._log(f"\x1b[92m[/{self._name}] {text}\x1b[0m")
 
     def _tune(self, controller: Controller) -> Answer:
         self._motors.start_tuning(controller, self._now_ms)

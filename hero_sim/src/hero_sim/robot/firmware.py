@@ -218,7 +218,7 @@ class Firmware:
 
     def warn(self, text: str) -> None:
         """Report a line to users, not to the server."""
-        self._report("%s: %s" % (self.name, text))
+        self._report(f"{self.name}: {text}")
 
     # -- time passes ---------------------------------------------------------------------------------------
 
@@ -248,7 +248,7 @@ class Firmware:
     def _begin_setup(self, now_ms: int) -> None:
         """Go on with setup() after the attempt to connect (ROSHandle.ino:92-94, firmware.ino:114-140)."""
         self._phase = self._run_setup
-        self.log("\x1b[94m[/%s] %s | IP: %s \x1b[0m" % (self.name, self.model.versions, self._address))
+        self.log(f"\x1b[94m[/{self.name}] {self.model.versions} | IP: {self._address} \x1b[0m")
         # The first spin comes before anything is advertised; a request that is in by then meets no topics.
         first_spin_ms = now_ms + int(self.rng.randint(0, 3))
         self._setup = [
@@ -274,11 +274,11 @@ class Firmware:
         del now_ms
         self._advertised = True
         if self.model.is_plus:
-            self.log("\x1b[92m[%s] TOF sensor initialized!\x1b[0m" % self.name)
+            self.log(f"\x1b[92m[{self.name}] TOF sensor initialized!\x1b[0m")
         elif self._has_imu_hat:
-            self.log("\x1b[92m[%s] IMU hat detected!\x1b[0m" % self.name)
+            self.log(f"\x1b[92m[{self.name}] IMU hat detected!\x1b[0m")
         else:
-            self.log("\x1b[91m[%s] IMU is not working or not connected! Error: 1\x1b[0m" % self.name)
+            self.log(f"\x1b[91m[{self.name}] IMU is not working or not connected! Error: 1\x1b[0m")
 
     def _enter_loop(self, now_ms: int) -> None:
         self._phase = self._run_loop
@@ -387,7 +387,7 @@ class Firmware:
             self._answer_topics(millis)
             return False
         if len(packet.payload) > declarations.BUFFER_LENGTH:
-            self.crash_reason = "a payload of %d bytes for its buffer of 4096" % len(packet.payload)
+            self.crash_reason = f"a payload of {len(packet.payload)} bytes for its buffer of 4096"
             return False
         if topic_id == packets.ID_TIME:
             self._receive_time(packet.payload, millis)

@@ -50,16 +50,16 @@ class Flash:
         try:
             os.makedirs(folder, exist_ok=True)
         except OSError as error:
-            raise OptionError("--flash-dir %s cannot be made: %s; choose another" % (folder, error.strerror)) from error
+            raise OptionError(f"--flash-dir {folder} cannot be made: {error.strerror}; choose another") from error
         if not os.access(folder, os.W_OK):
-            raise OptionError("--flash-dir %s is not writable; choose another" % folder)
+            raise OptionError(f"--flash-dir {folder} is not writable; choose another")
         try:
             content = json.loads(read_file(path))
         except FileNotFoundError:
             return
         except (OSError, RecursionError, ValueError) as error:
             reason = error.strerror if isinstance(error, OSError) else error
-            raise OptionError("flash file %s cannot be read: %s; %s" % (path, reason, _REMEDY)) from error
+            raise OptionError(f"flash file {path} cannot be read: {reason}; {_REMEDY}") from error
         for key, length in _LENGTHS.items():
             values = content.get(key) if isinstance(content, dict) else None
             may_be_erased = key == "ir_calibration_counts_m2"  # then it is NaN
@@ -85,4 +85,4 @@ class Flash:
         try:
             write_file(self._path, json.dumps(content, indent=1).encode())
         except OSError as error:
-            raise CommandError("flash file %s cannot be written: %s" % (self._path, error.strerror)) from error
+            raise CommandError(f"flash file {self._path} cannot be written: {error.strerror}") from error

@@ -72,7 +72,7 @@ def parse_models(texts: List[str], first_id: int, count: int) -> List[RobotModel
     for text in texts:
         name, _, robot = text.partition(",robot=")
         if name not in MODELS:
-            raise OptionError("--model %s: must be one of %s, or that with ,robot=ID" % (text, ", ".join(MODELS)))
+            raise OptionError(f"--model {text}: must be one of {', '.join(MODELS)}, or that with ,robot=ID")
         rows = range(count)
         if robot:
             if not robot.isdecimal() or not 0 <= int(robot) - first_id < count:

@@ -230,7 +230,7 @@ class MotorControl:
             targets = (targets[0] / self._odometry.tick_m, targets[1] / self._odometry.tick_m)
         stops = not any(targets)
         if stops:
-            self._log("\x1b[93m[/%s] Reseting PID...\x1b[0m" % self._name)
+            self._log(f"\x1b[93m[/{self._name}] Reseting PID...\x1b[0m")
             controller.stop()
             self.motors.stop()
         else:
@@ -245,7 +245,7 @@ class MotorControl:
 
     def start_tuning(self, controller: Controller, now_ms: int) -> None:
         """Begin a controller's self-tuning, which ends by its own failure or by a Twist that is not dropped."""
-        self._log("\x1b[94m[/%s] Starting Motors Auto Tuning! Wait... \x1b[0m" % self._name)
+        self._log(f"\x1b[94m[/{self._name}] Starting Motors Auto Tuning! Wait... \x1b[0m")
         is_position = controller is self.position
         limits_ms = POSITION_TUNING_MS if is_position else VELOCITY_TUNING_MS
         controller.start_tuning(now_ms, int(self._rng.randint(*limits_ms)))
@@ -282,11 +282,11 @@ class MotorControl:
     def _tune(self, controller: Controller, now_ms: int, measured: Sequence[float], outputs_us: Sequence[int]) -> None:
         if controller.continue_tuning(now_ms):
             for side in ("Left", "Right"):
-                self._log("\x1b[92m %s Motor Tuning Failure! Using default values.\x1b[0m" % side)
-                self._log("\x1b[94m %s Motor Best PID params (0.000000, 0.000000, 0.000000) \x1b[0m" % side)
+                self._log(f"\x1b[92m {side} Motor Tuning Failure! Using default values.\x1b[0m")
+                self._log(f"\x1b[94m {side} Motor Best PID params (0.000000, 0.000000, 0.000000) \x1b[0m")
         self.motors.drive(now_ms, outputs_us)
         text = "[%f,%f], [%f,%f]->[%d,%d]" % (*controller.targets, *measured, *outputs_us)
-        self._log("\x1b[93m[/%s] Tunning Motor Set: %s\x1b[0m" % (self._name, text))
+        self._log(f"\x1b[93m[/{self._name}] Tunning Motor Set: {text}\x1b[0m")
 
     def _count_ticks(self, now_ms: int) -> List[int]:
         return self._odometry.count_ticks(*self._body.read_wheels(now_ms))

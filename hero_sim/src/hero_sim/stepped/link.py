@@ -61,7 +61,7 @@ class StepLink(RobotLink):
     def missing(self) -> Optional[str]:
         for topic in ("odom", "proximity"):
             if self.age_s(topic) > FRESH_S:
-                return "no message on /%s/%s: is the robot on and in reach?" % (self._name, topic)
+                return f"no message on /{self._name}/{topic}: is the robot on and in reach?"
         return None
 
     def subscribe(self, topic: str) -> None:
@@ -78,7 +78,7 @@ class StepLink(RobotLink):
             last_ms = arrivals_ms[self.row]
             while arrivals_ms[self.row] == last_ms:
                 if self.clock.now_s >= deadline_s:
-                    raise StaleDataError("no message on /%s/%s within %.1f s" % (self._name, topic, timeout_s))
+                    raise StaleDataError(f"no message on /{self._name}/{topic} within {timeout_s:.1f} s")
                 self.clock.sleep(0.001)
 
     def read_pose(self) -> Pose:
@@ -118,7 +118,7 @@ class StepLink(RobotLink):
             return self._origin
         if frame == self._name + "/odom":
             return Pose(0.0, 0.0, 0.0)
-        raise FrameError("no transform from %s/odom to %s: robots in process know map and world" % (self._name, frame))
+        raise FrameError(f"no transform from {self._name}/odom to {frame}: robots in process know map and world")
 
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         if not self.is_stopped:

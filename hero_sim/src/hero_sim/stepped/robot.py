@@ -23,7 +23,7 @@ class StepRobot(BaseRobot):
         if name in ("encoder", "imu", "odometry"):
             text = "%s of %s is a ROS message, which robots in process do not send: see wheel_speeds, pose, velocity"
             raise ProgramError(text % (name, self.name))
-        raise AttributeError("%r object has no attribute %r" % (type(self).__name__, name))
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def row(self) -> int:

@@ -46,8 +46,8 @@ _PARTS: Dict[str, str] = {
 
 
 def _define(name: str, md5: str, fields: str, *parts: str) -> MessageType:
-    separator = "\n%s\n" % ("=" * 80)
-    return MessageType(name, md5, separator.join([fields, *("MSG: %s\n%s" % (part, _PARTS[part]) for part in parts)]))
+    separator = f"\n{'=' * 80}\n"
+    return MessageType(name, md5, separator.join([fields, *(f"MSG: {part}\n{_PARTS[part]}" for part in parts)]))
 
 
 _POSE_PARTS = ("geometry_msgs/Point", "geometry_msgs/Quaternion")

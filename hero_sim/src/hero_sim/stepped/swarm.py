@@ -98,7 +98,7 @@ class StepSwarm(StepWorld):
         )
         check_population(options, worlds)
         if wifi not in PROFILES:
-            raise OptionError("--wifi %r: must be one of %s" % (wifi, ", ".join(PROFILES)))
+            raise OptionError(f"--wifi {wifi!r}: must be one of {', '.join(PROFILES)}")
         radios = () if wifi == IDEAL else build_radios(options, worlds)
         models = parse_models(options.model, first_id, count) * worlds
         self.rows = RobotRows(build_world(options, worlds), radios, models)

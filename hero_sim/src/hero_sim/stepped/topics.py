@@ -63,11 +63,11 @@ class StepTopics:
             **({OBJECTS: MARKER_ARRAY} if self._has_objects else {}),
         }
         for row, name in enumerate(self._names):
-            self.types["/%s/odom" % name] = self.types["/%s/ground_truth" % name] = ODOMETRY
-            self.types["/%s/proximity" % name] = LASER_SCAN
-            self.types["/%s/cmd_vel" % name] = TWIST
+            self.types[f"/{name}/odom"] = self.types[f"/{name}/ground_truth"] = ODOMETRY
+            self.types[f"/{name}/proximity"] = LASER_SCAN
+            self.types[f"/{name}/cmd_vel"] = TWIST
             if row in rows.distance_rows:
-                self.types["/%s/distance" % name] = FLOAT
+                self.types[f"/{name}/distance"] = FLOAT
         origins = [
             (FRAME, name + "/odom", find_frame(true_pose, pose))
             for name, true_pose, pose in zip(self._names, self._true_poses, _list_poses(rows.odometry))
@@ -106,13 +106,13 @@ class StepTopics:
         for row in moved:
             name = self._names[row]
             frames = name + "/odom", name + "/base_link"
-            send("/%s/odom" % name, encode_odometry(time_ns, frames, poses[row], *velocities[row]))
+            send(f"/{name}/odom", encode_odometry(time_ns, frames, poses[row], *velocities[row]))
             truth = encode_odometry(time_ns, (FRAME, frames[1]), true_poses[row], *true_velocities[row])
-            send("/%s/ground_truth" % name, truth)
+            send(f"/{name}/ground_truth", truth)
             transforms.append((*frames, poses[row]))
             if commands[row] != self._commands[row].tolist():
                 self._commands[row] = commands[row]
-                send("/%s/cmd_vel" % name, encode_twist(*commands[row]))
+                send(f"/{name}/cmd_vel", encode_twist(*commands[row]))
         if transforms:
             send("/tf", encode_transforms(time_ns, transforms))
         if robots.now_ms >= self._next_markers_ms:
@@ -129,13 +129,13 @@ class StepTopics:
             if row < len(self._names):
                 name = self._names[row]
                 scan = encode_scan(self._time_ns, name + "/laser_link", ranges_m[row], _LIMITS_M, SCAN_TIME_S)
-                self._send("/%s/proximity" % name, scan)
+                self._send(f"/{name}/proximity", scan)
 
     def _take_distance(self, rows: np.ndarray) -> None:
         for row in rows.tolist():
             if row < len(self._names):
                 distance_m = self._rows.distance_m[row]
-                self._send("/%s/distance" % self._names[row], struct.pack("<f", distance_m))
+                self._send(f"/{self._names[row]}/distance", struct.pack("<f", distance_m))
 
 
 def _list_poses(poses: np.ndarray) -> List[Pose]:

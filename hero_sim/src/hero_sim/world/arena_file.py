@@ -50,7 +50,7 @@ def load_arena(name: str, read: Callable[[str], bytes] = read_file) -> Arena:
         text = "arena %s cannot be read: %s; shipped are %s"
         raise OptionError(text % (path, error.strerror, ", ".join(SHIPPED))) from error
     except ValueError as error:
-        raise OptionError("arena %s: %s" % (path, error)) from error
+        raise OptionError(f"arena {path}: {error}") from error
 
 
 def _build_from_map(content: Dict[str, Any], path: str, read: Callable[[str], bytes]) -> Arena:
@@ -68,7 +68,7 @@ def _build_from_map(content: Dict[str, Any], path: str, read: Callable[[str], by
         gray = np.asarray(image.convert("L"), dtype=float)
     except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ValueError("its picture %s cannot be read: %s" % (picture, reason)) from error
+        raise ValueError(f"its picture {picture} cannot be read: {reason}") from error
     return build_map_arena(os.path.basename(path), content, gray)
 
 
@@ -78,7 +78,7 @@ def _build_arena(content: Any, file_name: str) -> Arena:
         raise ValueError("must be a mapping with the keys " + ", ".join(_KEYS))
     for key in content:
         if key not in _KEYS:
-            raise ValueError("unknown key %s; known are %s" % (shorten(key), ", ".join(_KEYS)))
+            raise ValueError(f"unknown key {shorten(key)}; known are {', '.join(_KEYS)}")
     name = content.get("name", file_name)
     if not isinstance(name, str) or not name.isprintable():  # it is printed in terminals
         raise ValueError("name must be one line of text, not " + shorten(name))
@@ -110,9 +110,7 @@ def _read_object(item: Any) -> PushedBody:
     """Return what robots can push. Raises: ValueError."""
     known = isinstance(item, dict) and set(item) <= set(_OBJECT_KEYS)
     if not known or ("circle_m" in item) == ("polygon_m" in item):
-        raise ValueError(
-            "objects: %s must be a mapping with circle_m or polygon_m, mass_kg and friction" % shorten(item)
-        )
+        raise ValueError(f"objects: {shorten(item)} must be a mapping with circle_m or polygon_m, mass_kg and friction")
     mass_kg, friction = (_read_rows(key, [[item.get(key)]], 1)[0, 0] for key in ("mass_kg", "friction"))
     shape: Shape
     if "circle_m" in item:
@@ -140,7 +138,7 @@ def _read_bounds(content: Dict[str, Any], segments_m: np.ndarray) -> np.ndarray:
 def _list_items(content: Dict[str, Any], key: str) -> List[Any]:
     items = content.get(key) or []
     if not isinstance(items, list):
-        raise ValueError("%s must be a list, not %s" % (key, shorten(items)))
+        raise ValueError(f"{key} must be a list, not {shorten(items)}")
     return items
 
 

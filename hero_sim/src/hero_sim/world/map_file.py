@@ -30,20 +30,20 @@ def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Are
     cell_m = _read_number(content, "resolution", 0.05)
     free_share = _read_number(content, "free_thresh", 0.196)
     if not 0.0 < free_share <= 1.0:
-        raise ValueError("free_thresh must be above 0 and at most 1, such as 0.25 for 25 %%, not %g" % free_share)
+        raise ValueError(f"free_thresh must be above 0 and at most 1, such as 0.25 for 25 %, not {free_share:g}")
     negate = content.get("negate", "0")
     if negate not in ("0", "1"):
-        raise ValueError("negate must be 0 or 1, not %s" % shorten(negate))
+        raise ValueError(f"negate must be 0 or 1, not {shorten(negate)}")
     origin = content.get("origin", ["0", "0", "0"])
     try:
         x_m, y_m, yaw_rad = (float(value) for value in origin)
     except (TypeError, ValueError):
-        raise ValueError("origin must be x, y and yaw, not %s" % shorten(origin)) from None
+        raise ValueError(f"origin must be x, y and yaw, not {shorten(origin)}") from None
     if not (abs(x_m) <= _MAX_ORIGIN_M and abs(y_m) <= _MAX_ORIGIN_M and yaw_rad == 0.0):
         text = "origin must be within %.0f m (x and y, in m) and its yaw 0, not %s"
         raise ValueError(text % (_MAX_ORIGIN_M, shorten(origin)))
     if not 0.001 <= cell_m <= 1.0:
-        raise ValueError("resolution must be from 0.001 to 1 m, not %g" % cell_m)
+        raise ValueError(f"resolution must be from 0.001 to 1 m, not {cell_m:g}")
     shade = gray[::-1] / 255.0  # the first row of a picture is its upper one
     occupied_share = shade if negate == "1" else 1.0 - shade
     solid = occupied_share >= free_share
@@ -69,7 +69,7 @@ def _read_number(content: Dict[str, Any], key: str, default: float) -> float:
     except (TypeError, ValueError):
         value = math.nan
     if not math.isfinite(value):
-        raise ValueError("%s must be a number, not %r" % (key, content.get(key)))
+        raise ValueError(f"{key} must be a number, not {content.get(key)!r}")
     return value
 
 

@@ -133,7 +133,7 @@ def read_known(path: str, ids: Collection[int], read: Callable[[str], bytes] = r
     try:
         lines = [line.strip() for line in read(path).decode("utf-8").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
-        raise OptionError("errors %s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)) from error
+        raise OptionError(f"errors {path} cannot be read: {getattr(error, 'strerror', None) or error}") from error
     own = {"robot=%d" % robot_id for robot_id in ids}
     given = [line for line in lines if line and not line.startswith("#")]
     return [line for line in given if all(part in own for part in line.split(",") if part.startswith("robot="))]
@@ -144,6 +144,6 @@ def describe_errors(errors: RobotErrors, first_id: int) -> List[str]:
     lines: List[str] = []
     for row in range(len(errors.slip)):
         columns = {key: getattr(errors, kind.array)[row, kind.columns] for key, kind in KINDS.items()}
-        values = ["%s=%.6g" % (key, values[0]) for key, values in columns.items() if len(values) == 1]
+        values = [f"{key}={values[0]:.6g}" for key, values in columns.items() if len(values) == 1]
         lines.append(",".join(["robot=%d" % (first_id + row), *values]))
     return lines

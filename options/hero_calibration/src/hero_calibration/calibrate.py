@@ -43,7 +43,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     options.parts = [] if options.restore else options.parts or list(DEFAULT_PARTS)
     for part in options.parts:
         if part not in PARTS:
-            parser.error("%s: parts are %s; or: restore [FILE ...]" % (part, ", ".join(PARTS)))
+            parser.error(f"{part}: parts are {', '.join(PARTS)}; or: restore [FILE ...]")
     if options.yes and INFRARED in options.parts and len(options.parts) > 1:
         parser.error("--yes: motors and velocity need room around the robots, infrared a wall: name one or the other")
     if options.tape and WHEELS not in options.parts:

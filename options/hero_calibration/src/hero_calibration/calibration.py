@@ -105,12 +105,12 @@ class Calibration:
         except CalibrationError as error:
             probe.failure = probe.failure or str(error)
         except OSError as error:
-            probe.failure = probe.failure or "%s cannot be written: %s" % (picture, error.strerror)
+            probe.failure = probe.failure or f"{picture} cannot be written: {error.strerror}"
 
     def _describe(self, probe: Probe) -> List[str]:
         """Return the lines of a robot in the final table."""
         return [
-            "%s: %s" % (probe.name, "FAILED: " + probe.failure if probe.failure else "ok"),
-            *("  %-9s %s" % (part, r.describe()) for part, r in self._results.get(probe.robot_id, {}).items()),
+            f"{probe.name}: {'FAILED: ' + probe.failure if probe.failure else 'ok'}",
+            *(f"  {part:9} {r.describe()}" for part, r in self._results.get(probe.robot_id, {}).items()),
             *("  " + path for path in self._files.get(probe.robot_id, [])),
         ]

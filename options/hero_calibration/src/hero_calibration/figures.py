@@ -37,7 +37,7 @@ def _draw_motors(axes: Axes, result: MotorResult) -> None:
     for pulses, speeds, zone, (wheel, color) in zip(result.pulses_us, result.speeds_m_s, result.zones, _WHEELS):
         axes.plot(pulses, speeds, ".-", color=color, linewidth=0.8, markersize=4, label=wheel)
         axes.axvspan(zone.low_us, zone.high_us, color=color, alpha=0.12)
-        axes.axvline(zone.center_us, color=color, linewidth=1.2, label="center %.0f us" % zone.center_us)
+        axes.axvline(zone.center_us, color=color, linewidth=1.2, label=f"center {zone.center_us:.0f} us")
     axes.axvline(NOMINAL_CENTER_US, color=_GRAY, linestyle=":", label="nominal %d us" % NOMINAL_CENTER_US)
     axes.set_title("Servos: dead zones", fontsize=9)
     axes.set_xlabel("pulse (us)")
@@ -47,7 +47,7 @@ def _draw_motors(axes: Axes, result: MotorResult) -> None:
 def _draw_velocity(axes: Axes, result: VelocityResult) -> None:
     for responses, style, when in ((result.before, ":", "before"), (result.after, "-", "after")):
         for response, (wheel, color) in zip(responses, _WHEELS):
-            label = "%s, %s: mean error %.0f %%" % (wheel, when, 100.0 * response.mean_error)
+            label = f"{wheel}, {when}: mean error {100.0 * response.mean_error:.0f} %"
             for times_s, speeds_m_s in response.curves:
                 axes.plot(times_s, speeds_m_s, style, color=color, linewidth=1.0, label=label)
                 label = ""

@@ -58,7 +58,7 @@ def make_folder(folder: str) -> None:
     try:
         os.makedirs(folder, exist_ok=True)
     except OSError as error:
-        raise CalibrationError("%s cannot be created: %s" % (folder, error.strerror)) from error
+        raise CalibrationError(f"{folder} cannot be created: {error.strerror}") from error
 
 
 def list_files(folder: str) -> List[str]:
@@ -89,7 +89,7 @@ def save(path: str, calibration: KeptCalibration) -> None:
             content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **others, **values}
             write_file(path, replace_values(text, content).encode())
     except OSError as error:
-        raise CalibrationError("%s cannot be written: %s" % (path, error.strerror)) from error
+        raise CalibrationError(f"{path} cannot be written: {error.strerror}") from error
 
 
 def load(path: str) -> KeptCalibration:
@@ -97,19 +97,19 @@ def load(path: str) -> KeptCalibration:
     try:
         content = parse_yaml(read_text(path))
     except OSError as error:
-        raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from error
+        raise CalibrationError(f"{path} cannot be read: {error.strerror}") from error
     except YamlError as error:
-        raise _refuse(path, "is no calibration: %s" % error) from error
+        raise _refuse(path, f"is no calibration: {error}") from error
     if not isinstance(content, dict) or "robot" not in content:
         raise _refuse(path, "is no calibration: it needs a line robot: hero_N")
     known = {**SETTINGS, **RESULTS}
     for key in content:
         if key not in ("robot", "date", *OTHERS, *known):
             names = ", ".join(("robot", "date", *OTHERS, *known))
-            raise _refuse(path, "unknown key %s; known are %s" % (shorten(key), names))
+            raise _refuse(path, f"unknown key {shorten(key)}; known are {names}")
     match = re.fullmatch(r"hero_([0-9]{1,9})", str(content["robot"]))
     if match is None:
-        raise _refuse(path, "robot must be hero_N, not %s" % shorten(content["robot"]))
+        raise _refuse(path, f"robot must be hero_N, not {shorten(content['robot'])}")
     values = {key: _read_numbers(path, key, content[key], allowed) for key, allowed in known.items() if key in content}
     others = {key: content[key] for key in OTHERS if key in content}
     return KeptCalibration(int(match.group(1)), make_printable(str(content.get("date", ""))), values, others)
@@ -119,13 +119,13 @@ def _read_numbers(path: str, key: str, found: Any, allowed: Range) -> List[float
     count, low, high, meaning = allowed
     text = "%s must be %d numbers from %g to %g (%s)" % (key, count, low, high, meaning)
     if not isinstance(found, list) or len(found) != count:
-        raise _refuse(path, "%s, not %s" % (text, shorten(found)))
+        raise _refuse(path, f"{text}, not {shorten(found)}")
     for number in found:
         is_unknown = key in RESULTS and isinstance(number, float) and math.isnan(number)
         if not is_unknown and not is_number(number, low, high):
-            raise _refuse(path, "%s, not %s" % (text, shorten(number)))
+            raise _refuse(path, f"{text}, not {shorten(number)}")
     return [float(number) for number in found]
 
 
 def _refuse(path: str, reason: str) -> CalibrationError:
-    return CalibrationError("%s: %s; correct the file, or move it away" % (path, make_printable(reason)))
+    return CalibrationError(f"{path}: {make_printable(reason)}; correct the file, or move it away")

@@ -42,7 +42,7 @@ class GoalChoice:
         self._names = names
         self._chosen = names[0]
         self._publishers: Dict[str, rospy.Publisher] = {
-            name: rospy.Publisher("/%s/goal" % name, PoseStamped, queue_size=2) for name in names
+            name: rospy.Publisher(f"/{name}/goal", PoseStamped, queue_size=2) for name in names
         }
         self._markers = rospy.Publisher(CHOICE_TOPIC, MarkerArray, queue_size=2, latch=True)
         rospy.Subscriber(POINT_TOPIC, PointStamped, self._receive_point, queue_size=2)

@@ -19,18 +19,18 @@ def make_hero_plus(urdf: str) -> str:
     robot.set("name", "hero_plus")
     for cylinder in robot.iter("cylinder"):
         if cylinder.get("radius") == STOCK_WHEEL_RADIUS_M:
-            cylinder.set("radius", "%g" % WHEEL_RADIUS_M)
+            cylinder.set("radius", f"{WHEEL_RADIUS_M:g}")
     for joint in robot.iter("joint"):
         origin, side = joint.find("origin"), {"left_wheel_joint": 1, "right_wheel_joint": -1}.get(joint.get("name", ""))
         if origin is not None and side is not None:
             _, _, z_m = origin.get("xyz", "").split()
-            origin.set("xyz", "0 %g %s" % (side * WHEEL_Y_M, z_m))
+            origin.set("xyz", f"0 {side * WHEEL_Y_M:g} {z_m}")
     base = robot.find("link[@name='base_link']")
     if base is not None:
         for kind in ("collision", "visual"):
             shape = ElementTree.SubElement(base, kind)
             ElementTree.SubElement(shape, "origin", xyz="0 0 0.02", rpy="0 0 0")
-            size = {"radius": "%g" % SHIELD_RADIUS_M, "length": "%g" % SHIELD_HEIGHT_M}
+            size = {"radius": f"{SHIELD_RADIUS_M:g}", "length": f"{SHIELD_HEIGHT_M:g}"}
             ElementTree.SubElement(ElementTree.SubElement(shape, "geometry"), "cylinder", size)
         ElementTree.SubElement(shape, "material", name="rim")
     return ElementTree.tostring(robot, encoding="unicode")

@@ -50,7 +50,7 @@ def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
         "Update Interval": 0,
     }
     path = {
-        "Topic": "/%s/odom" % name,
+        "Topic": f"/{name}/odom",
         "Unreliable": False,
         "Queue Size": 100,  # of slow graphics, which draw a few times a second
         "Keep": 300,
@@ -61,14 +61,14 @@ def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
         "Shape": make_arrow(color, (0.025, 0.0025), (0.0001, 0.0001)),
     }
     proximity = {
-        "Topic": "/%s/proximity" % name,
+        "Topic": f"/{name}/proximity",
         "Style": "Spheres",
         "Size (m)": 0.012,
         "Color Transformer": "FlatColor",
         "Color": color,
         "Decay Time": 0,
     }
-    distance = {"Topic": "/%s/range" % name, "Color": color, "Alpha": 0.3}
+    distance = {"Topic": f"/{name}/range", "Color": color, "Alpha": 0.3}
     return [
         *([make_display("Range", name + " distance", distance)] if is_plus else []),
         make_display("RobotModel", name, model),
@@ -90,7 +90,7 @@ def make_arrow(color: str, shaft_m: Tuple[float, float], head_m: Tuple[float, fl
 def make_ground_truth_display(name: str) -> Dict[str, Any]:
     """Return the display of a simulated robot's ground truth: an arrow above the model."""
     settings = {
-        "Topic": "/%s/ground_truth" % name,
+        "Topic": f"/{name}/ground_truth",
         "Keep": 1,
         "Position Tolerance": 0,
         "Angle Tolerance": 0,
@@ -103,7 +103,7 @@ def make_ground_truth_display(name: str) -> Dict[str, Any]:
 def make_pose_display(name: str) -> Dict[str, Any]:
     """Return the display of a robot's pose by hero_localization, with its error."""
     settings = {
-        "Topic": "/%s/pose" % name,
+        "Topic": f"/{name}/pose",
         "Shape": "Axes",
         "Axes Length": 0.06,
         "Axes Radius": 0.003,

@@ -70,7 +70,7 @@ class PageRequests:
             if request["do"] == "start":
                 request["values"] = check_values(request["program"], request["values"])
         except RequestError as error:
-            page.tell("error", "invalid request (%s): reload the page" % error)
+            page.tell("error", f"invalid request ({error}): reload the page")
             return
         do = request["do"]
         try:
@@ -91,7 +91,7 @@ class PageRequests:
         """Carry out a message of a Foxglove client by the rules of the page; return why it is refused, empty if not."""
         request = read_command(topic, message_type, content)
         if request is None:
-            return "%s: only /hero_N/cmd_vel (geometry_msgs/Twist) and stop_request (std_msgs/Bool) are taken" % topic
+            return f"{topic}: only /hero_N/cmd_vel (geometry_msgs/Twist) and stop_request (std_msgs/Bool) are taken"
         if request["do"] == "release":
             return "robots are released on the page only"
         request["heard_ms"] = client.heard_ms
@@ -122,7 +122,7 @@ class PageRequests:
             return
         missing = [robot for robot in robots if robot not in self._feed.robots]
         if missing:
-            raise RefusedError("%s %s not connected" % (", ".join(missing), "is" if len(missing) == 1 else "are"))
+            raise RefusedError(f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not connected")
         if self._feed.stopped or not self._commander.may_drive():
             raise RefusedError("all robots are stopped: release them first")
         driver = self.programs.find_driver(robots)
@@ -139,13 +139,13 @@ class PageRequests:
         """Stop all robots, or release them."""
         verb, stopped_ms = request["do"], self._commander.stopped_ms
         if verb == "release" and stopped_ms is not None and read_clock_ms() - stopped_ms < 1e3 * INERT_S:
-            raise RefusedError("NOT RELEASED: robots were stopped less than %g s ago; hold Release again" % INERT_S)
+            raise RefusedError(f"NOT RELEASED: robots were stopped less than {INERT_S:g} s ago; hold Release again")
         self._commander.request_stop(verb == "stop")
         self.end_motions_of_stopped_robots()
         self._feed.read_stop()
         # After the acknowledgement has left.
         self._hand_over(self._broadcast)
-        self._background.warn("a page or Foxglove client requests to %s all robots" % verb)
+        self._background.warn(f"a page or Foxglove client requests to {verb} all robots")
 
     _do_release = _do_stop
 
@@ -175,11 +175,11 @@ class PageRequests:
         over = [robot for robot in robots if self._commander.dead_man.is_over(robot, request["pressed_ms"])]
         if over:
             verb = "was" if len(over) == 1 else "were"
-            raise RefusedError("%s %s stopped: let go, and press again to drive" % (", ".join(over), verb))
+            raise RefusedError(f"{', '.join(over)} {verb} stopped: let go, and press again to drive")
         taken = [robot for robot in robots if not self._commander.drive(page.number, robot, *velocity)]
         if taken:
             verb = "is" if len(taken) == 1 else "are"
-            text = "%s %s driven from another page" % (", ".join(taken), verb)
+            text = f"{', '.join(taken)} {verb} driven from another page"
             if len(taken) == len(robots):
                 raise RefusedError(text)
             page.tell("error", text)
@@ -202,7 +202,7 @@ class PageRequests:
     def _do_start(self, page: "PageSocket", request: Request) -> None:
         program, robots, values = request["program"], request["robots"], request["values"]
         if program not in self.programs.paths:
-            raise RefusedError("%s is not installed" % program)
+            raise RefusedError(f"{program} is not installed")
         if self.programs.count >= PROGRAMS_MAX:
             raise RefusedError("%d programs run: end one first" % PROGRAMS_MAX)
         unknown = [robot for robot in robots if not self._feed.placement.knows(robot)]
@@ -231,4 +231,4 @@ class PageRequests:
             if "record" not in self.programs.paths:
                 raise RefusedError("hero_recording is not installed")
             folder = Path(self._parameters.record_folder).expanduser() / time.strftime("%Y-%m-%d_%H-%M-%S")
-            self.programs.start(Child("record", folder=folder), ["--folder=%s" % folder])
+            self.programs.start(Child("record", folder=folder), [f"--folder={folder}"])

@@ -66,16 +66,16 @@ def read_token(host: str, file: str) -> Optional[str]:
     if not file:
         if is_loopback(host):
             return None
-        raise ProgramError("~host is %s, which other machines can reach: that needs a token; %s" % (host, TOKEN_REMEDY))
+        raise ProgramError(f"~host is {host}, which other machines can reach: that needs a token; {TOKEN_REMEDY}")
     path = os.path.expanduser(file)
     try:
         with open(path, encoding="utf-8") as opened:
             mode = os.fstat(opened.fileno()).st_mode
             token = opened.read(1000).strip()
     except (OSError, UnicodeDecodeError) as error:
-        raise ProgramError("~token_file %s cannot be read: %s; %s" % (path, error, TOKEN_REMEDY)) from None
+        raise ProgramError(f"~token_file {path} cannot be read: {error}; {TOKEN_REMEDY}") from None
     if stat.S_ISREG(mode) and mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise ProgramError("~token_file %s can be read by others: chmod 600 %s" % (path, path))
+        raise ProgramError(f"~token_file {path} can be read by others: chmod 600 {path}")
     if len(token) < TOKEN_LENGTH_MIN:
         raise ProgramError("~token_file %s holds less than %d characters: %s" % (path, TOKEN_LENGTH_MIN, TOKEN_REMEDY))
     return token

@@ -104,7 +104,7 @@ class Monitor:
                 "cannot listen on %s port %d: %s; choose others with host:=ADDRESS port:=PORT"
                 % (wanted.host, wanted.port, getattr(error, "strerror", None) or error)
             ) from None
-        host = "[%s]" % wanted.host if ":" in wanted.host else wanted.host
+        host = f"[{wanted.host}]" if ":" in wanted.host else wanted.host
         if wanted.host in ("0.0.0.0", "::"):
             host = platform.node()
         hint = "" if wanted.control else " (view only; control:=true allows driving)"

@@ -23,7 +23,7 @@ def prepare_folder(folder: str, limit_mb: float) -> float:
         os.makedirs(folder, exist_ok=True)
         free_mb = read_free_mb(folder)
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise RecordingError("%s is not writable; choose another folder" % folder)
+        raise RecordingError(f"{folder} is not writable; choose another folder")
     if free_mb < limit_mb:
         raise RecordingError(
             "only %.0f MB are free in %s and the limit is %.0f MB, so nothing is recorded; "
@@ -37,7 +37,7 @@ def find_reason_to_stop(folder: str, limit_mb: float) -> Optional[str]:
     try:
         free_mb = read_free_mb(folder)
     except OSError as error:
-        return "%s no longer exists: %s" % (folder, error.strerror)
+        return f"{folder} no longer exists: {error.strerror}"
     if free_mb >= limit_mb:
         return None
-    return "only %.0f MB are left in %s, less than the limit of %.0f MB (min_free_mb)" % (free_mb, folder, limit_mb)
+    return f"only {free_mb:.0f} MB are left in {folder}, less than the limit of {limit_mb:.0f} MB (min_free_mb)"

@@ -19,10 +19,10 @@ def explain_bag_errors(what: str) -> Iterator[None]:
     except HeroError:
         raise
     except OSError as error:
-        raise RecordingError("%s: %s" % (what, error.strerror or error)) from error
+        raise RecordingError(f"{what}: {error.strerror or error}") from error
     except Exception as error:  # rosbag checks little: a wrong byte may raise anything
         reason = make_printable(str(error))[:200]
-        raise RecordingError("%s: it is damaged, or no bag (%s: %s)" % (what, type(error).__name__, reason)) from error
+        raise RecordingError(f"{what}: it is damaged, or no bag ({type(error).__name__}: {reason})") from error
 
 
 @contextmanager

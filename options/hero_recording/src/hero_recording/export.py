@@ -38,7 +38,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     parser.add_argument("--ros2", dest="format", action="store_const", const="ros2", help="short for --format ros2")
     options = parser.parse_args(arguments)
     if options.format in BAG_WRITERS and (options.robots is not None or options.tables != list(TABLES)):
-        parser.error("--robots and --tables choose tables, but --format %s copies every message" % options.format)
+        parser.error(f"--robots and --tables choose tables, but --format {options.format} copies every message")
     return options
 
 
@@ -78,7 +78,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     out = options.out or os.path.splitext(bags.paths[0])[0] + OUT_SUFFIXES.get(options.format, "")
     out = os.path.abspath(out)
     if os.path.exists(out):
-        raise RecordingError("%s exists already; move it away or choose another --out" % out)
+        raise RecordingError(f"{out} exists already; move it away or choose another --out")
     part = out + PART_SUFFIX
     with explain_write_errors(part):
         os.makedirs(part)
@@ -91,4 +91,4 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         os.rename(incomplete, out)
     finally:
         shutil.rmtree(part, ignore_errors=True)
-    print("%s: %s" % (out, written))
+    print(f"{out}: {written}")

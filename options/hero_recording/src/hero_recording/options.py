@@ -11,7 +11,7 @@ def list_of(known: Collection[str]) -> Callable[[str], List[str]]:
         names = text.split(",")
         for name in names:
             if name not in known:
-                raise argparse.ArgumentTypeError("%r: known are %s" % (name, ",".join(known)))
+                raise argparse.ArgumentTypeError(f"{name!r}: known are {','.join(known)}")
         return names
 
     return parse

@@ -46,10 +46,8 @@ def observe(options: argparse.Namespace, bags: BagSet) -> Observations:
     observations = Observations(None if options.robots is None else set(options.robots))
     bags.read(observations.wants, observations.receive)
     if not observations.robots:
-        wanted = "" if options.robots is None else " with these ids (%s)" % ", ".join(map(str, options.robots))
-        raise RecordingError(
-            "%s: no robot%s in it; its topics: %s" % (", ".join(bags.paths), wanted, bags.describe_topics())
-        )
+        wanted = "" if options.robots is None else f" with these ids ({', '.join(map(str, options.robots))})"
+        raise RecordingError(f"{', '.join(bags.paths)}: no robot{wanted} in it; its topics: {bags.describe_topics()}")
     return observations
 
 
@@ -66,17 +64,17 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
     prefix = options.out or os.path.splitext(bags.paths[0])[0]
     paths, missing = [], []
     for name in options.figures:
-        path = "%s_%s.%s" % (prefix, name, options.format)
+        path = f"{prefix}_{name}.{options.format}"
         with rc_context(STYLE):
             figure = getattr(drawing, "draw_" + name)()
         if figure is None:
-            missing.append("no figure of %s: nothing of %s in the recording" % (name, FIGURES[name]))
+            missing.append(f"no figure of {name}: nothing of {FIGURES[name]} in the recording")
             continue
         with explain_write_errors(path), replace_file(path) as file:
             figure.savefig(file, dpi=130, format=options.format)
         paths.append(path)
     if not paths:
-        raise RecordingError("%s: %s" % (names, "; ".join(missing)))
+        raise RecordingError(f"{names}: {'; '.join(missing)}")
     return paths + missing
 
 
@@ -104,19 +102,19 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
     localization = analysis.compute_localization_errors(robot)
     error = "-"
     if errors is not None:
-        error = "%.0f mm" % (errors.position_m[-1] * 1e3)
+        error = f"{errors.position_m[-1] * 1000.0:.0f} mm"
         if path.length_m > MIN_DISTANCE_M:
-            error += " (%.1f %% of the distance)" % (100.0 * errors.position_m[-1] / path.length_m)
+            error += f" ({100.0 * errors.position_m[-1] / path.length_m:.1f} % of the distance)"
     return {
-        "DISTANCE": "%.2f m" % path.length_m,
-        "ODOM": "%.1f Hz" % (len(steady_s) / steady_s.sum()) if steady_s.any() else "-",
-        "LONGEST GAP": "%.2f s" % intervals_s.max() if len(intervals_s) else "-",
-        "MESSAGE DELAY": "%.0f ms" % np.median(delays_ms) if len(delays_ms) else "-",
-        "99 %": "%.0f ms" % np.percentile(delays_ms, 99) if len(delays_ms) else "-",
-        "COMMAND TO MOTION": "%.0f ms" % np.median(motion_delays_ms) if len(motion_delays_ms) else "-",
+        "DISTANCE": f"{path.length_m:.2f} m",
+        "ODOM": f"{len(steady_s) / steady_s.sum():.1f} Hz" if steady_s.any() else "-",
+        "LONGEST GAP": f"{intervals_s.max():.2f} s" if len(intervals_s) else "-",
+        "MESSAGE DELAY": f"{np.median(delays_ms):.0f} ms" if len(delays_ms) else "-",
+        "99 %": f"{np.percentile(delays_ms, 99):.0f} ms" if len(delays_ms) else "-",
+        "COMMAND TO MOTION": f"{np.median(motion_delays_ms):.0f} ms" if len(motion_delays_ms) else "-",
         "RECONNECTS": "%d" % robot.states[-1].reconnects if robot.states else "-",
         "FINAL ERROR": error,
-        "LOCALIZATION RMS": "-" if localization is None else "%.1f mm" % (1e3 * _compute_rms(localization.position_m)),
+        "LOCALIZATION RMS": "-" if localization is None else f"{1000.0 * _compute_rms(localization.position_m):.1f} mm",
     }
 
 

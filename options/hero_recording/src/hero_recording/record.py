@@ -76,7 +76,7 @@ class Recording:
         """Record until something ends it. Raises: RecordingError if that was not the user, or files were left open."""
         for path in sorted(self._old_files):
             if path.endswith(ACTIVE_SUFFIX):
-                say("%s was cut off, or is being recorded; to repair it: record --repair %s" % (path, path))
+                say(f"{path} was cut off, or is being recorded; to repair it: record --repair {path}")
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._receive_signal)
         seconds = self._options.seconds
@@ -107,7 +107,7 @@ class Recording:
         if reason is not None:
             raise RecordingError("stopped: " + reason)
         if repaired or code not in (0, -signal.SIGINT, -signal.SIGTERM):
-            raise RecordingError("rosbag's recorder failed (exit code %s); its last lines tell why" % code)
+            raise RecordingError(f"rosbag's recorder failed (exit code {code}); its last lines tell why")
 
     def _watch(self, recorder: "subprocess.Popen[bytes]", start_s: float) -> Optional[str]:
         """Wait for the end; return the reason if the disk forced it."""
@@ -125,7 +125,7 @@ class Recording:
             if not is_checked and now_s - start_s >= SILENCE_S:
                 is_checked = True
                 if sum(self._find_files().values()) <= EMPTY_BAG_BYTES:
-                    say("nothing received in %.0f s: is the driver running, has a robot joined?" % SILENCE_S)
+                    say(f"nothing received in {SILENCE_S:.0f} s: is the driver running, has a robot joined?")
         return None
 
     def _repair_leftovers(self) -> bool:
@@ -143,13 +143,13 @@ class Recording:
         if sum(files.values()) <= EMPTY_BAG_BYTES:
             say("nothing was recorded: no robot and no driver published anything")
         for path, size in files.items():
-            say("%s  %s" % (path, format_size(size)))
-        say("%s in %.0f s" % (format_size(sum(files.values())), elapsed_s))
+            say(f"{path}  {format_size(size)}")
+        say(f"{format_size(sum(files.values()))} in {elapsed_s:.0f} s")
 
 
 def format_size(size: float) -> str:
     """Return a number of bytes as text."""
-    return "%.1f GB" % (size / 1e9) if size >= 1e9 else "%.1f MB" % (size / 1e6)
+    return f"{size / 1000000000.0:.1f} GB" if size >= 1e9 else f"{size / 1000000.0:.1f} MB"
 
 
 def _end_with_parent() -> None:
@@ -211,7 +211,7 @@ def _make_option(name: str, value: object) -> List[str]:
     """Return a parameter as an option; a flag is given or left out."""
     if value is False:
         return []
-    return ["--" + name.replace("_", "-") + ("" if value is True else "=%s" % value)]
+    return ["--" + name.replace("_", "-") + ("" if value is True else f"={value}")]
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -231,15 +231,15 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--repair", nargs="+", metavar="FILE", help="repair recordings that were cut off, and exit")
     options = parser.parse_args(arguments)
     if options.seconds is not None and not 0.0 < options.seconds < math.inf:
-        parser.error("--seconds %g: must be more than 0, and finite" % options.seconds)
+        parser.error(f"--seconds {options.seconds:g}: must be more than 0, and finite")
     if not re.fullmatch(r"[\w][\w.-]*", options.name):
-        parser.error("--name %r: must be letters, digits, _ . and -" % options.name)
+        parser.error(f"--name {options.name!r}: must be letters, digits, _ . and -")
     options.topics = options.topics.split()
     for pattern in options.topics:
         try:
             re.compile(pattern)
         except re.error as error:
-            parser.error("--topics %r: not a regular expression: %s" % (pattern, error))
+            parser.error(f"--topics {pattern!r}: not a regular expression: {error}")
     options.folder = os.path.abspath(os.path.expanduser(options.folder))
     return options
 

@@ -34,7 +34,7 @@ class StepRecorder(ExitStack):
                 self._writer = rosbag1.Writer(path)
                 self._writer.open()
         except rosbag1.WriterError as error:
-            raise RecordingError("%s: %s; move it away or choose another name" % (path, error)) from None
+            raise RecordingError(f"{path}: {error}; move it away or choose another name") from None
         self.callback(self._complete)
         self.callback(StepTopics(rows, robot_ids, self._write).close)
 

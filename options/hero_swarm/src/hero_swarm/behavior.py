@@ -102,7 +102,7 @@ class Sensed:
         try:
             return self.__dict__["_readings"][name]
         except KeyError:
-            raise AttributeError("the behavior has no sensor %r" % name) from None
+            raise AttributeError(f"the behavior has no sensor {name!r}") from None
 
 
 def _lock_reading(reading: Any) -> Any:
@@ -131,13 +131,13 @@ class Behavior:
         """
         for name, value in parameters.items():
             if name.startswith("_") or not hasattr(self, name) or callable(getattr(self, name)):
-                raise TypeError("%s has no parameter %r; it has %s" % (type(self).__name__, name, self.parameters()))
+                raise TypeError(f"{type(self).__name__} has no parameter {name!r}; it has {self.parameters()}")
             setattr(self, name, value)
         if not is_number(self.rate_hz, MIN_RATE_HZ, MAX_RATE_HZ):
             text = "%s: rate_hz is %r, but must be a number from %g to %g"
             raise ValueError(text % (type(self).__name__, self.rate_hz, MIN_RATE_HZ, MAX_RATE_HZ))
         if self.drive not in DRIVES:
-            raise ValueError("%s: drive is %r, but must be %s" % (type(self).__name__, self.drive, " or ".join(DRIVES)))
+            raise ValueError(f"{type(self).__name__}: drive is {self.drive!r}, but must be {' or '.join(DRIVES)}")
 
     def parameters(self) -> Dict[str, Any]:
         """Return all parameters and sensors with their values."""

@@ -41,4 +41,4 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     if len(lines) == found:
         raise ExperimentError("no robot could be fitted")
     write_file(options.out, ("\n".join(lines) + "\n").encode())
-    print("written: %s" % options.out)
+    print(f"written: {options.out}")

@@ -61,9 +61,9 @@ class SafetyFilter:
         Raises: ValueError for another mode, and for a fence that is missing.
         """
         if mode not in MODES:
-            raise ValueError("safety %r: must be one of %s" % (mode, ", ".join(MODES)))
+            raise ValueError(f"safety {mode!r}: must be one of {', '.join(MODES)}")
         if mode == FENCE and fence_m is None:
-            raise ValueError("safety %s needs a fence: x min, y min, x max, y max in m" % mode)
+            raise ValueError(f"safety {mode} needs a fence: x min, y min, x max, y max in m")
         self.mode = mode
         self.radii_m: Union[float, Sequence[float]] = HERO.body_radius_m
         self._separations_m: Union[float, Sequence[float]] = HERO.wheel_separation_m

@@ -70,7 +70,7 @@ def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedB
                 placed.append(thing.put(Pose(x_m, y_m, math.pi * (2.0 * turn - 1.0))))
                 break
         else:
-            raise ValueError("%d objects find no place in arena %s" % (len(arena.objects), arena.name))
+            raise ValueError(f"{len(arena.objects)} objects find no place in arena {arena.name}")
     return placed
 
 

@@ -33,7 +33,7 @@ def load_user_module(path: str, sources: Sources) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
-        text = "%s: %s: %s" % (_find_place(error, path, sources), type(error).__name__, error)
+        text = f"{_find_place(error, path, sources)}: {type(error).__name__}: {error}"
         raise ValueError(" ".join(text.split())) from error
     return module
 
@@ -89,5 +89,5 @@ class _BesideFinder(importlib.abc.MetaPathFinder):
                     fullname, file, loader=loader, submodule_search_locations=package
                 )
             if os.path.isfile(file):
-                raise ImportError("%s is imported while it runs: import it at the top of the file" % file)
+                raise ImportError(f"{file} is imported while it runs: import it at the top of the file")
         return None

@@ -202,8 +202,8 @@ class FleetProgram:
         """Return all lines: the table, the state of a stop, and the keys."""
         size = shutil.get_terminal_size()
         left_s = self._seconds_left()
-        ending = "" if left_s == math.inf else "   ends in %.0f s" % left_s
-        last = "%s (now by %s)%s" % (KEYS_HELP, self._order, ending)
+        ending = "" if left_s == math.inf else f"   ends in {left_s:.0f} s"
+        last = f"{KEYS_HELP} (now by {self._order}){ending}"
         stop = "" if status is None else paint(status.level, status.text[: size.columns])
         return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
 

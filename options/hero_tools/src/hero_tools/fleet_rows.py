@@ -75,5 +75,5 @@ def find_missing(rows: Sequence[RobotRow], ids: Sequence[int]) -> Dict[int, str]
         elif row.track.pose is None:
             missing[robot_id] = "joined but sent no odometry"
         elif not row.moved:
-            missing[robot_id] = "joined but did not move (%.3f m)" % row.track.distance_m
+            missing[robot_id] = f"joined but did not move ({row.track.distance_m:.3f} m)"
     return missing

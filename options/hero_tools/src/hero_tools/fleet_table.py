@@ -23,7 +23,7 @@ def format_pose(pose: Optional[Pose]) -> str:
     """Return a pose in m and degrees."""
     if pose is None:
         return "-"
-    return "%6.2f %6.2f m %4.0f deg" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
+    return f"{pose.x_m:6.2f} {pose.y_m:6.2f} m {math.degrees(pose.yaw_rad):4.0f} deg"
 
 
 def format_nearest(seen: bool, free: bool, nearest: Optional[Obstacle]) -> str:
@@ -33,7 +33,7 @@ def format_nearest(seen: bool, free: bool, nearest: Optional[Obstacle]) -> str:
     if nearest is None:
         return "free" if free else "not calibrated"
     where = DIRECTIONS[round(nearest.bearing_rad / (math.pi / 4)) % 8]
-    return "touch %s" % where if nearest.range_m == -math.inf else "%.2f m %s" % (nearest.range_m, where)
+    return f"touch {where}" if nearest.range_m == -math.inf else f"{nearest.range_m:.2f} m {where}"
 
 
 def format_cells(row: RobotRow) -> List[str]:
@@ -44,10 +44,10 @@ def format_cells(row: RobotRow) -> List[str]:
         make_printable(row.name),
         make_printable(robot.address),
         ", ".join(filter(None, (row.state, row.stop_state))),
-        "%.1f Hz" % row.odom_hz,
-        "%.1f kB/s" % (robot.bytes_per_s / 1e3),
+        f"{row.odom_hz:.1f} Hz",
+        f"{robot.bytes_per_s / 1000.0:.1f} kB/s",
         format_pose(track.pose),
-        "%.2f m" % track.distance_m,
+        f"{track.distance_m:.2f} m",
         format_nearest(track.proximity_seen, track.is_free, track.nearest),
         make_printable("; ".join(filter(None, notes))),
     ]
@@ -77,9 +77,9 @@ def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent
     if stopped:
         title += ", ALL STOPPED"  # not last: a narrow terminal cuts the end off
     for driver in silent:
-        title += ", driver %s does not answer" % driver.strip("/")
+        title += f", driver {driver.strip('/')} does not answer"
     if listening:
-        title += ", driver listens on %s" % make_printable(listening)
+        title += f", driver listens on {make_printable(listening)}"
     return title
 
 

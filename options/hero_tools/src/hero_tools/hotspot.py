@@ -54,14 +54,14 @@ def run_nmcli(*arguments: str, typed: str = "") -> str:
     except OSError:
         raise HotspotError("nmcli is not installed: sudo apt install network-manager; or see docs/network.md") from None
     except subprocess.TimeoutExpired:
-        raise HotspotError("nmcli did not end within %g s: systemctl restart NetworkManager" % TIMEOUT_S) from None
+        raise HotspotError(f"nmcli did not end within {TIMEOUT_S:g} s: systemctl restart NetworkManager") from None
     output = result.stdout.decode(errors="replace")
     if result.returncode == NMCLI_NOT_RUNNING or "Could not create NMClient object" in output:
         raise HotspotError("NetworkManager is not running: sudo systemctl start NetworkManager")
     # The editor exits with 0 even if it could not save, and repeats what was typed: no line of it but errors is shown.
     if result.returncode != 0 or (typed and "successfully updated" not in output):
         errors = [line for line in output.splitlines() if line.startswith("Error:")]
-        text = " ".join(errors) or "nmcli %s failed" % " ".join(arguments[:2])
+        text = " ".join(errors) or f"nmcli {' '.join(arguments[:2])} failed"
         if re.search("privileges|not authorized|permission", text, re.IGNORECASE):
             text += ": run this in a desktop session (not over ssh), or as root"
         raise HotspotError(text)
@@ -87,16 +87,16 @@ def choose_device(wanted: Optional[str]) -> Tuple[str, str]:
         raise HotspotError("no Wi-Fi device: is one plugged in (nmcli device), is its radio on (rfkill list)?")
     name = wanted or ", ".join(devices)
     if name not in devices:
-        raise HotspotError("choose one of the Wi-Fi devices with --interface: %s" % ", ".join(devices))
+        raise HotspotError(f"choose one of the Wi-Fi devices with --interface: {', '.join(devices)}")
     state, connection = devices[name]
     if state == "unavailable":
-        raise HotspotError("%s is switched off: nmcli radio wifi on; or rfkill unblock wifi" % name)
+        raise HotspotError(f"{name} is switched off: nmcli radio wifi on; or rfkill unblock wifi")
     if state == "unmanaged":
-        raise HotspotError("%s is unmanaged: sudo nmcli device set %s managed yes" % (name, name))
+        raise HotspotError(f"{name} is unmanaged: sudo nmcli device set {name} managed yes")
     can = dict(row for row in read_fields("WIFI-PROPERTIES", "device", "show", name) if len(row) == 2)
     for capability, text in (("AP", "cannot be an access point"), ("2GHZ", "has no 2.4 GHz, which robots need")):
         if can.get("WIFI-PROPERTIES." + capability) == "no":
-            raise HotspotError("%s %s: use another Wi-Fi device, or a router" % (name, text))
+            raise HotspotError(f"{name} {text}: use another Wi-Fi device, or a router")
     return name, connection
 
 
@@ -125,25 +125,25 @@ def create(options: argparse.Namespace) -> int:
     """Create the hotspot and switch it on. Raises: HotspotError."""
     ssid = options.ssid or FACTORY_SSID
     if options.factory and ssid != FACTORY_SSID:
-        raise HotspotError("--factory means the network %s: omit --ssid" % FACTORY_SSID)
+        raise HotspotError(f"--factory means the network {FACTORY_SSID}: omit --ssid")
     if not ssid.isprintable() or not 1 <= len(ssid.encode()) <= SSID_BYTES_MAX:
         raise HotspotError("--ssid %s: must be 1 to %d bytes of printable text" % (ascii(ssid), SSID_BYTES_MAX))
     device, connection = choose_device(options.interface)
     if connection not in ("", CONNECTION) and not options.yes:
-        raise HotspotError("%s is connected to '%s': --yes disconnects it" % (device, connection))
+        raise HotspotError(f"{device} is connected to '{connection}': --yes disconnects it")
     password = FACTORY_PASSWORD if options.factory else read_password(options.password_stdin)
     if exists():
         run_nmcli("connection", "delete", CONNECTION)
     try:
         wifi = ["type", "wifi", "ifname", device, "con-name", CONNECTION, "autoconnect", "no", "ssid", ssid]
         run_nmcli("connection", "add", *wifi, *SETTINGS)
-        run_nmcli("connection", "edit", CONNECTION, typed="set wifi-sec.psk %s\nsave\nquit\n" % password)
+        run_nmcli("connection", "edit", CONNECTION, typed=f"set wifi-sec.psk {password}\nsave\nquit\n")
         run_nmcli("--wait", "30", "connection", "up", CONNECTION)
     except (HotspotError, KeyboardInterrupt):
         if exists():
             run_nmcli("connection", "delete", CONNECTION)
         raise
-    print("hotspot '%s' is on (%s, 2.4 GHz, WPA2)" % (ssid, device))
+    print(f"hotspot '{ssid}' is on ({device}, 2.4 GHz, WPA2)")
     if options.factory:
         print("robots with factory settings join it; its password is public: for first tries only")
     else:
@@ -162,7 +162,7 @@ def show_status() -> int:
     found = dict(row for row in read_fields(names, "connection", "show", CONNECTION) if len(row) == 2)
     ssid, device = found.get("802-11-wireless.ssid"), found.get("connection.interface-name")
     if found.get("GENERAL.STATE") != "activated":
-        print("hotspot '%s' is off: nmcli connection up %s" % (ssid, CONNECTION))
+        print(f"hotspot '{ssid}' is off: nmcli connection up {CONNECTION}")
         return 1
     print("hotspot '%s' is on (%s); robots connect to %s, port %d" % (ssid, device, ADDRESS, DRIVER_PORT))
     return 0
@@ -181,7 +181,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> int:
     parser = argparse.ArgumentParser(prog="hotspot", description="The access point that robots join.")
     commands = parser.add_subparsers(dest="command", metavar="create | status | remove", required=True)
     making = commands.add_parser("create", help="create the hotspot and switch it on")
-    making.add_argument("--ssid", metavar="NAME", help="name of the network (%s)" % FACTORY_SSID)
+    making.add_argument("--ssid", metavar="NAME", help=f"name of the network ({FACTORY_SSID})")
     making.add_argument("--interface", metavar="NAME", help="Wi-Fi device (default: the only one)")
     making.add_argument("--factory", action="store_true", help="network and password of unconfigured robots")
     making.add_argument("--password-stdin", action="store_true", help="read the password from standard input")

@@ -5,14 +5,14 @@ def make_bad_yaml(key):
     """Return texts, bytes; those that are YAML have this key."""
     shared = ["&a [x, x, x, x, x, x, x, x, x, x]"]
     for name, before in zip("bcdefghi", "abcdefgh"):
-        shared.append("&%s [%s]" % (name, ", ".join(["*" + before] * 10)))
+        shared.append(f"&{name} [{', '.join(['*' + before] * 10)}]")
     return [
         b"[" * 1000,  # PyYAML needs a second for 3,000
         b"{a: " * 1000,
         b"\xff\xfe\x00",
         b"\x00\x1b[2J",
         *(
-            ("%s: %s" % (key, value)).encode()
+            f"{key}: {value}".encode()
             for value in (
                 "[",
                 "2020-13-45",
@@ -22,7 +22,7 @@ def make_bad_yaml(key):
                 "&a {b: *a}",
                 "{1: 2, b: 3, 2020-01-01: 4}",
                 ".inf",
-                "[%s]" % ", ".join(shared),  # 1e9 entries, if written out
+                f"[{', '.join(shared)}]",  # 1e9 entries, if written out
             )
         ),
     ]

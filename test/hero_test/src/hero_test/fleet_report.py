@@ -15,5 +15,5 @@ def wait_until_ready(*robot_ids):
         ready.update(robot.id for robot in report.robots if robot.state == Robot.READY)
 
     subscriber = rospy.Subscriber("/hero_driver/robots", RobotArray, receive)
-    wait_for(lambda: ready == set(robot_ids), "robots %s to be ready" % (robot_ids,))
+    wait_for(lambda: ready == set(robot_ids), f"robots {robot_ids} to be ready")
     subscriber.unregister()

@@ -14,8 +14,8 @@ def make_list(declared: Mapping[str, Parameter]) -> List[str]:
     """Return an item of a list in Markdown for each parameter: name, default, what else is allowed, meaning."""
     items = []
     for name, parameter in declared.items():
-        values = ["`%s`" % write_default(parameter), _describe(parameter)]
-        text = "- `~%s` (%s): %s" % (name, ", ".join(value for value in values if value), parameter.text)
+        values = [f"`{write_default(parameter)}`", _describe(parameter)]
+        text = f"- `~{name}` ({', '.join(value for value in values if value)}): {parameter.text}"
         items.append("\n".join(textwrap.wrap(text, LINE_LENGTH, subsequent_indent="  ", break_on_hyphens=False)))
     return items
 
@@ -32,5 +32,5 @@ def _describe(parameter: Parameter) -> str:
     if parameter.limits is not None:
         low, high = (f"{limit:,}" for limit in parameter.limits)
         return " ".join(part for part in (low, "to", high, parameter.unit) if part)
-    others = ["`%s`" % option for option in parameter.choices if option != parameter.default]
+    others = [f"`{option}`" for option in parameter.choices if option != parameter.default]
     return " ".join(part for part in (", ".join(others), parameter.unit) if part)

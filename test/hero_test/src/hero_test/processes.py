@@ -72,7 +72,7 @@ class Dialog:
         """Return the next line that it prints."""
         line = self.process.stdout.readline()
         if not line:
-            raise self.Ended("%s ended with %s" % (self.process.args, self.process.wait()))
+            raise self.Ended(f"{self.process.args} ended with {self.process.wait()}")
         return line
 
 
@@ -109,7 +109,7 @@ class Program:
 
     def wait_line(self, pattern):
         """Return the first line that matches a regular expression, once it is printed."""
-        return wait_for(lambda: self.find_lines(pattern), lambda: "%r among %s" % (pattern, self.lines))[0]
+        return wait_for(lambda: self.find_lines(pattern), lambda: f"{pattern!r} among {self.lines}")[0]
 
     def wait_for_text(self, text):
         """Wait until it has printed a text."""

@@ -51,7 +51,7 @@ class ProgramTerminal:
         """Wait for text in the output from start on."""
         wait_for(
             lambda: text in self.output[start:],
-            lambda: "%r in %r" % (text, bytes(self.output[start:][-2000:])),
+            lambda: f"{text!r} in {bytes(self.output[start:][-2000:])!r}",
         )
 
     def wait_for_next(self, text):

@@ -51,7 +51,7 @@ class SwarmWatch:
 
     def wait_until_stopped(self, *robot_ids):
         """Wait until these robots stand; who stopped them, a program or their watchdogs, a CommandWatch tells."""
-        wait_for(lambda: self.at_rest(*robot_ids), "rest of %s" % (robot_ids,))
+        wait_for(lambda: self.at_rest(*robot_ids), f"rest of {robot_ids}")
 
     def wait_until_stopped_despite(self, act, *robot_ids):
         """Wait until these robots stand although act(), called meanwhile, commands them to move."""
@@ -60,7 +60,7 @@ class SwarmWatch:
             act()
             return self.at_rest(*robot_ids)
 
-        wait_for(stopped, "rest of %s" % (robot_ids,))
+        wait_for(stopped, f"rest of {robot_ids}")
 
     def path(self, robot_id):
         """Return all rows as an array (T, 5)."""
@@ -69,4 +69,4 @@ class SwarmWatch:
 
     def wait_until_complete(self, timeout_s=TIMEOUT_S):
         """Wait until every robot was reported."""
-        wait_for(lambda: all(self.rows.values()), "ground truth of %s" % sorted(self.rows), timeout_s)
+        wait_for(lambda: all(self.rows.values()), f"ground truth of {sorted(self.rows)}", timeout_s)

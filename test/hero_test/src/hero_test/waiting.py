@@ -23,6 +23,6 @@ def wait_for(condition, what, timeout_s=TIMEOUT_S):
             return value
         waited_s = time.monotonic() - start_s
         if waited_s > timeout_s:
-            raise AssertionError("waited %g s for %s" % (timeout_s, what() if callable(what) else what))
+            raise AssertionError(f"waited {timeout_s:g} s for {what() if callable(what) else what}")
         # Many conditions are calls of other programs, whose answers cost more than the pause.
         time.sleep(min(0.01 + 0.1 * waited_s, MAX_PAUSE_S))

@@ -49,7 +49,7 @@ class Disc:
     def __init__(self, radius_m: float) -> None:
         """Raises: ValueError for a radius that is not more than 0."""
         if not 0.0 < radius_m < math.inf:
-            raise ValueError("a radius must be more than 0, not %g" % radius_m)
+            raise ValueError(f"a radius must be more than 0, not {radius_m:g}")
         self.reach_m = self.radius_m = radius_m
         self.friction_radius_m = radius_m * (2.0 / 3.0)
 
@@ -108,7 +108,7 @@ def _find_friction_radius(corners_m: Sequence[Point]) -> float:
         integrals = [(tangent * math.sqrt(1.0 + tangent * tangent) + math.asinh(tangent)) / 2.0 for tangent in ends]
         moment += height_m**3 / 3.0 * (integrals[1] - integrals[0])
         area_m2 += height_m * length_m / 2.0
-    return float("%.7g" % (moment / area_m2))
+    return float(f"{moment / area_m2:.7g}")
 
 
 class PushedBody:
@@ -132,7 +132,7 @@ class PushedBody:
         """
         for name, value in (("mass_kg", mass_kg), ("friction", friction)):
             if not 0.0 < value < math.inf:
-                raise ValueError("%s must be more than 0, not %g" % (name, value))
+                raise ValueError(f"{name} must be more than 0, not {value:g}")
         self.friction_n = mass_kg * friction * GRAVITY_M_S2
         self.shape = shape
         self.radius_m2 = shape.friction_radius_m * shape.friction_radius_m

@@ -140,11 +140,11 @@ def find_dead_zone(pulses_us: Sequence[float], speeds_m_s: Sequence[float]) -> D
 
 def _find_zone(pulses: np.ndarray, speeds: np.ndarray) -> DeadZone:
     """Return the dead zone as a sweep in one direction, sorted by pulse, shows it."""
-    span = "%.0f to %.0f us" % (pulses[0], pulses[-1])
+    span = f"{pulses[0]:.0f} to {pulses[-1]:.0f} us"
     is_known = np.isfinite(speeds)
     pulses, speeds = pulses[is_known], speeds[is_known]
     if not (np.abs(speeds) > REST_M_S).any():
-        raise CalibrationError("does not turn at any pulse from %s: is its servo plugged in?" % span)
+        raise CalibrationError(f"does not turn at any pulse from {span}: is its servo plugged in?")
     # Which side of the dead zone is forward depends on how the servo is mounted.
     speeds = speeds * np.sign(np.polyfit(pulses, speeds, 1)[0])
     below, above = np.flatnonzero(speeds < -REST_M_S), np.flatnonzero(speeds > REST_M_S)
@@ -156,7 +156,7 @@ def _find_zone(pulses: np.ndarray, speeds: np.ndarray) -> DeadZone:
     low_us, low_slope = _find_edge(pulses[below[-FIT_POINTS:]], speeds[below[-FIT_POINTS:]])
     high_us, high_slope = _find_edge(pulses[above[:FIT_POINTS]], speeds[above[:FIT_POINTS]])
     if not -STEP_US <= high_us - low_us <= WIDEST_US:
-        raise CalibrationError("stops from %.0f to %.0f us, which is implausible: try again" % (low_us, high_us))
+        raise CalibrationError(f"stops from {low_us:.0f} to {high_us:.0f} us, which is implausible: try again")
     # If the dead zone is narrow, noise may show the edges in the wrong order.
     return DeadZone(min(low_us, high_us), max(low_us, high_us), (low_slope + high_slope) / 2.0)
 

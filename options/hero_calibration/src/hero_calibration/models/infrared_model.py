@@ -97,7 +97,7 @@ def estimate_misalignment_rad(facing: Facing) -> float:
     left, right = (max(facing.counts[index], FAINT_COUNTS) for index in neighbors)
     if max(left, right) <= NO_WALL_COUNTS:
         raise CalibrationError(
-            "the sensors beside %s see no wall: is it wider than 30 cm, and white?" % name_beam(facing.sensor)
+            f"the sensors beside {name_beam(facing.sensor)} see no wall: is it wider than 30 cm, and white?"
         )
     wall_m = WALL_M + BODY_RADIUS_M - facing.moved_m
     step_rad = math.radians(1.0)
@@ -132,7 +132,7 @@ def compute_calibration(facings: Sequence[Facing]) -> List[float]:
     low, high = PLAUSIBLE_COUNTS_M2
     for index, alpha in enumerate(alphas):
         if not low <= alpha <= high:
-            raise CalibrationError("sensor %s would get %.2f counts m^2: none has" % (name_beam(index), alpha))
+            raise CalibrationError(f"sensor {name_beam(index)} would get {alpha:.2f} counts m^2: none has")
     return alphas
 
 
@@ -162,4 +162,4 @@ def find_obstacle(counts: Sequence[float], at_wall: bool) -> Optional[str]:
     if counts[nearest] <= NEAR_COUNTS:
         return None
     distance_cm = 100.0 * math.sqrt(NOMINAL_COUNTS_M2 / counts[nearest])
-    return "something is about %.0f cm from it, at sensor %s" % (distance_cm, name_beam(nearest))
+    return f"something is about {distance_cm:.0f} cm from it, at sensor {name_beam(nearest)}"

@@ -97,7 +97,7 @@ def find_start(readings: Readings, command_s: float, may_be_late: bool = False) 
     if turned_s[0] > STEP_S / 2.0:
         if may_be_late:
             return before
-        raise CalibrationError("turned only %.1f s after its command: is the network busy? try again" % turned_s[0])
+        raise CalibrationError(f"turned only {turned_s[0]:.1f} s after its command: is the network busy? try again")
     return before + int(np.argmax(moved >= 2.0)) - 1
 
 
@@ -116,7 +116,7 @@ def measure_speed(readings: Readings, ticks: np.ndarray, start: int, end_s: floa
     kept = np.flatnonzero(seen & readings.find_even(APART))
     if len(kept) < MIN_SPEEDS or times_s[kept[-1] + APART] < LATE_S + 0.2:
         raise CalibrationError(
-            "only %d speeds could be measured in %.1f s: is the network busy? try again" % (len(kept), STEP_S)
+            f"only {len(kept)} speeds could be measured in {STEP_S:.1f} s: is the network busy? try again"
         )
     distances_m = (ticks[kept + APART] - ticks[kept]) * TICK_M
     between_s = times_s[kept + APART] - times_s[kept]

@@ -49,12 +49,12 @@ class InfraredResult(NamedTuple):
 def format_largest(errors_m: np.ndarray) -> str:
     """Return the largest error as text."""
     largest_m = np.abs(errors_m).max()
-    return "%.0f mm" % (1e3 * largest_m) if np.isfinite(largest_m) else "unknown (no calibration)"
+    return f"{1000.0 * largest_m:.0f} mm" if np.isfinite(largest_m) else "unknown (no calibration)"
 
 
 def calibrate_infrared(session: Session) -> Dict[int, InfraredResult]:
     """Calibrate all active robots, which face a wall; return the results by robot."""
-    say("infrared: about %.0f s" % (model.BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0)))
+    say(f"infrared: about {model.BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0):.0f} s")
     walls: Dict[int, Pose] = {}
     first = _face_wall_with_each_sensor(session, "infrared", model.SAMPLES, walls)
 

@@ -48,7 +48,7 @@ def evaluate_sweep(pulses_us: np.ndarray, speeds_m_s: np.ndarray) -> MotorResult
         try:
             zones.append(dead_zone.find_dead_zone(pulses, speeds))
         except CalibrationError as error:
-            raise CalibrationError("the %s wheel %s" % (wheel, error)) from error
+            raise CalibrationError(f"the {wheel} wheel {error}") from error
     return MotorResult(pulses_us, speeds_m_s, zones)
 
 

@@ -41,7 +41,7 @@ def place_robots(session: Session, at_wall: bool, ask: Optional[Ask]) -> None:
             raise EndedError
         problems = check_places(session, at_wall)
         for probe, reason in problems.items():
-            say("%s: %s" % (probe.name, reason))
+            say(f"{probe.name}: {reason}")
         if ask is None or answer == "s" or not problems:
             break
         question = "Enter to check again after correcting that, s to continue without these, q to end: "

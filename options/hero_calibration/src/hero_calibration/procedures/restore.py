@@ -45,6 +45,6 @@ def restore(session: Session, calibrations: Dict[int, store.KeptCalibration]) ->
     for probe in session.probes:
         keys = ", ".join(written[probe.robot_id]) or "nothing"
         date = calibrations[probe.robot_id].date or "an unknown day"
-        failure = "FAILED: %s; " % probe.failure if probe.failure else ""
-        say("%s: %srestored %s of %s" % (probe.name, failure, keys, date))
+        failure = f"FAILED: {probe.failure}; " if probe.failure else ""
+        say(f"{probe.name}: {failure}restored {keys} of {date}")
     return 1 if any(probe.failure for probe in session.probes) else 0

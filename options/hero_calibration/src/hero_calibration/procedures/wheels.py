@@ -103,7 +103,7 @@ def fit_wheels(legs: Sequence[Leg]) -> WheelResult:
         scales = scales - np.linalg.lstsq(jacobian, here, rcond=None)[0]
     if not (np.abs(scales - 1.0) < MAX_CHANGE).all():
         found_mm = "%.1f, %.1f and %.1f mm" % tuple(1e3 * NOMINAL_M * scales)
-        raise CalibrationError("wheels and distance would be %s: did it slip, or was it touched?" % found_mm)
+        raise CalibrationError(f"wheels and distance would be {found_mm}: did it slip, or was it touched?")
     rms = [float(np.sqrt(np.mean(np.square(values)))) for values in (before, measure_deviations(scales))]
     return WheelResult(NOMINAL_M * scales, *rms)
 
@@ -175,7 +175,7 @@ def _drive_for_tape(session: Session, ask: Ask) -> Dict[int, List[Leg]]:
         ("a square to the left", _list_square(1.0), TAPE_SD),
         ("a square to the right", _list_square(-1.0), TAPE_SD),
     ):
-        if ask("Mark center and heading of each robot for %s; then Enter, q to end: " % name) == "q":
+        if ask(f"Mark center and heading of each robot for {name}; then Enter, q to end: ") == "q":
             raise EndedError
         start_s = session.now_s
         for part in parts:
@@ -190,7 +190,7 @@ def _drive_for_tape(session: Session, ask: Ask) -> Dict[int, List[Leg]]:
 def _ask_for_leg(ask: Ask, start_s: float, end_s: float, sd: Tuple[float, float, float], probe: Probe) -> Leg:
     wanted = 1 if math.isinf(sd[1]) else 2
     what = "ahead" if wanted == 1 else "ahead and to the left, such as 12 -5"
-    question = "%s: mm from its mark, %s: " % (probe.name, what)
+    question = f"{probe.name}: mm from its mark, {what}: "
     while True:
         words = ask(question).replace(",", " ").split()
         try:

@@ -95,7 +95,7 @@ class Probe(ABC):
         """Return what is missing of the robot, as text; None if all its topics are alive."""
         for topic, heard_s in self._heard_s.items():
             if now_s - heard_s > STALE_S:
-                return "nothing received on /%s/%s: is the robot on and in reach?" % (self.name, topic)
+                return f"nothing received on /{self.name}/{topic}: is the robot on and in reach?"
         return None
 
     def check_alive(self, now_s: float) -> None:
@@ -127,7 +127,7 @@ class Probe(ABC):
         with self._lock:
             scans = list(self._scans)
         if not scans or any(len(values) != BEAMS for scan in scans for values in scan):
-            raise CalibrationError("no infrared readings came on /%s/laser" % self.name)
+            raise CalibrationError(f"no infrared readings came on /{self.name}/laser")
         signals, ranges_m = np.array(scans).transpose(1, 0, 2)
         return average(signals), average(ranges_m)
 

@@ -44,12 +44,12 @@ class RosProbe(Probe):
             ("laser", LaserScan, self._take_scan),
             ("odom", Odometry, self._take_odometry),
         ):
-            rospy.Subscriber("/%s/%s" % (self.name, topic), kind, receive, queue_size=20, tcp_nodelay=True)
+            rospy.Subscriber(f"/{self.name}/{topic}", kind, receive, queue_size=20, tcp_nodelay=True)
 
         rospy.Subscriber("/localization/poses", RobotPoses, self._take_places, queue_size=2, tcp_nodelay=True)
 
     def _advertise(self, topic: str, kind: Any) -> rospy.Publisher:
-        return rospy.Publisher("/%s/%s" % (self.name, topic), kind, queue_size=2, tcp_nodelay=True)
+        return rospy.Publisher(f"/{self.name}/{topic}", kind, queue_size=2, tcp_nodelay=True)
 
     def _take_encoder(self, message: Encoder) -> None:
         header = message.header
@@ -73,7 +73,7 @@ class RosProbe(Probe):
         silence = super().find_silence(now_s)
         for publisher in (self._motors, self._velocity, self._position):
             if silence is None and not publisher.get_num_connections():
-                silence = "nothing subscribes to %s: is the driver running?" % publisher.name
+                silence = f"nothing subscribes to {publisher.name}: is the driver running?"
         return silence
 
     def drive(self, angular_rad_s: float, linear_m_s: float = 0.0) -> None:
@@ -91,11 +91,11 @@ class RosProbe(Probe):
 
     def write(self, key: str, values: List[float]) -> None:
         service, kind, number = SERVICES[key]
-        name = "/%s/%s" % (self.name, service)
+        name = f"/{self.name}/{service}"
         try:
             rospy.wait_for_service(name, SERVICE_WAIT_S)
             answer = rospy.ServiceProxy(name, kind)(*map(number, values))
         except (rospy.ServiceException, rospy.ROSException) as error:
-            raise CalibrationError("%s: %s" % (name, one_line(error))) from error
+            raise CalibrationError(f"{name}: {one_line(error)}") from error
         if not answer.success:
-            raise CalibrationError("%s: the robot answers: %s" % (name, answer.message))
+            raise CalibrationError(f"{name}: the robot answers: {answer.message}")

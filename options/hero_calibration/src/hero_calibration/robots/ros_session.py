@@ -60,7 +60,7 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Ro
     wanted = sorted(ready if robot_ids is None else robot_ids)
     for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
         if drivers.is_stopped(driver):
-            raise CalibrationError("all robots are stopped; release them: rosservice call %s/stop false" % driver)
+            raise CalibrationError(f"all robots are stopped; release them: rosservice call {driver}/stop false")
     if not set(ready).intersection(wanted):
         raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
     probes = [RosProbe(robot_id, drivers.find_model("/hero_%d" % robot_id)) for robot_id in wanted]

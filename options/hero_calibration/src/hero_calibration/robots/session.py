@@ -76,8 +76,8 @@ class Session(Clock):
             except CalibrationError as error:
                 probe.stop()
                 if probe.failure is None:
-                    probe.failure = "%s: %s" % (step, error)
-                    say("%s failed: %s" % (probe.name, probe.failure))
+                    probe.failure = f"{step}: {error}"
+                    say(f"{probe.name} failed: {probe.failure}")
 
         self.map(work_on, probes)
         return results
@@ -108,7 +108,7 @@ class Session(Clock):
                     if is_last:
                         raise
                     probe.check_alive(self.now_s)
-                    say("%s once more: %s: %s" % (probe.name, step, error))
+                    say(f"{probe.name} once more: {step}: {error}")
 
             self.for_each(step, try_evaluating, [probe for probe in waiting if probe.failure is None])
             waiting = [probe for probe in self.active if probe.robot_id not in results]

@@ -173,7 +173,7 @@ def _refuse_mistakes(image: _Image) -> None:
         if fit is not None and fit.rms_m < WORST_RESIDUAL_M:
             causes.append(cause)
     if causes:
-        raise CalibrationError("the places of the reference tags have %s: correct them" % ", or ".join(causes))
+        raise CalibrationError(f"the places of the reference tags have {', or '.join(causes)}: correct them")
 
 
 class _WrongTag(NamedTuple):
@@ -227,7 +227,7 @@ def _judge(residuals_m: Mapping[int, float], left_out: Sequence[int], missing: S
         if tag_id not in left_out and residual_m > WORST_RESIDUAL_M:
             problems.append("tag %d is seen %.0f mm from its place; measure that again" % (tag_id, 1e3 * residual_m))
     if missing:
-        problems.append("not seen: reference tags %s" % ", ".join(map(str, missing)))
+        problems.append(f"not seen: reference tags {', '.join(map(str, missing))}")
     rms_m = _compute_rms(residuals_m, left_out)
     if rms_m > GOOD_RESIDUAL_M:
         problems.append(
@@ -246,7 +246,7 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Pose]) ->
     places_m = np.array([references[tag.tag_id][:2] for tag in seen])
     extent_m = float(np.ptp(places_m, axis=0).max())
     if extent_m > MAX_FIELD_M:
-        raise CalibrationError("the reference tags lie %g m apart: write their places in m, not in mm or cm" % extent_m)
+        raise CalibrationError(f"the reference tags lie {extent_m:g} m apart: write their places in m, not in mm or cm")
     spread_m = np.linalg.svd(places_m - places_m.mean(axis=0), compute_uv=False)
     if spread_m[1] < MIN_EXTENT_M:
         raise CalibrationError("all reference tags lie in a row: spread them over the field, best into its corners")

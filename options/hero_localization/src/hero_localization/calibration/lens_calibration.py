@@ -119,7 +119,7 @@ def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) ->
     problems = []
     if fit.rms_px > GOOD_RMS_PX:
         problems.append(
-            "error %.2f px rms is above %.1f px: is the board flat, are the images sharp?" % (fit.rms_px, GOOD_RMS_PX)
+            f"error {fit.rms_px:.2f} px rms is above {GOOD_RMS_PX:.1f} px: is the board flat, are the images sharp?"
         )
     if (fit.tilts_rad > TILTED_RAD).sum() < MIN_TILTED:
         problems.append("the board is hardly tilted: take images with it tilted by 30 to 45 degrees")
@@ -130,7 +130,7 @@ def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) ->
         )
     empty = _list_empty_regions(used, width_px, height_px)
     if empty:
-        problems.append("take images with the board there: %s" % ", ".join(empty))
+        problems.append(f"take images with the board there: {', '.join(empty)}")
     return LensCalibration(fit.lens, fit.rms_px, focal_error, left_out, problems)
 
 
@@ -156,7 +156,7 @@ def _fit(views: Sequence[BoardView], width_px: int, height_px: int, guess: Optio
             flags=flags,
         )
     except cv2.error as error:
-        raise CalibrationError("no lens explains these images: %s" % str(error).strip().splitlines()[-1]) from None
+        raise CalibrationError(f"no lens explains these images: {str(error).strip().splitlines()[-1]}") from None
     if not np.isfinite(matrix).all() or not math.isfinite(rms_px):
         raise CalibrationError("no lens explains these images: take them again")
     lens = Intrinsics(width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[:5])
@@ -204,10 +204,10 @@ def load_lens(path: str) -> Intrinsics:
             content["distortion_coefficients"]["data"],
         )
     except OSError as error:
-        raise CalibrationError("%s cannot be read: %s" % (path, error.strerror)) from None
+        raise CalibrationError(f"{path} cannot be read: {error.strerror}") from None
     except YamlError as error:
-        raise CalibrationError("%s is no YAML file: %s" % (path, error)) from None
+        raise CalibrationError(f"{path} is no YAML file: {error}") from None
     except KeyError as error:
-        raise CalibrationError("%s: %s is missing; is it a file of camera_calibration?" % (path, error)) from None
+        raise CalibrationError(f"{path}: {error} is missing; is it a file of camera_calibration?") from None
     except (AttributeError, OverflowError, TypeError, ValueError) as error:
-        raise CalibrationError("%s is no file of camera_calibration: %s" % (path, one_line(error))) from None
+        raise CalibrationError(f"{path} is no file of camera_calibration: {one_line(error)}") from None

@@ -95,9 +95,9 @@ def calibrate_robot(seen: Sequence[Tuple[float, Pose]], odometry: Sequence[Tuple
             % (1e3 * rms_m, 1e3 * GOOD_RMS_M)
         )
     if delay_error_s > GOOD_DELAY_S:
-        problems.append("the delay is known to %.0f ms only: let the robot turn to and fro" % (1e3 * delay_error_s))
+        problems.append(f"the delay is known to {1000.0 * delay_error_s:.0f} ms only: let the robot turn to and fro")
     if off_m > CENTERED_M:
-        problems.append("the tag sits %.0f mm from the robot's center" % (1e3 * off_m))
+        problems.append(f"the tag sits {1000.0 * off_m:.0f} mm from the robot's center")
     if is_upside_down(mount.yaw_rad):
         problems.append("the tag is on upside down: the upper edge of its print points to the robot's rear")
     return RobotCalibration(mount, delay_s, delay_error_s, rms_m, problems)

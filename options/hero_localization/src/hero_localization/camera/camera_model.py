@@ -40,16 +40,16 @@ class Intrinsics(NamedTuple):
         Raises: ValueError for images of no size, a camera that is not calibrated, or a lens of another model.
         """
         if not (0 < width_px <= MAX_SIZE_PX and 0 < height_px <= MAX_SIZE_PX):
-            size = "%s x %s" % (shorten(width_px), shorten(height_px))
+            size = f"{shorten(width_px)} x {shorten(height_px)}"
             raise ValueError("images must have 1 to %d pixels in width and height, not %s" % (MAX_SIZE_PX, size))
         values = np.asarray(matrix, dtype=float).reshape(-1)
         if values.shape != (9,) or not np.isfinite(values).all() or values[0] <= 0.0 or values[4] <= 0.0:
-            raise ValueError("this camera is not calibrated: K is %s" % list(values))
+            raise ValueError(f"this camera is not calibrated: K is {list(values)}")
         distortion = np.asarray(d, dtype=float).reshape(-1)
         if (distortion.any() and model != "plumb_bob") or len(distortion) not in (0, 4, 5):
-            raise ValueError("a lens must be plumb_bob with up to 5 numbers, not %r with %d" % (model, len(distortion)))
+            raise ValueError(f"a lens must be plumb_bob with up to 5 numbers, not {model!r} with {len(distortion)}")
         if not np.isfinite(distortion).all():
-            raise ValueError("the distortion of a lens must be finite, not %s" % list(distortion))
+            raise ValueError(f"the distortion of a lens must be finite, not {list(distortion)}")
         padded = np.concatenate((distortion, np.zeros(5 - len(distortion))))
         return cls(int(width_px), int(height_px), values.reshape(3, 3), padded)
 

@@ -81,9 +81,9 @@ def apply_controls(controls: DeviceControls, port: ControlPort) -> List[str]:
         control, value = list(values.items())[-1]
         found = port.read(control)
         if found is None:
-            problems.append("the camera has no %s to set: take it out of the camera file" % key)
+            problems.append(f"the camera has no {key} to set: take it out of the camera file")
         elif found != value:
-            problems.append("%s: the camera has %s, not %s" % (key, _scale(key, found), _scale(key, value)))
+            problems.append(f"{key}: the camera has {_scale(key, found)}, not {_scale(key, value)}")
     if port.read(AUTO_EXPOSURE) in AUTO_EXPOSURE_ON:
         problems.append("the camera changes its exposure by itself: set exposure_s, such as 0.008, in the camera file")
     if port.read(AUTO_FOCUS):
@@ -94,7 +94,7 @@ def apply_controls(controls: DeviceControls, port: ControlPort) -> List[str]:
 def _scale(key: str, value: int) -> str:
     """Return a value of the device in units of the camera file."""
     if key == "exposure_s":
-        return "%g" % (value * EXPOSURE_STEP_S)
+        return f"{value * EXPOSURE_STEP_S:g}"
     if key == "power_line_hz" and 0 <= value < len(POWER_LINES_HZ):
         return str(POWER_LINES_HZ[value])
     return str(value)

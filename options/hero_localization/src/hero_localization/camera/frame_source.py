@@ -191,7 +191,7 @@ class DeviceSource(FrameSource):
             if failures < MAX_FAILURES and time.monotonic() - asked_s < HANG_S:
                 continue
             self._capture.release()
-            self.problem = "%s gives no more images: is it plugged in? It is opened again" % self._path
+            self.problem = f"{self._path} gives no more images: is it plugged in? It is opened again"
             self._ending.wait(backoff_s)
             backoff_s, failures, shape = min(2.0 * backoff_s, MAX_BACKOFF_S), 0, None
             try:
@@ -243,7 +243,7 @@ class VideoSource(FrameSource):
     def _read(self) -> Optional[Frame]:
         is_read, image = self._capture.read()
         if not is_read:
-            self.problem = "%s gives no more images: the video has ended" % self._path
+            self.problem = f"{self._path} gives no more images: the video has ended"
             return None
         stamp_s = self._start_s + self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         return Frame(stamp_s, _make_gray(image), next(self._numbers))
@@ -261,7 +261,7 @@ def _open_capture(path: str, backend: int, reason: str) -> Any:
     _check_path(path)
     capture = cv2.VideoCapture(path, backend)
     if not capture.isOpened():
-        raise FrameSourceError("%s cannot be opened: %s" % (path, reason))
+        raise FrameSourceError(f"{path} cannot be opened: {reason}")
     return capture
 
 
@@ -271,16 +271,16 @@ def _check_path(path: str) -> None:
         return
     is_device = path.startswith(_DEVICES)
     if not os.path.exists(path):
-        raise FrameSourceError("%s does not exist%s" % (path, "; ls /dev/video* lists cameras" if is_device else ""))
+        raise FrameSourceError(f"{path} does not exist{'; ls /dev/video* lists cameras' if is_device else ''}")
     mode = os.stat(path).st_mode
     if stat.S_ISDIR(mode):
-        raise FrameSourceError("%s is a folder, but must be a camera or a video" % path)
+        raise FrameSourceError(f"{path} is a folder, but must be a camera or a video")
     if not (stat.S_ISCHR(mode) if is_device else stat.S_ISREG(mode)):  # a pipe would be waited for
         kind = "a camera" if is_device else "a video file"
-        raise FrameSourceError("%s is a pipe, socket or file of another kind, but must be %s" % (path, kind))
+        raise FrameSourceError(f"{path} is a pipe, socket or file of another kind, but must be {kind}")
     if not os.access(path, os.R_OK):
         remedy = ": sudo usermod -aG video $USER, and log in again" if is_device else ""
-        raise FrameSourceError("%s may not be read by this user%s" % (path, remedy))
+        raise FrameSourceError(f"{path} may not be read by this user{remedy}")
 
 
 def open_source(image: str, device: str, size_px: str, rate_hz: float, controls: DeviceControls) -> FrameSource:
@@ -295,5 +295,5 @@ def open_source(image: str, device: str, size_px: str, rate_hz: float, controls:
         return VideoSource(path)
     words = size_px.split("x")
     if len(words) != 2 or not all(word.strip().isdecimal() for word in words):
-        raise FrameSourceError("the size of images is %r, but must be such as 1920x1080" % size_px)
+        raise FrameSourceError(f"the size of images is {size_px!r}, but must be such as 1920x1080")
     return DeviceSource(path, (int(words[0]), int(words[1])), rate_hz, controls)

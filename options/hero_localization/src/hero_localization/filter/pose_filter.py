@@ -177,9 +177,9 @@ def is_near(one: Pose, other: Pose) -> bool:
 def _check(measurement: StampedPose) -> None:
     covariance = np.asarray(measurement.covariance, dtype=float)
     if not all(map(math.isfinite, (measurement.stamp_s, *measurement.pose))):
-        raise ValueError("a measured pose must be finite, not %r" % (measurement.pose,))
+        raise ValueError(f"a measured pose must be finite, not {measurement.pose!r}")
     if covariance.shape != (3, 3) or not np.isfinite(covariance).all() or not (covariance.diagonal() > 0.0).all():
         raise ValueError("a covariance of x, y and yaw must be 3 by 3 with variances above 0")
     (a, b, c), (_, d, e), (_, _, f) = covariance.tolist()
     if a * d <= b * b or a * (d * f - e * e) <= b * (b * f - c * e) - c * (b * e - c * d):
-        raise ValueError("a covariance must be positive definite, not %s" % covariance.tolist())
+        raise ValueError(f"a covariance must be positive definite, not {covariance.tolist()}")

@@ -194,7 +194,7 @@ class SwarmLocalizer:
             return ["hero_%d found at %s" % (robot_id, _describe_pose(measurement.pose))]
         step_m = measure_distance(before, after)
         step_deg = math.degrees(abs(wrap_angle(after.yaw_rad - before.yaw_rad)))
-        step = "%.0f mm and %.0f degrees" % (1e3 * step_m, step_deg)
+        step = f"{1000.0 * step_m:.0f} mm and {step_deg:.0f} degrees"
         if outcome is Outcome.MOVED:
             return ["hero_%d was moved by hand: pose reset by %s to %s" % (robot_id, step, _describe_pose(after))]
         if robot.is_lost:
@@ -254,7 +254,7 @@ class SwarmLocalizer:
             return []
         self._robots = {robot_id: _Robot() for robot_id in self._robots}
         self._loss_lines = _limit_loss_lines()
-        return ["time jumped back by %.1f s: all robots are localized again" % back_s]
+        return [f"time jumped back by {back_s:.1f} s: all robots are localized again"]
 
     def _tell_loss(self, robot_id: int, line: str) -> List[str]:
         """Return a line on a robot that is lost or found; of many, find_lost() tells how many there were."""
@@ -286,18 +286,18 @@ class SwarmLocalizer:
         if newest_s < now_s - SILENT_S:
             if now_s < robot.heard_s + SILENT_S:
                 offset = _describe_offset(robot.odometry_offset_s)
-                return "its odometry comes with stamps %s: do the clocks agree?" % offset
+                return f"its odometry comes with stamps {offset}: do the clocks agree?"
             if newest_s == -math.inf:
                 return "no odometry: is the robot on?"
-            return "no odometry for %.0f s: is the robot on and in reach?" % (now_s - newest_s)
+            return f"no odometry for {now_s - newest_s:.0f} s: is the robot on and in reach?"
         if robot.clock_offset_s is not None:
-            return "measured poses come with stamps %s: do the clocks agree?" % _describe_offset(robot.clock_offset_s)
+            return f"measured poses come with stamps {_describe_offset(robot.clock_offset_s)}: do the clocks agree?"
         if robot.measured_s == -math.inf:
             return "its pose was never measured: is its tag in view?"
         if robot.untrusted_s > now_s - LOST_S:
             return "the camera that sees it moved: calibrate_camera arena"
         if robot.is_lost:
-            return "not measured for %.0f s: is its tag occluded or out of view?" % (now_s - robot.filter.used_s)
+            return f"not measured for {now_s - robot.filter.used_s:.0f} s: is its tag occluded or out of view?"
         conflict = robot.find_conflict()
         if conflict is not None:
             return describe_conflict(conflict)
@@ -316,8 +316,8 @@ def _limit_loss_lines() -> TokenBucket:
 
 
 def _describe_offset(offset_s: float) -> str:
-    return "%.1f s %s" % (abs(offset_s), "ahead" if offset_s > 0.0 else "old")
+    return f"{abs(offset_s):.1f} s {'ahead' if offset_s > 0.0 else 'old'}"
 
 
 def _describe_pose(pose: Pose) -> str:
-    return "(%.3f, %.3f) m, %.0f degrees" % (pose.x_m, pose.y_m, math.degrees(pose.yaw_rad))
+    return f"({pose.x_m:.3f}, {pose.y_m:.3f}) m, {math.degrees(pose.yaw_rad):.0f} degrees"

@@ -64,7 +64,7 @@ class OccupancyGrid:
         """
         x_min_m, y_min_m, x_max_m, y_max_m = bounds_m
         if not (x_max_m - x_min_m >= cell_m > 0.0 and y_max_m - y_min_m >= cell_m):
-            raise ValueError("bounds must be x min, y min, x max, y max, not %r" % (bounds_m,))
+            raise ValueError(f"bounds must be x min, y min, x max, y max, not {bounds_m!r}")
         self.cell_m = cell_m
         self.origin_m = (float(x_min_m), float(y_min_m))
         shape = (math.ceil((y_max_m - y_min_m) / cell_m), math.ceil((x_max_m - x_min_m) / cell_m))

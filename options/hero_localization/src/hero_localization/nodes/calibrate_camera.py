@@ -100,7 +100,7 @@ class Images:
             if frame is not None:
                 return frame
         reason = self.source.problem or "is the camera's driver running?"
-        raise CalibrationError("no image from %s for %g s: %s" % (self._name, FRAME_S, reason))
+        raise CalibrationError(f"no image from {self._name} for {FRAME_S:g} s: {reason}")
 
     def find_tags(self, decimate: float, frame: Frame) -> List[TagCorners]:
         """Return the tags in an image; decimate of the first call counts.
@@ -163,9 +163,9 @@ def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program
             say("%d of at least %d images" % (len(views), min(ENOUGH_VIEWS, wanted)))
             continue
         result = calibrate_lens(views, *size)
-        say("%d images: %s" % (len(views), result.problems[0] if result.problems else "enough"))
+        say(f"{len(views)} images: {result.problems[0] if result.problems else 'enough'}")
     result = result or calibrate_lens(views, *size)
-    say("error %.2f px rms, focal length known to %.2f %%" % (result.rms_px, 100.0 * result.focal_error))
+    say(f"error {result.rms_px:.2f} px rms, focal length known to {100.0 * result.focal_error:.2f} %")
     return _finish(options.file, camera_file.describe_lens(result.lens), result.problems)
 
 
@@ -180,7 +180,7 @@ def _measure_shift(view: BoardView, other: BoardView) -> float:
 def import_lens(options: argparse.Namespace) -> int:
     """Take the intrinsics in a YAML file of camera_calibration. Return the exit code. Raises: CalibrationError."""
     lens = load_lens(options.yaml)
-    say("focal lengths %.1f and %.1f px" % (lens.matrix[0, 0], lens.matrix[1, 1]))
+    say(f"focal lengths {lens.matrix[0, 0]:.1f} and {lens.matrix[1, 1]:.1f} px")
     return _finish(options.file, camera_file.describe_lens(lens), [])
 
 
@@ -193,7 +193,7 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
         frames.append(images.find_tags(1.0, frame))
     lens = images.lens
     if lens is None:
-        raise CalibrationError("%s holds no lens: calibrate_camera lens comes first" % options.file)
+        raise CalibrationError(f"{options.file} holds no lens: calibrate_camera lens comes first")
     lens.check_size(*frame.gray.shape)
     layout = settings.layout
     tags = refine_corners(frame.gray, average_tags(frames), settings.family)
@@ -201,11 +201,11 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
         result = calibrate_arena(lens, tags, layout.references, layout.reference_size_m)
     except CalibrationError as error:
         hint = find_print_mistake(frame.gray, settings.family)
-        raise CalibrationError("%s%s" % (error, "; " + hint if hint else "")) from None
+        raise CalibrationError(f"{error}{'; ' + hint if hint else ''}") from None
     for tag_id, residual_m in sorted(result.residuals_m.items()):
         say("tag %d: %.1f mm%s" % (tag_id, 1e3 * residual_m, " (left out)" if tag_id in result.left_out else ""))
     height_m = result.camera.position_m[2]
-    say("residual %.1f mm rms; the camera is %.2f m above the floor" % (1e3 * result.rms_m, height_m))
+    say(f"residual {1000.0 * result.rms_m:.1f} mm rms; the camera is {height_m:.2f} m above the floor")
     fits = fit_references(result.camera, tags, layout.references)
     parts = camera_file.describe_camera(result.camera, {fit.tag_id: fit.pose for fit in fits})
     return _finish(options.file, parts, result.problems)
@@ -303,7 +303,7 @@ def _finish(path: str, parts: Dict[str, Any], problems: Sequence[str]) -> int:
     camera_file.update(path, parts)
     for problem in problems:
         say("  " + problem)
-    say("%s; written to %s" % ("USE WITH CARE" if problems else "good", path))
+    say(f"{'USE WITH CARE' if problems else 'good'}; written to {path}")
     return 1 if problems else 0
 
 
@@ -338,7 +338,7 @@ def _check_file(options: argparse.Namespace) -> Settings:
             " as  references: {100: [-0.9, -0.6, 0], 101: [0.9, -0.6, 0], ...}" % (options.file, count, MIN_TAGS)
         )
     if options.part == "robots" and settings.camera is None:
-        raise CalibrationError("%s has no camera pose (extrinsics): run calibrate_camera arena first" % options.file)
+        raise CalibrationError(f"{options.file} has no camera pose (extrinsics): run calibrate_camera arena first")
     return settings
 
 

@@ -77,7 +77,7 @@ def is_rotation(x: float, y: float, z: float, w: float) -> bool:
 
 def describe_source(topic: str, message: Any) -> str:
     """Return the topic and node that a message came from."""
-    return "%s (%s)" % (topic, (message._connection_header or {}).get("callerid", "unknown node"))
+    return f"{topic} ({(message._connection_header or {}).get('callerid', 'unknown node')})"
 
 
 def find_pose_mistake(pose: PoseMessage) -> str:
@@ -85,7 +85,7 @@ def find_pose_mistake(pose: PoseMessage) -> str:
     turn, place = pose.orientation, pose.position
     farthest_m = max(abs(place.x), abs(place.y))
     if MAX_FIELD_M < farthest_m < math.inf:
-        return "has a position of %.0f m: does the motion capture system publish mm?" % farthest_m
+        return f"has a position of {farthest_m:.0f} m: does the motion capture system publish mm?"
     if not is_rotation(turn.x, turn.y, turn.z, turn.w):
         text = "has the orientation %g, %g, %g, %g, but a quaternion has the length 1: is it filled in?"
         return text % (turn.x, turn.y, turn.z, turn.w)
@@ -130,12 +130,12 @@ class PoseInput:
         except genpy.DeserializationError:
             return
         except ValueError as error:
-            self._warn("%s %s" % (self._topic, error))
+            self._warn(f"{self._topic} {error}")
             return
         try:
             self._receive(measurement)
         except ValueError as error:
-            self._warn("%s: %s" % (self._topic, error))
+            self._warn(f"{self._topic}: {error}")
 
     def _read(self, message: rospy.AnyMsg) -> StampedPose:
         """Return the pose in a message. Raises: ValueError with what is wrong with it; genpy.DeserializationError."""
@@ -143,7 +143,7 @@ class PoseInput:
         if kind is None:
             known = ", ".join(kind._type for kind in POSE_TYPES.values())
             found = message._connection_header.get("type", "?")
-            raise ValueError("has the type %s, but must have one of: %s" % (found, known))
+            raise ValueError(f"has the type {found}, but must have one of: {known}")
         content = kind().deserialize(message._buff)
         frame = content.header.frame_id.lstrip("/")
         if frame not in ("", self._frame):

@@ -108,13 +108,13 @@ class MapNode:
             with self._lock:
                 image = save_map(self._path, self._grid)
         except OSError as error:
-            return TriggerResponse(False, "%s cannot be written: %s" % (error.filename or self._path, error.strerror))
-        return TriggerResponse(True, "%s and %s" % (self._path, image))
+            return TriggerResponse(False, f"{error.filename or self._path} cannot be written: {error.strerror}")
+        return TriggerResponse(True, f"{self._path} and {image}")
 
 
 def _check_path(path: str) -> str:
     if not path.endswith(".yaml"):
-        raise ProgramError("~file is %r, but must end in .yaml; the image beside it in .png" % path)
+        raise ProgramError(f"~file is {path!r}, but must end in .yaml; the image beside it in .png")
     return os.path.abspath(os.path.expanduser(path))
 
 
@@ -126,7 +126,7 @@ def _make_grid(bounds: Any, cell_m: float) -> OccupancyGrid:
             return OccupancyGrid((values[0], values[1], values[2], values[3]), cell_m)
     except ValueError:
         pass  # no numbers, or no area
-    raise ProgramError('~bounds_m is %r, but must be "x_min y_min x_max y_max" in m, up to 100 m wide' % (bounds,))
+    raise ProgramError(f'~bounds_m is {bounds!r}, but must be "x_min y_min x_max y_max" in m, up to 100 m wide')
 
 
 PARAMETERS = {

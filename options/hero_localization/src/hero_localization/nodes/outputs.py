@@ -88,7 +88,7 @@ class Outputs:
 
 def make_status(part: str, level: int, text: str) -> DiagnosticStatus:
     """Return the diagnostic status of a part of what this node works on, such as a robot."""
-    return DiagnosticStatus(level, "%s: %s" % (rospy.get_name().strip("/"), part), text, part, [])
+    return DiagnosticStatus(level, f"{rospy.get_name().strip('/')}: {part}", text, part, [])
 
 
 def publish_statuses(publisher: rospy.Publisher, statuses: List[DiagnosticStatus]) -> None:

@@ -84,11 +84,11 @@ class TrackNode:
         try:
             settings = camera_file.load(self._path)
         except LocalizationError as error:
-            rospy.logerr("%s; the calibration before it counts" % error)
+            rospy.logerr(f"{error}; the calibration before it counts")
             return
         if settings.camera is not None:
             self._settings, self._tracker = settings, Tracker(settings, settings.camera)
-            rospy.loginfo("%s has changed, and counts from now on" % self._path)
+            rospy.loginfo(f"{self._path} has changed, and counts from now on")
 
     def _take_frame(self, tracker: Tracker, frame: Frame) -> None:
         height_px, width_px = frame.gray.shape
@@ -126,7 +126,7 @@ class TrackNode:
             statuses.append(make_status(name, level, text))
             self._log(name, text, is_error, now_s)
         if not any(status.hardware_id == "camera" for status in statuses) and self._tracker is not None:
-            text = "%s, %d tags" % (self._tracker.describe_rate(), len(self._tracker.found))
+            text = f"{self._tracker.describe_rate()}, {len(self._tracker.found)} tags"
             statuses.append(make_status("camera", DiagnosticStatus.OK, text))
         publish_statuses(self._diagnostics, statuses)
 
@@ -136,7 +136,7 @@ class TrackNode:
         logged_s = self._logged_s.get(kind, -math.inf)
         if not logged_s <= now_s < logged_s + LOG_PERIOD_S:
             self._logged_s[kind] = now_s
-            (rospy.logerr if is_error else rospy.logwarn)("%s: %s" % (name, text))
+            (rospy.logerr if is_error else rospy.logwarn)(f"{name}: {text}")
 
     def _list_problems(self, now_s: float) -> List[Tuple[str, str, bool]]:
         if self._tracker is None:

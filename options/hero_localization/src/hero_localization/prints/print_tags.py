@@ -86,7 +86,7 @@ def list_sheets(options: argparse.Namespace, cells: int) -> List[Sheet]:
             outer_mm, most_mm = size_mm * (1.0 + 4.0 / cells), paper_mm / (1.0 + 4.0 / cells)
         if not 5.0 <= size_mm <= most_mm:
             name = "--size" if is_robot else "--reference-size"
-            raise LocalizationError("%s %g: it must be from 5 to %.1f mm" % (name, size_mm, most_mm))
+            raise LocalizationError(f"{name} {size_mm:g}: it must be from 5 to {most_mm:.1f} mm")
         sheets.extend(Sheet(tag_id, size_mm, outer_mm, is_robot) for tag_id in ids)
     both = sorted(set(options.robots) & set(options.references))
     if both:
@@ -153,7 +153,7 @@ def _open_page(paper_mm: Tuple[float, float]) -> Tuple[Any, Any]:
             color="black",
             linewidth=LINE,
         )
-    text = "Print at 100 %% (no scaling): this line must measure %g mm" % RULER_MM
+    text = f"Print at 100 % (no scaling): this line must measure {RULER_MM:g} mm"
     axes.text(width_mm / 2.0, EDGE_MM + 6.0, text, ha="center", va="bottom", fontsize=8)
     return figure, axes
 
@@ -239,12 +239,10 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
             if options.board:
                 pdf.savefig(draw_board_page(paper_mm))
     except OSError as error:
-        raise LocalizationError(
-            "%s cannot be written: %s; choose another --out" % (options.out, error.strerror)
-        ) from None
+        raise LocalizationError(f"{options.out} cannot be written: {error.strerror}; choose another --out") from None
     made = ([_count(len(sheets), "tag")] if sheets else []) + (["the board"] if options.board else [])
-    on_pages = "%s on %s" % (" and ".join(made), _count(len(pages) + bool(options.board), "page"))
-    print("%s: %s; print at 100 %%, and check the ruler" % (options.out, on_pages))
+    on_pages = f"{' and '.join(made)} on {_count(len(pages) + bool(options.board), 'page')}"
+    print(f"{options.out}: {on_pages}; print at 100 %, and check the ruler")
 
 
 def _count(count: int, thing: str) -> str:

@@ -69,7 +69,7 @@ class DetectorProcess:
         Raises: DetectorError if the process ended or does not answer; ValueError for a frame of another size.
         """
         if gray.shape != self._shape:
-            raise ValueError("a frame of %s pixels, but frames have %s" % (gray.shape, self._shape))
+            raise ValueError(f"a frame of {gray.shape} pixels, but frames have {self._shape}")
         self._frame[:] = gray
         return [TagCorners(tag_id, corners) for tag_id, corners in self._ask((stamp_s, dict(expected)))]
 
@@ -83,10 +83,10 @@ class DetectorProcess:
         except (EOFError, OSError):
             self.close()
             raise DetectorError(
-                "the detector's process ended with status %s: start again" % self._process.returncode
+                f"the detector's process ended with status {self._process.returncode}: start again"
             ) from None
         self.close()
-        raise DetectorError("the detector's process did not answer for %.0f s: start again" % ANSWER_S)
+        raise DetectorError(f"the detector's process did not answer for {ANSWER_S:.0f} s: start again")
 
     def close(self) -> None:
         """End the process; may be called twice."""

@@ -149,7 +149,7 @@ def find_print_mistake(gray: np.ndarray, family: str) -> str:
     """Return what is wrong if an image (H, W) shows tags of another family, or mirrored; empty if nothing is found."""
     for other in FAMILIES:
         if other != family and len(ArucoDetector(other, 1.0).detect(gray)) >= MIN_MISTAKEN_TAGS:
-            return "the image shows tags of %s: set family: %s in the camera file" % (other, other)
+            return f"the image shows tags of {other}: set family: {other} in the camera file"
     if len(ArucoDetector(family, 1.0).detect(gray[:, ::-1])) >= MIN_MISTAKEN_TAGS:
         return "the image is mirrored: switch that off in the camera or its driver"
     return ""

@@ -54,7 +54,7 @@ def load(path: str) -> Settings:
     try:
         return _build(content)
     except ValueError as error:
-        raise SettingsError("%s: %s" % (path, error)) from None
+        raise SettingsError(f"{path}: {error}") from None
 
 
 def find_change_s(path: str) -> float:
@@ -74,7 +74,7 @@ def update(path: str, parts: Mapping[str, Any]) -> None:
             text, content = _read(path)
             write_file(path, replace_values(text, {**content, **parts}).encode())
     except OSError as error:
-        raise SettingsError("%s cannot be written: %s" % (path, error.strerror)) from None
+        raise SettingsError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def describe_lens(lens: Intrinsics) -> Dict[str, Any]:
@@ -111,11 +111,11 @@ def _read(path: str) -> Tuple[str, Dict[str, Any]]:
     except FileNotFoundError:
         return "", {}
     except OSError as error:
-        raise SettingsError("%s cannot be read: %s" % (path, error.strerror)) from None
+        raise SettingsError(f"{path} cannot be read: {error.strerror}") from None
     except YamlError as error:
-        raise SettingsError("%s is no YAML file: %s" % (path, error)) from None
+        raise SettingsError(f"{path} is no YAML file: {error}") from None
     if not isinstance(content, (dict, type(None))):
-        raise SettingsError("%s must hold keys and values, such as family: 36h11" % path)
+        raise SettingsError(f"{path} must hold keys and values, such as family: 36h11")
     return text, content or {}
 
 
@@ -126,7 +126,7 @@ def _build(content: Mapping[str, Any]) -> Settings:
     ).split()
     for key in content:
         if key not in known:
-            raise ValueError("unknown key %s; known are: %s" % (key, ", ".join(known)))
+            raise ValueError(f"unknown key {key}; known are: {', '.join(known)}")
     tag_robots = _by_tag(content, "tag_robots", "the number of a robot", _whole_number)
     for robot in tag_robots.values():
         if list(tag_robots.values()).count(robot) > 1:
@@ -168,24 +168,24 @@ def _build_controls(content: Mapping[str, Any]) -> DeviceControls:
     exposure_s = _number(content, "exposure_s", 0.0, 0.0001, 1.0) if "exposure_s" in content else None
     for key in ("gain", "focus"):
         if not is_whole_number(content.get(key, 0), low=0):
-            raise ValueError("%s is %s, but must be a whole number from 0 on" % (key, shorten(content[key])))
+            raise ValueError(f"{key} is {shorten(content[key])}, but must be a whole number from 0 on")
     power_line_hz = content.get("power_line_hz", 0)
     if power_line_hz not in POWER_LINES_HZ:
-        raise ValueError("power_line_hz is %s, but must be 0, 50 or 60" % shorten(power_line_hz))
+        raise ValueError(f"power_line_hz is {shorten(power_line_hz)}, but must be 0, 50 or 60")
     return DeviceControls(exposure_s, content.get("gain"), content.get("focus"), content.get("power_line_hz"))
 
 
 def _number(content: Mapping[str, Any], key: str, default: float, low: float, high: float) -> float:
     value = content.get(key, default)
     if not is_number(value, low, high):
-        raise ValueError("%s is %s, but must be a number from %g to %g" % (key, shorten(value), low, high))
+        raise ValueError(f"{key} is {shorten(value)}, but must be a number from {low:g} to {high:g}")
     return float(value)
 
 
 def _choice(content: Mapping[str, Any], key: str, default: str, known: Iterable[str]) -> str:
     value = content.get(key, default)
     if value not in list(known):
-        raise ValueError("%s is %s, but must be one of: %s" % (key, shorten(value), ", ".join(sorted(known))))
+        raise ValueError(f"{key} is {shorten(value)}, but must be one of: {', '.join(sorted(known))}")
     return str(value)
 
 
@@ -197,7 +197,7 @@ def _by_tag(content: Mapping[str, Any], key: str, form: str, read: Callable[[Any
     try:
         return {_whole_number(tag_id): read(value) for tag_id, value in given.items()}
     except (AttributeError, OverflowError, TypeError, ValueError):
-        raise ValueError("%s must hold ID: %s for each tag, not %s" % (key, form, shorten(given))) from None
+        raise ValueError(f"{key} must hold ID: {form} for each tag, not {shorten(given)}") from None
 
 
 def _whole_number(value: Any) -> int:
@@ -229,9 +229,9 @@ def _build_lens(part: Any) -> Intrinsics:
         )
     except (KeyError, TypeError, OverflowError):
         keys = "width_px, height_px, matrix (nine numbers) and distortion"
-        raise ValueError("lens is %s, but must hold %s: calibrate the lens" % (shorten(part), keys)) from None
+        raise ValueError(f"lens is {shorten(part)}, but must hold {keys}: calibrate the lens") from None
     except ValueError as error:
-        raise ValueError("lens: %s: calibrate the lens" % error) from None
+        raise ValueError(f"lens: {error}: calibrate the lens") from None
 
 
 def _build_camera(part: Any, lens: Optional[Intrinsics]) -> Camera:
@@ -246,4 +246,4 @@ def _build_camera(part: Any, lens: Optional[Intrinsics]) -> Camera:
     except (KeyError, OverflowError, TypeError, ValueError):
         pass  # keys that are missing, other values than numbers, or too few of them
     keys = "rotation (nine numbers) and position_m (three)"
-    raise ValueError("camera is %s, but must hold %s: calibrate the arena" % (shorten(part), keys))
+    raise ValueError(f"camera is {shorten(part)}, but must hold {keys}: calibrate the arena")

@@ -138,7 +138,7 @@ class Tracker:
         for tag_id in sightings.doubled:
             note[tag_id] = (stamp_s, "appears more than once in the image and is ignored: remove one")
         for tag_id, share in sightings.misshapen.items():
-            text = "measures %.0f %% of its size: print it at 100 %%, or set tag_size_m" % (100.0 * share)
+            text = f"measures {100.0 * share:.0f} % of its size: print it at 100 %, or set tag_size_m"
             note[tag_id] = (stamp_s, text)
         seen = {tag_id: sighting.pose for tag_id, sighting in sightings.references.items()}
         moved = find_moved_references(seen, self._settings.seen_references)
@@ -174,11 +174,11 @@ class Tracker:
         problems = []
         used_hz, sent_hz = self.rates_hz
         if used_hz < MIN_USED_SHARE * sent_hz and len(self._images) == RATE_FRAMES:
-            text = "%s are used: this computer is busy, or too slow for more" % self.describe_rate()
+            text = f"{self.describe_rate()} are used: this computer is busy, or too slow for more"
             problems.append(Problem("camera", text, False))
         if self._shade < DARK or self._shade > BRIGHT:
             kind, remedy = ("dark", "more") if self._shade < DARK else ("bright", "less")
-            text = "images are too %s (mean %.0f of 255): give %s light or exposure" % (kind, self._shade, remedy)
+            text = f"images are too {kind} (mean {self._shade:.0f} of 255): give {remedy} light or exposure"
             problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
         smallest_px = min(sides_px, default=self.smallest_px)

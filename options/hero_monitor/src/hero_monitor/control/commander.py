@@ -74,7 +74,7 @@ class Commander:
         return publisher is not None
 
     def _open_velocity(self, robot: str) -> None:
-        topic = "/%s/velocity_controller/cmd_vel" % robot
+        topic = f"/{robot}/velocity_controller/cmd_vel"
         publisher = rospy.Publisher(topic, Twist, queue_size=1, tcp_nodelay=True)
         # A stop is sent once: it must not be lost before the driver is connected.
         _wait_for_connections(publisher, 1)
@@ -85,11 +85,11 @@ class Commander:
 
         Return level (info, warn, error) and text for the users of a page.
         """
-        topic = "/%s/goal" % robot
+        topic = f"/{robot}/goal"
         try:
             if not self._has_listener(topic):
-                launch = "roslaunch hero_examples go_to_goal.launch robots:=%s" % robot.rpartition("_")[2]
-                return "error", "no program takes goals for %s: start one here, or %s" % (robot, launch)
+                launch = f"roslaunch hero_examples go_to_goal.launch robots:={robot.rpartition('_')[2]}"
+                return "error", f"no program takes goals for {robot}: start one here, or {launch}"
         except NodeError as error:
             return "error", str(error)
         message = PoseStamped()
@@ -100,7 +100,7 @@ class Commander:
             message.pose.orientation.z = math.sin(goal.yaw_rad / 2.0)
             message.pose.orientation.w = math.cos(goal.yaw_rad / 2.0)
         self._goals[topic].publish(message)
-        return "info", "%s has a new goal" % robot
+        return "info", f"{robot} has a new goal"
 
     def _has_listener(self, topic: str) -> bool:
         """Return whether another node subscribes to a topic, as soon as it is connected."""

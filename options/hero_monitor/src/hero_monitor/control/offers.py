@@ -134,7 +134,7 @@ def check_values(program: str, values: Dict[str, Any]) -> Dict[str, Any]:
         raise RequestError("unknown program")
     fields = OFFERS[program].fields
     if set(values) != set(fields):
-        raise RequestError("%s needs values for: %s" % (program, ", ".join(fields) or "nothing"))
+        raise RequestError(f"{program} needs values for: {', '.join(fields) or 'nothing'}")
     try:
         return {name: fields[name].check(name, value) for name, value in values.items()}
     except ProgramError as error:
@@ -167,7 +167,7 @@ def make_arguments(program: str, robot_ids: Sequence[int], frame: str, values: D
     if offer.has_frame:
         parameters["frame"] = frame
     # JSON is YAML, as rospy reads arguments: no value becomes another one, or another type.
-    return ["_%s:=%s" % (name, json.dumps(value)) for name, value in parameters.items()]
+    return [f"_{name}:={json.dumps(value)}" for name, value in parameters.items()]
 
 
 def describe_offers(names: Sequence[str]) -> List[Dict[str, Any]]:

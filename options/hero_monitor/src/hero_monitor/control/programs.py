@@ -142,7 +142,7 @@ class Programs:
         """Return which program drives one of these robots, as a sentence; empty if none does."""
         for child in self._running.values():
             for robot in set(robots).intersection(child.driven):
-                return "%s drives %s: end it first" % (child.title, robot)
+                return f"{child.title} drives {robot}: end it first"
         return ""
 
     def find_recording(self) -> Optional[Child]:

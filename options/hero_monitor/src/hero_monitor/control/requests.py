@@ -100,7 +100,7 @@ def read_request(text: Union[str, bytes]) -> Dict[str, Any]:
         checks["yaw"] = _is_yaw
     for name, is_valid in checks.items():
         if not is_valid(fields.get(name)):
-            raise RequestError("%s of %s is missing or invalid" % (name, kind))
+            raise RequestError(f"{name} of {kind} is missing or invalid")
     return dict(fields)
 
 

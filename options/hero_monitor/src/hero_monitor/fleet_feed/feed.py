@@ -335,7 +335,7 @@ def describe_stop_of_others(stopped: bool, moving: Sequence[str]) -> Optional[St
     """Return the status of a stop that another program requested; None if there is none."""
     if moving:
         verb = "moves" if len(moving) == 1 else "move"
-        return StopStatus("error", "NOT STOPPED: %s %s" % (", ".join(moving), verb), is_final=False)
+        return StopStatus("error", f"NOT STOPPED: {', '.join(moving)} {verb}", is_final=False)
     return StopStatus("info", "stopped by another program", is_final=True) if stopped else None
 
 

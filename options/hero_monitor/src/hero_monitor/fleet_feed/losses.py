@@ -67,13 +67,13 @@ def list_losses(drivers: Dict[str, bool], master: str, localization: Localizatio
     silent = sorted(name.strip("/") for name, answers in drivers.items() if not answers)
     if silent:
         whose = "its" if len(silent) == 1 else "their"
-        cause = "No answer from %s: %s robots are unknown" % (", ".join(silent), whose)
+        cause = f"No answer from {', '.join(silent)}: {whose} robots are unknown"
         remedy = "Switch off robots that move; start the driver again: " + NO_DRIVER
         losses.append(Loss("driver", cause, remedy))
     elif not drivers:
         losses.append(Loss("driver", "No driver", "Start it: " + NO_DRIVER))
     if master:
-        cause = "No ROS master (%s): robots and programs that start now do not appear" % master
+        cause = f"No ROS master ({master}): robots and programs that start now do not appear"
         remedy = "Existing connections keep working, and STOP ALL works; start it again: " + NO_DRIVER
         losses.append(Loss("master", cause, remedy))
     if localization.is_lost(now_s):

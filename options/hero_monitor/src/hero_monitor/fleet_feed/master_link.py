@@ -32,7 +32,7 @@ class MasterLink:
         if not is_pending and now_s - self._asked_s >= period_s:
             self._asked_s, self._look = now_s, self._background.submit(self._ask)
         is_late = is_pending and now_s - self._asked_s > MASTER_SILENT_S
-        return "%s does not answer" % rosgraph.get_master_uri() if self._watch.is_lost or is_late else ""
+        return f"{rosgraph.get_master_uri()} does not answer" if self._watch.is_lost or is_late else ""
 
     def _ask(self) -> None:
         news = self._watch.look()  # its errors stay in the future: is_lost tells

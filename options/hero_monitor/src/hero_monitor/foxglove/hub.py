@@ -168,7 +168,7 @@ class Hub:
             try:
                 refusal = self._carry_out(client, json.loads(message))
             except (ValueError, TypeError, KeyError, RecursionError) as error:
-                refusal = "invalid request: %s" % type(error).__name__
+                refusal = f"invalid request: {type(error).__name__}"
         if refusal:
             client.send_text(make_status(WARNING, refusal))
 
@@ -182,7 +182,7 @@ class Hub:
             channels = {channel.id: channel for channel in self._channels.values()}
             pairs = [(each["id"], channels.get(each["channelId"])) for each in request["subscriptions"]]
             refused = [number for number, channel in pairs if not self._subscribe(client, number, channel)]
-            return "subscriptions refused: %s" % shorten(refused) if refused else ""
+            return f"subscriptions refused: {shorten(refused)}" if refused else ""
         if op == "unsubscribe":
             for number in request["subscriptionIds"]:
                 client.subscriptions.pop(number, None)
@@ -192,14 +192,14 @@ class Hub:
             for each in request["channels"]:
                 topic, kind, encoding = (str(each[name]) for name in ("topic", "schemaName", "encoding"))
                 if encoding != "ros1":
-                    return "%s: this server takes messages as ros1, not as %s" % (shorten(topic), shorten(encoding))
+                    return f"{shorten(topic)}: this server takes messages as ros1, not as {shorten(encoding)}"
                 if len(client.published) < PUBLISHED_MAX:
                     client.published[each["id"]] = Channel(each["id"], topic, kind, "")
         elif op == "unadvertise":
             for number in request["channelIds"]:
                 client.published.pop(number, None)
         else:
-            return "this server does not know %s" % shorten(op)
+            return f"this server does not know {shorten(op)}"
         return ""
 
     def _pass_on(self, client: Client, frame: bytes) -> str:

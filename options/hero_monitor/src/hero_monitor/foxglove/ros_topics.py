@@ -62,7 +62,7 @@ class RosTopics:
         for topic, type_name in published:
             message_class = roslib.message.get_message_class(type_name)
             if message_class is None:
-                self._background.warn("%s: %s is not built here: not offered" % (topic, type_name), WARN_PERIOD_S)
+                self._background.warn(f"{topic}: {type_name} is not built here: not offered", WARN_PERIOD_S)
                 continue
             self._md5[topic] = message_class._md5sum
             types[topic] = TopicType(type_name, message_class._full_text)

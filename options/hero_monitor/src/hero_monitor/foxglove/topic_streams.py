@@ -98,14 +98,14 @@ def open_stream(topic: str, node_uri: str, own_name: str) -> Stream:
             with xmlrpc.client.ServerProxy(node_uri, transport=LimitedTransport()) as node:
                 code, text, protocol = node.requestTopic(own_name, topic, [["TCPROS"]])
             if code != SUCCESS or not protocol:
-                raise OSError("%s: %s" % (topic, text))
+                raise OSError(f"{topic}: {text}")
             _, host, port = protocol
             sock = opened.enter_context(socket.create_connection((host, port), MASTER_TIMEOUT_S))
             wish = {"topic": topic, "callerid": own_name, "type": "*", "md5sum": "*", "tcp_nodelay": "0"}
             write_ros_handshake_header(sock, wish)
             header = read_ros_handshake_header(sock, buffer, READ_LENGTH)
         except (HTTPException, xmlrpc.client.Error, ExpatError, ROSHandshakeException, ValueError, TypeError) as error:
-            raise OSError("%s: %s" % (urlsplit(node_uri).netloc, error)) from None
+            raise OSError(f"{urlsplit(node_uri).netloc}: {error}") from None
         if "error" in header:
             raise OSError(header["error"])
         opened.pop_all()  # the stream keeps the socket open

@@ -32,7 +32,7 @@ class BagSet:
         self._counts: Dict[str, Dict[str, int]] = {}
         spans: List[Tuple[float, float, str]] = []
         for path in {os.path.realpath(path): path for path in paths}.values():
-            with open_bag(path, skip_index=True) as bag, explain_bag_errors("%s cannot be read" % path):
+            with open_bag(path, skip_index=True) as bag, explain_bag_errors(f"{path} cannot be read"):
                 topics = bag.list_topics()
                 self._counts[path] = {topic: count for topic, (_, count) in topics.items()}
                 if not any(self._counts[path].values()):
@@ -40,7 +40,7 @@ class BagSet:
                 self.topics.update({topic: message_type for topic, (message_type, _) in topics.items()})
                 spans.append((*bag.find_span(), path))
         if not spans:
-            raise RecordingError("%s: no messages in it" % ", ".join(paths))
+            raise RecordingError(f"{', '.join(paths)}: no messages in it")
         self.paths = [path for _, _, path in sorted(spans)]
         self.start_s = min(start_s for start_s, _, _ in spans)
         self.end_s = max(end_s for _, end_s, _ in spans)
@@ -62,7 +62,7 @@ class BagSet:
         for path in self.paths:
             total = sum(self._counts[path].get(topic, 0) for topic in topics)
             # receive() fails as well where a message definition in the bag is damaged.
-            with open_bag(path) as bag, explain_bag_errors("%s cannot be read" % path):
+            with open_bag(path) as bag, explain_bag_errors(f"{path} cannot be read"):
                 # disable=None: no bar in a log.
                 for message in tqdm(
                     read(bag), os.path.basename(path), total, unit=" messages", leave=False, disable=None
@@ -76,17 +76,17 @@ class BagSet:
 
 def open_bag(path: str, skip_index: bool = False) -> Reader:
     """Open a bag for reading. Raises: RecordingError with the remedy."""
-    repair = "if it was cut off, repair it: rosrun hero_recording record --repair %s" % path
+    repair = f"if it was cut off, repair it: rosrun hero_recording record --repair {path}"
     if path.endswith(ACTIVE_SUFFIX):
-        raise RecordingError("%s is still being written; %s" % (path, repair))
+        raise RecordingError(f"{path} is still being written; {repair}")
     if os.path.isdir(path):
-        raise RecordingError("%s is a folder; name the bags in it: %s" % (path, os.path.join(path, "*.bag")))
+        raise RecordingError(f"{path} is a folder; name the bags in it: {os.path.join(path, '*.bag')}")
     if os.path.exists(path) and not os.path.isfile(path):  # opening a pipe would wait for its writer
-        raise RecordingError("%s is a pipe, device or socket; name a bag" % path)
+        raise RecordingError(f"{path} is a pipe, device or socket; name a bag")
     try:
-        with explain_bag_errors("%s cannot be read" % path):
+        with explain_bag_errors(f"{path} cannot be read"):
             return Reader(path, skip_index)
     except RecordingError as error:
         if type(error.__cause__).__name__ in Reader.unindexed:
-            raise RecordingError("%s has no index, or a damaged one; %s" % (path, repair)) from error
+            raise RecordingError(f"{path} has no index, or a damaged one; {repair}") from error
         raise

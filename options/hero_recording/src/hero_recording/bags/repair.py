@@ -28,13 +28,13 @@ def repair_bag(path: str) -> str:
     """
     target = path[: -len(ACTIVE_SUFFIX)] if path.endswith(ACTIVE_SUFFIX) else path
     if target != path and os.path.exists(target):
-        raise RecordingError("%s: %s exists already; move one of them away" % (path, target))
+        raise RecordingError(f"{path}: {target} exists already; move one of them away")
     result = "repaired " + target
-    with explain_bag_errors("%s cannot be repaired" % path):
+    with explain_bag_errors(f"{path} cannot be repaired"):
         damage = _find_damage(path)
         if damage is not None and _has_chunks_after(path, damage):
             shutil.copyfile(path, target + ".damaged")
-            result += "; messages after the damage in its middle are only in %s.damaged" % target
+            result += f"; messages after the damage in its middle are only in {target}.damaged"
         with rosbag.Bag(path, "a", allow_unindexed=True) as bag:
             for _ in bag.reindex():
                 pass
@@ -54,7 +54,7 @@ def _find_damage(path: str) -> Optional[int]:
         except io.UnsupportedOperation:
             pass  # reindex() tried to cut off the end, at the last position, of a file that is open for reading
         if not bag.get_message_count():
-            raise RecordingError("%s holds no messages that can be read: it is left as it is" % path)
+            raise RecordingError(f"{path} holds no messages that can be read: it is left as it is")
     return damage
 
 

@@ -71,9 +71,9 @@ class RawMessage(NamedTuple):
 
 def make_patterns(robot_ids: Optional[Sequence[int]], with_raw: bool, extra: Sequence[str]) -> List[str]:
     """Return the regular expressions of the topics to record; robot_ids None: all robots, including later ones."""
-    robots = r"[0-9]+" if robot_ids is None else "(%s)" % "|".join(map(str, robot_ids))
+    robots = r"[0-9]+" if robot_ids is None else f"({'|'.join(map(str, robot_ids))})"
     names = [*ROBOT_TOPICS, *(RAW_ROBOT_TOPICS if with_raw else ())]
-    return ["/hero_%s/(%s)" % (robots, "|".join(names)), *SHARED_PATTERNS, *extra]
+    return [f"/hero_{robots}/({'|'.join(names)})", *SHARED_PATTERNS, *extra]
 
 
 def find_robot_topic(topic: str, message_type: str) -> Optional[Tuple[int, str]]:

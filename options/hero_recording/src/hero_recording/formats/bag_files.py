@@ -60,7 +60,7 @@ def write_ros2(bags: BagSet, folder: str) -> int:
     storage: Any = import_optional("rosbags.rosbag2", requirement)
     convert: Any = import_optional("rosbags.convert", requirement)
     if not hasattr(storage, "StoragePlugin"):
-        raise RecordingError("this format needs %s, which needs Python 3.10 or later" % requirement)
+        raise RecordingError(f"this format needs {requirement}, which needs Python 3.10 or later")
     sources, target = [Path(path) for path in bags.paths], Path(folder)
     try:
         # It prints a line per type of message.
@@ -69,4 +69,4 @@ def write_ros2(bags: BagSet, folder: str) -> int:
         with storage.Reader(target) as reader:
             return int(reader.message_count)
     except (convert.ConverterError, storage.ReaderError) as error:
-        raise RecordingError("%s cannot be converted: %s" % (", ".join(bags.paths), error)) from error
+        raise RecordingError(f"{', '.join(bags.paths)} cannot be converted: {error}") from error

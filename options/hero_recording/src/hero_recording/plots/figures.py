@@ -168,7 +168,7 @@ class Figures:
         if list(robots) == ["own odom frame"]:
             return "each robot in its own odom frame: no transforms on /tf_static" if len(drawn) > 1 else ""
         first, *others = sorted(robots, key=lambda frame: (frame.startswith("own"), -len(robots[frame])))
-        texts = [first] + ["%s: %s" % (", ".join(robots[frame]), frame) for frame in others]
+        texts = [first] + [f"{', '.join(robots[frame])}: {frame}" for frame in others]
         true_frame = self._seen.true_frame
         if true_frame and "frame " + true_frame != first and any(map(_has_comparable_truth, drawn.values())):
             texts.append("ground truth: frame " + true_frame)
@@ -193,7 +193,7 @@ class Figures:
         drawn = {key: self._robots[key] for key in moving[:SPEED_ROWS]}
         if not drawn:
             return None
-        title = "Speeds" if len(drawn) == len(moving) else "Speeds of the first %d robots" % len(drawn)
+        title = "Speeds" if len(drawn) == len(moving) else f"Speeds of the first {len(drawn)} robots"
         figure, grid = self._begin(1.2 + 1.5 * len(drawn), title, len(drawn), 2, sharex=True, sharey="col")
         for row, (robot_id, robot) in zip(grid, drawn.items()):
             arrival_s, _, _, _, _, *speeds = robot.odometry.columns()
@@ -296,7 +296,7 @@ class Figures:
         axes.set_xlabel("time (s)")
         seen = {report.state for robot in self._robots.values() for report in robot.states}
         handles = [patches.Patch(color=STATE_COLORS[key], label=key) for key in STATE_COLORS if key in seen]
-        gap = "no odom for\nmore than %g s" % analysis.ODOMETRY_GAP_S
+        gap = f"no odom for\nmore than {analysis.ODOMETRY_GAP_S:g} s"
         handles.append(patches.Patch(facecolor="white", edgecolor=_GRAY, label=gap))
         if not seen:
             text = "the driver's reports (/hero_driver/robots) were not recorded: lines show odometry"
@@ -316,7 +316,7 @@ class Figures:
                 known[name] = {key: error for key, error in found.items() if error is not None}
         if not known:
             return None
-        title = "Errors of %s against ground truth" % " and ".join(known)
+        title = f"Errors of {' and '.join(known)} against ground truth"
         figure, grid = self._begin(6.0, title, 2, len(known), sharex=True)
         for (position_axes, yaw_axes), (name, errors) in zip(grid.T, known.items()):
             times_s = {key: error.times_s for key, error in errors.items()}

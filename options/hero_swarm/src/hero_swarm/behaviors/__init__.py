@@ -56,13 +56,13 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
         return found
     path, _, class_name = name.partition(":")
     if not path.endswith(".py"):
-        raise ValueError("behavior %r: must be FILE.py, FILE.py:Class, or one of %s" % (name, ", ".join(list_names())))
+        raise ValueError(f"behavior {name!r}: must be FILE.py, FILE.py:Class, or one of {', '.join(list_names())}")
     if not sources.find(path):
-        raise ValueError("behavior %s: no such file from %s; give its whole path" % (path, os.getcwd()))
+        raise ValueError(f"behavior {path}: no such file from {os.getcwd()}; give its whole path")
     try:
         loaded = sources.load(path, lambda: load_user_module(path, sources))
     except OSError as error:
-        raise ValueError("behavior %s cannot be read: %s" % (path, error.strerror)) from error
+        raise ValueError(f"behavior {path} cannot be read: {error.strerror}") from error
     classes = {
         key: value for key, value in vars(loaded).items()
         if inspect.isclass(value) and issubclass(value, Behavior) and value.__module__ == loaded.__name__
@@ -71,7 +71,7 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
         return classes[class_name]
     if class_name or len(classes) != 1:
         raise ValueError(
-            "behavior %s: name one class as %s:CLASS; it has %s" % (name, path, ", ".join(sorted(classes)) or "none")
+            f"behavior {name}: name one class as {path}:CLASS; it has {', '.join(sorted(classes)) or 'none'}"
         )
     return next(iter(classes.values()))
 
@@ -87,13 +87,13 @@ def make_behavior(name: str, numbers: Any) -> Behavior:
         try:
             numbers = parse_yaml(numbers)
         except YamlError as error:
-            raise ValueError("parameters: not YAML: %s" % error) from None
+            raise ValueError(f"parameters: not YAML: {error}") from None
     if not isinstance(numbers, dict):
         raise ValueError("parameters is %r, but must be numbers such as {rate_hz: %g}" % (numbers, kind.rate_hz))
     for key, value in numbers.items():
         if key not in defaults:
-            raise ValueError("parameters: %s has no number %r; it has %s" % (name, key, ", ".join(defaults)))
+            raise ValueError(f"parameters: {name} has no number {key!r}; it has {', '.join(defaults)}")
         low, high = (MIN_RATE_HZ, MAX_RATE_HZ) if key == "rate_hz" else (-MAX_NUMBER, MAX_NUMBER)
         if not is_number(value, low, high):
-            raise ValueError("parameters: %s is %r, but must be a number from %g to %g" % (key, value, low, high))
+            raise ValueError(f"parameters: {key} is {value!r}, but must be a number from {low:g} to {high:g}")
     return kind(**numbers)

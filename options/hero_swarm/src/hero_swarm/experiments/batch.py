@@ -72,7 +72,7 @@ def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Tri
         arena = load_cell_arena(experiment, cell)
         pushes = any(isinstance(sensor, Objects) for sensor in behavior.sensors().values())
         if pushes and not arena.objects:
-            raise ExperimentError("%s pushes objects: arena must have them, as box does" % experiment.behavior)
+            raise ExperimentError(f"{experiment.behavior} pushes objects: arena must have them, as box does")
     with _at(experiment, "start"):
         starts = place_robots(experiment, cell, seeds)
     with _at(experiment, "objects"):
@@ -95,7 +95,7 @@ def _at(experiment: Experiment, name: str) -> Iterator[None]:
         yield
     except (HeroError, TypeError, ValueError) as error:
         place = experiment.places.get(name, experiment.places["behavior"])
-        raise ExperimentError("%s: %s" % (place, error)) from error
+        raise ExperimentError(f"{place}: {error}") from error
 
 
 def make_behavior(experiment: Experiment, cell: Cell) -> Behavior:

@@ -42,7 +42,7 @@ def _hash_packages() -> str:
         # In a devel space of catkin, the first folder holds but an __init__.py that leads to the second one.
         folder = next(folder for folder in folders if {path.name for path in folder.glob("*.py")} > {"__init__.py"})
         for path in sorted(filter(_is_source, folder.rglob("*"))):
-            _add_file(digest, "%s/%s" % (package, path.relative_to(folder)), path.read_bytes())
+            _add_file(digest, f"{package}/{path.relative_to(folder)}", path.read_bytes())
     return digest.hexdigest()[:16]
 
 
@@ -62,7 +62,7 @@ def check_suite(suite: str) -> None:
 
 
 def _add_file(digest: Any, name: str, content: bytes) -> None:
-    digest.update(("%s %d\n" % (name, len(content))).encode())
+    digest.update(f"{name} {len(content)}\n".encode())
     digest.update(content)
 
 

@@ -93,9 +93,7 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
         if threads[worker] > 1:  # they wait for each other, and would share streams of random numbers
             raise ExperimentError("worker %s has %d threads: start it with --nthreads 1" % (worker, threads[worker]))
         if code != own:
-            raise ExperimentError(
-                "worker %s runs other code (%s, here %s): update it and start it again" % (worker, code, own)
-            )
+            raise ExperimentError(f"worker {worker} runs other code ({code}, here {own}): update it and start it again")
     return client.get_executor(pure=False, retries=DASK_RETRIES), len(codes)
 
 

@@ -220,7 +220,7 @@ def _parse_start(entry: Optional[Entry]) -> Start:
     required, optional = START_KEYS[kind]
     for name, value in given.items():
         if name not in ("kind", *required, *optional):
-            raise ExperimentError("%s: start.%s does not go with kind: %s; leave it out" % (value.place, name, kind))
+            raise ExperimentError(f"{value.place}: start.{name} does not go with kind: {kind}; leave it out")
     entry.mapping(None, required)
     cover = given["cover"].number(1e-4, 0.5, "(share of the area)") if "cover" in given else 0.0
     gap_m = given["gap_m"].number(0.0, 10.0, "m") if "gap_m" in given else 0.0
@@ -246,7 +246,7 @@ def _check_different(entry: Entry, values: Sequence[Any]) -> None:
     seen = set()
     for item, value in zip(entry.entries(), values):
         if value in seen:
-            raise ExperimentError("%s: %s holds %r more than once" % (item.place, entry.name, value))
+            raise ExperimentError(f"{item.place}: {entry.name} holds {value!r} more than once")
         seen.add(value)
 
 
@@ -257,14 +257,14 @@ def _parse_cells(root: Dict[str, Entry], seeds: int) -> Tuple[Cell, ...]:
     varied: List[Tuple[str, List[Any]]] = []
     for name, entry in (root["vary"].mapping() if "vary" in root else {}).items():
         if name in settings or name in parameters:
-            raise ExperimentError("%s: %s is given twice: once as what varies" % (entry.place, name))
+            raise ExperimentError(f"{entry.place}: {name} is given twice: once as what varies")
         values = [
             _parse_setting(name, item) if name in SETTINGS else _parse_parameter(item) for item in entry.entries()
         ]
         _check_different(entry, values)
         varied.append((name, values))
     if "robots" not in settings and "robots" not in dict(varied):
-        raise ExperimentError("%s: robots is missing: give robots: 20, or vary it" % root["behavior"].place)
+        raise ExperimentError(f"{root['behavior'].place}: robots is missing: give robots: 20, or vary it")
     runs = math.prod(len(values) for _, values in varied) * seeds
     if runs > MAX_RUNS:
         root["seeds"].refuse("such that there are at most %d runs, not %d" % (MAX_RUNS, runs))
@@ -306,10 +306,10 @@ def _parse_metric(entry: Entry) -> Metric:
     kind, inner = entry.single(("time_until", "mean_of_last_s"))
     if kind == "time_until":
         bound = _parse_bound(inner)
-        return Metric("time_until_%s_%g_s" % (bound.metric, bound.value), bound.metric, bound=bound)
+        return Metric(f"time_until_{bound.metric}_{bound.value:g}_s", bound.metric, bound=bound)
     name, value = inner.single(METRICS)
     last_s = value.number(1.0, MAX_TIME_S, "s")
-    return Metric("%s_mean_of_last_%g_s" % (name, last_s), name, last_s)
+    return Metric(f"{name}_mean_of_last_{last_s:g}_s", name, last_s)
 
 
 def _parse_comparing(entry: Entry, metrics: List[str], cells: Tuple[Cell, ...]) -> Comparing:

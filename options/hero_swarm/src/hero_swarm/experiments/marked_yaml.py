@@ -35,14 +35,14 @@ class Entry(NamedTuple):
         """Raise ExperimentError: place, name and value, and what it must be."""
         kinds: Dict[type, str] = {list: "a list", dict: "a mapping"}
         shown = kinds.get(type(self.value), self.value)
-        raise ExperimentError("%s: %s is %s, but must be %s" % (self.place, self.name, shorten(shown), text))
+        raise ExperimentError(f"{self.place}: {self.name} is {shorten(shown)}, but must be {text}")
 
     def number(self, low: float, high: float, unit: str) -> float:
         """Return a number in low..high."""
         value = self.value
         if not is_number(value) or not low <= value <= high:
-            limits = " from %g to %g" % (low, high) if math.isfinite(high - low) else ""
-            self.refuse("a number%s%s" % (limits, " " + unit if unit else ""))
+            limits = f" from {low:g} to {high:g}" if math.isfinite(high - low) else ""
+            self.refuse(f"a number{limits}{' ' + unit if unit else ''}")
         return float(value)
 
     def whole(self, low: int, high: int) -> int:
@@ -61,7 +61,7 @@ class Entry(NamedTuple):
     def choice(self, choices: Collection[str]) -> str:
         """Return one of choices."""
         if not isinstance(self.value, str) or self.value not in choices:
-            self.refuse("one of: %s" % ", ".join(choices))
+            self.refuse(f"one of: {', '.join(choices)}")
         return str(self.value)
 
     def entries(self) -> List["Entry"]:
@@ -74,14 +74,14 @@ class Entry(NamedTuple):
         """Return name -> entry of a mapping with only the allowed names (None: any), and all the required ones."""
         if not isinstance(self.value, dict):
             self.refuse("a mapping such as {%s: ...}" % next(iter(allowed or ("name",))))
-        where = " in %s" % self.name if self.name else ""
+        where = f" in {self.name}" if self.name else ""
         for name, entry in self.value.items():
             if allowed is not None and name not in allowed:
                 text = "%s: unknown %s%s; allowed are: %s"
                 raise ExperimentError(text % (entry.place, shorten(name), where, ", ".join(allowed)))
         for name in required:
             if name not in self.value:
-                raise ExperimentError("%s: %s is missing%s" % (self.place, name, where))
+                raise ExperimentError(f"{self.place}: {name} is missing{where}")
         return dict(self.value)
 
     def single(self, allowed: Collection[str]) -> Tuple[str, "Entry"]:
@@ -104,11 +104,11 @@ def read_entries(text: str, file: str) -> Entry:
         loader.name = file
         node = loader.get_single_node()
     except yaml.MarkedYAMLError as error:
-        raise ExperimentError("%s: not YAML: %s" % (_find_place(error.problem_mark), error.problem)) from None
+        raise ExperimentError(f"{_find_place(error.problem_mark)}: not YAML: {error.problem}") from None
     except yaml.YAMLError as error:
-        raise ExperimentError("%s: not YAML: %s" % (file, one_line(error))) from None
+        raise ExperimentError(f"{file}: not YAML: {one_line(error)}") from None
     if not isinstance(node, yaml.MappingNode):
-        raise ExperimentError("%s: must hold names and values, such as behavior: aggregation.Aggregation" % file)
+        raise ExperimentError(f"{file}: must hold names and values, such as behavior: aggregation.Aggregation")
     return _convert(node, "", loader)
 
 
@@ -122,7 +122,7 @@ class _Loader(yaml.SafeLoader):  # type: ignore[misc]
         self._depth += isinstance(event, yaml.CollectionStartEvent)
         if event.anchor is not None or self._depth > MAX_DEPTH:
             what = "more than %d levels" % MAX_DEPTH if event.anchor is None else "anchors cannot be used"
-            raise ExperimentError("%s: %s" % (_find_place(event.start_mark), what))
+            raise ExperimentError(f"{_find_place(event.start_mark)}: {what}")
         node = super().compose_node(parent, index)
         self._depth -= isinstance(event, yaml.CollectionStartEvent)
         return node
@@ -141,7 +141,7 @@ def _convert(node: yaml.Node, name: str, loader: Any) -> Entry:
     try:
         return Entry(loader.construct_object(node), name, place)
     except (yaml.YAMLError, ValueError) as error:
-        raise ExperimentError("%s: %s: %s" % (place, name, one_line(error))) from None
+        raise ExperimentError(f"{place}: {name}: {one_line(error)}") from None
 
 
 def _convert_mapping(node: yaml.MappingNode, name: str, loader: Any) -> Dict[str, Entry]:
@@ -149,9 +149,9 @@ def _convert_mapping(node: yaml.MappingNode, name: str, loader: Any) -> Dict[str
     for key_node, value_node in node.value:
         place = _find_place(key_node.start_mark)
         if not isinstance(key_node, yaml.ScalarNode):
-            raise ExperimentError("%s: a name must be a text" % place)
+            raise ExperimentError(f"{place}: a name must be a text")
         key = str(key_node.value)
         if key in mapping:
-            raise ExperimentError("%s: %s appears twice" % (place, shorten(key)))
-        mapping[key] = _convert(value_node, "%s.%s" % (name, key) if name else key, loader)
+            raise ExperimentError(f"{place}: {shorten(key)} appears twice")
+        mapping[key] = _convert(value_node, f"{name}.{key}" if name else key, loader)
     return mapping

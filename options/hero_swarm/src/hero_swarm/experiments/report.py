@@ -36,10 +36,10 @@ def write_report(path: str) -> None:
         suffix = "" if kind == SIMULATED else "_robots"
         over_time = _read_over_time(folder, experiment) if kind == SIMULATED else {}
         page = draw_page(report, over_time, text, about)
-        write_file(os.path.join(path, "summary%s.csv" % suffix), format_summaries(report).encode())
-        write_file(os.path.join(path, "report%s.html" % suffix), page.encode())
+        write_file(os.path.join(path, f"summary{suffix}.csv"), format_summaries(report).encode())
+        write_file(os.path.join(path, f"report{suffix}.html"), page.encode())
         print(describe(report))
-        print(os.path.join(path, "report%s.html" % suffix))
+        print(os.path.join(path, f"report{suffix}.html"))
 
 
 def _read_over_time(folder: ResultsFolder, experiment: Experiment) -> Dict[str, OverTime]:

@@ -117,7 +117,7 @@ class ResultsFolder:
     def _make(self) -> None:
         """Make the folder, unless it is there and ours. Raises: ExperimentError."""
         if "\0" in self.path:
-            raise ExperimentError("--out %r: a name cannot hold a NUL character" % self.path)
+            raise ExperimentError(f"--out {self.path!r}: a name cannot hold a NUL character")
         names = _list_names(self.path)
         # A program that was killed while it began has left these.
         begun = [name for name in names if name.endswith(LOCK_ENDING) or name.startswith(ABOUT)]
@@ -208,9 +208,9 @@ class ResultsFolder:
         path = os.path.join(self._batches, name)
         remedy = "start over with --fresh, which sets trials on robots aside, or choose another --out"
         if any(run.kind == SIMULATED for run in runs) and self._code != code:
-            raise ExperimentError("%s: computed by other code (%s, now %s); %s" % (path, code, self._code, remedy))
+            raise ExperimentError(f"{path}: computed by other code ({code}, now {self._code}); {remedy}")
         if any(run.cell == OTHER_CELL for run in runs):
-            raise ExperimentError("%s: of an experiment with other parameters; %s" % (path, remedy))
+            raise ExperimentError(f"{path}: of an experiment with other parameters; {remedy}")
         count, seeds = len(self._experiment.metrics), self._experiment.seeds
         return [(place, run) for place, run in enumerate(runs) if len(run.values) == count and run.seed in seeds]
 
@@ -279,10 +279,10 @@ def read_about(path: str) -> Dict[str, str]:
         about = json.loads(read_file(file))
     except (OSError, RecursionError, ValueError) as error:
         reason = getattr(error, "strerror", None) or one_line(error)
-        raise ExperimentError("%s: no folder with results of run: %s: %s" % (path, ABOUT, reason)) from error
+        raise ExperimentError(f"{path}: no folder with results of run: {ABOUT}: {reason}") from error
     is_ours = isinstance(about, dict) and "code" in about and all(isinstance(value, str) for value in about.values())
     if not is_ours:
-        raise ExperimentError("%s: no folder with results of run: %s is not written by run" % (path, ABOUT))
+        raise ExperimentError(f"{path}: no folder with results of run: {ABOUT} is not written by run")
     return about
 
 

@@ -58,7 +58,7 @@ class RobotTrial:
         """
         lost = [name for name, pose in zip(self._names, poses) if not np.isfinite(pose).all()]
         if lost:
-            self.remark = "no pose of %s at %.1f s" % (", ".join(lost), time_s)
+            self.remark = f"no pose of {', '.join(lost)} at {time_s:.1f} s"
             return None
         if len(things.radii_m) < self._objects:
             self.remark = "poses of %d of the arena's %d objects" % (len(things.radii_m), self._objects)

@@ -44,14 +44,14 @@ Task = Tuple[Inputs, int, Tuple[int, ...], str]
 def _parse_part(text: str) -> Tuple[int, int]:
     part, slash, parts = text.partition("/")
     if not (slash and part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
-        raise argparse.ArgumentTypeError("%r must be K/N with K from 1 to N, such as 3/16" % text)
+        raise argparse.ArgumentTypeError(f"{text!r} must be K/N with K from 1 to N, such as 3/16")
     return int(part), int(parts)
 
 
 def _parse_executor(text: str) -> str:
     if not text.startswith(DASK) or text == DASK:
         allowed = "dask:tls://HOST:PORT, dask:tcp://127.0.0.1:PORT or dask:SCHEDULER_FILE"
-        raise argparse.ArgumentTypeError("%r must be %s" % (text, allowed))
+        raise argparse.ArgumentTypeError(f"{text!r} must be {allowed}")
     return text[len(DASK) :]
 
 
@@ -99,7 +99,7 @@ def read_experiment(path: str, folder: Optional[str] = None) -> Tuple[str, Exper
     try:
         text = read_text(path)
     except (OSError, YamlError) as error:
-        raise ExperimentError("%s cannot be read: %s" % (path, getattr(error, "strerror", None) or error)) from error
+        raise ExperimentError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from error
     return text, parse_experiment(text, path, folder)
 
 
@@ -110,7 +110,7 @@ def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
     """
     file = os.path.join(path, "experiment.yaml")
     if not os.path.isfile(file):
-        raise ExperimentError("%s: no experiment.yaml in it, so not a folder of run" % path)
+        raise ExperimentError(f"{path}: no experiment.yaml in it, so not a folder of run")
     about = read_about(path)
     # Results of older versions have paths relative to the working directory.
     return (*read_experiment(file, os.path.join(path, about[FOLDER]) if FOLDER in about else ""), about)
@@ -177,7 +177,7 @@ def open_folder(options: argparse.Namespace) -> Iterator[Tuple[str, Experiment, 
         with folder.hold(kind):
             aside = folder.clear(kind)
         if aside:
-            print("%s: set aside: damaged batches, and trials on robots that do not count now" % aside, file=sys.stderr)
+            print(f"{aside}: set aside: damaged batches, and trials on robots that do not count now", file=sys.stderr)
     with folder.hold(kind, is_shared=options.part[1] > 1):
         yield text, experiment, folder, folder.begin(text, about)
 
@@ -207,7 +207,7 @@ def _run_missing(
         for (_, cell, seeds, _), (computed, wall_s) in _watch(done, len(missing), len(runs)):
             folder.write_batch(computed)
             folder.note_time(cell, seeds, wall_s)
-        print("%d runs in %.1f s" % (len(missing), time.monotonic() - began_s), file=sys.stderr)
+        print(f"{len(missing)} runs in {time.monotonic() - began_s:.1f} s", file=sys.stderr)
     runs = folder.read_runs()
     left = folder.list_missing(runs)
     cells, count = len(experiment.cells), len(experiment.seeds)

@@ -40,7 +40,7 @@ def place_all(
     try:
         return np.array([_place(start, arena, robots, seed) for seed in seeds])
     except (OptionError, ValueError) as error:
-        raise ExperimentError("start: %s" % error) from error
+        raise ExperimentError(f"start: {error}") from error
 
 
 def place_objects(
@@ -55,7 +55,7 @@ def place_objects(
     try:
         return [scatter_objects(arena, poses, seed) for poses, seed in zip(starts, seeds)]
     except ValueError as error:
-        raise ExperimentError("objects: %s" % error) from error
+        raise ExperimentError(f"objects: {error}") from error
 
 
 def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:
@@ -95,7 +95,7 @@ def _read_poses(path: str, robots: int, read: Callable[[str], bytes]) -> np.ndar
                 poses.append(_parse_pose(line))
                 numbers.append(number)
     except OSError as error:
-        raise ExperimentError("start.file %s cannot be read: %s" % (path, error.strerror)) from error
+        raise ExperimentError(f"start.file {path} cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise ExperimentError("start.file %s, line %d: %s" % (path, number, error)) from error
     if len(poses) < robots:
@@ -118,5 +118,5 @@ def _parse_pose(line: str) -> Pose:
     except (TypeError, ValueError):
         pose = Pose(math.nan, math.nan, math.nan)
     if not is_plausible(pose):
-        raise ValueError("%s must be x m, y m, yaw rad, within %g m" % (shorten(line.strip()), MAX_POSITION_M))
+        raise ValueError(f"{shorten(line.strip())} must be x m, y m, yaw rad, within {MAX_POSITION_M:g} m")
     return pose

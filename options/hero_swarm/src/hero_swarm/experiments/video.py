@@ -35,10 +35,10 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
     """
     is_gif = path.lower().endswith(".gif")
     if not is_gif and shutil.which("ffmpeg") is None:
-        raise ExperimentError("--video %s: apt install ffmpeg, or write a .gif" % path)
+        raise ExperimentError(f"--video {path}: apt install ffmpeg, or write a .gif")
     folder = os.path.dirname(path) or "."
     if not os.access(folder, os.W_OK):
-        raise ExperimentError("--video %s: the folder cannot be written to" % path)
+        raise ExperimentError(f"--video {path}: the folder cannot be written to")
     run = trial.run(time_s, speed / FRAMES_PER_S)
     frames = [(poses[0].copy(), *list_outlines(trial.rows.world.list_objects())) for _, poses in run]
     figure = Figure(figsize=(_SIZE_IN, _SIZE_IN))
@@ -80,7 +80,7 @@ def _write_with_ffmpeg(path: str, frames: Iterator[np.ndarray]) -> None:
         for frame in itertools.chain((first,), frames):
             process.stdin.write(frame.tobytes())  # type: ignore[union-attr]
     if process.returncode:
-        raise ExperimentError("--video %s: ffmpeg cannot write it" % path)
+        raise ExperimentError(f"--video {path}: ffmpeg cannot write it")
 
 
 def _make_circles(axes: Any, circles_m: np.ndarray, color: str) -> EllipseCollection:
@@ -114,5 +114,5 @@ def draw_moving(
         _make_circles(axes, bodies_m, "#0072B2"),
         LineCollection(noses_m, colors="white", linewidths=1),
     )
-    text = axes.text(0.02, 0.97, "%.1f s" % time_s, transform=axes.transAxes, va="top")
+    text = axes.text(0.02, 0.97, f"{time_s:.1f} s", transform=axes.transAxes, va="top")
     return [*map(axes.add_collection, collections), text]

@@ -40,7 +40,7 @@ def fit_body(recordings: List[Recording]) -> np.ndarray:
     stretches = [stretch for recording in recordings for stretch in _list_stretches(recording)]
     turned_rad = sum(float(np.abs(np.diff(np.unwrap(poses[:, 2]))).sum()) for _, poses in stretches)
     if turned_rad < MIN_TURN_RAD:
-        raise ValueError("turned by %.1f rad only; %.0f are needed, with poses" % (turned_rad, MIN_TURN_RAD))
+        raise ValueError(f"turned by {turned_rad:.1f} rad only; {MIN_TURN_RAD:.0f} are needed, with poses")
     return np.clip(least_squares(lambda body: _compare(stretches, body), np.ones(3)).x, 0.5, 2.0)
 
 

@@ -57,7 +57,7 @@ def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit
         [predict_ends(recording, [drawn, (own, body)], share, PATH_S) for recording, own in zip(recordings, motors)]
     )
     if not ends_m.size:
-        raise ValueError("too short: %.0f s hold no path that the fit has not seen" % recordings[0].time_s)
+        raise ValueError(f"too short: {recordings[0].time_s:.0f} s hold no path that the fit has not seen")
     before_m, after_m = np.median(ends_m, axis=1).tolist()
     left_wheel, right_wheel = (body[:2] / (1.0 - SLIP * _SLIP_MEAN)).tolist()
     rolled = {"left_wheel": left_wheel, "right_wheel": right_wheel, "slip": SLIP}
@@ -73,12 +73,12 @@ def describe_fit(fit: Fit, robot_id: int) -> List[str]:
     ends = "held-out paths of %g s end %.1f mm off, before the fit %.1f mm"
     motors = "no servo pulses were recorded, so motors are nominal"
     if "lag_s" in fit.values:
-        motors = "commands work %.0f ms later than in the simulator" % (1e3 * fit.delay_s)
+        motors = f"commands work {1000.0 * fit.delay_s:.0f} ms later than in the simulator"
     remarks = [ends % (PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m), motors]
     if fit.infrared is not None:
         errors_counts = fit.infrared.after_counts, fit.infrared.before_counts
         remarks.append("held-out infrared signals are %.1f counts off, before the fit %.1f" % errors_counts)
         unseen = [str(beam) for beam in range(BEAMS) if "alpha%d_counts_m2" % beam not in fit.values]
         if unseen:
-            remarks.append("infrared sensors that saw too little are nominal: %s" % ", ".join(unseen))
+            remarks.append(f"infrared sensors that saw too little are nominal: {', '.join(unseen)}")
     return ["# hero_%d: %s" % (robot_id, remark) for remark in remarks] + ["robot=%d,%s" % (robot_id, values)]

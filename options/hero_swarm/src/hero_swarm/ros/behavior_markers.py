@@ -51,7 +51,7 @@ class BehaviorMarkers:
     def _make_marker(self, name: str, kind: int) -> Marker:
         marker = Marker()
         marker.header.frame_id, marker.header.stamp = self._frame, rospy.Time.now()
-        marker.ns, marker.type, marker.action = "%s/%s" % (self._node, name), kind, Marker.ADD
+        marker.ns, marker.type, marker.action = f"{self._node}/{name}", kind, Marker.ADD
         marker.pose.orientation.w = 1.0
         return marker
 
@@ -91,7 +91,7 @@ class BehaviorMarkers:
             Point(x, y, 0.02) for x, y in ((left_m, low_m + height_m), (left_m, low_m), (left_m + width_m, low_m))
         ]
         text = self._make_marker("metric", Marker.TEXT_VIEW_FACING)
-        text.text = "%s %.2f (%.2f to %.2f in %.0f s)" % (self._behavior.metric, value, least, most, PLOT_S)
+        text.text = f"{self._behavior.metric} {value:.2f} ({least:.2f} to {most:.2f} in {PLOT_S:.0f} s)"
         text.scale.z, text.color = 0.045, _PLOT_COLOR
         text.pose.position = Point(left_m + width_m / 2.0, low_m + height_m + 0.03, 0.1)
         # RViz draws no line of one point.

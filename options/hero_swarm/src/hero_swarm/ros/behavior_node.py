@@ -46,7 +46,7 @@ def _parse_fence(text: str) -> Optional[np.ndarray]:
     except ValueError:
         bounds_m = np.empty(0)
     if bounds_m.shape != (4,) or not np.isfinite(bounds_m).all() or (bounds_m[2:] <= bounds_m[:2]).any():
-        raise ProgramError('~fence is %r, but must be "x_min y_min x_max y_max" in m' % text)
+        raise ProgramError(f'~fence is {text!r}, but must be "x_min y_min x_max y_max" in m')
     return bounds_m
 
 
@@ -56,7 +56,7 @@ def _make_filter(parameters: Any) -> SafetyFilter:
     if mode == FENCE and fence_m is None:
         raise ProgramError('~safety is fence, but ~fence is empty: give "x_min y_min x_max y_max" in m')
     if mode == OFF and fence_m is not None:
-        raise ProgramError('~fence is %r, but ~safety is off: set it to "fence"' % parameters["fence"])
+        raise ProgramError(f'~fence is {parameters["fence"]!r}, but ~safety is off: set it to "fence"')
     return SafetyFilter(mode, fence_m)
 
 
@@ -114,7 +114,7 @@ class BehaviorNode:
         if not may_move.all():
             name = self._swarm.robots[int(may_move.argmin())].name
             missing = self._objects.describe_missing() or self._source.describe_missing()
-            missing = missing or "the behavior gives %s a speed that is no finite number" % name
+            missing = missing or f"the behavior gives {name} a speed that is no finite number"
             self._source.warn(missing + "; the robots are stopped meanwhile")
         elif self._others and self._others.describe_missing():
             self._source.warn(self._others.describe_missing())

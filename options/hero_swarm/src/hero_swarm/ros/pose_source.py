@@ -69,15 +69,15 @@ class PoseSource:
             age_s = share_poses().age_s(robot_id)
         if pose is None:
             source = "the simulator" if self._frame == SIMULATOR_FRAME else "localize"
-            raise FrameError("%s has no pose in the frame %s: does %s run?" % (name, self._frame, source))
+            raise FrameError(f"{name} has no pose in the frame {self._frame}: does {source} run?")
         if not -MAX_AGE_S < age_s <= MAX_AGE_S:
-            raise StaleDataError("the pose of %s in the frame %s is %.1f s old" % (name, self._frame, age_s))
+            raise StaleDataError(f"the pose of {name} in the frame {self._frame} is {age_s:.1f} s old")
         return pose, age_s
 
     def describe_missing(self) -> str:
         """Return why the last read() lacks poses, for users; empty if all are known."""
         more = " (and %d more robots)" % (len(self._missing) - 1) if len(self._missing) > 1 else ""
-        return "%s%s" % (self._missing[0], more) if self._missing else ""
+        return f"{self._missing[0]}{more}" if self._missing else ""
 
     def warn(self, text: str) -> None:
         """Log that something is missing, every few seconds, and not while all starts at once."""
@@ -117,4 +117,4 @@ class ObjectSource:
         """Return that there are no objects that are needed, for users; empty if there are."""
         if self._known or not self.are_needed:
             return ""
-        return "no object on %s in the frame %s" % (self._topic, self._frame)
+        return f"no object on {self._topic} in the frame {self._frame}"

@@ -80,7 +80,7 @@ def run_on_robots(
                 break
             folder.write_batch([Run(cell_index, seed, trial.list_values(), REAL, trial.remark)])
             folder.write_table(folder.read_runs())
-            print("%s: %s" % (label, "does not count: " + trial.remark if trial.remark else "done"))
+            print(f"{label}: {'does not count: ' + trial.remark if trial.remark else 'done'}")
             if safety.limited_calls:
                 text = "%s: in %.0f %% of the steps the behavior asked for more than robots can drive: limited"
                 print(text % (label, 100.0 * safety.limited_calls / safety.calls))
@@ -91,7 +91,7 @@ def run_on_robots(
 
 def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource, label: str) -> None:
     """Drive all robots to their places, and turn them; the time limit and a stop end it, too."""
-    print("%s: driving to the start" % label)
+    print(f"{label}: driving to the start")
     drive, end_s = StartDrive(starts, swarm.max_body_radius_m), time.monotonic() + START_LIMIT_S
     try:
         for _ in program.rate(1.0 / PERIOD_S):
@@ -117,7 +117,7 @@ def _ask(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource,
     DRIVE to drive there again, or END."""
     while program.running:
         offsets = _describe_offsets(swarm, starts, source)
-        answer = program.ask("%s: %s. Enter starts, d drives there again, q ends: " % (label, offsets))
+        answer = program.ask(f"{label}: {offsets}. Enter starts, d drives there again, q ends: ")
         if answer in (DRIVE, END, None):
             return answer or END
         if answer != START:
@@ -125,7 +125,7 @@ def _ask(program: Program, swarm: Swarm, starts: np.ndarray, source: PoseSource,
         obstacle = _find_obstacle(swarm, source)
         if not obstacle:
             return START
-        print("%s: cannot start: %s" % (label, obstacle), file=sys.stderr)
+        print(f"{label}: cannot start: {obstacle}", file=sys.stderr)
         program.sleep(1.0)  # where answers come from a file
     return END
 
@@ -135,7 +135,7 @@ def _describe_offsets(swarm: Swarm, starts: np.ndarray, source: PoseSource) -> s
     offsets_m = np.nan_to_num(np.hypot(offsets[:, 0], offsets[:, 1]), nan=np.inf)
     row = int(offsets_m.argmax())
     if math.isinf(offsets_m[row]):
-        return "%s has no pose" % swarm.robots[row].name
+        return f"{swarm.robots[row].name} has no pose"
     turns_rad = np.abs(np.remainder(offsets[:, 2] + math.pi, 2.0 * math.pi) - math.pi)
     text = "robots are up to %.0f mm (%s) and %.0f degrees (%s) from their places"
     names = swarm.robots[row].name, swarm.robots[int(turns_rad.argmax())].name
@@ -151,7 +151,7 @@ def _find_obstacle(swarm: Swarm, source: PoseSource) -> str:
             return str(error)
         reason = robot.missing()
         if reason:
-            return "%s: %s" % (robot.name, reason)
+            return f"{robot.name}: {reason}"
     source.read()
     return source.describe_missing()
 
@@ -165,13 +165,13 @@ def _record(program: Program, path: str, name: str, ids: Sequence[int], time_s: 
     command = ["rosrun", "hero_recording", "record", "--raw", "--folder", bags, "--name", name]
     command += ["--robots", " ".join(map(str, ids))]
     # Should this program be killed, the recorder ends by itself.
-    command += ["--seconds", "%g" % (time_s + RECORD_START_S)]
+    command += ["--seconds", f"{time_s + RECORD_START_S:g}"]
     recorder = subprocess.Popen(command, stdin=subprocess.DEVNULL)
     try:
         end_s = time.monotonic() + RECORD_START_S
         while program.sleep(0.1) and set(glob.glob(pattern)) == before:
             if recorder.poll() is not None or time.monotonic() > end_s:
-                raise ExperimentError("%s: the trial is not recorded; is hero_recording installed?" % name)
+                raise ExperimentError(f"{name}: the trial is not recorded; is hero_recording installed?")
         yield
     finally:
         end_process(recorder, RECORD_END_S)
@@ -195,7 +195,7 @@ def _drive(
                 robot.check_not_stopped()
                 reason = robot.missing()
                 if reason:
-                    trial.remark = "lost %s at %.1f s: %s" % (robot.name, rospy.get_time() - start_s, reason)
+                    trial.remark = f"lost {robot.name} at {rospy.get_time() - start_s:.1f} s: {reason}"
                     return True
             poses, ages_s = source.read()
             trial.safety.others_m = others.read()
@@ -210,12 +210,12 @@ def _drive(
             if late:
                 rospy.logwarn(late)
             if min(shares) == 0.0:
-                trial.remark = "commands or poses came too late at %.1f s" % (rospy.get_time() - start_s)
+                trial.remark = f"commands or poses came too late at {rospy.get_time() - start_s:.1f} s"
                 return True
             linear_m_s, angular_rad_s = np.array(speeds) * shares
             commands.send(linear_m_s, angular_rad_s, all_may_move)
     except StoppedError:
-        trial.remark = "stopped at %.1f s" % (rospy.get_time() - start_s)
+        trial.remark = f"stopped at {rospy.get_time() - start_s:.1f} s"
         return True
     finally:
         swarm.stop()

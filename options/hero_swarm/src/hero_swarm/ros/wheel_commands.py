@@ -54,7 +54,7 @@ class WheelCommands:
             return
         self._dead_zones_us = np.array([found[name] for name in names])
         self._publishers = [
-            rospy.Publisher("/%s/cmd_motor" % name, Motor, queue_size=1, tcp_nodelay=True) for name in names
+            rospy.Publisher(f"/{name}/cmd_motor", Motor, queue_size=1, tcp_nodelay=True) for name in names
         ]
 
     def send(self, linear_m_s: np.ndarray, angular_rad_s: np.ndarray, may_move: np.ndarray) -> None:

@@ -47,7 +47,7 @@ def check_python() -> Finding:
     """Check this interpreter, its modules, and the python3 that is first on PATH."""
     version = platform.python_version()
     if sys.version_info < OLDEST_PYTHON:
-        return fail("Python %s; 3.8 or newer is needed" % version, "use a newer system")
+        return fail(f"Python {version}; 3.8 or newer is needed", "use a newer system")
     missing = []
     for name in NEEDED_MODULES:
         try:
@@ -56,18 +56,18 @@ def check_python() -> Finding:
             missing.append(name)
     if missing:
         return fail(
-            "Python %s (%s) lacks %s" % (version, sys.executable, ", ".join(missing)),
+            f"Python {version} ({sys.executable}) lacks {', '.join(missing)}",
             "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
         )
-    text = "Python %s (%s) has all modules" % (version, sys.executable)
+    text = f"Python {version} ({sys.executable}) has all modules"
     other = shutil.which("python3")
     if other and os.path.realpath(other) != os.path.realpath(sys.executable):
         look = "import importlib.util as i, sys; sys.exit(not i.find_spec('rospy'))"
         if ask_system([other, "-c", look]) is None:
             return warn(
-                "%s; the first python3 on PATH, %s, has no rospy" % (text, other),
-                "rosrun and roslaunch are not affected; your own scripts: %s FILE" % sys.executable,
-                "build with -DPYTHON_EXECUTABLE=%s; Debian 13: -DPython_EXECUTABLE" % sys.executable,
+                f"{text}; the first python3 on PATH, {other}, has no rospy",
+                f"rosrun and roslaunch are not affected; your own scripts: {sys.executable} FILE",
+                f"build with -DPYTHON_EXECUTABLE={sys.executable}; Debian 13: -DPython_EXECUTABLE",
             )
     return ok(text)
 
@@ -90,7 +90,7 @@ def check_packages() -> Finding:
             "packages of several versions are mixed: " + ", ".join(sorted(versions)),
             "rebuild all of them from one clone, and source only that workspace",
         )
-    text = "all of version %s, below %s" % (versions.pop(), os.path.commonpath(paths))
+    text = f"all of version {versions.pop()}, below {os.path.commonpath(paths)}"
     return ok(text + (", without " + ", ".join(missing) if missing else ""))
 
 
@@ -102,11 +102,11 @@ def check_messages() -> Finding:
         try:
             built = getattr(importlib.import_module(module), kind)._md5sum
         except (ImportError, AttributeError) as error:
-            return fail("%s is not built: %s" % (name, error), "build the workspace: catkin build", SOURCE)
+            return fail(f"{name} is not built: {error}", "build the workspace: catkin build", SOURCE)
         if built != md5:
-            wrong.append("%s has md5 %s, the firmware %s" % (name, built, md5))
+            wrong.append(f"{name} has md5 {built}, the firmware {md5}")
     if wrong:
         return fail(
             "; ".join(wrong), "rebuild hero_msgs; another package of that name may hide it: rospack find hero_msgs"
         )
-    return ok("%d types match those of firmware v3.8" % len(FIRMWARE_MD5))
+    return ok(f"{len(FIRMWARE_MD5)} types match those of firmware v3.8")

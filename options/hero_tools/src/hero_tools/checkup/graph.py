@@ -37,7 +37,7 @@ def read_master_host() -> str:
 
 def fail_master_uri() -> Finding:
     """Return the finding of a ROS_MASTER_URI that is no address of a master."""
-    text = "ROS_MASTER_URI is %s, but must be like http://ADDRESS:11311" % ascii(rosgraph.get_master_uri())
+    text = f"ROS_MASTER_URI is {rosgraph.get_master_uri()!a}, but must be like http://ADDRESS:11311"
     return fail(text, "export ROS_MASTER_URI=http://localhost:11311")
 
 
@@ -48,9 +48,9 @@ def check_variables(own: Optional[Sequence[Address]]) -> Finding:
     ip, hostname = os.environ.get("ROS_IP", ""), os.environ.get("ROS_HOSTNAME", "")
     addresses = [found.address for found in own or []]
     if ip and own is not None and ip not in addresses and not ip.startswith("127."):
-        remedy = "export ROS_IP=%s" % (addresses[0] if addresses else "127.0.0.1")
-        return fail("ROS_IP is %s, which is not an address of this PC" % ascii(ip), remedy)
-    text = "master %s, ROS_IP %s, ROS_HOSTNAME %s" % (rosgraph.get_master_uri(), ip or "-", hostname or "-")
+        remedy = f"export ROS_IP={addresses[0] if addresses else '127.0.0.1'}"
+        return fail(f"ROS_IP is {ip!a}, which is not an address of this PC", remedy)
+    text = f"master {rosgraph.get_master_uri()}, ROS_IP {ip or '-'}, ROS_HOSTNAME {hostname or '-'}"
     if ip and not hostname and "ROS_HOSTNAME" in os.environ:
         return warn(text + ": ROS_HOSTNAME is set but empty, which hides ROS_IP", "unset ROS_HOSTNAME")
     if ip and hostname:
@@ -68,13 +68,13 @@ def check_own_name(own: Sequence[Address]) -> Finding:
     export = "export ROS_IP=%s" % (address or (own[0].address if own else "127.0.0.1"))
     remedy = [export] if is_remote else ["one PC: export ROS_HOSTNAME=localhost", "several PCs: " + export]
     source = "ROS_IP or ROS_HOSTNAME" if rosgraph.network.get_address_override() else "the host name"
-    text = "nodes here register as %s (%s)" % (ascii(name)[1:-1], source)
+    text = f"nodes here register as {ascii(name)[1:-1]} ({source})"
     if not found:
         return fail(text + ", which cannot be resolved: topics are listed but nothing arrives", *remedy)
     if not any(is_own(entry, own) for entry in found):
-        return fail("%s, which leads to %s: not this PC" % (text, ", ".join(sorted(found))), *remedy)
+        return fail(f"{text}, which leads to {', '.join(sorted(found))}: not this PC", *remedy)
     if is_remote and all(entry.startswith("127.") for entry in found):
-        return fail("%s: the master's PC would connect to itself (%s)" % (text, ", ".join(sorted(found))), *remedy)
+        return fail(f"{text}: the master's PC would connect to itself ({', '.join(sorted(found))})", *remedy)
     return ok(text)
 
 
@@ -87,15 +87,15 @@ def check_master(own: Sequence[Address]) -> Finding:
     addresses = resolve(host)
     if not addresses:
         return fail(
-            "%s: the name %s cannot be resolved" % (uri, host),
+            f"{uri}: the name {host} cannot be resolved",
             "export ROS_MASTER_URI=http://ADDRESS_OF_THE_MASTER_PC:11311",
-            "or a line 'ADDRESS %s' in /etc/hosts" % host,
+            f"or a line 'ADDRESS {host}' in /etc/hosts",
         )
     try:
         ask_master("getPid")
     except NodeError as error:
         start = "roslaunch hero_bringup hero_bringup.launch starts one"
-        away = "is that PC on, is a master running there, is its port open? ping %s" % host
+        away = f"is that PC on, is a master running there, is its port open? ping {host}"
         return fail(str(error), start if any(is_own(address, own) for address in addresses) else away)
     return ok("answers at " + uri)
 
@@ -124,7 +124,7 @@ class OwnNode:
         if not subscribers:
             return warn("not tried: no node rosout runs beside the master", "start the master by roscore or roslaunch")
         return fail(
-            "%s lists this node but did not connect to it within %.1f s" % (subscribers[0], CONNECT_TIMEOUT_S),
+            f"{subscribers[0]} lists this node but did not connect to it within {CONNECT_TIMEOUT_S:.1f} s",
             "export ROS_IP=THE_ADDRESS_OF_THIS_PC (point own_name)",
             "a firewall here may drop connections from that PC",
         )
@@ -134,7 +134,7 @@ class OwnNode:
         wait_until(lambda: self._drivers.is_settled, REPORT_TIMEOUT_S)
         silent = self._drivers.find_silent()
         if silent:
-            text = "no report comes from %s, which the ROS master lists" % ", ".join(silent)
+            text = f"no report comes from {', '.join(silent)}, which the ROS master lists"
             return fail(text, CLEAN_UP, "points own_name and return_path say more")
         reports = self._drivers.read_each()
         if not reports:
@@ -148,19 +148,19 @@ class OwnNode:
 def describe_report(driver: str, report: RobotArray) -> Tuple[str, List[str]]:
     """Return one line on a driver's robots, and a line for each that cannot be driven."""
     ready = [robot for robot in report.robots if robot.state == Robot.READY]
-    text = "%s: %d of %d robots ready" % (driver, len(ready), len(report.robots))
+    text = f"{driver}: {len(ready)} of {len(report.robots)} robots ready"
     text += ", the driver listens on %s" % (report.listening or "no port")
     versions = sorted({robot.firmware for robot in ready if robot.firmware})
     if versions:
         text += ", firmware " + ", ".join(versions)
     lines = []
     if report.stopped:
-        lines.append("all robots are stopped; release them: rosservice call %s/stop false" % driver)
+        lines.append(f"all robots are stopped; release them: rosservice call {driver}/stop false")
     for robot in report.robots:
         if robot.state != Robot.READY:
             error = ": " + robot.last_error if robot.last_error else ""
             name, state = robot.namespace or "a robot", STATES.get(robot.state, "?")
-            lines.append("%s at %s is %s%s" % (name, robot.address, state, error))
+            lines.append(f"{name} at {robot.address} is {state}{error}")
     if not report.robots:
         is_local = is_loopback(report.listening.rpartition(":")[0])
         general = "robots must be on, in this network, and connect to this PC (point addresses)"

@@ -26,10 +26,10 @@ def check_camera(pattern: str = "/dev/video*") -> Finding:
     """List the camera devices of this PC, and whether this user may open them."""
     devices = sorted(glob.glob(pattern))
     if not devices:
-        return ok("no %s: images must come on a topic; without tags no camera is needed" % pattern)
+        return ok(f"no {pattern}: images must come on a topic; without tags no camera is needed")
     closed = [device for device in devices if not os.access(device, os.R_OK | os.W_OK)]
     if closed:
-        text = "this user may not open %s" % ", ".join(closed)
+        text = f"this user may not open {', '.join(closed)}"
         return warn(text, "sudo usermod -aG video $USER, and log in again")
     return ok(", ".join(devices))
 
@@ -77,12 +77,12 @@ def describe_nodes(running: Sequence[str], statuses: Sequence[DiagnosticStatus])
         own = list_statuses(name, statuses)
         good = [status for status in own if status.level == DiagnosticStatus.OK]
         if name == LOCALIZER:
-            texts.append("%s: %d of %d robots without a problem" % (name, len(good), len(own)))
+            texts.append(f"{name}: {len(good)} of {len(own)} robots without a problem")
         else:
             camera = [status for status in own if status.name == name + ": camera"]
             is_usable = camera and camera[0].level < DiagnosticStatus.ERROR
-            texts.append("%s: %s" % (name, camera[0].message if is_usable else "no usable images"))
+            texts.append(f"{name}: {camera[0].message if is_usable else 'no usable images'}")
         if not own:
-            remedies.append("%s sends no diagnostics: rosnode ping %s tells whether it hangs" % (name, name))
-        remedies += ["%s: %s" % (status.name, status.message) for status in own if status not in good]
+            remedies.append(f"{name} sends no diagnostics: rosnode ping {name} tells whether it hangs")
+        remedies += [f"{status.name}: {status.message}" for status in own if status not in good]
     return warn("; ".join(texts), *remedies[:LINES_MAX]) if remedies else ok("; ".join(texts))

@@ -66,7 +66,7 @@ def check_addresses(
     if addresses is None:
         return warn("unknown: the command ip is missing", "sudo apt install iproute2")
     if interface is not None and interface not in {found.interface for found in addresses}:
-        return fail("interface %s has no IPv4 address" % interface, "ip -4 address shows which have one")
+        return fail(f"interface {interface} has no IPv4 address", "ip -4 address shows which have one")
     if listening and all(map(is_loopback, listening)):
         text = "port %d is open on %s only: simulated robots on this PC reach it, robots in the network do not"
         return warn(text % (port, ", ".join(listening)), HOST_REMEDY)
@@ -78,13 +78,13 @@ def check_addresses(
             "rosrun hero_tools hotspot create",
             "or join the robots' 2.4 GHz network",
         )
-    listed = ", ".join("%s (%s)" % (found.address, found.interface) for found in addresses)
+    listed = ", ".join(f"{found.address} ({found.interface})" for found in addresses)
     if any(found.address == HOTSPOT_ADDRESS for found in addresses):
         text = "robots connect to %s:%d by default, which is this PC; all: %s"
         return ok(text % (HOTSPOT_ADDRESS, port, listed))
     return warn(
         "robots must be configured to connect to one of these, port %d: %s" % (port, listed),
-        "rosrun hero_tools hotspot create gives this PC the default address, %s" % HOTSPOT_ADDRESS,
+        f"rosrun hero_tools hotspot create gives this PC the default address, {HOTSPOT_ADDRESS}",
         "or set the address on the robot's page (docs/network.md)",
     )
 
@@ -92,7 +92,7 @@ def check_addresses(
 def advise_firewall(interface: Optional[str], port: int) -> Finding:
     """Print the commands that admit robots; the rules themselves are not read."""
     name = interface or "INTERFACE"
-    zone = "--permanent --zone=$(firewall-cmd --get-zone-of-interface=%s)" % name
+    zone = f"--permanent --zone=$(firewall-cmd --get-zone-of-interface={name})"
     return ok(
         "not inspected; to admit robots on %s to port %d:" % (name, port),
         "ufw: sudo ufw allow in on %s to any port %d proto tcp" % (name, port),

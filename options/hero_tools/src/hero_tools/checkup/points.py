@@ -53,8 +53,8 @@ def run_points(points: Dict[str, Point], timeout_s: float) -> Dict[str, Finding]
         try:
             found[name] = point()
         except Exception as error:  # noqa: BLE001  a point that broke must not hide the others
-            text = "%s: %s" % (type(error).__name__, one_line(error))
-            found[name] = fail("this point broke: %s" % text, "please report it")
+            text = f"{type(error).__name__}: {one_line(error)}"
+            found[name] = fail(f"this point broke: {text}", "please report it")
 
     threads = [threading.Thread(target=run, args=item, daemon=True) for item in points.items()]
     for thread in threads:
@@ -63,7 +63,7 @@ def run_points(points: Dict[str, Point], timeout_s: float) -> Dict[str, Finding]
     for thread in threads:
         thread.join(max(0.0, end_s - time.monotonic()))
     remedy = "the ROS master, a name server or a disk hangs; the other points are valid"
-    late = fail("no answer within %.1f s" % timeout_s, remedy)
+    late = fail(f"no answer within {timeout_s:.1f} s", remedy)
     return {name: found.get(name, late) for name in points}
 
 
@@ -77,7 +77,7 @@ def wait_until(condition: Callable[[], bool], timeout_s: float) -> bool:
 
 def ask_system(command: List[str], timeout_s: float = 2.0) -> Optional[str]:
     """Return the output of a command that only reads; None if it is missing, fails, or does not end in time."""
-    environment = dict(os.environ, LC_ALL="C", PATH="%s:%s" % (os.environ.get("PATH", ""), TOOL_PATH))
+    environment = dict(os.environ, LC_ALL="C", PATH=f"{os.environ.get('PATH', '')}:{TOOL_PATH}")
     try:
         result = subprocess.run(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,

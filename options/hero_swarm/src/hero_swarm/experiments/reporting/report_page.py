@@ -28,8 +28,8 @@ def draw_page(report: Report, over_time: Mapping[str, OverTime], text: str, abou
     over_time: metric -> its course, of those that were recorded; text: the experiment's file; about: of the folder.
     """
     experiment = report.experiment
-    parts = ["<h1>%s</h1>" % html.escape(experiment.behavior)]
-    parts += ['<p class="note">%s</p>' % html.escape(remark) for remark in report.remarks]
+    parts = [f"<h1>{html.escape(experiment.behavior)}</h1>"]
+    parts += [f'<p class="note">{html.escape(remark)}</p>' for remark in report.remarks]
     parts.append("<p>Each point is a run; large points are medians, with 95 % intervals.</p>")
     for metric in experiment.metrics:
         unit = UNITS.get(metric.source, "") if metric.bound is None else "s"
@@ -40,7 +40,7 @@ def draw_page(report: Report, over_time: Mapping[str, OverTime], text: str, abou
         labels = [experiment.cells[cell].label for cell in values]
         parts.append(to_svg(draw_over_time(source, UNITS.get(source, ""), labels, times_s, list(values.values()))))
     parts += _list_comparisons(report)
-    parts.append("<h2>Experiment</h2><pre>%s</pre>" % html.escape(text))
+    parts.append(f"<h2>Experiment</h2><pre>{html.escape(text)}</pre>")
     parts.append(_table(("", ""), list(about.items())))
     title = html.escape(experiment.behavior)
     head = '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>%s</title><style>%s</style></head><body>'
@@ -51,7 +51,7 @@ def _draw_metric(metric: str, unit: str, summaries: Sequence[Summary]) -> List[s
     cells, values, intervals = zip(*summaries)
     labels = [cell.label for cell in cells]
     rows = [(cell.label, str(len(runs)), format_interval(interval)) for cell, runs, interval in summaries]
-    heading, figure = "<h2>%s</h2>" % html.escape(metric), to_svg(draw_runs(unit, labels, values, intervals))
+    heading, figure = f"<h2>{html.escape(metric)}</h2>", to_svg(draw_runs(unit, labels, values, intervals))
     return [heading, figure, _table(("cell", "runs", "median (95 % interval)"), rows)]
 
 
@@ -61,11 +61,11 @@ def _list_comparisons(report: Report) -> List[str]:
     names = ("cells", "pairs", "difference (95 % interval)", "corrected p", "Cliff's delta")
     rows = [format_comparison(*comparison) for comparison in report.compared]
     text = "%s: runs of the same seed are paired; Wilcoxon's signed-rank test, corrected by Holm's method"
-    heading = "<h2>Comparison</h2><p>%s</p>" % html.escape(text % report.experiment.compare.metric)
+    heading = f"<h2>Comparison</h2><p>{html.escape(text % report.experiment.compare.metric)}</p>"
     return [heading, _table(names, rows)]
 
 
 def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    head = "".join("<th>%s</th>" % html.escape(name) for name in names)
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
     body = "".join("<tr>%s</tr>" % "".join("<td>%s</td>" % html.escape(cell) for cell in row) for row in rows)
-    return "<table><tr>%s</tr>%s</table>" % (head, body)
+    return f"<table><tr>{head}</tr>{body}</table>"

@@ -59,9 +59,7 @@ def bootstrap_median(values: Sequence[float]) -> Interval:
     """
     sample = np.sort(np.asarray(values, dtype=float))
     if not len(sample) or np.isnan(sample).any():
-        raise ExperimentError(
-            "no median of %d values%s" % (len(sample), ", one of which is nan" if len(sample) else "")
-        )
+        raise ExperimentError(f"no median of {len(sample)} values{', one of which is nan' if len(sample) else ''}")
     rng = np.random.RandomState(_SEED)
     block = _BLOCK_VALUES // len(sample)
     medians: List[np.ndarray] = []
@@ -89,7 +87,7 @@ def compare_pairs(first: Sequence[float], second: Sequence[float]) -> Comparison
     """
     ours, theirs = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     if len(ours) != len(theirs):
-        raise ExperimentError("%d and %d values cannot be paired" % (len(ours), len(theirs)))
+        raise ExperimentError(f"{len(ours)} and {len(theirs)} values cannot be paired")
     differences = theirs - ours
     if not np.isfinite(differences).all():
         raise ExperimentError("a value that is not finite cannot be compared: compare another metric, or longer runs")

@@ -98,7 +98,7 @@ def describe(report: Report) -> str:
     for metric, summaries in report.summaries.items():
         lines.append(metric)
         for cell, values, interval in summaries:
-            lines.append("  %-40s %s, %d runs" % (cell.label, format_interval(interval), len(values)))
+            lines.append(f"  {cell.label:40} {format_interval(interval)}, {len(values)} runs")
     for comparison in report.compared:
         assert report.experiment.compare is not None
         text = "%s: %s, %s pairs: difference %s, corrected p %s, Cliff's delta %s"
@@ -113,8 +113,8 @@ def format_interval(interval: Interval) -> str:
 
 def format_comparison(first: Cell, second: Cell, one: Comparison) -> Tuple[str, ...]:
     """Return a comparison as texts: cells, pairs, difference, corrected p-value, and Cliff's delta."""
-    cells, difference = "%s against %s" % (second.label, first.label), format_interval(one.difference)
-    return cells, str(one.pairs), difference, "%.2g" % one.p_value, "%+.2f" % one.delta
+    cells, difference = f"{second.label} against {first.label}", format_interval(one.difference)
+    return cells, str(one.pairs), difference, f"{one.p_value:.2g}", f"{one.delta:+.2f}"
 
 
 def format_summaries(report: Report) -> str:
