@@ -13,7 +13,8 @@ import hypothesis.configuration
 import pytest
 
 ROOT = Path(__file__).resolve().parent
-sys.path.append(str(ROOT / "test"))  # sources.py, which knows where packages and modules are
+# sources.py, which knows where packages and modules are; robots of the benchmarks. Helpers are in hero_test.
+sys.path += [str(ROOT / "test"), str(ROOT / "test" / "bench")]
 
 # Before numpy is imported: threads of OpenBLAS take turns with the tests beside, and more CPU than they save.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"

@@ -2,17 +2,10 @@
 
 import json
 import os
-import sys
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-# The parts of the driver's own tests: robots that a test scripts, drivers with parameters of their own.
-sys.path[:0] = [str(ROOT / "hero_driver" / "test" / "rostest"), str(ROOT / "test" / "bench")]
-
-import rospy  # noqa: E402
-from rig import Master  # noqa: E402
+import rospy
+from rig import Master
 
 
 class Effort:
@@ -72,7 +65,7 @@ def record(request):
 @pytest.fixture
 def start_driver(master):
     """Return what starts a driver, which ends after the test; as DriverProcess()."""
-    from driver_case import DriverProcess
+    from hero_test.driver_case import DriverProcess
 
     drivers = []
 

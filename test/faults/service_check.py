@@ -3,13 +3,13 @@
 import struct
 
 import rospy
-from driver_case import Recorder, make_publisher, wait_packets, wait_payloads
-from fake_robot import TIME_PACKET
 from std_msgs.msg import ColorRGBA
-from stock_messages import make_encoder
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder
+from hero_test.driver_case import Recorder, make_publisher, wait_packets, wait_payloads
+from hero_test.fake_robot import TIME_PACKET
+from hero_test.stock_messages import make_encoder
 
 
 class ServiceCheck:

@@ -7,16 +7,13 @@ import json
 import os
 import signal
 import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "hero_driver" / "test" / "rostest"))
 
 import rospy
-from driver_case import DriverProcess, make_publisher
-from fake_robot import READ_CYCLE_S, FakeRobot
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool
 
+from hero_test.driver_case import DriverProcess, make_publisher
+from hero_test.fake_robot import READ_CYCLE_S, FakeRobot
 from hero_test.waiting import wait_for
 
 rospy.init_node("stop_without_master", disable_signals=True)

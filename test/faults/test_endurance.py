@@ -11,8 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import rospy
-from driver_case import Recorder
-from fake_robot import FakeRobot
 from measuring import read_one_cpu_s
 from rig import (
     BENCH,
@@ -29,6 +27,8 @@ from rig import (
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder
 from hero_msgs.srv import SetPID
+from hero_test.driver_case import Recorder
+from hero_test.fake_robot import FakeRobot
 from hero_test.waiting import wait_for
 
 ROBOTS = 20

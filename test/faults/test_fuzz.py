@@ -9,11 +9,11 @@ import emulated_swarm
 import pytest
 import rospy
 import rosservice
-from fake_robot import STOCK_DECLARATIONS, FakeRobot
 from rig import HERE
 from service_check import ServiceCheck
 
 from hero_msgs.srv import SetPID
+from hero_test.fake_robot import STOCK_DECLARATIONS, FakeRobot
 
 GARBLED = 5
 

@@ -6,8 +6,6 @@ import time
 import emulated_swarm
 import pytest
 import rospy
-import stock_messages
-from fake_robot import FakeRobot
 from rig import (
     BENCH,
     EMULATED_NAMES,
@@ -19,6 +17,8 @@ from rig import (
 )
 
 from hero_msgs.msg import Encoder
+from hero_test import stock_messages
+from hero_test.fake_robot import FakeRobot
 from hero_test.waiting import wait_for
 
 GOOD_ROBOTS = 20
@@ -72,7 +72,7 @@ class Scene:
 
 @pytest.fixture(scope="module")
 def scene(master):
-    from driver_case import DriverProcess
+    from hero_test.driver_case import DriverProcess
 
     robots = ["--count", str(GOOD_ROBOTS)]
     with DriverProcess({"grace_s": 1.0}, name="isolating_driver") as driver:

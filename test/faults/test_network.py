@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 import rosgraph
-from driver_case import Recorder
 from rig import Program, count_holdings, start_python
 
 from hero_msgs.msg import Encoder, Robot
+from hero_test.driver_case import Recorder
 from hero_test.processes import find_free_port
 from hero_test.waiting import wait_for
 
@@ -141,7 +141,7 @@ def start_robots(host, address, port, first=0):
 @pytest.fixture(scope="module")
 def lab(master):
     """A driver here, robots on a host of their own, and a relay there that they dial."""
-    from driver_case import DriverProcess
+    from hero_test.driver_case import DriverProcess
 
     robots = master.hosts[0]
     with DriverProcess({"report_period_s": 0.2}, name="lab_driver") as driver:
@@ -259,7 +259,7 @@ def test_robots_keep_their_identity_when_their_address_changes(lab, record):
 
 
 def test_killing_one_of_two_drivers_does_not_affect_the_other(by_cable, master, record):
-    from driver_case import DriverProcess
+    from hero_test.driver_case import DriverProcess
 
     driver, _, watch = by_cable
     second = master.hosts[1]

@@ -7,9 +7,6 @@ import time
 
 import pytest
 import rospy
-import stock_messages
-from driver_case import Recorder, make_publisher
-from fake_robot import READ_CYCLE_S, TIME_PACKET, FakeRobot
 from geometry_msgs.msg import Twist
 from rig import HERE
 from service_check import ServiceCheck
@@ -17,6 +14,9 @@ from simulated_robots import SPEED_M_S, GroundTruth, drive, start_simulator, wai
 
 from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder
+from hero_test import stock_messages
+from hero_test.driver_case import Recorder, make_publisher
+from hero_test.fake_robot import READ_CYCLE_S, TIME_PACKET, FakeRobot
 from hero_test.processes import find_free_port, suspended
 from hero_test.small_disk import SmallDisk
 from hero_test.waiting import wait_for

@@ -3,12 +3,12 @@
 import struct
 
 import emulated_swarm
-from driver_case import list_driver_topics
-from fake_robot import FakeRobot
 from rig import EMULATED_NAMES, STOCK_NAMES, count_holdings, count_robots_names
 from service_check import ServiceCheck
 
 from hero_msgs.msg import Robot
+from hero_test.driver_case import list_driver_topics
+from hero_test.fake_robot import FakeRobot
 from hero_test.waiting import wait_for
 
 SWARM = 10

@@ -7,17 +7,17 @@ import threading
 
 import pytest
 import rospy
-from driver_case import has_connection, list_driver_topics, make_publisher, reads_from_somebody
-from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from rig import STOCK_NAMES, count_holdings, start_python
 from rosgraph_msgs.msg import Clock
 from scripted_publisher import ScriptedPublisher
 from service_check import ServiceCheck
-from stock_messages import make_laser
 
 from hero_msgs.srv import SetPID
+from hero_test.driver_case import has_connection, list_driver_topics, make_publisher, receives_topic
+from hero_test.fake_robot import FakeRobot
 from hero_test.processes import suspended
+from hero_test.stock_messages import make_laser
 from hero_test.waiting import wait_for
 
 
@@ -123,11 +123,11 @@ def test_a_publisher_that_goes_while_it_is_connected_to_may_return(served, recor
         publisher.refuses = True
         publisher.announce()
         wait_for(lambda: publisher.refused, "a connection that is refused")
-        wait_for(lambda: not reads_from_somebody(driver.node, topic), "the refused connection to be forgotten")
+        wait_for(lambda: not receives_topic(driver.node, topic), "the refused connection to be forgotten")
         publisher.refuses = False
         publisher.announce()
         wait_for(lambda: publisher.connections, "a connection")
-        wait_for(lambda: reads_from_somebody(driver.node, topic), "the driver to know of it")
+        wait_for(lambda: receives_topic(driver.node, topic), "the driver to know of it")
     record("a publisher that goes while the driver connects to it returns", 1, 1)
 
 

@@ -10,15 +10,15 @@ import pytest
 import rosgraph
 import rospy
 from bad_peer import declare_topic
-from driver_case import Recorder
-from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from service_check import ServiceCheck
 from std_msgs.msg import Bool, String
 from std_srvs.srv import SetBool
-from text_messages import STRING_MD5, make_text
 
 from hero_driver.rosserial import payloads
 from hero_msgs.msg import RobotArray
+from hero_test.driver_case import Recorder
+from hero_test.fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
+from hero_test.text_messages import STRING_MD5, make_text
 from hero_test.waiting import wait_for
 
 EVIL_NAMES = (

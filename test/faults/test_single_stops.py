@@ -3,11 +3,11 @@
 import contextlib
 
 import pytest
-from driver_case import make_command, make_publisher
-from fake_robot import READ_CYCLE_S, FakeRobot
 from geometry_msgs.msg import Twist
 from rig import start_python
 
+from hero_test.driver_case import make_command, make_publisher
+from hero_test.fake_robot import READ_CYCLE_S, FakeRobot
 from hero_test.waiting import wait_for
 
 PARTS = ("group", "teleop", "monitor", "calibration")

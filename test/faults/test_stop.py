@@ -9,8 +9,6 @@ import sys
 import pytest
 import rosgraph
 import rospy
-from driver_case import make_publisher, reads_from_somebody
-from fake_robot import READ_CYCLE_S, FakeRobot
 from geometry_msgs.msg import Twist
 from rig import HERE, Master, start_python
 from simulated_robots import SPEED_M_S, GroundTruth, drive, start_simulator, wait_until_stopped
@@ -20,6 +18,8 @@ from std_srvs.srv import SetBool, Trigger
 from hero_client.ros.drivers import Drivers
 from hero_msgs.msg import Robot
 from hero_sim.srv import InjectFault
+from hero_test.driver_case import make_publisher, receives_topic
+from hero_test.fake_robot import READ_CYCLE_S, FakeRobot
 from hero_test.processes import find_free_port, suspended
 from hero_test.waiting import wait_for
 
@@ -45,7 +45,7 @@ while not rospy.is_shutdown():
 @pytest.fixture(scope="module")
 def simulated(master):
     """A driver with simulated robots of its own."""
-    from driver_case import DriverProcess
+    from hero_test.driver_case import DriverProcess
 
     port = find_free_port()
     with DriverProcess({"port": port, "allow_self_tuning": True}) as driver, start_simulator(ROBOTS, port):
@@ -64,7 +64,7 @@ def field(simulated):
     # rospy may miss a publisher that comes before the end of its predecessor in the same node is known.
     heard = ["/hero_%d/%s_controller/cmd_vel" % (n, kind) for n in range(ROBOTS) for kind in ("velocity", "position")]
     try:
-        wait_for(lambda: not any(reads_from_somebody(simulated.node, topic) for topic in heard), "the publishers to go")
+        wait_for(lambda: not any(receives_topic(simulated.node, topic) for topic in heard), "the publishers to go")
     finally:
         rospy.ServiceProxy(simulated.node + "/stop", SetBool)(True)
         wait_for(lambda: is_confirmed(simulated), "the driver's confirmation")

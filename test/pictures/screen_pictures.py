@@ -15,11 +15,11 @@ import numpy as np
 from picture_program import make_pictures
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "test" / "bench"), str(ROOT / "options" / "hero_monitor" / "test" / "rostest")]
-from monitor_page import MonitorPage  # noqa: E402
+sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
 from hero_test.browser import MISSING as NO_BROWSER  # noqa: E402
+from hero_test.monitor_page import MonitorPage  # noqa: E402
 from hero_test.processes import find_free_port  # noqa: E402
 from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 

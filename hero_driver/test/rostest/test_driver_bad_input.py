@@ -12,8 +12,14 @@ from pathlib import Path
 import rosgraph
 import rospy
 import rostest
-import stock_messages
-from driver_case import (
+from std_msgs.msg import ColorRGBA
+from std_srvs.srv import SetBool
+
+from hero_driver.rosserial import packets
+from hero_msgs.msg import Encoder, Robot
+from hero_node.ros.handshakes import HANDSHAKE_TIMEOUT_S
+from hero_test import stock_messages
+from hero_test.driver_case import (
     DriverProcess,
     OwnDriverCase,
     Recorder,
@@ -21,13 +27,7 @@ from driver_case import (
     make_publisher,
     wait_payloads,
 )
-from fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
-from std_msgs.msg import ColorRGBA
-from std_srvs.srv import SetBool
-
-from hero_driver.rosserial import packets
-from hero_msgs.msg import Encoder, Robot
-from hero_node.ros.handshakes import HANDSHAKE_TIMEOUT_S
+from hero_test.fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
 from hero_test.waiting import wait_for
 
 USAGE_ERROR = 2

@@ -10,8 +10,6 @@ import struct
 
 import rospy
 import rostest
-from driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_payloads
-from fake_robot import STOCK_DECLARATIONS
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Log as RosLog
 from std_msgs.msg import Bool, ColorRGBA
@@ -20,6 +18,8 @@ from std_srvs.srv import SetBool
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import SetOdom
+from hero_test.driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_payloads
+from hero_test.fake_robot import STOCK_DECLARATIONS
 from hero_test.processes import Program
 from hero_test.waiting import wait_for
 

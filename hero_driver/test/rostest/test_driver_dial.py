@@ -5,12 +5,12 @@ import socket
 
 import rospy
 import rostest
-import stock_messages
-from driver_case import OwnDriverCase, Recorder, make_publisher, wait_payloads
-from fake_robot import FakeRobot
 from std_msgs.msg import ColorRGBA
 
 from hero_msgs.msg import Encoder, Robot
+from hero_test import stock_messages
+from hero_test.driver_case import OwnDriverCase, Recorder, make_publisher, wait_payloads
+from hero_test.fake_robot import FakeRobot
 
 
 def listen(port=0):

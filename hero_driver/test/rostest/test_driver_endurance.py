@@ -8,8 +8,12 @@ import subprocess
 import rosgraph
 import rospy
 import rostest
-import stock_messages
-from driver_case import (
+from std_msgs.msg import ColorRGBA
+
+from hero_driver.rosserial import packets
+from hero_msgs.msg import Encoder, Robot
+from hero_test import stock_messages
+from hero_test.driver_case import (
     OwnDriverCase,
     Recorder,
     has_connection,
@@ -18,13 +22,9 @@ from driver_case import (
     wait_packets,
     wait_payloads,
 )
-from fake_robot import (
+from hero_test.fake_robot import (
     TIME_PACKET,
 )
-from std_msgs.msg import ColorRGBA
-
-from hero_driver.rosserial import packets
-from hero_msgs.msg import Encoder, Robot
 from hero_test.processes import suspended
 from hero_test.waiting import wait_for
 

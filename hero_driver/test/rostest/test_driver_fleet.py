@@ -3,15 +3,22 @@
 
 import rospy
 import rostest
-import stock_messages
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from driver_case import NODE, DriverCase, Recorder, list_driver_topics, make_publisher, wait_payloads
-from fake_robot import FakeRobot, boot_line, heartbeat_line
 from geometry_msgs.msg import Twist
 from std_msgs.msg import ColorRGBA
 
 from hero_msgs.msg import Encoder, Robot
 from hero_msgs.srv import SetOdom
+from hero_test import stock_messages
+from hero_test.driver_case import (
+    NODE,
+    DriverCase,
+    Recorder,
+    list_driver_topics,
+    make_publisher,
+    wait_payloads,
+)
+from hero_test.fake_robot import FakeRobot, boot_line, heartbeat_line
 from hero_test.waiting import wait_for
 
 OTHER_HOST = "127.0.0.2"

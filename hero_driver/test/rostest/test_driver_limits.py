@@ -8,18 +8,18 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
-import stock_messages
-from driver_case import OwnDriverCase, Recorder
-from fake_robot import (
+
+from hero_driver.rosserial import packets
+from hero_msgs.msg import Encoder, Robot
+from hero_test import stock_messages
+from hero_test.driver_case import OwnDriverCase, Recorder
+from hero_test.fake_robot import (
     PUB,
     STOCK_DECLARATIONS,
     TIME_PACKET,
     Declaration,
 )
-from text_messages import STRING_MD5
-
-from hero_driver.rosserial import packets
-from hero_msgs.msg import Encoder, Robot
+from hero_test.text_messages import STRING_MD5
 from hero_test.waiting import wait_for
 
 

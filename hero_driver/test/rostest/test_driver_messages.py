@@ -6,17 +6,17 @@ import struct
 
 import rospy
 import rostest
-import stock_messages
 from diagnostic_msgs.msg import DiagnosticArray
-from driver_case import DriverCase, DriverProcess, Recorder
-from fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer, heartbeat_line
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, LaserScan, Range
-from stock_messages import TICK_M, WHEEL_SEPARATION_M, send_burst
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder, Robot
 from hero_msgs.srv import SetOdom
+from hero_test import stock_messages
+from hero_test.driver_case import DriverCase, DriverProcess, Recorder
+from hero_test.fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer, heartbeat_line
+from hero_test.stock_messages import TICK_M, WHEEL_SEPARATION_M, send_burst
 from hero_test.waiting import wait_for
 
 STEP_S = 0.034

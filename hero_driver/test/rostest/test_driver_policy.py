@@ -5,8 +5,14 @@ import subprocess
 
 import rospy
 import rostest
-import stock_messages
-from driver_case import (
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Bool, ColorRGBA
+from tf2_msgs.msg import TFMessage
+
+from hero_msgs.msg import Encoder, Robot
+from hero_msgs.srv import SetOdom
+from hero_test import stock_messages
+from hero_test.driver_case import (
     OwnDriverCase,
     Recorder,
     list_driver_topics,
@@ -14,7 +20,7 @@ from driver_case import (
     make_publisher,
     wait_payloads,
 )
-from fake_robot import (
+from hero_test.fake_robot import (
     PUB,
     REQUESTS,
     STOCK_DECLARATIONS,
@@ -22,13 +28,7 @@ from fake_robot import (
     Declaration,
     encode_answer,
 )
-from geometry_msgs.msg import Twist
-from std_msgs.msg import Bool, ColorRGBA
-from text_messages import STRING_MD5, WRONG_MD5, make_text
-from tf2_msgs.msg import TFMessage
-
-from hero_msgs.msg import Encoder, Robot
-from hero_msgs.srv import SetOdom
+from hero_test.text_messages import STRING_MD5, WRONG_MD5, make_text
 from hero_test.waiting import wait_for
 
 

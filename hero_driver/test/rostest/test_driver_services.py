@@ -7,14 +7,14 @@ import threading
 import genpy
 import rospy
 import rostest
-import stock_messages
-from driver_case import DriverCase, make_publisher, wait_payloads
-from fake_robot import encode_answer
 from std_msgs.msg import ColorRGBA
 from std_srvs.srv import Trigger
 
 from hero_msgs.msg import Robot
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
+from hero_test import stock_messages
+from hero_test.driver_case import DriverCase, make_publisher, wait_payloads
+from hero_test.fake_robot import encode_answer
 from hero_test.waiting import wait_for
 
 GAINS = (100.0, 2.0, 0.5, 101.0, 2.5, 0.25)

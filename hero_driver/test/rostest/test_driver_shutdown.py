@@ -6,12 +6,12 @@ import socket
 
 import rospy
 import rostest
-from driver_case import OwnDriverCase, make_command, make_publisher, wait_payloads
-from fake_robot import READ_CYCLE_S
 from geometry_msgs.msg import Twist
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Motor, Robot
+from hero_test.driver_case import OwnDriverCase, make_command, make_publisher, wait_payloads
+from hero_test.fake_robot import READ_CYCLE_S
 from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller/cmd_vel"

@@ -10,21 +10,21 @@ import sys
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from driver_case import (
-    DriverProcess,
-    OwnDriverCase,
-    Recorder,
-    make_command,
-    make_publisher,
-    reads_from_somebody,
-)
-from fake_robot import READ_CYCLE_S, SUB
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool, Trigger
 
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
+from hero_test.driver_case import (
+    DriverProcess,
+    OwnDriverCase,
+    Recorder,
+    make_command,
+    make_publisher,
+    receives_topic,
+)
+from hero_test.fake_robot import READ_CYCLE_S, SUB
 from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller"
@@ -342,7 +342,7 @@ class TestDriverStop(OwnDriverCase):
         self.drive(robot, POSITION)
         idle.unregister()
         # Both are handled in order: a stop would be there before what comes now.
-        wait_for(lambda: not reads_from_somebody(driver.node, "/hero_41/velocity_controller/cmd_vel"), "its end")
+        wait_for(lambda: not receives_topic(driver.node, "/hero_41/velocity_controller/cmd_vel"), "its end")
         make_publisher("/hero_41/led", ColorRGBA).publish(ColorRGBA())
         wait_for(lambda: robot.payloads_on("led"), "the next command")
         self.assertTrue(robot.motors.is_turning)
@@ -355,7 +355,7 @@ class TestDriverStop(OwnDriverCase):
         wait_for(lambda: robot.velocities, "the first command")
         self.drive(robot)
         older.unregister()
-        wait_for(lambda: not reads_from_somebody(driver.node, "/hero_43/cmd_vel"), "its end")
+        wait_for(lambda: not receives_topic(driver.node, "/hero_43/cmd_vel"), "its end")
         make_publisher("/hero_43/led", ColorRGBA).publish(ColorRGBA())
         wait_for(lambda: robot.payloads_on("led"), "the next command")
         self.assertTrue(robot.motors.is_turning)

@@ -10,9 +10,6 @@ import rosgraph
 import rospy
 import rosservice
 import rostest
-import stock_messages
-from driver_case import DriverCase, Recorder, list_driver_topics, make_publisher, wait_packets, wait_payloads
-from fake_robot import STOCK_DECLARATIONS, SUB, TIME_PACKET, FakeRobot, boot_line, heartbeat_line
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log as RosLog
@@ -21,6 +18,16 @@ from std_msgs.msg import Bool, ColorRGBA
 
 from hero_driver.rosserial import packets, payloads
 from hero_msgs.msg import Encoder, Motor
+from hero_test import stock_messages
+from hero_test.driver_case import (
+    DriverCase,
+    Recorder,
+    list_driver_topics,
+    make_publisher,
+    wait_packets,
+    wait_payloads,
+)
+from hero_test.fake_robot import STOCK_DECLARATIONS, SUB, TIME_PACKET, FakeRobot, boot_line, heartbeat_line
 from hero_test.waiting import wait_for
 
 CAPTURES = Path(__file__).resolve().parents[4] / "shared" / "captures"

@@ -6,9 +6,9 @@ import struct
 import unittest
 
 import rostest
-from fake_robot import FakeRobot
 
 from hero_driver.rosserial import packets, payloads
+from hero_test.fake_robot import FakeRobot
 from hero_test.waiting import TIMEOUT_S, wait_for
 
 NEUTRAL = packets.encode_packet(104, struct.pack("<2h", 1500, 1500))

@@ -7,8 +7,6 @@ end is a robot that reads every 51 ms, by the firmware's rules (fake_motors).
 import contextlib
 import heapq
 import struct
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 from unittest import mock
 
@@ -22,10 +20,8 @@ from hero_driver.ros import robot_bridge, robot_commands
 from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import Session, SessionLimits
 from hero_driver.transport.event_loop import POLL_INTERVAL_S
-
-sys.path.append(str(Path(__file__).parents[1] / "rostest"))
-from fake_motors import FakeMotors
-from fake_robot import (
+from hero_test.fake_motors import FakeMotors
+from hero_test.fake_robot import (
     ENCODER_INTERVAL_S,
     READ_CYCLE_S,
     STOCK_DECLARATIONS,

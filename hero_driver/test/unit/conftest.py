@@ -1,15 +1,11 @@
 """What the unit tests share: byte captures of a real robot where they are there, and vectors."""
 
 import os
-import sys
 from pathlib import Path
 
 import pytest
 
 CAPTURES = Path(__file__).resolve().parents[3].parent / "shared" / "captures"
-
-# The vectors of the rosserial core serve the other tests too.
-sys.path.insert(0, str(Path(__file__).parent / "rosserial"))
 
 
 @pytest.fixture

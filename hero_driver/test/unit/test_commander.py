@@ -2,7 +2,6 @@
 
 import pytest
 from commanded_robot import MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
-from fake_motors import LAG_S, FakeMotors
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,6 +10,7 @@ from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
 from hero_driver.robot_constants import MAX_WATCHDOG_S
 from hero_driver.transport.event_loop import POLL_INTERVAL_S
+from hero_test.fake_motors import LAG_S, FakeMotors
 
 NAN_TWIST = bytes(6) + b"\xf8\x7f" + bytes(40)
 STOP_S = 0.5

@@ -1,7 +1,5 @@
 """The gateway's own decisions: which connection is a robot's, and which of two is refused; without sockets or time."""
 
-import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -12,9 +10,7 @@ from hero_driver.gateway import Gateway
 from hero_driver.rosserial.packets import ID_LOG, encode_packet
 from hero_driver.rosserial.payloads import LOG_INFO, Log, encode_log
 from hero_driver.transport.link import Address
-
-sys.path.append(str(Path(__file__).parents[1] / "rostest"))
-from fake_robot import PUB, STOCK_DECLARATIONS, FakeRobot
+from hero_test.fake_robot import PUB, STOCK_DECLARATIONS, FakeRobot
 
 PUBLISHED = [entry for entry in STOCK_DECLARATIONS if entry.kind == PUB]
 HELLO = FakeRobot(0, PUBLISHED).encode_declarations()

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import pytest
 from commanded_robot import LIGHT, MOTORS, POSITION, VELOCITY, WINDOW_LENGTH, Clock, CommandedRobot
-from fake_motors import LAG_S, FakeMotors
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,6 +18,7 @@ from hero_driver.stop_delivery import (
     encode_stop,
     is_light,
 )
+from hero_test.fake_motors import LAG_S, FakeMotors
 
 phases = st.floats(0.0, 0.051)
 networks = st.floats(0.0, 0.05)

@@ -14,10 +14,8 @@ from pathlib import Path
 import rosgraph
 import rostest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tutorial_runner import Course
-
 from hero_test.processes import find_free_port
+from hero_test.tutorial_runner import Course
 
 PACKAGE = Path(__file__).resolve().parents[2]
 ROOT = PACKAGE.parent

@@ -1,13 +1,11 @@
 """The pages of the courses, without running them; the rostests run them."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tutorial_runner import check_same_as, read_blocks
+from hero_test.tutorial_runner import check_same_as, read_blocks
 
 PACKAGE = Path(__file__).resolve().parents[2]
 TUTORIAL = PACKAGE.parent / "docs" / "tutorial"

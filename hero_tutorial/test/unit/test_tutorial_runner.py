@@ -1,12 +1,15 @@
 """The tutorial runner: how it parses pages, what it types, and how it reports differences."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tutorial_runner import Course, PageError, TutorialError, clean_output, make_pattern, read_blocks
+from hero_test.tutorial_runner import (
+    Course,
+    PageError,
+    TutorialError,
+    clean_output,
+    make_pattern,
+    read_blocks,
+)
 
 
 @pytest.fixture()

@@ -8,12 +8,12 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
-from monitor_page import MonitorPage
 from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_monitor, wait_until_it_answers
 from rosgraph_msgs.msg import Log
 
 from hero_sim.srv import InjectFault
 from hero_test.browser import MISSING
+from hero_test.monitor_page import MonitorPage
 from hero_test.processes import find_pid, suspended
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for

@@ -7,7 +7,6 @@ import unittest
 import rospy
 import rostest
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
-from monitor_page import MonitorPage
 from monitor_process import HOST, end, start_scripted_driver, wait_until_it_answers
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Log
@@ -15,6 +14,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
 
 from hero_test.browser import MISSING
+from hero_test.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
 
 

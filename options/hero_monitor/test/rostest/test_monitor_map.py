@@ -9,7 +9,6 @@ import rospy
 import rostest
 from geometry_msgs.msg import Point, Point32, Polygon, PolygonStamped, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
-from monitor_page import MonitorPage
 from monitor_process import HOST, end, start_scripted_driver, wait_until_it_answers
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
 from PIL import Image
@@ -17,6 +16,7 @@ from sensor_msgs.msg import CompressedImage
 
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_test.browser import MISSING
+from hero_test.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
 
 COLORS = {"red": (255, 0, 0), "green": (0, 160, 0), "blue": (0, 0, 255), "magenta": (255, 0, 255)}

@@ -9,7 +9,6 @@ import rosgraph
 import rospy
 import rostest
 from geometry_msgs.msg import Twist
-from monitor_page import MonitorPage
 from monitor_process import (
     HOST,
     OTHER_HOST,
@@ -24,6 +23,7 @@ from std_msgs.msg import Bool, String
 
 from hero_msgs.msg import RobotArray
 from hero_test.browser import MISSING
+from hero_test.monitor_page import MonitorPage
 from hero_test.processes import find_pid, suspended
 from hero_test.waiting import wait_for
 

@@ -1,6 +1,6 @@
 """Which motion commands a fake robot accepts, and whether its wheels turn: the stock firmware's rules.
 
-Pure: time enters in seconds. It stands on the codec alone. Source: firmware v3.8 as measured: a controller drops
+Pure: time enters in seconds. Source: firmware v3.8 as measured: a controller drops
 each Twist that comes within 50 ms after its watchdog was set; an accepted motion sets the watchdog, self-tuning
 keeps setting it, and an accepted zero resets it. Of the motion watchdogs (2, 4 and 1 s) nothing is modeled.
 """
@@ -43,7 +43,7 @@ class FakeMotors:
     """The controllers, by the part of their topics' names in front of cmd_vel, and the wheels.
 
     Attributes:
-        is_pushed: whether somebody turns the wheels by hand.
+        is_pushed: whether a hand turns the wheels.
         lag_s: for how long the wheels turn on when nothing drives them.
         light_s: for how long each led holds the robot's program.
         read_s: when the robot has finished what it reads.

@@ -7,11 +7,11 @@ import xmlrpc.client
 
 import rosgraph
 import rospy
-from fake_robot import FakeRobot
 from geometry_msgs.msg import Twist
 from rosgraph_msgs.msg import Log as RosLog
 
 from hero_msgs.msg import Robot, RobotArray
+from hero_test.fake_robot import FakeRobot
 from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for
 
@@ -34,8 +34,8 @@ def has_connection(node, topic, reader):
     return any(entry[2] == "o" and entry[4] == topic and reader in entry[1] for entry in list_connections(node))
 
 
-def reads_from_somebody(node, topic):
-    """Return whether node itself says that it receives topic from somebody."""
+def receives_topic(node, topic):
+    """Return whether node itself says that it receives topic."""
     return any(entry[2] == "i" and entry[4] == topic for entry in list_connections(node))
 
 

@@ -1,7 +1,7 @@
 """A scripted robot behind a real TCP socket: says what the stock robot says, and whatever else a test wants.
 
 It takes packets as the firmware does (read cycle, receive window, the motion rules of fake_motors) and keeps them
-for the test. It stands on the codec alone, never on the driver's session or on ROS. Source: firmware v3.8 as
+for the test. It knows nothing of the driver's code or of ROS. Source: firmware v3.8 as
 measured: ids in call order, publishers from 125, subscribers from 100; one burst of declarations for each request.
 """
 
@@ -13,9 +13,8 @@ import threading
 import time
 from typing import Callable, Dict, List, NamedTuple, Optional
 
-from fake_motors import FakeMotors
-
-from hero_driver.rosserial import packets, payloads
+from hero_test import robot_packets
+from hero_test.fake_motors import FakeMotors
 
 BUFFER_LENGTH = 4096
 ANSWER_MD5 = "937c9679a518e3a18d831e57125ea522"
@@ -30,11 +29,11 @@ ENCODER_INTERVAL_S = 0.034
 TUNING_INTERVAL_S = 1.0 / 47.0
 """Between two log lines of a robot that tunes itself."""
 
-REQUEST_PACKET = packets.encode_packet(packets.ID_PUBLISHER, b"")
-TIME_PACKET = packets.encode_packet(packets.ID_TIME, bytes(8))
+REQUEST_PACKET = robot_packets.encode_packet(robot_packets.PUBLISHER, b"")
+TIME_PACKET = robot_packets.encode_packet(robot_packets.TIME, bytes(8))
 
-PUB, SUB = packets.ID_PUBLISHER, packets.ID_SUBSCRIBER
-ANSWERS, REQUESTS = packets.ID_SERVICE_SERVER_PUBLISHER, packets.ID_SERVICE_SERVER_SUBSCRIBER
+PUB, SUB = robot_packets.PUBLISHER, robot_packets.SUBSCRIBER
+ANSWERS, REQUESTS = robot_packets.SERVICE_ANSWERS, robot_packets.SERVICE_REQUESTS
 
 
 class Declaration(NamedTuple):
@@ -166,7 +165,7 @@ class FakeRobot:
         self.namespace = "/" + self.name
         chosen = STOCK_DECLARATIONS if declarations is None else declarations
         self.declarations = [entry._replace(name=entry.name.format(self.name)) for entry in chosen]
-        self.received: List[packets.Packet] = []
+        self.received: List[robot_packets.Packet] = []
         self.velocities: List[Velocity] = []
         self.motors = FakeMotors()
         self.requests = 0
@@ -242,15 +241,15 @@ class FakeRobot:
 
     def send_packet(self, topic_id: int, payload: bytes) -> None:
         """Send one packet."""
-        self.send_bytes(packets.encode_packet(topic_id, payload))
+        self.send_bytes(robot_packets.encode_packet(topic_id, payload))
 
     def send(self, name: str, payload: bytes) -> None:
         """Publish on one of its own topics, by the name that it declared."""
         self.send_packet(self.find_id(name, (PUB,)), payload)
 
-    def log(self, text: str, level: int = payloads.LOG_INFO) -> None:
+    def log(self, text: str, level: int = robot_packets.LOG_INFO) -> None:
         """Send a log line."""
-        self.send_packet(packets.ID_LOG, payloads.encode_log(payloads.Log(level, text)))
+        self.send_packet(robot_packets.LOG, robot_packets.encode_log(level, text))
 
     def declare(self) -> None:
         """Send the burst that answers a request for topics."""
@@ -259,14 +258,7 @@ class FakeRobot:
     def encode_declarations(self) -> bytes:
         """Return all declarations as packets."""
         return b"".join(
-            packets.encode_packet(
-                entry.kind,
-                payloads.encode_topic_info(
-                    payloads.TopicInfo(
-                        entry.topic_id, entry.name, entry.message_type, entry.md5sum, entry.buffer_length
-                    )
-                ),
-            )
+            robot_packets.encode_packet(entry.kind, robot_packets.encode_declaration(*entry[1:]))
             for entry in self.declarations
         )
 
@@ -329,7 +321,7 @@ class FakeRobot:
                     self.log("\x1b[93m[/%s] %s\x1b[0m" % (self.name, text))
 
     def _run(self, sock: socket.socket) -> None:
-        reader = packets.PacketReader()
+        reader = robot_packets.PacketReader()
         next_time_request_s = time.monotonic() + TIME_REQUEST_INTERVAL_S
         while not self._closing.is_set():
             now_s = time.monotonic()
@@ -354,9 +346,9 @@ class FakeRobot:
             for packet in reader.receive_bytes(data):
                 self._take(packet)
 
-    def _take(self, packet: packets.Packet) -> None:
+    def _take(self, packet: robot_packets.Packet) -> None:
         self.received.append(packet)
-        if packet.topic_id == packets.ID_PUBLISHER:
+        if packet.topic_id == robot_packets.PUBLISHER:
             self.requests += 1
             if self.declares:
                 self.declare()

@@ -1,7 +1,8 @@
 """std_msgs/String and md5s for declarations of topics and services that stock robots do not have."""
 
-import stock_messages
 from std_msgs.msg import String
+
+from hero_test import stock_messages
 
 STRING_MD5 = String._md5sum
 WRONG_MD5 = "0123456789abcdef0123456789abcdef"
