@@ -48,6 +48,13 @@ def test_the_newest_early_command_is_sent_with_the_subscription(ros):
     assert ros.sent == ["fast", "next"] and ros.warned == []
 
 
+def test_a_command_that_waited_goes_to_the_first_subscriber_only(ros):
+    ros.topic.publish("fast")
+    for _ in range(2):  # the driver, and later rostopic echo
+        subscribe(ros)
+    assert ros.sent == ["fast"], "a second subscriber starts no robot"
+
+
 def test_a_stop_takes_the_place_of_an_early_command(ros):
     ros.topic.publish("fast")
     for _ in range(2):

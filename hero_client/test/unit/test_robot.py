@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from linkless_robot import make_robot
+from linkless_robot import FakeSwarm, make_robot
 
 from hero_client.robots.group import READY_TIMEOUT_S
 from hero_client.robots.robot_base import WARNING_PERIOD_S
@@ -308,6 +308,21 @@ def test_what_ends_a_wait_stops_the_robot_before_it_goes_on():
     with pytest.raises(RobotNotReadyError):
         robot.wait_until_ready(10.0)
     assert robot.now_s < 101.1
+
+
+@pytest.mark.parametrize("ending", [KeyboardInterrupt, SystemExit, StoppedError])
+def test_whatever_ends_a_motion_stops_every_robot_of_a_swarm(monkeypatch, ending):
+    swarm = FakeSwarm(2, 5)
+    sleep = swarm._clock.sleep
+
+    def end_once(duration_s):
+        monkeypatch.setattr(swarm._clock, "sleep", sleep)
+        raise ending
+
+    monkeypatch.setattr(swarm._clock, "sleep", end_once)
+    with pytest.raises(ending):
+        swarm.drive(0.1, 0.5, duration_s=1.0)
+    assert [[velocity[1:] for velocity in link.sent] for link in swarm.links] == [[(0.1, 0.5), (0.0, 0.0)]] * 2
 
 
 def test_only_a_robot_that_was_driven_is_stopped_at_the_end():

@@ -329,6 +329,8 @@ def test_a_robot_that_only_motor_commands_reach_is_stopped_by_them():
     light = (4, LIGHT_TYPE)
     assert stop_by((1, motor), (2, twist), (3, twist), light) == b"2,3,", "the controllers overwrite pulses"
     assert stop_by((1, motor), (9, twist), light) == stop_by((1, motor), light) == b"1,"
+    assert stop_by((9, twist), (2, twist)) == b"2,", "a topic that is refused leaves the next one its zero"
+    assert stop_by((9, twist), (1, motor)) == b"1,"
     assert stop_by((1, motor), light, with_burst=True) == b"4," * BURST_LIGHTS + b"1,"
     assert stop_by((1, "nav_msgs/Odometry"), light) == b""
 

@@ -55,9 +55,36 @@ def test_a_chain_whose_odometry_drifts_follows_without_touching(tmp_path):
         assert true_paths.measure_gaps(path).min() > 0.01
 
 
-def test_a_follower_whose_leader_is_not_known_stops():
+class HiddenLeader(CommonFrame):
+    """A frame in which hero_0 has no pose any more while it is hidden."""
+
+    is_hidden = False
+
+    def pose_of(self, robot):
+        pose = super().pose_of(robot)
+        return None if self.is_hidden and robot.robot_id == 0 else pose
+
+
+def test_a_follower_whose_leader_is_not_known_any_more_stops(tmp_path):
+    arena = tmp_path / "row.yaml"
+    arena.write_text(ARENA)
+    with StepSwarm(3, arena=str(arena)) as swarm:
+        common, lateness = HiddenLeader("world"), Lateness()
+
+        def step(time_s):
+            swarm[0].drive(0.08, 0.0)
+            follow.step(swarm, common, FollowLaw(gap_m=GAP_M), lateness)
+
+        true_paths.run(swarm, step, 2.0)
+        assert swarm[1].velocity.linear_m_s > 0.05
+        common.is_hidden = True
+        (path,) = true_paths.run(swarm, step, 1.0)  # the robot's own watchdog would take 2 s
+        moved_m, leader_m = true_paths.measure_lengths(path[len(path) // 2 :])[[1, 0]]
+        assert moved_m < true_paths.REST < leader_m
+
+
+def test_robots_without_poses_in_the_frame_are_named():
     with StepSwarm(2) as swarm:
         common = CommonFrame("nowhere")
-        true_paths.run(swarm, lambda time_s: follow.step(swarm, common, FollowLaw(), Lateness()), 1.0)
-        assert "nowhere" in common.missing["hero_1"]
-        assert swarm[1].velocity == (0.0, 0.0)
+        true_paths.run(swarm, lambda time_s: follow.step(swarm, common, FollowLaw(), Lateness()), 0.2)
+        assert all("nowhere" in common.missing[name] for name in ("hero_0", "hero_1"))

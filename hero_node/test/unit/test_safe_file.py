@@ -62,6 +62,19 @@ def test_a_replaced_file_keeps_its_mode(tmp_path):
     assert path.stat().st_mode & 0o777 == 0o640
 
 
+def test_a_file_of_another_user_keeps_its_mode_though_not_its_owner(tmp_path, monkeypatch):
+    path = tmp_path / "token"
+    path.write_bytes(b"old")
+    path.chmod(0o600)
+
+    def refuse(fd, user, group):
+        raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    monkeypatch.setattr(os, "chown", refuse)
+    write_file(str(path), b"new")
+    assert path.read_bytes() == b"new" and path.stat().st_mode & 0o777 == 0o600
+
+
 def test_a_device_is_written_and_not_replaced(tmp_path):
     pipe = str(tmp_path / "pipe")
     os.mkfifo(pipe)

@@ -1,6 +1,7 @@
 """Files of calibrations: saved values are loaded again; a damaged file is refused in one line, and never in the way."""
 
 import os
+from contextlib import contextmanager
 from unittest import mock
 
 import pytest
@@ -49,6 +50,25 @@ def test_values_that_were_not_measured_again_stay_and_the_old_file_is_kept(tmp_p
     assert set(kept.values) == {*WHOLE.values, *NEWER.values}
     assert (tmp_path / "hero_3.previous.yaml").read_bytes() == content
     assert len(os.listdir(str(tmp_path))) == 2
+
+
+def test_what_another_program_saves_before_the_lock_is_taken_stays(tmp_path, monkeypatch):
+    path, _ = save_whole(tmp_path)
+    lock_file = store.lock_file
+
+    @contextmanager
+    def lock_after_another(locked):
+        monkeypatch.setattr(store, "lock_file", lock_file)
+        store.save(path, store.KeptCalibration(3, "meanwhile", {"wheels_m": [0.05, 0.05, 0.065]}))
+        with lock_file(locked):
+            yield
+
+    monkeypatch.setattr(store, "lock_file", lock_after_another)
+    store.save(path, NEWER)
+    kept = store.load(path)
+    assert kept.date == "later" and kept.values["wheels_m"] == [0.05, 0.05, 0.065]
+    assert {key: kept.values[key] for key in NEWER.values} == NEWER.values
+    assert store.load(str(tmp_path / "hero_3.previous.yaml")).date == "meanwhile"
 
 
 def test_comments_stay_when_a_robot_is_calibrated_again(tmp_path):

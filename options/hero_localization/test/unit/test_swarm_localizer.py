@@ -207,6 +207,16 @@ def test_many_robots_lost_and_found_make_one_line_in_ten_seconds():
     assert summaries[1] == "64 more lines on robots lost or found again: " + names
 
 
+def test_a_jump_back_in_time_gives_lost_robots_their_lines_again():
+    robots = range(3, 7)  # as many as there are lines at once
+    places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}
+    swarm = Swarm(*robots).run(1.0, places, robots=robots).run(1.5, robots=robots)
+    swarm.now_s -= 50.0
+    swarm.run(1.0, places, robots=robots).lines.clear()
+    swarm.run(1.5, robots=robots)
+    assert swarm.lines == ["hero_%d lost: its pose follows its odometry" % robot_id for robot_id in robots]
+
+
 def test_after_a_quiet_while_each_lost_robot_has_a_line_again():
     robots = range(8)
     places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}

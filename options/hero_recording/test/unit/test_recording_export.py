@@ -110,7 +110,9 @@ def test_npz_tables_hold_the_values_of_csv(bag, tmp_path, capsys):
     run_export(capsys, bag, "--out", tmp_path / "csv")
     run_export(capsys, bag, "--out", tmp_path / "npz", "--format", "npz")
     assert not list((tmp_path / "npz").rglob("*.csv"))
-    for path in (tmp_path / "csv").rglob("*.csv"):
+    tables = sorted((tmp_path / "csv").rglob("*.csv"))
+    assert len(tables) == 12 == len(list((tmp_path / "npz").rglob("*.npz")))
+    for path in tables:
         rows = read_csv(path)
         with np.load(str(tmp_path / "npz" / path.parent.name / (path.stem + ".npz"))) as arrays:
             assert list(arrays) == list(rows[0])

@@ -296,6 +296,20 @@ def test_a_recording_ends_by_its_time_a_signal_or_the_disk(recording):
     assert recording.run() == 1 and recording.errors == ["stopped: only 5 MB are left"]
 
 
+def test_files_that_vanish_while_they_are_listed_hide_no_others(recording):
+    kept = [recording.folder / ("hero_2026_%d.bag" % number) for number in range(20)]
+
+    def write():
+        for path in kept:
+            path.write_bytes(bytes(EMPTY_BAG_BYTES + 1))
+            (recording.folder / (path.name + ".gone")).symlink_to(recording.folder / "nothing")
+
+    recording.reasons[1.0] = write
+    assert recording.run("--seconds", "2") == 0
+    assert sorted(recording.said[-21:-1]) == sorted("%s  0.0 MB" % path for path in kept)
+    assert recording.said[-1] == "0.2 MB in 2 s"
+
+
 def test_silence_and_a_recorder_that_fails_are_told(recording):
     recording.ends_s, recording.code = SILENCE_S + 5.0, 3
     assert recording.run() == 1

@@ -5,6 +5,7 @@ real one.
 """
 
 import io
+import signal
 import sys
 
 import pytest
@@ -153,6 +154,24 @@ def test_a_hotspot_that_cannot_be_switched_on_leaves_nothing_behind(nmcli, monke
     nmcli.answer("-f NAME connection show", 0, "hero_hotspot\n")
     run(monkeypatch, capsys, "create", "--password-stdin")
     assert nmcli.read_calls()[-1].arguments == ["connection", "delete", "hero_hotspot"]
+
+
+@pytest.mark.parametrize("step", ["add", "edit", "up"])
+def test_ctrl_c_leaves_no_hotspot_without_a_password(nmcli, monkeypatch, capsys, step):
+    nmcli.answer("-f NAME connection show", 0, "hero_hotspot\n")
+    run_nmcli = hotspot.run_nmcli
+
+    def press(*arguments, typed=""):
+        output = run_nmcli(*arguments, typed=typed)
+        if step in arguments:
+            raise KeyboardInterrupt
+        return output
+
+    monkeypatch.setattr(hotspot, "run_nmcli", press)
+    code, output, _ = run(monkeypatch, capsys, "create", "--password-stdin")
+    assert code == 128 + signal.SIGINT and "is on" not in output
+    last, clearing = [call.arguments for call in nmcli.read_calls() if "-f" not in call.arguments][-2:]
+    assert step in last and clearing == ["connection", "delete", "hero_hotspot"]
 
 
 def test_status_prints_the_address_for_robots_and_never_the_password(nmcli, monkeypatch, capsys):

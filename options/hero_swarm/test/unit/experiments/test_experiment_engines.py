@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 import types
-from concurrent.futures import Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 
 import pytest
 
@@ -47,6 +47,28 @@ def test_tasks_of_a_killed_worker_run_again(tmp_path):
     done = list(engines.compute(open_two, 2, square_but_die_once, tasks))
     assert sorted(result for _, result in done) == [number * number for number in range(8)]
     assert os.path.exists(str(tmp_path / "died"))
+
+
+class PoolThatBreaks(Executor):
+    """Computes so many tasks at once, and breaks while the next one is handed in."""
+
+    def __init__(self, tasks):
+        self.left = tasks
+
+    def submit(self, function, *arguments):
+        if not self.left:
+            raise BrokenExecutor("a worker died")
+        self.left -= 1
+        future = Future()
+        future.set_result(function(*arguments))
+        return future
+
+
+@pytest.mark.parametrize("tasks", range(4))
+def test_a_pool_that_breaks_while_it_takes_a_task_loses_none(tasks):
+    pools = iter((PoolThatBreaks(tasks), PoolThatBreaks(99)))
+    done = list(engines.compute(lambda: next(pools), 2, square, [(number,) for number in range(6)]))
+    assert sorted(done) == [((number,), number * number) for number in range(6)]
 
 
 def test_a_task_that_always_kills_its_worker_ends_with_an_error():
@@ -106,9 +128,10 @@ class Cluster:
     scheduler, worker = "tcp://127.0.0.1:1", "tcp://127.0.0.1:2"
 
     def __init__(self, address, scheduler_file, timeout):
-        pass
+        assert (address is None) != (scheduler_file is None) and timeout == 20.0
 
     def wait_for_workers(self, count, timeout):
+        assert (count, timeout) == (1, 20.0)
         if not self.threads:
             raise ArrivalError("Only 0/1 workers arrived after 20s")
 
@@ -123,7 +146,9 @@ class Cluster:
     def scheduler_info(self):
         return {"address": self.scheduler}
 
-    def get_executor(self, **options):
+    def get_executor(self, pure, retries):
+        assert not pure, "equal tasks may give other results"
+        assert retries == 3, "a batch outlives the loss of a worker"
         return "executor"
 
 
