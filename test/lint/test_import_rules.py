@@ -78,6 +78,7 @@ PURE_ROOMS = (
     "hero_client.apps.goals",
     "hero_monitor.foxglove.hub",
     "hero_monitor.foxglove.protocol",
+    "hero_node.calibration_file",
     "hero_node.clock",
     "hero_node.errors",
     "hero_node.geometry",

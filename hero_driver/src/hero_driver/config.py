@@ -6,8 +6,9 @@ config/hero_driver.yaml are generated from these declarations.
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Any, Mapping, Tuple
 
+from hero_node.calibration_file import KeptCalibration, read_calibrations
 from hero_node.errors import ProgramError
 from hero_node.number_checks import is_whole_number
 from hero_node.parameters import (
@@ -21,11 +22,9 @@ from hero_node.parameters import (
     whole_number,
     words,
 )
-from hero_node.yaml_text import read_calibrations
 
 from .commands.command_settings import CommandSettings
 from .corrections.correction_settings import CorrectionSettings, OwnWheels
-from .corrections.robot_models import HERO_PLUS, STOCK
 from .fleet.admission import AdmissionLimits
 from .rosserial.session import SessionLimits
 from .transport.link import Address
@@ -86,30 +85,20 @@ FORMER_STOP = "stopped"
 
 
 def read_config(given: Mapping[str, Any]) -> DriverConfig:
-    """Return the checked configuration in the given parameters (names without "~").
-
-    Raises: ProgramError, also for a calibration file that calibrate did not write.
-    """
+    """Return the checked configuration in the given parameters (names without "~"). Raises: ProgramError."""
     given = {name: value for name, value in given.items() if name != FORMER_STOP}
     config = DriverConfig(**check_parameters(PARAMETERS, given))
-    own_wheels = read_calibrations(config.calibration_folder, "wheels_m", _convert_wheels)
     if not config.host and not config.robots:
         raise ProgramError(
             "~host is empty and ~robots too: the driver would neither listen nor dial;"
             " give an address to listen on (0.0.0.0 for all) or robots to dial"
         )
-    return dataclasses.replace(config, own_wheels=own_wheels)
+    calibrations = read_calibrations(config.calibration_folder)
+    own_wheels = {name: _take_wheels(kept) for name, kept in calibrations.found.items() if "wheels_m" in kept.values}
+    return dataclasses.replace(config, own_wheels=own_wheels, calibration_problems=calibrations.problems)
 
 
-def _convert_wheels(lengths: Any, content: Dict[str, Any]) -> OwnWheels:
-    left_m, right_m, separation_m = wheels_m = [float(length) for length in lengths]
-    if not all(0.01 <= length_m <= 1.0 for length_m in wheels_m):
-        raise ValueError("wheels_m must be from 0.01 to 1 m")
-    ticks_per_turn: Optional[float] = content.get("ticks_per_turn")
-    if ticks_per_turn is not None and not float(ticks_per_turn) >= 1.0:
-        raise ValueError("ticks_per_turn must be 1 or more")
-    model = content.get("model", "")
-    if model not in ("", STOCK, HERO_PLUS):
-        raise ValueError(f"model must be {STOCK} or {HERO_PLUS}, not {model!r}")
-    diameter_m, ratio = (left_m + right_m) / 2.0, right_m / left_m
-    return OwnWheels(diameter_m, separation_m, ratio, ticks_per_turn and float(ticks_per_turn), model)
+def _take_wheels(kept: KeptCalibration) -> OwnWheels:
+    left_m, right_m, separation_m = kept.values["wheels_m"]
+    ticks_per_turn, model = kept.others.get("ticks_per_turn"), kept.others.get("model", "")
+    return OwnWheels((left_m + right_m) / 2.0, separation_m, right_m / left_m, ticks_per_turn, model)

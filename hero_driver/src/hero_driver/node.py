@@ -114,6 +114,8 @@ class DriverNode:
         self._thread.start()
         threading.Thread(target=self._watch_master, name="master watch", daemon=True).start()
         self._log.log("info", self._describe_start())
+        for problem in self._config.calibration_problems.values():
+            self._log.log("warn", f"a calibration is not used: {problem}, then restart the driver")
         # Whatever ~host calls it: "0" is every address too.
         listening = self._loop.listening
         if listening is not None and listening.host in ("0.0.0.0", "::") and not self._config.allow:

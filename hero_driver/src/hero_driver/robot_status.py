@@ -30,6 +30,7 @@ class RobotStatus:
     odometry_resets: int
     foreign_frames: List[str]
     duplicates: List[Tuple[str, str, StopState]]  # address, reason and stop of each refused one that waits
+    calibration_problem: str  # empty: its calibration file is used, or there is none
 
     @property
     def name(self) -> str:
@@ -51,10 +52,11 @@ def describe_robot(
     """
     corrections = None if bridge is None else bridge.corrections
     dropped = record.dropped_messages
-    problem = ""
+    problem = calibration_problem = ""
     if bridge is not None:
         dropped += bridge.commands.refused + bridge.commands.queue.dropped + bridge.corrections.refused
         problem = bridge.last_error
+        calibration_problem = bridge.corrections.calibration_problem
     packets, bad_packets, received_length = record.packets, record.bad_packets, record.received_length
     if peer is not None:
         packets += peer.session.reader.packets
@@ -76,7 +78,7 @@ def describe_robot(
         dropped_messages=dropped,
         bad_packets=bad_packets,
         clock_offset=0.0 if corrections is None else corrections.clock_offset_s,
-        last_error=problem or record.last_error,
+        last_error="; ".join(filter(None, (problem or record.last_error, calibration_problem))),
     )
     return RobotStatus(
         message,
@@ -92,4 +94,5 @@ def describe_robot(
             (address, reason, duplicate_stops.get(address, StopState.NOT_STOPPED))
             for address, reason in sorted(record.refused.items())[:DUPLICATES_SHOWN]
         ],
+        calibration_problem,
     )

@@ -2,6 +2,8 @@
 """Which names, types, services and parameters a robot may use."""
 
 import subprocess
+import tempfile
+from pathlib import Path
 
 import rospy
 import rostest
@@ -118,6 +120,20 @@ class TestDriverPolicy(OwnDriverCase):
         ):
             self.assertEqual(len(driver.find_lines(name + " refused")), 1, name)
         self.assertIn("refused", driver.fleet.wait("/hero_4", Robot.READY, "error", lambda e: e.last_error).last_error)
+
+    def test_a_damaged_calibration_keeps_the_driver_from_nothing(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        Path(folder.name, "hero_5.yaml").write_bytes(b"\xff")
+        Path(folder.name, "hero_6.yaml").mkdir()
+        Path(folder.name, "hero_7.yaml").write_text("robot: hero_7\nwheels_m: [0.049, 0.049, 0.064]\n")
+        driver = self.start(calibration_folder=folder.name)
+        for number in (5, 6, 7):
+            self.dial(driver, number)
+        for number in (5, 6):
+            driver.wait_line(r"a calibration is not used: .*hero_%d\.yaml" % number)
+            self.assertIn("not calibrated: ", driver.fleet.find("/hero_%d" % number).last_error)
+        self.assertEqual(driver.fleet.find("/hero_7").last_error, "")
 
     def declare_anew(self, driver, robot, **changes):
         """Let a robot come back with another declaration of its light, and of the service set_odom."""

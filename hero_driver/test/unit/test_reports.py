@@ -1,9 +1,12 @@
 """What ~robots says: every robot in a row that can be sent, and duplicates with data of their own."""
 
 import io
+from types import SimpleNamespace
 
 import pytest
 import rospy
+from corrected_robot import make_corrections
+from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_updater import DiagnosticStatusWrapper
 
 from hero_driver import reports
@@ -140,6 +143,23 @@ def test_rates_are_what_came_since_the_last_report_by_the_time_between(reporter)
 def test_a_report_says_since_when_each_robot_is_in_its_state(reporter):
     assert publish(reporter, make_record(since_s=NOW_S - 12.0))[0].since.to_sec() == 1795240942 - 12
     assert publish(reporter, make_record(since_s=NOW_S - 2e9))[0].since.to_sec() == 0
+
+
+def test_a_damaged_calibration_is_reported_beside_all_else(reporter):
+    commands = SimpleNamespace(refused=0, queue=SimpleNamespace(dropped=0), tunes=lambda now_s: False)
+
+    def describe(problems, **changes):
+        corrections = make_corrections("/hero_7", [], calibration_problems=problems)
+        bridge = SimpleNamespace(last_error="", commands=commands, corrections=corrections)
+        status = describe_robot(make_record(**changes), bridge, None, StopState.NOT_STOPPED, {}, NOW_S)
+        return status.message.last_error, reports._assess(status)
+
+    text = "not calibrated: hero_7.yaml: broken; correct it, then restart the driver"
+    problems = {"hero_7": "hero_7.yaml: broken; correct it"}
+    assert describe({"hero_70": "broken"}) == ("", (DiagnosticStatus.OK, "ready"))
+    assert describe(problems) == (text, (DiagnosticStatus.WARN, text))
+    last_error, (level, _) = describe(problems, state=RobotState.AWAY, last_error="silent for 6 s")
+    assert (last_error, level) == ("silent for 6 s; " + text, DiagnosticStatus.ERROR)
 
 
 def test_diagnostics_have_a_part_for_each_robot_that_is_known(reporter):

@@ -1,16 +1,11 @@
 """YAML from files and parameters as values, or one line that says what is wrong with it. Knows no ROS."""
 
-import glob
-import os
-from typing import Any, Callable, Dict, Type, TypeVar
+from typing import Any, Type
 
 import yaml
 
-from .errors import ProgramError
 from .safe_file import read_file
 from .texts import one_line
-
-T = TypeVar("T")
 
 MAX_CHARACTERS = 500_000
 """PyYAML reads about 160,000 in a second, in which nothing else of the program runs; real files have some thousand."""
@@ -46,21 +41,3 @@ def parse_yaml(text: str, loader: Type[Any] = yaml.SafeLoader) -> Any:
         raise YamlError("lists or tables within each other, deeper than can be read") from None
     except Exception as error:  # noqa: BLE001 - PyYAML raises many kinds at invalid dates and numbers
         raise YamlError(one_line(error)) from None
-
-
-def read_calibrations(folder: str, key: str, convert: Callable[[Any, Dict[str, Any]], T]) -> Dict[str, T]:
-    """Return what `calibrate` has kept under key in a folder's files (empty: none), by the names of the robots.
-
-    convert(value, content of the file) raises TypeError or ValueError for a value that cannot be used.
-    Raises: ProgramError that names the file.
-    """
-    found = {}
-    for path in sorted(glob.glob(os.path.join(os.path.expanduser(folder), "hero_*.yaml"))) if folder else []:
-        try:
-            content = {} if path.endswith(".previous.yaml") else parse_yaml(read_text(path))
-            if isinstance(content, dict) and key in content:
-                found[str(content.get("robot"))] = convert(content[key], content)
-        except (OSError, TypeError, ValueError) as error:
-            text = "%s: %s; correct the file, move it away, or set ~calibration_folder"
-            raise ProgramError(text % (path, one_line(error))) from None
-    return found

@@ -2,9 +2,8 @@
 
 import pytest
 
-from hero_node.errors import ProgramError
 from hero_node.texts import shorten
-from hero_node.yaml_text import MAX_CHARACTERS, YamlError, parse_yaml, read_calibrations, read_text
+from hero_node.yaml_text import MAX_CHARACTERS, YamlError, parse_yaml, read_text
 
 
 @pytest.mark.slow
@@ -43,23 +42,3 @@ def test_values_are_shown_in_some_words():
         assert len(shorten(value)) < 200 and shorten(value).isprintable()
     assert shorten([1, 2.5, "a"]) == "[1, 2.5, 'a']"
     assert shorten([[[1]]]) == "[[[...]]]"
-
-
-def test_calibrations_are_read_by_robot_but_not_those_before(tmp_path):
-    (tmp_path / "hero_1.yaml").write_text("robot: hero_1\nwidth_m: 0.06\nturns: 2\n")
-    (tmp_path / "hero_2.yaml").write_text("robot: hero_2\n")
-    (tmp_path / "hero_3.previous.yaml").write_text("robot: hero_3\nwidth_m: {")
-
-    def convert(width_m, content):
-        return float(width_m) * content["turns"]
-
-    assert read_calibrations(str(tmp_path), "width_m", convert) == {"hero_1": 0.12}
-    assert read_calibrations("", "width_m", convert) == {}
-    assert read_calibrations(str(tmp_path / "none"), "width_m", convert) == {}
-
-
-@pytest.mark.parametrize("text", ["robot: hero_4\nwidth_m: wide\n", "robot: hero_4\nwidth_m: [1]\n", "{"])
-def test_a_calibration_that_cannot_be_used_is_named(tmp_path, text):
-    (tmp_path / "hero_4.yaml").write_text(text)
-    with pytest.raises(ProgramError, match=r"hero_4.yaml: [^\n]*; correct the file, move it away"):
-        read_calibrations(str(tmp_path), "width_m", lambda width_m, content: float(width_m))

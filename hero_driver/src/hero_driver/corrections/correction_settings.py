@@ -3,11 +3,12 @@
 from dataclasses import dataclass, field
 from typing import Any, Mapping, NamedTuple, Optional, Tuple
 
+from hero_node.calibration_file import HERO_PLUS, STOCK
 from hero_node.number_checks import is_number
 from hero_node.parameters import Parameter, choice, declare, make_error, number, parse_given_ids, words
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
-from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, PLUS_WHEELS, STOCK
+from .robot_models import PLUS_ENCODER_MD5, PLUS_WHEELS
 from .tick_odometry import WheelGeometry
 
 
@@ -90,6 +91,8 @@ class CorrectionSettings:
     )
     own_wheels: Mapping[str, OwnWheels] = field(default_factory=dict)
     """Of robots whose wheels were calibrated, by name, such as hero_3; from ~calibration_folder."""
+    calibration_problems: Mapping[str, str] = field(default_factory=dict)
+    """Reasons why calibration files are not used, for users, by the robot's name."""
 
     def find_model(self, namespace: str, encoder_md5: str) -> str:
         """Return the model of the robot in namespace, whose Encoder message has this md5."""

@@ -18,12 +18,13 @@ from typing import (
     Tuple,
 )
 
+from hero_node.calibration_file import HERO_PLUS
 from hero_node.geometry import Pose
 
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
 from .correction_settings import CorrectionSettings
-from .robot_models import HERO_PLUS, PLUS_ENCODER_MD5, describe_conflict
+from .robot_models import PLUS_ENCODER_MD5, describe_conflict
 from .stamps import NS_PER_S, StampFilter
 from .tick_odometry import TickOdometry
 from .transforms import AddTransform, TransformCorrector
@@ -157,6 +158,12 @@ class RobotCorrections:
     def refused(self) -> int:
         """Messages and transforms that could not be used."""
         return self._refused + self.transforms.refused
+
+    @property
+    def calibration_problem(self) -> str:
+        """Reason why the robot's calibration file is not used, for users; empty: none."""
+        problem = self._settings.calibration_problems.get(self._namespace.strip("/"), "")
+        return problem and f"not calibrated: {problem}, then restart the driver"
 
     def take_problem(self) -> str:
         """Return what was wrong with a message since the last call, with a remedy, for users; empty: nothing."""

@@ -6,11 +6,10 @@ one field more, a distance sensor on the hat, and a bump shield. Its firmware lo
 
 from typing import AbstractSet
 
+from hero_node.calibration_file import STOCK
+
 from ..robot_constants import TICKS_PER_TURN
 from .tick_odometry import WheelGeometry
-
-STOCK = "hero"
-HERO_PLUS = "hero_plus"
 
 PLUS_WHEELS = WheelGeometry(wheel_diameter_m=0.050, wheel_separation_m=0.065, ticks_per_turn=TICKS_PER_TURN / 3.0)
 """The firmware's config.h divides the circumference by 96."""

@@ -53,7 +53,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def main() -> int:
-    """Calibrate; return the exit code. Raises: CalibrationError, ProgramError."""
+    """Calibrate; return the exit code. Raises: CalibrationError, CalibrationFileError, ProgramError."""
     options = parse_options(rospy.myargv(sys.argv)[1:])
     # Errors in files and folders are reported before waiting for robots.
     if options.restore:

@@ -5,6 +5,7 @@ import os
 import time
 from typing import Any, Dict, List, Optional, Sequence
 
+from hero_node.calibration_file import KeptCalibration
 from hero_node.command_line import say
 from hero_node.safe_file import replace_file
 
@@ -92,7 +93,7 @@ class Calibration:
         values = {key: numbers for result in results for key, numbers in result.to_file().items()}
         date = time.strftime("%Y-%m-%d %H:%M:%S")
         try:
-            store.save(path, store.KeptCalibration(probe.robot_id, date, values, {"model": probe.model}))
+            store.save(path, KeptCalibration(probe.robot_id, date, values, {"model": probe.model}))
             self._files[probe.robot_id] = [path]
             if importlib.util.find_spec("matplotlib") is not None:
                 from .figures import draw_robot

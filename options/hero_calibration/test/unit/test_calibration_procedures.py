@@ -18,6 +18,7 @@ from hero_calibration.procedures.placement import place_robots
 from hero_calibration.procedures.restore import restore
 from hero_calibration.procedures.velocity import VelocityResult, calibrate_velocity
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.calibration_file import KeptCalibration, read_calibration
 from hero_sim.link.wifi import PROFILES, Radio
 from hero_sim.robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
 from hero_sim.stepped.robot_rows import RobotRows
@@ -317,7 +318,7 @@ class TestCalibration:
         return Calibration(session, parts, str(tmp_path), ask).run()
 
     def load(self, tmp_path, robot_id):
-        return store.load(store.name_file(str(tmp_path), robot_id)).values
+        return read_calibration(store.name_file(str(tmp_path), robot_id)).values
 
     def test_results_are_saved_by_robot_and_printed_in_a_table(self, tmp_path, capsys):
         session = make_session(count=2, known=["robot=1,left_gain=0"])
@@ -387,7 +388,7 @@ class TestRestore:
         session = make_session(count=2)
         values = {"motor_centers_us": [1511, 1489], "velocity_gains": [7.0] * 6, "velocity_errors": [0.2, 0.1]}
         session.probes[1].is_lost = True
-        assert restore(session, {row: store.KeptCalibration(row, "today", values) for row in (0, 1)}) == 1
+        assert restore(session, {row: KeptCalibration(row, "today", values) for row in (0, 1)}) == 1
         assert session.probes[0].written == {key: values[key] for key in ("motor_centers_us", "velocity_gains")}
         output = capsys.readouterr().out
         assert "hero_0: restored motor_centers_us, velocity_gains of today" in output

@@ -24,6 +24,7 @@ from hero_calibration.procedures.wheels import CAMERA_SD, DIAMETER_M, NOMINAL_M,
 from hero_calibration.robots.probe import STALE_S, Probe
 from hero_calibration.robots.session import SETTLE_S, Session
 from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.calibration_file import KeptCalibration
 from hero_node.geometry import Pose
 
 
@@ -331,7 +332,7 @@ def test_gains_are_searched_first_for_the_integral_and_scaled_to_the_servo():
 def test_kept_calibrations_are_restored_robot_by_robot(tmp_path, capsys):
     for number, gains in ((0, [1.0, 2.0, 0.1] * 2), (1, [3.0, 4.0, 0.1] * 2)):
         values = {"velocity_gains": gains, "wheels_m": [0.05, 0.05, 0.06]}
-        store.save(store.name_file(str(tmp_path), number), store.KeptCalibration(number, "2026-01-01", values))
+        store.save(store.name_file(str(tmp_path), number), KeptCalibration(number, "2026-01-01", values))
     found = restore.load_calibrations(str(tmp_path), [], [1])
     assert list(found) == [1] and list(restore.load_calibrations(str(tmp_path), [], None)) == [0, 1]
     session = FakeSession(2)

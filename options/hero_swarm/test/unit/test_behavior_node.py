@@ -1,6 +1,7 @@
 """The program behavior on stepped robots, in their time: what it sends to robots, and what it says and shows."""
 
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -179,10 +180,13 @@ def test_without_all_motors_calibrated_velocities_drive_and_are_explained(stage,
 
 
 @pytest.mark.parametrize("content", ["dead_zones_us: [1, 2]", "dead_zones_us: [a, 2, 3, 4]", "{", "dead_zones_us: 3"])
-def test_an_unusable_calibration_file_is_named(stage, tmp_path, content):
+def test_an_unusable_calibration_file_is_named_and_its_robot_alone_lacks(stage, tmp_path, content):
+    for number in range(6):
+        write_calibration(tmp_path, number)
     (tmp_path / "hero_1.yaml").write_text("robot: hero_1\n" + content)
-    with pytest.raises(ProgramError, match=r"hero_1\.yaml: .*; "):
-        stage.start("milling", calibration_folder=str(tmp_path))
+    stage.start("milling", calibration_folder=str(tmp_path))
+    assert re.search(r"hero_1\.yaml: .*; correct the file", stage.warnings[0])
+    assert "the motors of hero_1 are not calibrated" in stage.warnings[1]
 
 
 @pytest.mark.parametrize("fence", ["1 2 3", "0 0 a 1", "1 0 0 1", "0 0 inf 1"])

@@ -2,9 +2,9 @@
 
 from typing import Dict, List, Optional, Sequence
 
+from hero_node.calibration_file import SETTINGS, KeptCalibration, list_files, read_calibration
 from hero_node.command_line import say
 
-from .. import store
 from ..errors import CalibrationError
 from ..robots.probe import Probe
 from ..robots.session import Session
@@ -12,14 +12,14 @@ from ..robots.session import Session
 
 def load_calibrations(
     folder: str, files: Sequence[str], robot_ids: Optional[Sequence[int]]
-) -> Dict[int, store.KeptCalibration]:
+) -> Dict[int, KeptCalibration]:
     """Return the calibrations of robots (None: all) in files (none: all of folder), by id.
 
-    Raises: CalibrationError for a wrong file, two files of one robot, or none at all.
+    Raises: CalibrationFileError for a wrong file. CalibrationError for two files of one robot, or none at all.
     """
-    calibrations: Dict[int, store.KeptCalibration] = {}
-    for path in files or store.list_files(folder):
-        calibration = store.load(path)
+    calibrations: Dict[int, KeptCalibration] = {}
+    for path in files or list_files(folder):
+        calibration = read_calibration(path)
         if robot_ids is not None and calibration.robot_id not in robot_ids:
             continue
         if calibration.robot_id in calibrations:
@@ -30,13 +30,13 @@ def load_calibrations(
     return calibrations
 
 
-def restore(session: Session, calibrations: Dict[int, store.KeptCalibration]) -> int:
+def restore(session: Session, calibrations: Dict[int, KeptCalibration]) -> int:
     """Write calibrations into the robots of session; return the exit code."""
     written: Dict[int, List[str]] = {probe.robot_id: [] for probe in session.probes}
 
     def write(probe: Probe) -> None:
         values = calibrations[probe.robot_id].values
-        for key in store.SETTINGS:
+        for key in SETTINGS:
             if key in values:
                 probe.write(key, values[key])
                 written[probe.robot_id].append(key)

@@ -23,7 +23,7 @@ SERVICES: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
     "velocity_gains": ("velocity_controller/pid_parameters", SetPID, float),
     "infrared_counts_m2": ("ir_calibration", SetIRCalibration, float),
 }
-"""Service that writes each of store.SETTINGS, and the type of its numbers."""
+"""Service that writes each of the SETTINGS, and the type of its numbers."""
 
 STOCK_TICKS = {"hero_plus": 288.0 / 96.0}
 """Ticks of the stock robot in one of another model (docs/robot_interface.md); their wheels differ by less than 4 %."""

@@ -1,26 +1,27 @@
 """Speeds to robots over ROS: velocities, or servo pulses if `calibrate motors` has measured their dead zones."""
 
-import math
-from typing import Any, Dict, List, Optional
+from typing import Dict, List, Optional
 
 import numpy as np
 import rospy
 
 from hero_client import Swarm
 from hero_msgs.msg import Motor
+from hero_node.calibration_file import read_calibrations
 from hero_node.texts import list_names
-from hero_node.yaml_text import read_calibrations
 from hero_sim.stepped.swarm import StepSwarm
 
 from ..behavior import PULSES
 from ..wheel_pulses import find_pulses, list_dead_zones
 
 
-def _convert_dead_zones(edges: Any, _content: Any) -> List[float]:
-    edges_us = [float(edge_us) for edge_us in edges]
-    if len(edges_us) != 4 or not all(map(math.isfinite, edges_us)):
-        raise ValueError("dead_zones_us must be four numbers")
-    return edges_us
+def _read_dead_zones(folder: str) -> Dict[str, List[float]]:
+    """Return the dead zones in the files of `calibrate`; files that cannot be used are logged."""
+    calibrations = read_calibrations(folder)
+    for problem in calibrations.problems.values():
+        rospy.logwarn("a calibration is not used: %s", problem)
+    key = "dead_zones_us"
+    return {name: kept.values[key] for name, kept in calibrations.found.items() if key in kept.values}
 
 
 def _list_simulated(count: int) -> Dict[str, List[float]]:
@@ -33,7 +34,7 @@ class WheelCommands:
     """Commands to all robots of a swarm."""
 
     def __init__(self, swarm: Swarm, drive: str, folder: str, simulated: int = 0) -> None:
-        """Take the dead zones from folder if drive is "pulses". Raises: ProgramError for an unusable file.
+        """Take the dead zones from folder if drive is "pulses".
 
         simulated: this many robots are those of a simulator with seed 0; their motors are as if calibrated.
         """
@@ -42,7 +43,7 @@ class WheelCommands:
         self._dead_zones_us: Optional[np.ndarray] = None
         if drive != PULSES:
             return
-        found = {**_list_simulated(simulated), **read_calibrations(folder, "dead_zones_us", _convert_dead_zones)}
+        found = {**_list_simulated(simulated), **_read_dead_zones(folder)}
         names = ["hero_%d" % robot.robot_id for robot in swarm]
         missing = [name for name in names if name not in found]
         if missing:
