@@ -37,13 +37,6 @@ def pytest_configure(config):
     config.addinivalue_line("markers", "option(module): needs this optional package, which the stage options has")
 
 
-def pytest_collection_modifyitems(config, items):
-    """Keep every n-th test where another process runs the others: HERO_PART is the number of the first and n."""
-    part, parts = map(int, os.environ.get("HERO_PART", "0/1").split("/"))
-    config.hook.pytest_deselected(items=[item for number, item in enumerate(items) if number % parts != part])
-    items[:] = items[part::parts]
-
-
 def pytest_runtest_setup(item):
     """Skip a test whose optional package is missing."""
     for marker in item.iter_markers("option"):

@@ -8,6 +8,7 @@ they are left out.
 import argparse
 import os
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import run_rostests
@@ -31,15 +32,13 @@ def make_pytest_job(name, arguments, results_dir):
 
 
 def make_unit_jobs(results_dir, packages):
-    """Return the jobs of some packages; the tests of a few packages are divided into jobs that all run at once."""
+    """Return a job for each package; the tests of a few packages are divided among processes, by pytest-xdist."""
     jobs = []
     for package in sorted(packages):
         files = sorted(map(str, packages[package]))
-        parts = min(2 * count_cores() // len(packages) or 1, len(files))
-        for part in range(parts):
-            name = package + (f"_{part + 1}_of_{parts}" if parts > 1 else "")
-            job = make_pytest_job("unit: " + name, files, results_dir / name)
-            jobs.append(job._replace(environment={"HERO_PART": f"{part}/{parts}"}))
+        workers = min(2 * count_cores() // len(packages), len(files))
+        divided = ["-n", str(workers), "--dist", "loadfile"] if workers > 1 and find_spec("xdist") else []
+        jobs.append(make_pytest_job("unit: " + package, [*divided, *files], results_dir / package))
     return jobs
 
 

@@ -35,7 +35,7 @@ def make_jobs(results_dir, families, table, long_minutes=0.0):
         command += ["--table", str(table), "-p", "no:cacheprovider"]
         timeout_s = SHORT_TIMEOUT_S
         if long_minutes:
-            command += ["-x", "--long", "--minutes", str(long_minutes)]
+            command += ["-x", "--long", "--minutes", str(long_minutes), "-o", "timeout=0"]
             timeout_s = LONG_TIMEOUT_S + 60.0 * long_minutes
         # Drivers of two families may have the same name: a stop that one keeps is not for the other.
         environment = {"ROS_HOME": str(own_results / "ros_home")}

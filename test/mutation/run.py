@@ -121,7 +121,7 @@ def fork(act):
 
 def run_pytest(paths, *plugins, options=()):
     """Run these tests in this process; return pytest's exit code."""
-    arguments = ["-q", "-p", "no:cacheprovider", f"--rootdir={ROOT}", *map(str, paths)]
+    arguments = ["-q", "-p", "no:cacheprovider", "-o", "timeout=0", f"--rootdir={ROOT}", *map(str, paths)]
     return int(pytest.main([*arguments, *options], plugins=list(plugins)))
 
 
