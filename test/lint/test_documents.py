@@ -17,6 +17,7 @@ TEST_NAME = re.compile(r"`(test_\w+)`")
 # Begin no command but stand before one.
 PREFIXES = ("sudo", "time", "timeout", "env", "exec", "nohup", "do", "then")
 NAMES_OF_ROS = {"/tf", "/tf_static", "/rosout", "/rosout_agg", "/diagnostics", "/clock", "/joy", "/odom"}
+STAGES = ("lint", "unit", "options", "noetic", "rostest", "noetic_rostest", "faults", "workspaces", "core")
 TALKS_ABOUT_NAMES = {
     "rostopic": ("echo", "hz", "bw", "info", "pub", "delay"),
     "rosservice": ("call", "info", "args", "type"),
@@ -102,10 +103,21 @@ def test_every_rosrun_names_a_program_its_options_and_parameters():
                 assert re.search(rf"\b{name}\b", read_package_text(package)), f"{place}: no parameter {name}"
 
 
-def test_every_rostest_exists():
-    for place, words in commands_of("rostest"):
-        if len(words) > 2 and words[1] in PACKAGES:
-            assert (sources.ROOT / words[1] / "test" / "rostest" / words[2]).is_file(), place
+def list_rostest_patterns():
+    """Places and patterns of `script/test rostest PATTERN`."""
+    for place in COMMANDS:
+        words = strip_prefixes(place.words)
+        if words and words[0].endswith("script/test"):
+            for stage, pattern in zip(words[1:], words[2:]):
+                if stage in ("rostest", "noetic_rostest") and pattern not in STAGES:
+                    yield place, pattern
+
+
+def test_every_pattern_of_rostests_matches_one():
+    patterns = list(list_rostest_patterns())
+    assert patterns, "no document names a rostest: take this test out"
+    for place, pattern in patterns:
+        assert any(pattern in sources.name_of(path) for path in sources.find("test/rostest/*.test")), place
 
 
 def test_every_script_and_its_options_exist():

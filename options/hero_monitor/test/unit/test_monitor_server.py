@@ -13,15 +13,13 @@ from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import (
     SOCKETS_MAX,
-    TOKEN_BURST,
-    TOKEN_PERIOD_S,
     FileHandler,
     LoginHandler,
     PageSocket,
     PictureHandler,
+    Server,
     choose_served,
 )
-from hero_node.token_bucket import TokenBuckets
 
 TOKEN = "a secret of more than sixteen letters"
 OURS = {"Origin": "http://localhost"}
@@ -106,8 +104,10 @@ RIGHT = json.dumps({"token": TOKEN})
 
 
 def make_login(headers=OURS):
-    """Return a function that sends a login with this body from an address."""
-    tokens = TokenBuckets(TOKEN_BURST, 1.0 / TOKEN_PERIOD_S)
+    """Return a function that sends a login with this body from an address, to a server of its own."""
+    login = tornado.httputil.HTTPServerRequest(method="POST", uri="/login", connection=mock.Mock())
+    server = Server(Access(TOKEN, []), ClientLimits(400), mock.Mock())
+    tokens = server._http.request_callback.find_handler(login).handler_kwargs["wrong_tokens"]
     fixed = {"headers": headers, "method": "POST", "token": TOKEN, "wrong_tokens": tokens}
     return lambda body, address="10.0.0.2": ask(LoginHandler, body=body.encode(), address=address, **fixed)
 
@@ -129,7 +129,7 @@ def test_wrong_tokens_are_refused_and_counted(body):
     assert status == 204
     assert "HttpOnly" in headers["Set-Cookie"]
     assert "SameSite=Strict" in headers["Set-Cookie"]
-    assert [log_in(body)[0] for _ in range(TOKEN_BURST)] == [403] * TOKEN_BURST
+    assert [log_in(body)[0] for _ in range(5)] == [403] * 5
     status, headers, text = log_in(RIGHT)
     assert status == 429
     assert "Set-Cookie" not in headers
@@ -144,9 +144,9 @@ def test_pages_that_can_be_seen_are_served_first():
 
 def test_too_many_wrong_tokens_make_their_address_wait_and_no_other(clock):
     log_in = make_login()
-    assert [log_in("wrong")[0] for _ in range(TOKEN_BURST + 1)] == [403] * TOKEN_BURST + [429]
+    assert [log_in("wrong")[0] for _ in range(6)] == [403] * 5 + [429]
     assert log_in("wrong", "10.0.0.1")[0] == 403 and log_in("wrong", "::ffff:10.0.0.2")[0] == 429
-    for waited_s, status in ((TOKEN_PERIOD_S - 0.1, 429), (TOKEN_PERIOD_S + 0.1, 204)):
+    for waited_s, status in ((4.9, 429), (5.1, 204)):
         clock.return_value = 1000.0 + waited_s
         assert log_in(RIGHT)[0] == status
 
@@ -155,4 +155,4 @@ def test_an_address_that_waited_long_has_no_more_tries_than_a_new_one(clock):
     log_in = make_login()
     assert log_in("wrong")[0] == 403
     clock.return_value = 2000.0
-    assert [log_in("wrong")[0] for _ in range(TOKEN_BURST + 1)] == [403] * TOKEN_BURST + [429]
+    assert [log_in("wrong")[0] for _ in range(6)] == [403] * 5 + [429]
