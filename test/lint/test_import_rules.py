@@ -82,6 +82,7 @@ PURE_ROOMS = (
     "hero_node.clock",
     "hero_node.errors",
     "hero_node.geometry",
+    "hero_node.marked_yaml",
     "hero_node.number_checks",
     "hero_node.parameters",
     "hero_node.texts",

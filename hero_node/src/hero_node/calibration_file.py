@@ -6,12 +6,13 @@ One damaged file leaves its robot uncalibrated, and is told of; it never keeps t
 import math
 import os
 import re
-from typing import Any, Dict, List, NamedTuple
+from typing import Any, Dict, List, NamedTuple, Tuple
 
 from .errors import HeroError
+from .marked_yaml import Entry, EntryError, read_entries
 from .number_checks import is_number
 from .texts import make_printable, shorten
-from .yaml_text import YamlError, parse_yaml, read_text
+from .yaml_text import YamlError, read_text
 
 STOCK, HERO_PLUS = "hero", "hero_plus"
 """Models of the robot."""
@@ -54,11 +55,15 @@ RESULTS = {
 }
 """Results that programs use, or that the user may want to look up."""
 
+NUMBERS = {**SETTINGS, **RESULTS}
+
 OTHERS = ("model", "ticks_per_turn")
 """Model of the robot, and ticks per turn of a wheel that were entered by hand."""
 
-MODELS = ("", STOCK, HERO_PLUS)
-"""Values of model; empty: not known."""
+MODELS = (STOCK, HERO_PLUS)
+"""Values of model; an empty one is not known."""
+
+REMEDY = "correct the file, or move it away"
 
 
 class KeptCalibration(NamedTuple):
@@ -113,53 +118,52 @@ def read_calibrations(folder: str) -> Calibrations:
 
 
 def read_calibration(path: str) -> KeptCalibration:
-    """Read a file. Raises: CalibrationFileError with file, key, value and what is allowed."""
+    """Read a file. Raises: CalibrationFileError with file, line, key, value and what is allowed."""
+    robot = ""
     try:
-        content = parse_yaml(read_text(path))
+        content = read_entries(read_text(path), path, "robot: hero_3").mapping(None, ("robot",))
+        robot_id = _read_robot_id(content["robot"])
+        robot = "hero_%d" % robot_id
+        values, others = _read_values(content)
     except OSError as error:
-        raise _refuse(path, f"cannot be read: {error.strerror}") from error
+        raise CalibrationFileError(f"{path}: cannot be read: {error.strerror}; {REMEDY}") from error
     except YamlError as error:
-        raise _refuse(path, f"is no calibration: {error}") from error
-    if not isinstance(content, dict) or "robot" not in content:
-        raise _refuse(path, "is no calibration: it needs a line robot: hero_N")
-    match = re.fullmatch(r"hero_([0-9]{1,9})", str(content["robot"]))
-    if match is None:
-        raise _refuse(path, f"robot must be hero_N, not {shorten(content['robot'])}")
-    robot_id = int(match.group(1))
-    try:
-        values, others = _check(content)
-    except ValueError as error:
-        raise _refuse(path, str(error), "hero_%d" % robot_id) from error
-    return KeptCalibration(robot_id, make_printable(str(content.get("date", ""))), values, others)
+        raise CalibrationFileError(f"{path}: {error}; {REMEDY}") from error
+    except EntryError as error:
+        raise CalibrationFileError(f"{error}; {REMEDY}", robot) from error
+    date = str(content["date"].value) if "date" in content else ""
+    return KeptCalibration(robot_id, make_printable(date), values, others)
 
 
-def _check(content: Dict[Any, Any]) -> Any:
-    """Return numbers and others of a file's content. Raises: ValueError."""
-    known = {**SETTINGS, **RESULTS}
-    for key in content:
-        if key not in ("robot", "date", *OTHERS, *known):
-            names = ", ".join(("robot", "date", *OTHERS, *known))
-            raise ValueError(f"unknown key {shorten(key)}; known are {names}")
-    values = {key: _check_numbers(key, content[key], allowed) for key, allowed in known.items() if key in content}
-    others = {key: content[key] for key in OTHERS if key in content}
-    ticks_per_turn, model = others.get("ticks_per_turn"), others.get("model", "")
-    if ticks_per_turn is not None and not is_number(ticks_per_turn, 1.0, 1e6):
-        raise ValueError(f"ticks_per_turn must be a number from 1 to 1000000, not {shorten(ticks_per_turn)}")
-    if model not in MODELS:
-        raise ValueError(f"model must be {STOCK} or {HERO_PLUS}, not {shorten(model)}")
+def _read_robot_id(entry: Entry) -> int:
+    match = re.fullmatch(r"hero_([0-9]{1,9})", str(entry.value))
+    return int(match.group(1)) if match else entry.refuse("hero_N")
+
+
+def _read_values(content: Dict[str, Entry]) -> Tuple[Dict[str, List[float]], Dict[str, Any]]:
+    """Return the numbers and the others of a file. Raises: EntryError."""
+    values: Dict[str, List[float]] = {}
+    others: Dict[str, Any] = {}
+    for key, entry in content.items():
+        if key in NUMBERS:
+            values[key] = _read_numbers(entry, NUMBERS[key])
+        elif key == "model":
+            others[key] = "" if entry.value == "" else entry.choice(MODELS)
+        elif key == "ticks_per_turn":
+            others[key] = None if entry.value is None else entry.number(1.0, 1e6, "")
+        elif key not in ("robot", "date"):
+            names = ", ".join(("robot", "date", *OTHERS, *NUMBERS))
+            raise EntryError(f"{entry.place}: unknown key {shorten(key)}; known are {names}")
     return values, others
 
 
-def _check_numbers(key: str, found: Any, allowed: Numbers) -> List[float]:
-    text = "%s must be %d numbers from %g to %g (%s)" % (key, *allowed[:4])
-    if not isinstance(found, list) or len(found) != allowed.length:
-        raise ValueError(f"{text}, not {shorten(found)}")
-    for number in found:
+def _read_numbers(entry: Entry, allowed: Numbers) -> List[float]:
+    text = "%d numbers from %g to %g (%s)" % allowed[:4]
+    if not isinstance(entry.value, list) or len(entry.value) != allowed.length:
+        entry.refuse(text)
+    for item in entry.value:
+        number = item.value
         is_unknown = allowed.may_be_unknown and isinstance(number, float) and math.isnan(number)
         if not is_unknown and not is_number(number, allowed.low, allowed.high):
-            raise ValueError(f"{text}, not {shorten(number)}")
-    return [float(number) for number in found]
-
-
-def _refuse(path: str, reason: str, robot: str = "") -> CalibrationFileError:
-    return CalibrationFileError(f"{path}: {make_printable(reason)}; correct the file, or move it away", robot)
+            item.refuse(text)
+    return [float(item.value) for item in entry.value]

@@ -99,33 +99,36 @@ def test_files_are_listed_without_those_that_newer_ones_replaced(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("motor_centers_us: [1511, 9000]", r"motor_centers_us must be 2 numbers from 1200 to 1800 .*, not 9000;"),
-        ("motor_centers_us: [1511]", r"motor_centers_us must be 2 numbers .*, not \[1511\]"),
-        ("motor_centers_us: 2026-11-21", "motor_centers_us must be 2 numbers"),
-        ("motor_centers_us: [2026-11-21, 1500]", r"not datetime.date\(2026"),
-        ("motor_centers_us: [1%s, 1500]" % ("0" * 400), "not 1000"),
-        ("motor_centers_us: [1%s, 1500]" % ("0" * 5000), "is no calibration|not 1000"),
-        ("motor_centers_us: [true, 1500]", "not True"),
-        ("velocity_gains: [1.0e+9, 1, 1, 1, 1, 1]", r"velocity_gains must be 6 numbers .* not 1000000000\.0"),
-        ("velocity_gains: [.nan, 1, 1, 1, 1, 1]", "not nan"),
-        ("velocity_gains: [nan, 1, 1, 1, 1, 1]", "not 'nan'"),
-        ("velocity_gains: [-.inf, 1, 1, 1, 1, 1]", "not -inf"),
-        ("velocity_gains: [[1], 1, 1, 1, 1, 1]", r"not \[1\]"),
-        ("infrared_counts_m2: {a: 1}", "infrared_counts_m2 must be 8 numbers .* not {.a.: 1}"),
-        ("velocity_errors: &a [*a, *a]", r"not \[\[\[...\], \[...\]\], "),
-        ("velocity_errors: [0.1, .inf]", "not inf"),
+        ("motor_centers_us: [1511, 9000]", "motor_centers_us is 9000, but must be 2 numbers from 1200 to 1800 .*;"),
+        ("motor_centers_us: [1511]", "motor_centers_us is 'a list', but must be 2 numbers"),
+        ("motor_centers_us: 2026-11-21", r"is datetime.date\(2026"),
+        ("motor_centers_us: [2026-11-21, 1500]", r"is datetime.date\(2026"),
+        ("motor_centers_us: [1%s, 1500]" % ("0" * 400), "is 1000"),
+        ("motor_centers_us: [1%s, 1500]" % ("0" * 5000), "motor_centers_us: Exceeds|is 1000"),
+        ("motor_centers_us: [true, 1500]", "is True"),
+        ("motor_centers_us: [!!int '', 1500]", "motor_centers_us: "),
+        ("motor_centers_us: [2026-13-45, 1500]", "motor_centers_us: month must be"),
+        ("velocity_gains: [1.0e+9, 1, 1, 1, 1, 1]", r"velocity_gains is 1000000000\.0, but must be 6 numbers"),
+        ("velocity_gains: [.nan, 1, 1, 1, 1, 1]", "is nan"),
+        ("velocity_gains: [nan, 1, 1, 1, 1, 1]", "is 'nan'"),
+        ("velocity_gains: [-.inf, 1, 1, 1, 1, 1]", "is -inf"),
+        ("velocity_gains: [[1], 1, 1, 1, 1, 1]", "is 'a list'"),
+        ("infrared_counts_m2: {a: 1}", "infrared_counts_m2 is 'a mapping', but must be 8 numbers"),
+        ("velocity_errors: &a [*a, *a]", "anchors cannot be used"),
+        ("velocity_errors: [0.1, .inf]", "is inf"),
+        ("model: turtle", "model is 'turtle', but must be one of: hero, hero_plus"),
+        ("ticks_per_turn: 0.9", "ticks_per_turn is 0.9, but must be a number from 1 to"),
         ("color: red", "unknown key 'color'"),
-        ("? [a]\n: 1", "is no calibration: .* line 2"),
-        ("\x00", "is no calibration"),
-        ("date: [", "is no calibration: .* line 3"),
+        ("robot: hero_4", "'robot' appears twice"),
+        ("? [a]\n: 1", "a name must be a text"),
     ],
 )
-def test_a_wrong_file_is_refused_with_file_key_and_value(change, words, tmp_path):
+def test_a_wrong_file_is_refused_with_line_key_and_value(change, words, tmp_path):
     path = tmp_path / "hero_3.yaml"
     path.write_text("robot: hero_3\n" + change + "\n")
     with pytest.raises(CalibrationFileError, match=words) as caught:
         read_calibration(str(path))
-    assert str(caught.value).startswith(str(path)) and str(caught.value).isprintable()
+    assert str(caught.value).startswith(f"{path}, line 2: ") and str(caught.value).isprintable()
 
 
 def test_numbers_at_their_limits_are_taken_and_beyond_them_refused(tmp_path):
@@ -147,7 +150,7 @@ def test_numbers_at_their_limits_are_taken_and_beyond_them_refused(tmp_path):
             if allowed:
                 assert read_calibration(str(path)).values[key] == [number] * count
             else:
-                with pytest.raises(CalibrationFileError, match=key + " must be"):
+                with pytest.raises(CalibrationFileError, match=key + " is .*, but must be"):
                     read_calibration(str(path))
 
 
@@ -159,14 +162,21 @@ def test_a_date_cannot_draw_on_the_terminal(tmp_path):
 @pytest.mark.parametrize("robot", ["wall_e", "hero_", "hero_-1", "hero_" + "9" * 5000, "[hero_3]", "hero_\u0663"])
 def test_a_file_of_no_robot_is_refused(robot, tmp_path):
     (tmp_path / "x.yaml").write_text("robot: %s\n" % robot, encoding="utf-8")
-    with pytest.raises(CalibrationFileError, match=r"x\.yaml: robot must be hero_N"):
+    with pytest.raises(CalibrationFileError, match=r"x\.yaml, line 1: robot is .*, but must be hero_N"):
         read_calibration(str(tmp_path / "x.yaml"))
 
 
 def test_a_file_that_is_no_calibration_is_refused(tmp_path):
-    for content in ("- 1\n", "", "a\n"):
+    for content, words in (
+        ("- 1\n", ": must hold names and values, such as robot: hero_3;"),
+        ("", ": must hold names and values"),
+        ("a\n", ": must hold names and values"),
+        ("\x00", ": not YAML: "),
+        ("robot: hero_3\ndate: [", ", line 2: not YAML: "),
+        ("date: today\n", ", line 1: robot is missing"),
+    ):
         (tmp_path / "x.yaml").write_text(content)
-        with pytest.raises(CalibrationFileError, match=r"x\.yaml: is no calibration"):
+        with pytest.raises(CalibrationFileError, match=r"x\.yaml" + words):
             read_calibration(str(tmp_path / "x.yaml"))
     with pytest.raises(CalibrationFileError, match="No such file"):
         read_calibration(str(tmp_path / "y.yaml"))

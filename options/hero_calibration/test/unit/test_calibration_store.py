@@ -60,16 +60,16 @@ def test_what_another_program_saves_before_the_lock_is_taken_stays(tmp_path, mon
     @contextmanager
     def lock_after_another(locked):
         monkeypatch.setattr(store, "lock_file", lock_file)
-        store.save(path, store.KeptCalibration(3, "meanwhile", {"wheels_m": [0.05, 0.05, 0.065]}))
+        store.save(path, KeptCalibration(3, "meanwhile", {"wheels_m": [0.05, 0.05, 0.065]}))
         with lock_file(locked):
             yield
 
     monkeypatch.setattr(store, "lock_file", lock_after_another)
     store.save(path, NEWER)
-    kept = store.load(path)
+    kept = read_calibration(path)
     assert kept.date == "later" and kept.values["wheels_m"] == [0.05, 0.05, 0.065]
     assert {key: kept.values[key] for key in NEWER.values} == NEWER.values
-    assert store.load(str(tmp_path / "hero_3.previous.yaml")).date == "meanwhile"
+    assert read_calibration(str(tmp_path / "hero_3.previous.yaml")).date == "meanwhile"
 
 
 def test_comments_stay_when_a_robot_is_calibrated_again(tmp_path):

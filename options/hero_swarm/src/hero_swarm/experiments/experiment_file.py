@@ -17,12 +17,12 @@ import math
 import os
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
+from hero_node.marked_yaml import Entry, EntryError, read_entries
 from hero_sim.world.arena_file import SHIPPED
 
 from ..metrics import FALLING, METRICS
 from ..sources import Sources
 from .errors import ExperimentError
-from .marked_yaml import Entry, read_entries
 
 MAX_ROBOTS = 1000
 MAX_TIME_S = 86_400.0
@@ -189,7 +189,14 @@ def parse_experiment(
     read when it is needed first. Behavior and parameters are checked when they are loaded.
     Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
     """
-    root = read_entries(text, file).mapping(_KEYS, _REQUIRED)
+    try:
+        return _parse(text, file, os.path.dirname(file) if folder is None else folder, sources or Sources())
+    except EntryError as error:
+        raise ExperimentError(str(error)) from None
+
+
+def _parse(text: str, file: str, folder: str, sources: Sources) -> Experiment:
+    root = read_entries(text, file, "behavior: aggregation.Aggregation").mapping(_KEYS, _REQUIRED)
     start = _parse_start(root.get("start"))
     seeds = _parse_seeds(root["seeds"])
     cells = _parse_cells(root, len(seeds))
@@ -205,8 +212,6 @@ def parse_experiment(
     behavior = root["behavior"].text()
     inner = [root[name].mapping() for name in ("start", "vary", "parameters") if name in root]
     places = {name: entry.place for entries in (*inner, root) for name, entry in entries.items()}
-    folder = os.path.dirname(file) if folder is None else folder
-    sources = sources or Sources()
     return Experiment(
         behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare, places, folder, sources
     )

@@ -2,9 +2,9 @@
 
 import pytest
 
+from hero_node.yaml_text import MAX_CHARACTERS
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Bound, Start, parse_experiment
-from hero_swarm.experiments.marked_yaml import MAX_CHARACTERS
 
 FILE = """\
 behavior: aggregation.Aggregation

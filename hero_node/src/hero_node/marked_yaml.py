@@ -8,14 +8,20 @@ from typing import Any, Collection, Dict, List, NamedTuple, NoReturn, Optional, 
 
 import yaml
 
-from hero_node.number_checks import is_number, is_whole_number
-from hero_node.texts import one_line, shorten
-from hero_node.yaml_text import MAX_CHARACTERS
-
-from .errors import ExperimentError
+from .errors import HeroError
+from .number_checks import is_number, is_whole_number
+from .texts import make_printable, one_line, shorten
+from .yaml_text import MAX_CHARACTERS
 
 MAX_DEPTH = 20
 """Of lists and mappings within each other; an experiment has four."""
+
+
+class EntryError(HeroError):
+    """A mistake in a file: one line with file, line, name, value and what is allowed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(make_printable(text))
 
 
 class Entry(NamedTuple):
@@ -32,10 +38,10 @@ class Entry(NamedTuple):
     place: str
 
     def refuse(self, text: str) -> NoReturn:
-        """Raise ExperimentError: place, name and value, and what it must be."""
+        """Raise EntryError: place, name and value, and what it must be."""
         kinds: Dict[type, str] = {list: "a list", dict: "a mapping"}
         shown = kinds.get(type(self.value), self.value)
-        raise ExperimentError(f"{self.place}: {self.name} is {shorten(shown)}, but must be {text}")
+        raise EntryError(f"{self.place}: {self.name} is {shorten(shown)}, but must be {text}")
 
     def number(self, low: float, high: float, unit: str) -> float:
         """Return a number in low..high."""
@@ -78,10 +84,10 @@ class Entry(NamedTuple):
         for name, entry in self.value.items():
             if allowed is not None and name not in allowed:
                 text = "%s: unknown %s%s; allowed are: %s"
-                raise ExperimentError(text % (entry.place, shorten(name), where, ", ".join(allowed)))
+                raise EntryError(text % (entry.place, shorten(name), where, ", ".join(allowed)))
         for name in required:
             if name not in self.value:
-                raise ExperimentError(f"{self.place}: {name} is missing{where}")
+                raise EntryError(f"{self.place}: {name} is missing{where}")
         return dict(self.value)
 
     def single(self, allowed: Collection[str]) -> Tuple[str, "Entry"]:
@@ -92,23 +98,23 @@ class Entry(NamedTuple):
         return next(iter(mapping.items()))
 
 
-def read_entries(text: str, file: str) -> Entry:
-    """Return the mapping that text, the contents of file, holds.
+def read_entries(text: str, file: str, example: str) -> Entry:
+    """Return the mapping that text, the contents of file, holds; example: of a line in it.
 
-    Raises: ExperimentError with file and line for what is not YAML, not a mapping, or too large.
+    Raises: EntryError with file and line for what is not YAML, not a mapping, or too large.
     """
     if len(text) > MAX_CHARACTERS:
-        raise ExperimentError("%s: longer than %d characters, so not an experiment" % (file, MAX_CHARACTERS))
+        raise EntryError("%s: longer than %d characters" % (file, MAX_CHARACTERS))
     try:
         loader = _Loader(text)
         loader.name = file
         node = loader.get_single_node()
     except yaml.MarkedYAMLError as error:
-        raise ExperimentError(f"{_find_place(error.problem_mark)}: not YAML: {error.problem}") from None
+        raise EntryError(f"{_find_place(error.problem_mark)}: not YAML: {error.problem}") from None
     except yaml.YAMLError as error:
-        raise ExperimentError(f"{file}: not YAML: {one_line(error)}") from None
+        raise EntryError(f"{file}: not YAML: {one_line(error)}") from None
     if not isinstance(node, yaml.MappingNode):
-        raise ExperimentError(f"{file}: must hold names and values, such as behavior: aggregation.Aggregation")
+        raise EntryError(f"{file}: must hold names and values, such as {example}")
     return _convert(node, "", loader)
 
 
@@ -122,7 +128,7 @@ class _Loader(yaml.SafeLoader):  # type: ignore[misc]
         self._depth += isinstance(event, yaml.CollectionStartEvent)
         if event.anchor is not None or self._depth > MAX_DEPTH:
             what = "more than %d levels" % MAX_DEPTH if event.anchor is None else "anchors cannot be used"
-            raise ExperimentError(f"{_find_place(event.start_mark)}: {what}")
+            raise EntryError(f"{_find_place(event.start_mark)}: {what}")
         node = super().compose_node(parent, index)
         self._depth -= isinstance(event, yaml.CollectionStartEvent)
         return node
@@ -140,8 +146,8 @@ def _convert(node: yaml.Node, name: str, loader: Any) -> Entry:
         return Entry([_convert(item, name, loader) for item in node.value], name, place)
     try:
         return Entry(loader.construct_object(node), name, place)
-    except (yaml.YAMLError, ValueError) as error:
-        raise ExperimentError(f"{place}: {name}: {one_line(error)}") from None
+    except Exception as error:  # noqa: BLE001 - PyYAML raises many kinds at invalid dates and numbers
+        raise EntryError(f"{place}: {name}: {one_line(error)}") from None
 
 
 def _convert_mapping(node: yaml.MappingNode, name: str, loader: Any) -> Dict[str, Entry]:
@@ -149,9 +155,9 @@ def _convert_mapping(node: yaml.MappingNode, name: str, loader: Any) -> Dict[str
     for key_node, value_node in node.value:
         place = _find_place(key_node.start_mark)
         if not isinstance(key_node, yaml.ScalarNode):
-            raise ExperimentError(f"{place}: a name must be a text")
+            raise EntryError(f"{place}: a name must be a text")
         key = str(key_node.value)
         if key in mapping:
-            raise ExperimentError(f"{place}: {shorten(key)} appears twice")
+            raise EntryError(f"{place}: {shorten(key)} appears twice")
         mapping[key] = _convert(value_node, f"{name}.{key}" if name else key, loader)
     return mapping
