@@ -13,7 +13,7 @@ from hero_client.apps import joystick_teleop, keyboard_teleop
 from hero_client.apps.joystick_teleop import DRAIN_S, SILENCE_S, JoystickMapping, JoystickTeleop
 from hero_client.apps.keyboard_teleop import PERIOD_S, KeyboardTeleop
 from hero_client.apps.robot_choice import ChoiceButtons, RobotChoice
-from hero_client.apps.teleop_output import PAUSE_S, TeleopOutput
+from hero_client.apps.teleop_output import HOLD_ENDED, PAUSE_S, TeleopOutput
 from hero_client.controllers.formation_drive import FormationDrive
 from hero_client.ros.stop_status import StopStatus
 from hero_node.errors import ProgramError
@@ -125,6 +125,7 @@ def test_keys_stop_and_release_all_robots(shown):
     teleop.step(0.2)
     assert velocities(swarm.links[0])[-1] == (0.0, 0.0)
     swarm.links[0].is_stopped = True
+    teleop.step(0.96)
     for now_s in (1.0, 2.0):
         teleop.press("w", now_s)
         teleop.step(now_s)
@@ -133,13 +134,39 @@ def test_keys_stop_and_release_all_robots(shown):
         "all robots are stopped, so hero_0 cannot move: r releases them\n"
     ]
     swarm.links[0].is_stopped = False
+    teleop.step(2.9)
     teleop.press("w", 3.0)
     teleop.step(3.0)
     assert velocities(swarm.links[0]) == [(0.1, 0.0)]
+    teleop.step(3.8)
     swarm.links[0].is_stopped = True
-    teleop.press("a", 3.1)
-    teleop.step(3.1)
+    teleop.step(3.9)
+    teleop.press("a", 4.0)
+    teleop.step(4.0)
     assert len(shown) == 2, "said again after it was released"
+
+
+@pytest.mark.parametrize("other", [0, 1])
+def test_a_key_that_repeats_through_a_stop_drives_after_a_new_press(shown, other):
+    swarm = make_swarm(0, 1)
+    teleop = KeyboardTeleop(swarm, 0.1, 1.0)
+
+    def hold(start_s, end_s):
+        for step in range(round((end_s - start_s) / 0.05)):
+            teleop.press("w", start_s + 0.05 * step)
+            teleop.step(start_s + 0.05 * step)
+        return velocities(swarm.links[0])
+
+    assert (0.1, 0.0) in hold(0.0, 1.0)
+    swarm.links[other].is_stopped = True
+    hold(1.0, 3.0)
+    assert shown == [HOLD_ENDED + "\n"]
+    swarm.links[other].is_stopped = False
+    assert (0.1, 0.0) not in hold(3.0, 5.0)
+    assert shown == [HOLD_ENDED + "\n"] * 2, "once for the stop, once for the release"
+    for now_s in (5.2, 5.3):
+        teleop.step(now_s)
+    assert hold(5.4, 6.0)[0] == (0.1, 0.0) and len(shown) == 2
 
 
 def test_the_live_line_tells_the_robot_or_what_keeps_it_from_driving():
@@ -227,6 +254,37 @@ def test_what_waited_during_a_pause_drives_no_robot(shown):
     push(teleop, 4)
     teleop.step(swarm.now_s)
     assert velocities(swarm.links[0]) == [(0.1, 0.0)]
+
+
+def test_an_enable_button_held_through_a_stop_drives_after_a_new_press(shown):
+    swarm = make_swarm(0, 1)
+    teleop = JoystickTeleop(swarm, MAPPING)
+
+    def use(*messages):
+        """Receive messages of these pressed buttons and stick positions, step, and return what was sent."""
+        for pressed, stick in messages:
+            push(teleop, *pressed, stick=stick)
+        teleop.step(swarm.now_s)
+        swarm.sleep(0.1)
+        return velocities(swarm.links[0])
+
+    held, released = ((4,), 1.0), ((), 1.0)
+    assert use(held) == [(0.1, 0.0)]
+    swarm.links[1].is_stopped = True
+    assert use(held) == [(0.0, 0.0)] and use(held) == []
+    swarm.links[1].is_stopped = False
+    assert use(held) == [] == use(((4,), 0.0)) == use(held), "a stick in its middle is no release of the button"
+    assert [said for said in shown if said[0] == "logwarn"] == [("logwarn", HOLD_ENDED)] * 2
+    assert use() == [] == use(released) and use(held) == [(0.1, 0.0)]
+    swarm.links[0].is_stopped = True
+    assert use(released, held) == [(0.0, 0.0)], "which came first is not known"
+    swarm.links[0].is_stopped = False
+    assert use(held) == [] and use(released, held) == [(0.1, 0.0)], "a short release"
+    for is_stopped in (True, False):
+        use(released)
+        swarm.links[0].is_stopped = is_stopped
+        use()
+    assert use(held) == [(0.1, 0.0)], "nothing was held through these"
 
 
 def test_a_press_of_the_stop_button_stops_all_once_even_after_a_pause(shown):

@@ -115,6 +115,7 @@ def test_enter_stops_all_robots_of_all_drivers_and_r_releases_them(swarm, capsys
     use_keys(swarm, teleop, [*hold("w", 1.0), (1.0, "\r")], 1.1)
     assert swarm.drivers.requests == [True]
     swarm.emergency_stop()
+    use_keys(swarm, teleop, [], 0.1)
     use_keys(swarm, teleop, hold("w", 1.0), 1.0)
     assert "all robots are stopped, so hero_0 cannot move" in capsys.readouterr().out
     assert swarm[0].velocity == (0.0, 0.0)

@@ -47,6 +47,10 @@ class JoystickMapping(NamedTuple):
     enable_button: int
     stop_button: int
 
+    def is_enabled(self, buttons: Sequence[int]) -> bool:
+        """Return whether the enable button is held."""
+        return self.enable_button < len(buttons) and bool(buttons[self.enable_button])
+
     def read(self, joy: Joy) -> Velocity:
         """Return the command of a message; STOP while the enable button is released or an axis is not finite.
 
@@ -62,7 +66,7 @@ class JoystickMapping(NamedTuple):
         if not math.isfinite(linear) or not math.isfinite(angular):
             rospy.logwarn_once("the joystick sends numbers that are not finite: the robot is stopped meanwhile")
             return STOP
-        if not joy.buttons[self.enable_button]:
+        if not self.is_enabled(joy.buttons):
             return STOP
         return Velocity(linear * self.linear_m_s, angular * self.angular_rad_s)
 
@@ -132,14 +136,20 @@ class JoystickTeleop:
             self._next_warning_s = now_s + REPORT_PERIOD_S
             rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
         while self._presses:
+            buttons = self._presses.popleft()
+            self._output.note_hold(self._mapping.is_enabled(buttons))
             was_formation = self._choice.is_formation
-            for robot in self._choice.read(self._presses.popleft()):
+            for robot in self._choice.read(buttons):
                 robot.drive(*STOP)
             if self._choice.is_formation != was_formation:
                 self._formation = None
                 for robot in self._choice.robots:
                     robot.drive(*STOP)
                     robot._link.subscribe("odom")  # by each alone none is read
+        command = self._output.limit(command, self._swarm)
+        warning = self._output.take_warning()
+        if warning:
+            rospy.logwarn(warning)
         missing = self._drive(command) if self._output.passes(command) else None
         self._report_stop()
         self._swarm.report_missing(missing)

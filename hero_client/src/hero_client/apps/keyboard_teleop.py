@@ -183,6 +183,11 @@ class KeyboardTeleop:
     def step(self, now_s: float) -> None:
         """Send what is due: a change at once, else every PERIOD_S."""
         command = self._drive.command(now_s)
+        self._output.note_hold(command != STOP)
+        command = self._output.limit(command, self._swarm)
+        warning = self._output.take_warning()
+        if warning:
+            show_text(f"{warning}\n")
         if command == self._sent and now_s < self._next_send_s:
             return
         self._next_send_s = now_s + PERIOD_S

@@ -1,9 +1,19 @@
-"""Which commands of a teleoperation are sent: every motion, one stop after it, and no motion of before a pause."""
+"""Which commands of a teleoperation are sent.
+
+Every motion, one stop after it, and no motion of before a pause, a stop or a release of all robots.
+"""
+
+from typing import Iterable, Set
 
 from hero_node.geometry import STOP, Velocity
 
+from ..robots.robot_base import BaseRobot
+
 PAUSE_S = 0.5
 """A teleoperation takes a step every 0.05 to 0.1 s; after more than this it, or its PC, was suspended or too busy."""
+
+
+HOLD_ENDED = "robots were stopped or released, which ends what you hold: let go, then press again"
 
 
 class TeleopOutput:
@@ -11,6 +21,31 @@ class TeleopOutput:
 
     def __init__(self) -> None:
         self._is_moving = False
+        self._is_held = False
+        self._stopped: Set[str] = set()
+        self._is_hold_over = False
+        self._warning = ""
+
+    def note_hold(self, is_held: bool) -> None:
+        """The operator holds what drives robots, or has let go of it."""
+        self._is_held = is_held
+        self._is_hold_over = self._is_hold_over and is_held
+
+    def limit(self, command: Velocity, robots: Iterable[BaseRobot]) -> Velocity:
+        """Return the command, but STOP after a stop or release during a hold, until the operator has let go.
+
+        robots: all that the operator can choose. Call it in every step.
+        """
+        stopped = {robot.name for robot in robots if robot.is_stopped}
+        if stopped != self._stopped:
+            self._stopped, self._is_hold_over = stopped, self._is_held
+            self._warning = HOLD_ENDED if self._is_held else ""
+        return STOP if self._is_hold_over else command
+
+    def take_warning(self) -> str:
+        """Return that the operator must let go, for users, once for each stop and release; else nothing."""
+        warning, self._warning = self._warning, ""
+        return warning
 
     def demand_stop(self) -> None:
         """Pass the next stop on, also without a motion before it."""
