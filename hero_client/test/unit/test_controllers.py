@@ -148,7 +148,7 @@ def test_a_wanderer_turns_away_from_the_nearer_side():
 
 
 def test_only_what_the_body_would_touch_is_in_its_path():
-    assert find_in_path(FREE) == (INF, None) == find_in_path([math.nan] * 8)
+    assert find_in_path(FREE) == (INF, None)
     free_m, obstacle = find_in_path([0.12] + [INF] * 7)
     assert free_m == pytest.approx(0.12 - BODY_RADIUS_M) and obstacle == (0.12, 0.0)
     assert find_in_path([0.12] + [INF] * 7, backward=True) == (INF, None)
@@ -158,6 +158,18 @@ def test_only_what_the_body_would_touch_is_in_its_path():
     assert find_in_path([INF, 0.06, 0.04] + [INF] * 5) == (INF, None)
     assert find_in_path([INF, 0.0] + [INF] * 6)[0] == pytest.approx(0.017, abs=0.001)
     assert find_in_path([0.0] + [INF] * 7)[0] == pytest.approx(0.01)
+
+
+def test_a_path_that_a_sensor_does_not_tell_of_is_never_free():
+    for index, is_backward in ((0, False), (1, False), (7, False), (3, True), (4, True), (5, True)):
+        ranges = list(FREE)
+        ranges[index] = math.nan
+        free_m, obstacle = find_in_path(ranges, is_backward)
+        assert math.isnan(free_m) and obstacle is None
+        assert find_in_path(ranges, not is_backward) == (INF, None), "the other side is known"
+        ranges[4 if is_backward else 0] = 0.12
+        assert find_in_path(ranges, is_backward)[1] is not None or index in (0, 4), "what is seen counts"
+    assert math.isnan(find_in_path([])[0])
 
 
 def cast_in_box(pose, half_m):

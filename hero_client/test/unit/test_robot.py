@@ -77,6 +77,26 @@ def test_a_blind_robot_stops_and_names_the_calibration_now_and_then():
     assert link.warned == ["hero_3 waits: " + NOT_CALIBRATED]
 
 
+@pytest.mark.parametrize("unknown", [[0], range(8)])
+def test_motions_of_a_robot_that_does_not_see_its_way_say_so(unknown):
+    robot, link = make_robot()
+    for index in unknown:
+        link.ranges[index] = math.nan
+    text = "hero_3 does not see what is in its way: " + NOT_CALIBRATED
+    robot.turn(1.0)
+    robot.turn(-1.0)
+    assert link.warned == []
+    robot.forward(0.1)
+    assert link.pose.x_m > 0.05 and link.warned == [text]
+    link.clock.sleep(WARNING_PERIOD_S)
+    robot.go_to(0.2, 0.0)
+    assert link.warned == [text] * 2
+    link.clock.sleep(WARNING_PERIOD_S)
+    link.silent_s["proximity"] = math.inf
+    robot.go_to(0.3, 0.0)
+    assert link.warned == [text] * 2, "ranges that the program did not ask for"
+
+
 def test_a_pose_in_another_frame_is_the_measured_one_or_by_the_origin():
     robot, link = make_robot()
     link.pose, link.origin = Pose(1.0, 0.0, 3.0), Pose(5.0, 7.0, math.pi / 2.0)

@@ -11,6 +11,7 @@ from hero_client.robots.common_frame import POLL_HZ, CommonFrame
 from hero_client.robots.group import wait_for_all
 from hero_client.robots.swarm_base import FIRST_REPORT_S, REPORT_PERIOD_S
 from hero_client.values.errors import FrameError, GoalError, RobotNotReadyError, StaleDataError, StoppedError
+from hero_client.values.readings import NOT_CALIBRATED
 from hero_node.errors import ProgramError
 from hero_node.geometry import Pose, Velocity
 from hero_node.texts import NAMES_SHOWN
@@ -139,7 +140,7 @@ def test_robots_that_do_not_arrive_are_named_and_all_are_stopped():
     for spoil, error, says in (
         (lambda swarm: None, GoalError, "^no goal is reached by hero_0: not there after 3 s$"),
         (stop_all, StoppedError, "hero_1 does not move"),
-        (lose_pose, GoalError, "by hero_0: not there after 3 s; the pose of hero_1 is old"),
+        (lose_pose, GoalError, "no goal is reached: hero_1: no pose for 2 s: the pose of hero_1 is old$"),
         (end, GoalError, "by hero_0: cancelled"),
     ):
         swarm = FakeSwarm(0, 1)
@@ -155,6 +156,32 @@ def test_robots_that_do_not_arrive_are_named_and_all_are_stopped():
             swarm.go_to_each({0: (9.0, 0.0)}, frame="world", timeout_s=3.0)
         assert motion.done() and swarm.now_s - started_s < 3.4
         assert all(velocity == [0.0, 0.0] for link in swarm.links for _, *velocity in link.sent[-1:])
+
+
+def test_without_poses_go_to_each_stops_at_once_and_ends_after_two_seconds():
+    swarm = FakeSwarm(4, 1)
+    ahead = StaleDataError("the pose of hero_1 is stamped 3600.0 s ahead")
+
+    def lose_pose_now_and_then(step_s):
+        passed_s = swarm.now_s - 100.0
+        swarm.links[1].localized = ahead if 1.0 < passed_s < 2.9 or passed_s > 4.0 else None
+
+    swarm._clock.joined.append(SimpleNamespace(advance=lose_pose_now_and_then))
+    with pytest.raises(GoalError, match="no goal is reached: hero_1: no pose for 2 s: .* stamped 3600.0 s ahead"):
+        swarm.go_to_each({4: (9.0, 0.0)}, frame="world")
+    assert swarm.now_s - 100.0 == pytest.approx(6.0, abs=0.3), "1.9 s before were no reason to end"
+    assert not any(velocity for sent_s, *velocity in swarm.links[0].sent if 1.1 < sent_s < 2.8 for velocity in velocity)
+
+
+def test_robots_that_cannot_see_drive_by_their_poses_and_are_named():
+    swarm = FakeSwarm(0, 1, 2)
+    swarm.links[1].ranges = swarm.links[2].ranges = [math.nan] * 8
+    swarm.go_to_each({0: (0.2, 0.0), 1: (0.2, 0.5)}, frame="world", tolerance_m=0.02)
+    assert [link.warned for link in swarm.links] == [
+        [],
+        ["hero_1 does not see what is in its way: " + NOT_CALIBRATED],
+        [],
+    ], "the last one rests"
 
 
 def test_what_is_waited_for_is_reported_now_and_then_and_its_end_once():

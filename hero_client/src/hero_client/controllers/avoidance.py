@@ -37,22 +37,25 @@ def split_sectors(ranges: Sequence[float]) -> Tuple[float, float, float]:
 def find_in_path(ranges: Sequence[float], backward: bool = False) -> Tuple[float, Optional[Obstacle]]:
     """Return how far, m, the body can drive straight on, or backward, and the obstacle that it would touch there.
 
-    (inf, None) if none is seen. nan counts as nothing: what is not known cannot be said to be in the way.
+    (inf, None) if there is none; (nan, None) if none is seen, but not every sensor on that side tells.
     """
-    free_m, nearest = math.inf, None
+    free_m, nearest, is_known = math.inf, None, len(ranges) > 0
     for index, range_m in enumerate(ranges):
-        if not math.isfinite(range_m):
-            continue
         bearing_rad = wrap_angle(index * math.tau / len(ranges))
         off_rad = wrap_angle(bearing_rad - math.pi) if backward else bearing_rad
+        if abs(off_rad) >= math.pi / 2.0:
+            continue
+        if not math.isfinite(range_m):
+            is_known = is_known and not math.isnan(range_m)
+            continue
         known_m = max(range_m, MIN_RANGE_M)
         aside_m = known_m * abs(math.sin(off_rad))
-        if abs(off_rad) >= math.pi / 2.0 or aside_m >= BODY_RADIUS_M:
+        if aside_m >= BODY_RADIUS_M:
             continue
         touch_m = known_m * math.cos(off_rad) - math.sqrt(BODY_RADIUS_M**2 - aside_m**2)
         if touch_m < free_m:
             free_m, nearest = touch_m, Obstacle(range_m, bearing_rad)
-    return free_m, nearest
+    return (free_m, nearest) if nearest or is_known else (math.nan, None)
 
 
 class WanderLaw(NamedTuple):

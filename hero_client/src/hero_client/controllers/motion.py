@@ -74,6 +74,7 @@ class MotionController:
         distance_m: still to drive at the last step; nan before the first pose.
         body_radius_m: of this robot's model.
         lateness: of its steps; a late motion is slow.
+        is_unseen: whether it drives where not every sensor tells, and none sees an obstacle.
     """
 
     def __init__(self, now_s: float, timeout_s: float) -> None:
@@ -83,6 +84,7 @@ class MotionController:
         self.distance_m = math.nan
         self.body_radius_m = BODY_RADIUS_M
         self.lateness = Lateness()
+        self.is_unseen = False
         self._timeout_s = timeout_s
         self._start_s = now_s
         self._stepped_s = now_s
@@ -158,6 +160,7 @@ class MotionController:
     def _slow_for_obstacle(self, command: Velocity, ranges: Sequence[float], seen_s: float) -> Velocity:
         """Return the command, slower before an obstacle that is nearer than the goal; fail if it stays there."""
         free_m, obstacle = find_in_path(ranges, backward=command.linear_m_s < 0.0)
+        self.is_unseen = math.isnan(free_m) and command.linear_m_s != 0.0
         limit_m_s = APPROACH_GAIN * max(0.0, free_m - CLEARANCE_M)
         if obstacle is None or free_m >= self.distance_m or abs(command.linear_m_s) <= limit_m_s:
             self._blocked_since_s = math.inf

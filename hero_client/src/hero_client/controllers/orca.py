@@ -172,7 +172,7 @@ def avoid_sensed(
     Odometry drifts by centimeters over a meter or two, so robots that avoid each other by odometry alone touch now and
     then. Of two robots that meet where odometry expects none, each would wait for the other for ever: so what is
     not allowed of the wanted velocity is driven to the right, as on a road. Half planes: normals (K, 2), bounds (K,),
-    as in nearest_allowed(). ranges: as in avoidance; nan (not known) is ignored.
+    as in nearest_allowed(). ranges: as in avoidance; nan (not known) gives none, so the caller warns of it.
     """
     normals, bounds = [], []
     for index, range_m in enumerate(ranges):

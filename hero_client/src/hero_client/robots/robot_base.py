@@ -18,7 +18,7 @@ from ..controllers.straight_and_turn import ForwardController, TurnController
 from ..values.background_motion import BackgroundMotion, Sleep, Steps
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
-from ..values.readings import NOT_CALIBRATED, is_blind
+from ..values.readings import FRESH_S, NOT_CALIBRATED, is_blind
 from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from ..values.robot_link import RobotLink
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, carry_out, wait_for_all
@@ -118,6 +118,11 @@ class BaseRobot(RobotReadings):
         self.drive(0.0, 0.0)
         self._warn(f"{self.name} waits: {NOT_CALIBRATED}")
         return True
+
+    def _warn_unseen(self) -> None:
+        """Log every 5 s that sensors of the robot are not calibrated; not where the program receives no ranges."""
+        if self.age_s("proximity") <= FRESH_S:
+            self._warn(f"{self.name} does not see what is in its way: {NOT_CALIBRATED}")
 
     def _describe_stop(self) -> str:
         return f"{self.name} does not move: {self._link.describe_stop()}"
@@ -282,6 +287,8 @@ class BaseRobot(RobotReadings):
             age_s = self.age_s("odom")
             self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s, odometry, age_s))
             self._warn(controller.lateness.take_warning())
+            if controller.is_unseen:
+                self._warn_unseen()
             on_step()
             if controller.state is State.REACHED:
                 return

@@ -9,17 +9,18 @@ import numpy as np
 
 from hero_node.clock import Clock
 from hero_node.errors import HeroError
-from hero_node.geometry import Pose
+from hero_node.geometry import STOP, Pose
 from hero_node.number_checks import check_finite
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M
-from ..controllers.motion import DEFAULT_TIMEOUT_S
+from ..controllers.motion import DEFAULT_TIMEOUT_S, SILENT_STEPS
 from ..controllers.orca import AvoidanceLaw
 from ..controllers.pose_check import FrozenCheck
 from ..controllers.swarm_go_to import SwarmGoToController
 from ..values.background_motion import BackgroundMotion, Steps
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError
+from ..values.readings import is_blind
 from ..values.robot_link import MAP
 from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .robot_base import BaseRobot
@@ -143,7 +144,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         goals: robot's id -> (x m, y m), at least 0.18 m apart (HeRo+: 0.23 m), also from robots without a goal: they
         stay, and the others drive around them. Law: controllers.swarm_go_to.
 
-        Raises: GoalError for goals too near to each other, and with the robots that are not there after timeout_s.
+        Raises: GoalError for goals too near to each other, with the robots that are not there after timeout_s, and with
+        one that has no pose for 2 s, or whose pose stays the same although it drives.
         KeyError for a robot of no swarm. FrameError, StoppedError and RobotNotReadyError as Robot.go_to(). All robots
         are stopped then.
         """
@@ -169,17 +171,21 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         controller = SwarmGoToController(places, law, REPEAT_PERIOD_S, seed=0, tolerance_m=tolerance_m)
         end_s = self.now_s + timeout_s
         checks = [FrozenCheck() for _ in self.robots]
+        silent_steps = dict.fromkeys((robot.name for robot in self.robots), 0)
         while not all(controller.arrived):
             poses: List[Optional[Pose]] = []
-            absence = ""
             missing: Dict[str, Optional[str]] = {}
             for robot, check in zip(self.robots, checks):
                 try:
                     pose = robot.pose_in(frame, timeout_s=0.0)
                 except StaleDataError as error:
                     poses.append(None)
-                    absence, missing[robot.name] = f"; {error}", str(error)
+                    missing[robot.name] = str(error)
+                    silent_steps[robot.name] += 1
+                    if silent_steps[robot.name] >= SILENT_STEPS:
+                        raise GoalError(f"no goal is reached: {robot.name}: no pose for 2 s: {error}") from None
                     continue
+                silent_steps[robot.name] = 0
                 poses.append(pose)
                 odometry = robot.fresh_pose()
                 problem = check.add(pose, odometry, self.now_s) if odometry else ""
@@ -192,13 +198,17 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             warning = controller.lateness.take_warning()
             if warning:
                 self._log("warn", warning)
-            for robot, command in zip(self.robots, commands):
+            for robot, command, seen in zip(self.robots, commands, ranges):
                 robot.check_not_stopped()
                 robot._send_velocity(*command)
+                if command != STOP and is_blind(seen):
+                    robot._warn_unseen()
             if self.now_s > end_s or not (yield REPEAT_PERIOD_S):
                 late = [robot.name for robot, arrived in zip(self.robots, controller.arrived) if not arrived]
                 why = "cancelled" if self.now_s <= end_s else f"not there after {timeout_s:g} s"
-                raise GoalError(f"no goal is reached by {', '.join(late)}: {why}{absence}")
+                raise GoalError(
+                    "; ".join([f"no goal is reached by {', '.join(late)}: {why}", *filter(None, missing.values())])
+                )
 
     @staticmethod
     def _wait_for(motions: Sequence[BackgroundMotion]) -> None:
