@@ -1,4 +1,7 @@
-"""The time of a ROS program that is no Program: the machine's, and waits that tell when ROS has ended."""
+"""The time of a ROS program that is no Program: the machine's, and waits that tell when ROS has ended.
+
+And the time for what lasts as long in simulated time.
+"""
 
 import time
 
@@ -21,3 +24,8 @@ class _RosClock(Clock):
 
 
 ROS_CLOCK = _RosClock()
+
+
+def read_duration_clock_s() -> float:
+    """Return a time for durations: simulated where /use_sim_time is set, else the machine's, which is never set."""
+    return time.monotonic() if rospy.rostime.is_wallclock() else float(rospy.get_time())

@@ -18,6 +18,7 @@ from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_msgs.msg import Robot, RobotArray, RobotPose
 from hero_node.geometry import Pose
 from hero_node.parameters import check_parameters
+from hero_node.ros import ros_clock
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
 from hero_sim.stepped.swarm import StepSwarm, StepWorld
@@ -43,7 +44,8 @@ class Stage:
         self.swarm = StepSwarm(count, seed=3)
         self.sent, self.warnings = {}, []
         self.silent = set()
-        monkeypatch.setattr(rospy, "get_time", lambda: self.swarm.now_s)
+        self.clock_ahead_s = 0.0  # of ROS, which is set back and forth
+        monkeypatch.setattr(rospy, "get_time", lambda: self.swarm.now_s + self.clock_ahead_s)
         monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time.from_sec(self.swarm.now_s))
         monkeypatch.setattr(rospy, "get_name", lambda: "/behavior")
         monkeypatch.setattr(rospy, "Subscriber", lambda *arguments, **options: None)
@@ -51,7 +53,7 @@ class Stage:
         monkeypatch.setattr(rospy, "logwarn", lambda text, *values: self.warnings.append(text % values))
         self.joined = range(count)
         monkeypatch.setattr(other_robots, "share_drivers", lambda: self)
-        for module in (behavior_node, pose_source, other_robots):
+        for module in (behavior_node, pose_source, other_robots, ros_clock):
             monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.swarm.now_s))
 
     def advertise(self, topic, message_class, **options):
@@ -83,7 +85,7 @@ class Stage:
 
     def tell(self, pose):
         message = Odometry()
-        message.header.stamp = rospy.Time.from_sec(self.swarm.now_s)
+        message.header.stamp = rospy.Time.from_sec(self.swarm.now_s + self.clock_ahead_s)
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         place.x, place.y, turn.z, turn.w = pose.x_m, pose.y_m, np.sin(pose.yaw_rad / 2.0), np.cos(pose.yaw_rad / 2.0)
         return message
@@ -140,6 +142,23 @@ def test_a_program_that_is_late_drives_slowly_says_so_and_recovers(stage):
     stage.node.control.rate_hz = planned_hz
     stage.run(4.0)
     assert np.abs(stage.swarm.rows.world.speeds_m_s).mean() > 0.8 * usual_m_s
+
+
+def test_the_time_of_a_behavior_goes_on_when_the_clock_is_set(stage, monkeypatch):
+    stage.clock_ahead_s = 7200.0
+    stage.start("milling")
+    stage.warnings.clear()
+    times_s, step = [], stage.node.control.step
+
+    def note(time_s, *sensed):
+        times_s.append(time_s)
+        return step(time_s, *sensed)
+
+    monkeypatch.setattr(stage.node.control, "step", note)
+    for stage.clock_ahead_s in (7200.0, 3600.0, 9000.0):
+        stage.run(1.0)
+    assert np.diff(times_s) == pytest.approx(1.0 / stage.node.control.rate_hz)
+    assert not stage.warnings
 
 
 def test_calibrated_motors_get_pulses_and_zero_velocity_at_rest(stage, tmp_path):

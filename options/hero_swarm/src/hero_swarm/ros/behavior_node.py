@@ -16,6 +16,7 @@ from hero_client.controllers.lateness import Lateness
 from hero_client.swarm import open_swarm
 from hero_client.values.object_sensing import Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
+from hero_node.ros.ros_clock import read_duration_clock_s
 
 from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior
@@ -84,7 +85,7 @@ class BehaviorNode:
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         self.control = Control(self.behavior, Random([parameters["seed"]], len(ids)), self._filter)
         self._lateness = Lateness(1.0 / self.control.rate_hz)
-        self._start_s = rospy.get_time()
+        self._start_s = read_duration_clock_s()
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._next_show_s = 0.0
         self._colors: Optional[np.ndarray] = None
@@ -98,7 +99,7 @@ class BehaviorNode:
         things = self._objects.read()
         if self._objects.are_needed and not len(things.radii_m):
             poses, things = np.full_like(poses, np.nan), Things(np.full((1, 1, 3), np.nan), np.ones(1))
-        now_s = rospy.get_time()
+        now_s = read_duration_clock_s()
         self._filter.set_models([robot.model for robot in self._swarm])
         if self._others:
             self._filter.others_m = self._others.read()

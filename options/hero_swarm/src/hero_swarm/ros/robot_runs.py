@@ -16,6 +16,7 @@ import rospy
 from hero_client import Program, StoppedError, Swarm
 from hero_client.controllers.lateness import Lateness
 from hero_node.processes import end_process
+from hero_node.ros.ros_clock import read_duration_clock_s
 
 from ..experiments.batch import place_robots
 from ..experiments.errors import ExperimentError
@@ -187,7 +188,7 @@ def _drive(
     others: OtherRobots,
 ) -> bool:
     """Run one trial; return whether it has ended by itself, by a stop or a loss."""
-    start_s, lateness = rospy.get_time(), Lateness(1.0 / trial.rate_hz)
+    start_s, lateness = read_duration_clock_s(), Lateness(1.0 / trial.rate_hz)
     all_may_move = np.ones(len(swarm), dtype=bool)
     try:
         for _ in program.rate(trial.rate_hz):
@@ -195,13 +196,13 @@ def _drive(
                 robot.check_not_stopped()
                 reason = robot.missing()
                 if reason:
-                    trial.remark = f"lost {robot.name} at {rospy.get_time() - start_s:.1f} s: {reason}"
+                    trial.remark = f"lost {robot.name} at {read_duration_clock_s() - start_s:.1f} s: {reason}"
                     return True
             poses, ages_s = source.read()
             trial.safety.others_m = others.read()
             if others.describe_missing():
                 source.warn(others.describe_missing())
-            speeds = trial.step(rospy.get_time() - start_s, poses, ages_s, objects.read())
+            speeds = trial.step(read_duration_clock_s() - start_s, poses, ages_s, objects.read())
             if speeds is None:
                 return True
             lateness.step(time.monotonic())
@@ -210,12 +211,12 @@ def _drive(
             if late:
                 rospy.logwarn(late)
             if min(shares) == 0.0:
-                trial.remark = f"commands or poses came too late at {rospy.get_time() - start_s:.1f} s"
+                trial.remark = f"commands or poses came too late at {read_duration_clock_s() - start_s:.1f} s"
                 return True
             linear_m_s, angular_rad_s = np.array(speeds) * shares
             commands.send(linear_m_s, angular_rad_s, all_may_move)
     except StoppedError:
-        trial.remark = f"stopped at {rospy.get_time() - start_s:.1f} s"
+        trial.remark = f"stopped at {read_duration_clock_s() - start_s:.1f} s"
         return True
     finally:
         swarm.stop()

@@ -1,0 +1,93 @@
+"""One trial on robots in virtual time: it lasts as long as its experiment says, by a time that nobody sets."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rospy", reason="trials on robots need ROS")
+import rospy
+
+from hero_client import StoppedError
+from hero_node.clock import Clock
+from hero_node.ros import ros_clock
+from hero_swarm.ros import robot_runs
+
+RATE_HZ, TRIAL_S = 10.0, 2.0
+
+
+class Stage(Clock):
+    """A program with one robot and the trial that it drives; the clock of ROS is ahead of the machine's time."""
+
+    now_s = 50.0
+    is_simulated, ahead_s, rate_hz, remark, lost, stop_s = False, 1000.0, RATE_HZ, "", None, np.inf
+
+    def __init__(self, monkeypatch):
+        self.times_s, self.stops, self.name, self.safety = [], 0, "hero_3", SimpleNamespace()
+        for module in (ros_clock, robot_runs):
+            monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
+        monkeypatch.setattr(rospy, "get_time", lambda: self.now_s + self.ahead_s)
+        monkeypatch.setattr(rospy.rostime, "is_wallclock", lambda: not self.is_simulated)
+
+    def sleep(self, duration_s):
+        self.now_s += duration_s
+        return True
+
+    def check_not_stopped(self):
+        if self.now_s >= self.stop_s:
+            raise StoppedError("stopped")
+
+    def missing(self):
+        return self.lost
+
+    def stop(self):
+        self.stops += 1
+
+    def __iter__(self):
+        yield self
+
+    def __len__(self):
+        return 1
+
+    def read(self):
+        return np.zeros((1, 3)), np.zeros(1)
+
+    def describe_missing(self):
+        return ""
+
+    def step(self, time_s, *sensed):
+        """Note the time of the trial; the clock is set by an hour, back and forth, in each step."""
+        self.times_s.append(time_s)
+        self.ahead_s = self.ahead_s if self.is_simulated else 4600.0 - self.ahead_s
+        return (np.zeros(1), np.zeros(1)) if time_s < TRIAL_S else None
+
+    def send(self, *speeds):
+        if self.is_simulated:
+            self.ahead_s += 1.0 / RATE_HZ  # twice as fast
+
+    def drive(self):
+        return robot_runs._drive(self, self, self, self, self, self, self)
+
+
+@pytest.fixture(name="stage")
+def make_stage(monkeypatch):
+    return Stage(monkeypatch)
+
+
+def test_a_trial_lasts_as_long_as_it_should_when_the_clock_is_set(stage):
+    assert stage.drive() and stage.remark == "" and stage.stops == 1
+    assert stage.now_s == pytest.approx(50.0 + TRIAL_S, abs=0.11)
+    assert np.diff(stage.times_s) == pytest.approx(1.0 / RATE_HZ)
+
+
+def test_a_trial_lasts_its_time_of_a_simulation(stage):
+    stage.is_simulated = True
+    assert stage.drive() and stage.remark == ""
+    assert stage.now_s == pytest.approx(50.0 + TRIAL_S / 2.0, abs=0.11)
+
+
+def test_a_trial_that_ends_early_says_when(stage):
+    stage.stop_s = 51.0
+    assert stage.drive() and stage.remark in ("stopped at 1.0 s", "stopped at 1.1 s")
+    stage.lost, stage.stop_s = "has gone", np.inf
+    assert stage.drive() and stage.remark == "lost hero_3 at 0.0 s: has gone"
