@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseArray
 from hero_client import CommonFrame, Program, open_swarm, read_parameters
 from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
 from hero_client.controllers.go_to_goal import Goal, GoToGoalController
+from hero_client.controllers.lateness import Lateness
 from hero_client.controllers.motion import State
 from hero_client.values.readings import is_blind
 from hero_node.geometry import STOP
@@ -31,6 +32,7 @@ class Explorer:
         self.robot, self.common = robot, common
         self.random = random.Random(seed)
         self.memory = WanderMemory()
+        self.lateness = Lateness()
         self.controller = None
         self.failed = []
 
@@ -43,15 +45,18 @@ class Explorer:
         """Send the next command. frontiers: places on the frontier of the map; taken: goals of the other robots."""
         pose, ranges = self.common.pose_of(self.robot), self.robot.fresh_proximity()
         command = STOP
+        self.lateness.step(now_s)
         if is_blind(ranges):
             self.common.missing[self.robot.name] = self.robot.missing_ranges()
         elif pose is not None:
             self.choose(pose, frontiers, taken, now_s)
             ranges = shorten_for_body(ranges, self.robot.model.body_radius_m)
+            age_s = self.robot.age_s("odom")
             if self.controller:
-                command = self.controller.step(pose, ranges, now_s, pose_age_s=self.robot.age_s("odom"))
+                command = self.controller.step(pose, ranges, now_s, pose_age_s=age_s)
             else:
                 command, self.memory = wander(ranges, self.memory, self.random.random(), WanderLaw())
+                command = self.lateness.slow(command, age_s)
         self.robot.drive(*command)
         self.robot.led("green" if self.controller else "yellow")
 
@@ -74,10 +79,12 @@ def is_near(place, others, distance_m):
 
 
 def explore_together(explorers, frontiers, now_s):
-    """Step all explorers."""
+    """Step all explorers; log if they are late."""
     for explorer in explorers:
         taken = [other.goal for other in explorers if other is not explorer and other.goal]
         explorer.step(frontiers, taken, now_s)
+    for warning in {(explorer.controller or explorer).lateness.take_warning() for explorer in explorers} - {""}:
+        rospy.logwarn(warning)
 
 
 def main():

@@ -12,6 +12,7 @@ from hero_node.geometry import Pose
 from hero_sim.stepped.swarm import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
+from hero_examples import explore as explore_program
 from hero_examples.explore import NEAR_M, Explorer, explore_together
 
 GREEN, YELLOW = (0.0, 1.0, 0.0), (1.0, 1.0, 0.0)
@@ -83,6 +84,30 @@ def test_a_robot_without_ranges_stops_and_goes_on_when_they_come(swarm, monkeypa
         explorer.step([LEFT], [], 0.0)
         assert (explorer.common.missing["hero_0"] == NOT_CALIBRATED) == all(map(math.isnan, known))
     assert driven[0] == (0.0, 0.0) and driven[1] != (0.0, 0.0)
+
+
+def test_robots_that_explore_late_drive_slowly_and_say_so_once(swarm, monkeypatch):
+    said = []
+    monkeypatch.setattr(explore_program.rospy, "logwarn", said.append)
+    explorers = [Explorer(robot, CommonFrame("map"), seed=robot.robot_id) for robot in swarm]
+
+    def run(places, hz, duration_s):
+        path = true_paths.run(swarm, lambda _: explore_together(explorers, places, swarm.now_s), duration_s, hz)[0]
+        return true_paths.measure_lengths(path) / duration_s
+
+    run([], 10.0, 1.0)  # they speed up
+    usual_m_s = run([], 10.0, 1.5)
+    assert not said
+    run([], 2.5, 1.0)
+    late_m_s = run([], 2.5, 1.5)
+    assert (0.3 * usual_m_s < late_m_s).all() and (late_m_s < 0.7 * usual_m_s).all()
+    (text,) = said
+    assert text.startswith("commands are late by 0.3 s: this PC is busy; robots drive at 4"), "poses have an age, too"
+    run([LEFT, RIGHT], 10.0, 4.0)
+    said.clear()
+    run([LEFT, RIGHT], 2.5, 1.0)
+    (text,) = said
+    assert text.startswith("commands are late by 0.3 s"), "on the way to places"
 
 
 HERE = Pose(0.0, 0.0, 0.0)
