@@ -370,24 +370,39 @@ class ViewTest(unittest.TestCase):
         bad = [away, make_robot(4, known=False), make_robot(5, odom=0.0)]
         status = {"level": "error", "text": "NOT STOPPED: hero_3 moves", "is_final": False, "reads": 0}
         loss = {"source": "driver", "cause": "No answer from hero_driver", "remedy": "start it again"}
+
+        def read_state():
+            banners = [one for one in ("#losses", "#release_bar", "#stopping") if self.page.find(one).is_displayed()]
+            return self.page.text("#ready"), banners
+
         self.page.run(AXE)
         for theme in ("light", "dark"):
             self.page.run("document.documentElement.dataset.theme = '%s'" % theme)
-            for name, updates in (
-                ("empty", {"fleet": make_fleet()}),
-                ("live", {"fleet": make_fleet(*robots)}),
-                ("stopped", {"fleet": make_fleet(*robots, stopped=True), "stop": {**status, "level": "info"}}),
-                ("wrong", {"fleet": make_fleet(*robots, *bad), "stop": status, "losses": [loss]}),
+            for updates, ready, shown in (
+                ({"fleet": make_fleet()}, "0 of 0 ready", []),
+                ({"fleet": make_fleet(*robots)}, "3 of 3 ready", []),
+                (
+                    {"fleet": make_fleet(*robots, stopped=True), "stop": {**status, "level": "info"}},
+                    "3 of 3 ready",
+                    ["#release_bar", "#stopping"],
+                ),
+                (
+                    {"fleet": make_fleet(*robots, *bad), "stop": status, "losses": [loss]},
+                    "1 of 6 unknown",
+                    ["#losses", "#stopping"],
+                ),
             ):
-                self.monitor.show(**updates)
-                count = "%d of" % len(updates["fleet"]["robots"])
-                wait_for(lambda count=count: count[:1] in self.page.text("#ready"), name)
-                self.assertEqual(self.page.browser.execute_async_script(RUN_AXE), [], (theme, name))
+                self.monitor.show(**{"stop": None, "losses": [], **updates})
+                wait_for(lambda wanted=(ready, shown): read_state() == wanted, (ready, shown))
+                self.assertEqual(self.page.browser.execute_async_script(RUN_AXE), [], (theme, ready, shown))
         self.addCleanup(self.page.resize, 1440, 900)
         self.page.resize(360, 740)
         for panel in ("fleet", "robot", "log"):
             self.page.click("[data-panel=%s]" % panel)
             self.assertEqual(self.page.browser.execute_async_script(RUN_AXE), [], panel)
+        self.page.run("document.body.append(document.createElement('button'))")
+        (broken,) = self.page.browser.execute_async_script(RUN_AXE)
+        self.assertTrue(broken.startswith("button-name: "), "a button without a name is found")
 
 
 if __name__ == "__main__":
