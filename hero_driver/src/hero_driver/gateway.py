@@ -85,7 +85,7 @@ class Gateway(LinkHandler):
     def open_link(self, link: Link) -> Optional[str]:
         """Begin a conversation, unless the limits are against it."""
         self._make_room(link.address.host)
-        refusal = self._admission.admit(link.address.host)
+        refusal = self._admission.admit(link, link.address.host)
         if refusal is not None:
             self.refused_connections += 1
             return refusal
@@ -97,15 +97,13 @@ class Gateway(LinkHandler):
         return None
 
     def _make_room(self, host: str) -> None:
-        """Evict a connection of the address with the most, where a cap is reached: unidentified ones first."""
+        """Evict a connection where a cap is reached."""
         eviction = self._admission.find_eviction(host)
         if eviction is None:
             return
-        largest, parameter = eviction
-        peers = [peer for peer in self.peers.values() if peer.link.address.host == largest]
-        peer = next((peer for peer in peers if peer.record is None), peers[-1])
-        self._stops.begin(peer)
-        peer.link.close(f"its address has the most of too many connections ({parameter})")
+        link, parameter = eviction
+        self._stops.begin(self.peers[link])
+        link.close(f"its address has the most of too many connections ({parameter})")
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
         """Pass bytes to the session and its events on; the hot path of the driver."""
@@ -182,9 +180,8 @@ class Gateway(LinkHandler):
                 f"connection of {link.address} refused: {reason}",
             )
             return
-        self._admission.release(link.address.host)
+        self._admission.release(link)
         if peer.record is None:
-            self._admission.note_identified(link.address.host)
             self.last_refusal = f"{link.address}: {reason}"
             self._log.log_throttled(
                 "debug" if reason == THE_DRIVER_ENDS else "warn",
@@ -294,7 +291,7 @@ class Gateway(LinkHandler):
         decision = self.fleet.claim_identity(
             peer.link, identity, address.host, str(address), peer.session.opened_s, now_s
         )
-        self._admission.note_identified(address.host)
+        self._admission.note_identified(peer.link)
         peer.record = decision.record
         if decision.verdict is Verdict.REFUSED:
             peer.refused = True

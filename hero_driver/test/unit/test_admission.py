@@ -20,108 +20,108 @@ def make_admission(*networks, **limits):
     return Admission(AdmissionLimits(allow=tuple(map(ipaddress.ip_network, networks)), **limits))
 
 
+def connect(admission, *hosts):
+    """Return the connections of these hosts, all of which are admitted."""
+    connections = [object() for _ in hosts]
+    assert [admission.admit(*each) for each in zip(connections, hosts)] == [None] * len(hosts)
+    return connections
+
+
+def try_to_connect(admission, host):
+    """Return why a connection is refused."""
+    return admission.admit(object(), host)
+
+
 @pytest.mark.parametrize("host", [ROBOT, "127.0.0.1", "::1", "fe80::1%wlan0"])
 def test_every_address_may_come_by_default(host):
-    assert make_admission().admit(host) is None
+    assert try_to_connect(make_admission(), host) is None
 
 
 @pytest.mark.parametrize("host", [ROBOT, "10.42.0.255", "::ffff:10.42.0.17", "fe80::1%wlan0", "192.168.4.1"])
 def test_addresses_of_the_allowed_networks_may_come(host):
-    assert make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1").admit(host) is None
+    assert try_to_connect(make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1"), host) is None
 
 
 @pytest.mark.parametrize("host", ["10.42.1.17", "192.168.4.2", "::ffff:10.42.1.17", "2001:db8::1", "127.0.0.1"])
 def test_other_addresses_are_refused_with_the_name_of_the_parameter(host):
     admission = make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1")
-    assert "~allow" in admission.admit(host)
+    assert "~allow" in try_to_connect(admission, host)
     assert admission.unidentified == 0
 
 
 def test_connections_beyond_the_total_are_refused_until_one_leaves():
     admission = make_admission(max_connections=2)
-    assert admission.admit("10.0.0.1") is None
-    assert admission.admit("10.0.0.2") is None
-    assert "more than 2 connections (~max_connections)" in admission.admit("10.0.0.3")
-    admission.release("10.0.0.1")
-    assert admission.admit("10.0.0.3") is None
+    first, _ = connect(admission, "10.0.0.1", "10.0.0.2")
+    assert "more than 2 connections (~max_connections)" in try_to_connect(admission, "10.0.0.3")
+    admission.release(first)
+    connect(admission, "10.0.0.3")
 
 
 def test_where_all_places_are_taken_the_address_with_the_most_gives_one_up():
     admission = make_admission("10.0.0.0/24", max_connections=4, max_connections_per_address=3)
-    for host in ("10.0.0.1", "10.0.0.2", "10.0.0.2"):
-        admission.admit(host)
+    first, *of_the_largest = connect(admission, "10.0.0.1", "10.0.0.2", "10.0.0.2")
     assert admission.find_eviction("10.0.0.3") is None, "there is room"
-    admission.admit("10.0.0.2")
-    for host in ("10.0.0.1", "10.0.0.2", "10.0.0.3"):
-        admission.note_identified(host)
-    assert admission.find_eviction("10.0.0.3") == ("10.0.0.2", "~max_connections")
-    assert admission.find_eviction("10.0.0.1") == ("10.0.0.2", "~max_connections")
+    of_the_largest += connect(admission, "10.0.0.2")
+    admission.note_identified(first)
+    admission.note_identified(of_the_largest[0])
+    assert admission.find_eviction("10.0.0.3") == (of_the_largest[1], "~max_connections"), "the oldest unidentified"
+    for connection in of_the_largest:
+        admission.note_identified(connection)
+    assert admission.find_eviction("10.0.0.3") == (of_the_largest[2], "~max_connections"), "the newest"
+    assert admission.find_eviction("10.0.0.1") == (of_the_largest[2], "~max_connections")
     assert admission.find_eviction("10.0.0.2") is None, "its own newcomer has to wait"
     assert admission.find_eviction("10.0.1.1") is None, "it may not come anyway"
 
 
 def test_addresses_with_equal_shares_do_not_evict_each_other():
     admission = make_admission(max_connections=4)
-    for host in ("10.0.0.1", "10.0.0.1", "10.0.0.2", "10.0.0.2"):
-        admission.admit(host)
+    connections = connect(admission, "10.0.0.1", "10.0.0.1", "10.0.0.2", "10.0.0.2")
     assert admission.find_eviction("10.0.0.1") is None
-    assert admission.find_eviction("10.0.0.3")[0] in ("10.0.0.1", "10.0.0.2")
+    assert admission.find_eviction("10.0.0.3")[0] in connections
 
 
 def test_connections_of_one_address_are_limited_each_on_its_own():
     admission = make_admission(max_connections_per_address=1)
-    assert admission.admit("10.0.0.1") is None
-    assert "~max_connections_per_address" in admission.admit("10.0.0.1")
-    assert admission.admit("10.0.0.2") is None
-    admission.release("10.0.0.1")
-    assert admission.admit("10.0.0.1") is None
+    (first,) = connect(admission, "10.0.0.1")
+    assert "~max_connections_per_address" in try_to_connect(admission, "10.0.0.1")
+    connect(admission, "10.0.0.2")
+    admission.release(first)
+    connect(admission, "10.0.0.1")
 
 
 def test_connections_that_say_nothing_are_limited():
     admission = make_admission(max_unidentified=1)
-    assert admission.admit("10.0.0.1") is None
-    assert "~max_unidentified" in admission.admit("10.0.0.2")
-    admission.note_identified("10.0.0.1")
-    assert admission.admit("10.0.0.2") is None
+    (first,) = connect(admission, "10.0.0.1")
+    assert "~max_unidentified" in try_to_connect(admission, "10.0.0.2")
+    admission.note_identified(first)
+    connect(admission, "10.0.0.2")
 
 
 def test_at_the_unidentified_cap_the_largest_address_makes_room():
     admission = make_admission("10.0.0.0/24", max_unidentified=4)
-    for host in ("10.0.0.1", "10.0.0.2", "10.0.0.2"):
-        admission.admit(host)
+    _, oldest, _ = connect(admission, "10.0.0.1", "10.0.0.2", "10.0.0.2")
     assert admission.find_eviction("10.0.0.3") is None, "there is room"
-    admission.admit("10.0.0.2")
-    assert admission.find_eviction("10.0.0.3") == ("10.0.0.2", "~max_unidentified")
-    assert admission.find_eviction("10.0.0.1") == ("10.0.0.2", "~max_unidentified")
+    connect(admission, "10.0.0.2")
+    assert admission.find_eviction("10.0.0.3") == (oldest, "~max_unidentified")
+    assert admission.find_eviction("10.0.0.1") == (oldest, "~max_unidentified")
     assert admission.find_eviction("10.0.0.2") is None, "its own newcomer has to wait"
     assert admission.find_eviction("10.9.9.9") is None, "it may not come at all"
 
 
 def test_an_address_with_one_silent_connection_never_makes_room():
     admission = make_admission(max_unidentified=3)
-    for number in range(3):
-        admission.admit("10.0.0.%d" % number)
+    connect(admission, *("10.0.0.%d" % number for number in range(3)))
     assert admission.find_eviction("10.0.0.9") is None
 
 
 def test_a_refused_connection_counts_nowhere():
     admission = make_admission(max_connections=1)
-    admission.admit("10.0.0.1")
+    (first,) = connect(admission, "10.0.0.1")
     for _ in range(10):
-        admission.admit("10.0.0.2")
-    admission.release("10.0.0.1")
-    assert admission.admit("10.0.0.2") is None
-    assert admission.unidentified == 2
-
-
-def test_addresses_that_left_are_forgotten():
-    admission = make_admission()
-    for number in range(256):
-        host = "10.0.0.%d" % number
-        assert admission.admit(host) is None
-        admission.note_identified(host)
-        admission.release(host)
-    assert len(admission._by_host) == len(admission._unidentified) == 0
+        assert try_to_connect(admission, "10.0.0.2") is not None
+    admission.release(first)
+    connect(admission, "10.0.0.2")
+    assert admission.unidentified == 1
 
 
 # Rates.

@@ -1,10 +1,10 @@
 """Limits on untrusted peers: the address allow-list, caps on connections, token buckets for bytes and names. Pure."""
 
-import collections
 import ipaddress
 from dataclasses import dataclass
-from typing import Any, Counter, Optional, Tuple, Union
+from typing import Any, Optional, Tuple, Union
 
+from hero_node.connection_table import ConnectionTable
 from hero_node.parameters import Parameter, declare, make_error, whole_number
 from hero_node.token_bucket import TokenBuckets
 
@@ -56,48 +56,53 @@ class Admission:
 
     def __init__(self, limits: AdmissionLimits) -> None:
         self._limits = limits
-        self._by_host: Counter[str] = collections.Counter()
-        self._unidentified: Counter[str] = collections.Counter()
+        self._connected: ConnectionTable[Any] = ConnectionTable()
+        self._unidentified: ConnectionTable[Any] = ConnectionTable()
         self._new_robots = TokenBuckets(limits.max_connections_per_address, NEW_ROBOTS_PER_S)
         self._garbage = TokenBuckets(GARBAGE_BURST_LENGTH, GARBAGE_PER_S)
 
-    def admit(self, host: str) -> Optional[str]:
-        """Count a connection from host; return why it is refused, None if it may stay."""
+    def admit(self, connection: Any, host: str) -> Optional[str]:
+        """Count a connection from host, of any type; return why it is refused, None if it may stay."""
         limits = self._limits
         refusal = self._find_own_refusal(host)
-        if refusal is None and sum(self._by_host.values()) >= limits.max_connections:
+        if refusal is None and len(self._connected) >= limits.max_connections:
             refusal = "more than %d connections (~max_connections)" % limits.max_connections
         if refusal is None and self.unidentified >= limits.max_unidentified:
             refusal = "more than %d unidentified connections (~max_unidentified)" % limits.max_unidentified
         if refusal is None:
-            self._by_host[host] += 1
-            self._unidentified[host] += 1
+            self._connected.add(connection, host)
+            self._unidentified.add(connection, host)
         return refusal
 
-    def find_eviction(self, host: str) -> Optional[Tuple[str, str]]:
-        """Return the address that has to give up a connection for one of host's, and the parameter that demands it.
+    def find_eviction(self, host: str) -> Optional[Tuple[Any, str]]:
+        """Return the connection that has to end for one of host's, and the parameter that demands it.
 
-        It is the one with the most connections of those that are capped. None while there is room, where host may not
-        connect anyway, or where no address has more than host would have: so no address can keep others out.
+        It is of the address with the most connections of those that are capped: the oldest unidentified one, else the
+        newest. None while there is room, where host may not connect anyway, or where no address has more than host
+        would have: so no address can keep others out.
         """
         if self._find_own_refusal(host) is not None:
             return None
-        for counts, most, parameter in (
-            (self._by_host, self._limits.max_connections, "~max_connections"),
+        for table, most, parameter in (
+            (self._connected, self._limits.max_connections, "~max_connections"),
             (self._unidentified, self._limits.max_unidentified, "~max_unidentified"),
         ):
-            if sum(counts.values()) >= most:
-                largest, count = counts.most_common(1)[0]
-                return (largest, parameter) if count > counts[host] + 1 else None
+            if len(table) >= most:
+                largest = table.find_largest()
+                if table.count(largest) <= table.count(host) + 1:
+                    return None
+                unidentified = self._unidentified.list_connections(largest)
+                return (unidentified or self._connected.list_connections(largest)[-1:])[0], parameter
         return None
 
-    def note_identified(self, host: str) -> None:
-        """A connection of host has said which robot it is, or ended before that."""
-        _decrement(self._unidentified, host)
+    def note_identified(self, connection: Any) -> None:
+        """A connection has said which robot it is."""
+        self._unidentified.remove(connection)
 
-    def release(self, host: str) -> None:
-        """An admitted connection from host is closed."""
-        _decrement(self._by_host, host)
+    def release(self, connection: Any) -> None:
+        """An admitted connection is closed."""
+        self._connected.remove(connection)
+        self._unidentified.remove(connection)
 
     def admit_new_robot(self, host: str, now_s: float) -> Optional[str]:
         """Count a robot of host that is not known yet; return why it has to wait, None if it may come.
@@ -120,7 +125,7 @@ class Admission:
     @property
     def unidentified(self) -> int:
         """Number of unidentified connections."""
-        return sum(self._unidentified.values())
+        return len(self._unidentified)
 
     def _find_own_refusal(self, host: str) -> Optional[str]:
         """Return why host may not connect, whatever others do."""
@@ -130,17 +135,11 @@ class Admission:
             mapped = getattr(address, "ipv4_mapped", None)
             if not any((mapped or address) in network for network in limits.allow):
                 return "address not in ~allow"
-        if self._by_host[host] >= limits.max_connections_per_address:
+        if self._connected.count(host) >= limits.max_connections_per_address:
             return "more than %d connections of one address (~max_connections_per_address)" % (
                 limits.max_connections_per_address
             )
         return None
-
-
-def _decrement(counts: "Counter[str]", host: str) -> None:
-    counts[host] -= 1
-    if not counts[host]:
-        del counts[host]
 
 
 class RateLimit:

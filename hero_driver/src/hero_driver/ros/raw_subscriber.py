@@ -18,6 +18,8 @@ from typing import Any, Callable, FrozenSet, Optional
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
 
+from hero_node.tcpros import LENGTH, TooLongError, find_messages
+
 from ..transport.event_loop import EventLoop, Reader
 from .rospy_internals import (
     count_read,
@@ -42,7 +44,6 @@ MESSAGE_LENGTH_MAX = 1 << 20
 RESUMED_S = 0.5
 """After a pause of the driver rospy's threads pass on within this time what they held."""
 
-_LENGTH = struct.Struct("<I")
 _INT = struct.Struct("i")
 
 
@@ -160,29 +161,25 @@ class MessageStream(Reader):
         subscriber = self._subscriber
         newest_only, self._is_ahead = self._is_ahead, subscriber.moves and length_read >= READ_LENGTH
         newest: Optional[bytes] = None
-        old_end = 0
+        old_end = 0  # a message that starts before it, behind its length, is old
         if self._old_length:
-            old_end = self._old_length + len(self._remainder)
+            old_end = self._old_length + len(self._remainder) + LENGTH.size
             self._old_length = max(0, self._old_length - length_read)
-        position, end = 0, len(data)
-        while end - position >= _LENGTH.size:
-            length: int = _LENGTH.unpack_from(data, position)[0]
-            if length > MESSAGE_LENGTH_MAX:
-                return False
-            start = position + _LENGTH.size
-            if end - start < length:
-                break
-            subscriber.is_old = position < old_end
-            position = start + length
-            messages += 1
-            subscriber.last_sender = self._connection
-            if newest_only and not subscriber.is_old:  # of old ones stops count, whatever came after them
-                newest = data[start:position]
-            else:
-                subscriber.receive(data[start:position])
+        end = 0
+        try:
+            for start, end in find_messages(data, MESSAGE_LENGTH_MAX):
+                subscriber.is_old = start < old_end
+                messages += 1
+                subscriber.last_sender = self._connection
+                if newest_only and not subscriber.is_old:  # of old ones stops count, whatever came after them
+                    newest = data[start:end]
+                else:
+                    subscriber.receive(data[start:end])
+        except TooLongError:
+            return False
         if newest is not None:
             subscriber.receive(newest)
-        self._remainder = data[position:]
+        self._remainder = data[end:]
         count_read(self._connection, length_read, messages)
         return True
 

@@ -4,13 +4,14 @@ TCPROS: a program that connects sends a 32-bit length and a connection header of
 answer. Knows no ROS: a complete header goes to serve().
 """
 
-import collections
 import contextlib
 import socket
-import struct
 import threading
 import time
-from typing import Any, Callable, Counter, Dict
+from typing import Any, Callable
+
+from ..connection_table import ConnectionTable
+from ..tcpros import LENGTH
 
 HANDSHAKE_TIMEOUT_S = 5.0
 """A program sends its header as soon as it has connected."""
@@ -20,8 +21,6 @@ PENDING_MAX = 256
 
 HEADER_LENGTH_MAX = 65536
 """A header holds the definition of a message type; the longest of ROS's own packages is 15 kB."""
-
-_LENGTH = struct.Struct("<I")
 
 Serve = Callable[[socket.socket, Any, bytes], None]
 """Takes over a connection: its blocking socket, the address of its other end, and the header with its length."""
@@ -33,27 +32,25 @@ class ConnectionLimit:
     def __init__(self, most: int) -> None:
         self._most = most
         self._lock = threading.Lock()
-        self._held: Dict[socket.socket, Any] = {}  # the other end's address of each; the oldest first
+        self._held: ConnectionTable[socket.socket] = ConnectionTable()
 
     def add(self, sock: socket.socket, address: Any) -> None:
         """Hold a connection; if there are too many, shut down the oldest one of the address with the most."""
         with self._lock:
             if len(self._held) >= self._most:
                 self._evict()
-            self._held[sock] = address
+            self._held.add(sock, address[0])
 
     def _evict(self) -> None:
-        counts: Counter[str] = collections.Counter(address[0] for address in self._held.values())
-        most = counts.most_common(1)[0][0]
-        victim = next(sock for sock, address in self._held.items() if address[0] == most)
-        del self._held[victim]
+        victim = self._held.list_connections(self._held.find_largest())[0]
+        self._held.remove(victim)
         with contextlib.suppress(OSError):
             victim.shutdown(socket.SHUT_RDWR)  # its own thread closes it
 
     def remove(self, sock: socket.socket) -> bool:
         """Return whether sock was still held."""
         with self._lock:
-            return self._held.pop(sock, None) is not None
+            return self._held.remove(sock)
 
 
 class HandshakeReader:
@@ -91,10 +88,10 @@ class HandshakeReader:
         Raises: OSError where the connection breaks or the time is over.
         """
         deadline_s = time.monotonic() + self._timeout_s
-        data = _read(sock, _LENGTH.size, deadline_s)
-        if len(data) < _LENGTH.size:
+        data = _read(sock, LENGTH.size, deadline_s)
+        if len(data) < LENGTH.size:
             return b""
-        length: int = _LENGTH.unpack(data)[0]
+        length: int = LENGTH.unpack(data)[0]
         if not 0 < length <= HEADER_LENGTH_MAX:
             return b""
         header = _read(sock, length, deadline_s)

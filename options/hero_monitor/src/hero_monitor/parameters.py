@@ -7,11 +7,12 @@ import stat
 from dataclasses import dataclass
 from typing import Any, List, Optional, Sequence
 
+from hero_node.addresses import is_loopback
 from hero_node.errors import ProgramError
 from hero_node.parameters import Parameter, declare, find_declared, flag, make_error, number, whole_number
 from hero_node.ros.private_parameters import read_parameters
 
-from .serving.access import TOKEN_LENGTH_MIN, is_loopback
+from .serving.access import TOKEN_LENGTH_MIN
 
 TOKEN_REMEDY = (
     "write one into a file that only you can read, and name it with token_file:=FILE: "

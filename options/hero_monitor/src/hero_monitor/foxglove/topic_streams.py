@@ -8,7 +8,6 @@ import contextlib
 import errno
 import selectors
 import socket
-import struct
 import xmlrpc.client
 from http.client import HTTPException
 from io import BytesIO
@@ -19,6 +18,7 @@ from xml.parsers.expat import ExpatError
 from rosgraph.network import ROSHandshakeException, read_ros_handshake_header, write_ros_handshake_header
 
 from hero_node.ros.master import MASTER_TIMEOUT_S, SUCCESS, LimitedTransport
+from hero_node.tcpros import TooLongError, find_messages
 
 READ_LENGTH = 65536
 READS_MAX = 200
@@ -26,8 +26,6 @@ READS_MAX = 200
 
 MESSAGE_LENGTH_MAX = 1 << 28
 """A publisher that announces more does not speak TCPROS."""
-
-_LENGTH = struct.Struct("<I")
 
 
 class Source(NamedTuple):
@@ -70,18 +68,13 @@ class Stream:
         return self._split()
 
     def _split(self) -> List[bytes]:
-        data, position, messages = self._data, 0, []
-        while len(data) - position >= _LENGTH.size:
-            start = position + _LENGTH.size
-            (length,) = _LENGTH.unpack_from(data, position)
-            if length > MESSAGE_LENGTH_MAX:
-                self.is_open = False
-                break
-            if len(data) < start + length:
-                break
-            position = start + length
-            messages.append(bytes(data[start:position]))
-        del data[:position]
+        data, end, messages = self._data, 0, []
+        try:
+            for start, end in find_messages(data, MESSAGE_LENGTH_MAX):
+                messages.append(bytes(data[start:end]))
+        except TooLongError:
+            self.is_open = False
+        del data[:end]
         return messages
 
     def close(self) -> None:

@@ -13,14 +13,6 @@ TOKEN_LENGTH_MIN = 16
 """A shorter token could be guessed."""
 
 
-def is_loopback(host: str) -> bool:
-    """Return whether an address to bind to can be reached from this PC only."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
-
-
 class Access:
     """The rules of one server."""
 

@@ -6,8 +6,9 @@ with the most. Times enter as now_s, any clock that never steps.
 """
 
 import ipaddress
-from collections import Counter
-from typing import Dict, NamedTuple, Protocol, Set
+from typing import Dict, Protocol
+
+from hero_node.connection_table import ConnectionTable
 
 CONNECTIONS_MAX = 400
 UNTRUSTED_PER_ADDRESS_MAX = 50
@@ -25,13 +26,6 @@ class Connection(Protocol):
 
     def closed(self) -> bool:
         """Whether either end has closed it."""
-
-
-class Arrival(NamedTuple):
-    """Source and time of an untrusted connection."""
-
-    address: str
-    time_s: float
 
 
 def group_address(address: str) -> str:
@@ -54,36 +48,39 @@ class ClientLimits:
         """per_address_max: of untrusted connections."""
         self._connections_max = connections_max
         self._per_address_max = per_address_max
-        self._untrusted: Dict[Connection, Arrival] = {}  # oldest first
-        self._trusted: Set[Connection] = set()
+        self._opened_s: Dict[Connection, float] = {}  # of all, the oldest first
+        self._untrusted: ConnectionTable[Connection] = ConnectionTable()
 
     def admit(self, connection: Connection, address: str, now_s: float) -> bool:
         """Take a new connection, evicting another if need be; return False if all others are trusted."""
-        self._untrusted = {known: arrival for known, arrival in self._untrusted.items() if not known.closed()}
-        self._trusted = {known for known in self._trusted if not known.closed()}
+        for known in [known for known in self._opened_s if known.closed()]:
+            self._forget(known)
         address = group_address(address)
-        counts = Counter(arrival.address for arrival in self._untrusted.values())
-        if counts[address] >= self._per_address_max:
+        if self._untrusted.count(address) >= self._per_address_max:
             self._evict_oldest_of(address)
-        elif len(self._untrusted) + len(self._trusted) >= self._connections_max:
-            if not counts:
+        elif len(self._opened_s) >= self._connections_max:
+            if not self._untrusted:
                 return False
-            self._evict_oldest_of(counts.most_common(1)[0][0])
-        self._untrusted[connection] = Arrival(address, now_s)
+            self._evict_oldest_of(self._untrusted.find_largest())
+        self._untrusted.add(connection, address)
+        self._opened_s[connection] = now_s
         return True
 
     def _evict_oldest_of(self, address: str) -> None:
-        oldest = next(known for known, arrival in self._untrusted.items() if arrival.address == address)
-        del self._untrusted[oldest]
+        oldest = self._untrusted.list_connections(address)[0]
+        self._forget(oldest)
         oldest.close()
+
+    def _forget(self, connection: Connection) -> None:
+        del self._opened_s[connection]
+        self._untrusted.remove(connection)
 
     def trust(self, connection: Connection) -> None:
         """Exempt a connection on which a request with a login has arrived."""
-        if self._untrusted.pop(connection, None) is not None:
-            self._trusted.add(connection)
+        self._untrusted.remove(connection)
 
     def expire(self, now_s: float) -> None:
         """Close untrusted connections that are too old; to be called about once a second."""
-        for connection, arrival in self._untrusted.items():
-            if now_s - arrival.time_s > UNTRUSTED_S:
+        for connection in self._untrusted:
+            if now_s - self._opened_s[connection] > UNTRUSTED_S:
                 connection.close()

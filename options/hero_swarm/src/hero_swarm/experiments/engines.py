@@ -4,7 +4,6 @@ Knows nothing of experiments: it calls a function with arguments, and survives w
 """
 
 import collections
-import ipaddress
 import multiprocessing
 import os
 import signal
@@ -20,6 +19,7 @@ from concurrent.futures import (
 )
 from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
 
+from hero_node.addresses import is_loopback
 from hero_node.optional import import_optional
 from hero_node.texts import one_line
 
@@ -101,16 +101,9 @@ def _check_reach(addresses: Iterable[str]) -> None:
     """Check that what other PCs can reach has TLS. Raises: ExperimentError."""
     for address in addresses:
         protocol, _, place = address.partition("://")
-        if protocol != "tls" and not _is_loopback(place.rpartition(":")[0]):
+        if protocol != "tls" and not is_loopback(place.rpartition(":")[0]):
             text = "Dask at %s lets all who reach it run code there: use TLS, or --host 127.0.0.1 (docs/experiments.md)"
             raise ExperimentError(text % address)
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def compute(

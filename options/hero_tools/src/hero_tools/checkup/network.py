@@ -3,12 +3,13 @@
 Read by ip(8) and ss(8) of iproute2: nothing is bound or connected.
 """
 
-import ipaddress
 import json
 import re
 import socket
 from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional, Sequence, Set
+
+from hero_node.addresses import is_loopback
 
 from .points import Finding, ask_system, fail, ok, warn
 
@@ -38,7 +39,7 @@ def read_addresses() -> Optional[List[Address]]:
         Address(link["ifname"], entry["local"])
         for link in json.loads(answer or "[]")
         for entry in link.get("addr_info", [])
-        if entry.get("family") == "inet" and not ipaddress.ip_address(entry["local"]).is_loopback
+        if entry.get("family") == "inet" and not is_loopback(entry["local"])
     ]
 
 
@@ -49,14 +50,6 @@ def find_robot_interface(addresses: Sequence[Address]) -> Optional[str]:
             return found.interface
     real = {found.interface for found in addresses if not found.interface.startswith(VIRTUAL)}
     return real.pop() if len(real) == 1 else None
-
-
-def is_loopback(address: str) -> bool:
-    """Whether only programs on this PC can reach an address; False for text that is no address."""
-    try:
-        return ipaddress.ip_address(address.strip("[]")).is_loopback
-    except ValueError:
-        return False
 
 
 def check_addresses(
@@ -144,7 +137,7 @@ def resolve(name: str) -> Set[str]:
 
 def is_own(address: str, own: Sequence[Address]) -> bool:
     """Whether an IPv4 address leads to this PC."""
-    return ipaddress.ip_address(address).is_loopback or address in {found.address for found in own}
+    return is_loopback(address) or address in {found.address for found in own}
 
 
 def find_source_address(target: str) -> Optional[str]:
