@@ -155,6 +155,30 @@ class StopTest(unittest.TestCase):
         self.assertEqual(commands[-1].linear.x, 0.0)
         self.page.actions().release().perform()
 
+    def test_after_a_release_an_arrow_key_that_is_still_held_moves_no_robot(self):
+        self.open_other()
+        commands = []
+        rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
+        self.page.choose("hero_2")
+        self.page.run("document.getElementById('pad').focus()")
+        for stopping in self.pages:
+            self.page.send_key("keyDown", "ArrowUp")
+            wait_for(lambda: commands and commands[-1].linear.x > 0, "a command")
+            stopping.press_stop()
+            self.wait_for_banner(GREEN, "stopped, all wheels at rest")
+            self.assertEqual(commands[-1].linear.x, 0.0)
+            del commands[:]
+            self.release()
+            self.page.wait_for_text("#stop", "STOP ALL")
+            for _ in range(20):
+                self.page.send_key("keyDown", "ArrowUp", autoRepeat=True)
+            self.page.send_key("keyUp", "ArrowUp")
+            # Commands arrive in order: what the held key had sent would be before those of the new press.
+            self.page.send_key("keyDown", "ArrowDown")
+            wait_for(lambda: commands and commands[-1].linear.x < 0, "a command of a new press")
+            self.page.send_key("keyUp", "ArrowDown")
+            self.assertFalse([command for command in commands if command.linear.x > 0])
+
     def test_a_stop_of_one_robot_ends_the_hold_of_another_page(self):
         self.open_other()
         commands = []

@@ -134,8 +134,7 @@ class TouchTest(unittest.TestCase):
 
     def press_key(self, kind, key):
         text = {"Enter": "\r", "Space": " "}[key]
-        keys = {"type": kind, "code": key, "key": key if key == "Enter" else " ", "text": text}
-        self.page.browser.execute_cdp_cmd("Input.dispatchKeyEvent", keys)
+        self.page.send_key(kind, key, key=key if key == "Enter" else " ", text=text)
 
     def stop(self):
         self.tap(self.find("stop"))
@@ -183,6 +182,16 @@ class TouchTest(unittest.TestCase):
                     self.assertLessEqual(top + height, size[1], (state, size))
         self.page.resize(1440, 900)
         self.assertEqual({size: len(found) for size, found in places.items()}, dict.fromkeys(SIZES, 1))
+
+    def test_a_notice_does_not_cover_the_release_that_it_asks_for(self):
+        self.stop()
+        self.let_arrive("all robots are stopped: release them first")
+        for size in SIZES:
+            self.page.resize(*size)
+            _, top, _, height = self.page.run(FIND_BUTTONS)["release"]
+            notice = self.page.find("#notices p").rect
+            self.assertLess(notice["y"] + notice["height"], top, size)
+            self.assertGreater(height, 0, size)
 
     def test_three_quick_taps_on_stop_all_or_release_never_release(self):
         for size in SIZES:

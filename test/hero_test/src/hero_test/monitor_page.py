@@ -112,6 +112,10 @@ class MonitorPage:
         press()
         wait_for(is_true, what)
 
+    def send_key(self, kind, code, **more):
+        """Send a keyDown or keyUp to what has the focus."""
+        self.browser.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, "code": code, "key": code, **more})
+
     def wait_for_text(self, selector, text):
         wait_for(lambda: text in self.text(selector), "%r in %s" % (text, selector))
 
