@@ -5,7 +5,7 @@ import struct
 from pathlib import Path
 
 import pytest
-from driver_side import SENT, VELOCITY, DriverSide, read_text
+from driver_side import POSITION, RECEIVED, SENT, VELOCITY, DriverSide, read_text
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 G_COUNTS = 8192
@@ -36,6 +36,25 @@ def test_the_documented_rate_of_commands_is_the_highest_that_is_taken(monkeypatc
     most_hz = find_number("robot_interface.md", r"10 Hz is enough, (\d+) Hz the maximum")
     assert count_lost(monkeypatch, most_hz) <= 1, "the last one may wait"
     assert count_lost(monkeypatch, most_hz + 1.0) > 3
+
+
+@pytest.mark.parametrize(
+    ("topic", "send"),
+    [
+        ("/velocity_controller/cmd_vel", lambda driver: driver.send_twist(0, 0.1, 0.0, VELOCITY)),
+        ("/position_controller/cmd_vel", lambda driver: driver.send_twist(0, 0.1, 0.0, POSITION)),
+        ("/cmd_motor", lambda driver: driver.send(0, RECEIVED["cmd_motor"], struct.pack("<HH", 1400, 1600))),
+    ],
+)
+def test_motors_are_off_the_documented_time_after_the_last_command(topic, send):
+    after_s = find_number("robot_interface.md", re.escape(topic) + r"`.*?stops after (\d+) s")
+    driver = DriverSide()
+    driver.start_streaming()
+    send(driver)
+    driver.run(round(1000.0 * after_s) - 50)
+    assert driver.swarm.robots[0].motors.motors.attached
+    driver.run(200)
+    assert not driver.swarm.robots[0].motors.motors.attached
 
 
 def test_an_imu_message_is_in_the_documented_units():
