@@ -191,7 +191,7 @@ class CalibrateTest(unittest.TestCase):
         file = keep(self.files, 1, motor_centers_us=[1511, 9000])
         cases = [
             (self.start("motors", "--robots", "1"), "no terminal to answer"),
-            (self.start("restore"), "hero_1.yaml, line 1: motor_centers_us is"),
+            (self.start("restore"), "hero_1.yaml, line 3: motor_centers_us is 9000, but"),
             (self.start("motors", "--folder", file), "hero_1.yaml cannot be created: File exists"),
         ]
         for program, reason in cases:
