@@ -32,7 +32,7 @@ DAMAGED = {
 }
 
 
-@pytest.mark.parametrize("content", DAMAGED.values(), ids=DAMAGED)
+@pytest.mark.parametrize("content", DAMAGED.values(), ids=list(DAMAGED))
 def test_a_damaged_file_is_told_of_and_the_others_are_read(tmp_path, content):
     (tmp_path / "hero_3.yaml").write_bytes(content)
     (tmp_path / "hero_7.yaml").write_text(GOOD)

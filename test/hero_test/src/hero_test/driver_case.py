@@ -4,6 +4,7 @@ import os
 import re
 import unittest
 import xmlrpc.client
+from typing import Dict, Tuple
 
 import rosgraph
 import rospy
@@ -162,6 +163,9 @@ class DriverCase(unittest.TestCase):
     """Tests of the driver that the .test file starts."""
 
     node = NODE
+    fleet: "Fleet"
+    rosout: "Recorder"
+    address: Tuple[str, int]
 
     @classmethod
     def setUpClass(cls):
@@ -242,6 +246,8 @@ class DriverProcess(Program):
 
 class OwnDriverCase(unittest.TestCase):
     """Tests that start drivers with parameters of their own."""
+
+    _shared: Dict[str, "DriverProcess"]
 
     @classmethod
     def setUpClass(cls):
