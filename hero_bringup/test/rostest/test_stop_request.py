@@ -196,7 +196,9 @@ class StopRequestTest(unittest.TestCase):
             joystick.publish(Joy(axes=[math.nan, 1.0], buttons=[0, is_pressed, 0, 0, 1]))
         teleop.wait_for_text("stopped, all wheels at rest")
         self.wait_for_report(True)
-        joystick.publish(Joy(axes=[0.0, 1.0], buttons=[0, 0, 0, 0, 1]))
+        teleop.wait_for_text("let go, then press again")
+        for is_enabled in (0, 1):
+            joystick.publish(Joy(axes=[0.0, 1.0], buttons=[0, 0, 0, 0, is_enabled]))
         teleop.wait_for_text("hero_0 does not move: the driver hero_driver has stopped all robots")
         self.assertEqual(teleop.end(), 0)
         self.assertEqual(teleop.text().count("not finite"), 1, teleop.text())

@@ -38,11 +38,11 @@ class FairStream(tornado.iostream.IOStream):
 
     def read_bytes(self, num_bytes: int, partial: bool = False) -> Awaitable[bytes]:
         """Read when it is this client's turn."""
-        return self._read_in_turn(super().read_bytes(num_bytes, partial))
+        return self._read_in_turn(super().read_bytes(num_bytes, partial=partial))
 
     def read_until_regex(self, regex: bytes, max_bytes: Optional[int] = None) -> Awaitable[bytes]:
         """Read when it is this client's turn."""
-        return self._read_in_turn(super().read_until_regex(regex, max_bytes))
+        return self._read_in_turn(super().read_until_regex(regex, max_bytes=max_bytes))
 
     async def _read_in_turn(self, reading: Awaitable[bytes]) -> bytes:
         # Since the last read the loop has worked for this client alone.
