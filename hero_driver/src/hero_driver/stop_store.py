@@ -1,4 +1,4 @@
-"""Whether robots are stopped, on disk, for a driver that is started again under the same name and ROS master.
+"""The stop of the robots, kept on disk for a driver that is started again under the same name and ROS master.
 
 An empty file says it by its name: NAME.released becomes NAME.stopped and back. Renaming needs no space on the disk, so
 a disk that has filled up since the driver's start loses no stop. When they were stopped is the file's time.

@@ -18,7 +18,7 @@ MAX_FILE_BYTES = 2**26
 """Files that people write or draw, such as images of maps, are smaller."""
 
 NEW_ENDING = ".new"
-"""Of files that replace others once they are whole; what a killed program left behind ends so, too."""
+"""Ending of files that replace others once they are whole, and of what a killed program left behind."""
 
 LOCK_TIMEOUT_S = 10.0
 """Writers hold a lock for milliseconds; one that is suspended meanwhile must not block the others for ever."""

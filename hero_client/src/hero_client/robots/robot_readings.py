@@ -181,7 +181,7 @@ class RobotReadings(Group):
 
     @property
     def connected(self) -> bool:
-        """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
+        """True while the driver subscribes to the robot's commands, as it does while it knows the robot."""
         return self._link.connected
 
     @property
@@ -191,7 +191,7 @@ class RobotReadings(Group):
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the robot takes no motion because its driver has stopped all robots (emergency stop).
+        """True while the robot takes no motion, as its driver has stopped all robots (emergency stop).
 
         Never waits. False until the robot's driver has reported, which wait_until_ready() waits for.
         """

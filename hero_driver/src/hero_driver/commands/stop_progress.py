@@ -79,7 +79,7 @@ class StopProgress:
 
     @property
     def has_begun(self) -> bool:
-        """Whether a stop was sent."""
+        """True once a stop was sent."""
         return self._stops > 0
 
     def renew(self, now_s: float) -> None:

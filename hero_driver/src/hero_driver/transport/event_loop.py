@@ -36,10 +36,10 @@ POLL_INTERVAL_S = 0.05
 silence and repeated requests. One timer for all, because each costs a turn of the loop; messages wait meanwhile."""
 
 PAUSE_S = 1.0
-"""Between two turns of the loop: after more, the driver or its PC was suspended, or too busy to run the loop."""
+"""Time from one turn of the loop to the next, s, beyond which the driver or its PC was suspended, or too busy."""
 
 LATE_S = 0.1
-"""Between two turns of the loop, which has a timer every POLL_INTERVAL_S: after more, it lacks CPU or was suspended."""
+"""Time from one turn of the loop to the next, s, beyond which it lacks CPU: it has a timer every POLL_INTERVAL_S."""
 
 LATE_KEPT_S = 5.0
 """For so long it is known that the loop was late."""
