@@ -13,7 +13,7 @@ from hero_node.parameters import number, robot_ids
 
 
 def main():
-    with Program("teleop") as program:
+    with Program("teleop", anonymous=True) as program:
         parameters = read_parameters(
             {
                 "robots": robot_ids("0"),

@@ -8,7 +8,7 @@ from hero_node.parameters import number, robot_ids, whole_number
 
 
 def main():
-    with Program("teleop_joy") as program:
+    with Program("teleop_joy", anonymous=True) as program:
         parameters = read_parameters(
             {
                 "robots": robot_ids("0"),

@@ -151,6 +151,26 @@ class TeleopTest(unittest.TestCase):
             wait_for(lambda t=terminal: t.before == t.settings(), "the terminal as it was")
             commands.wait_for_stops(robot_id)
 
+    def test_two_pupils_drive_two_robots_and_one_name_is_there_once(self):
+        commands = CommandWatch([0, 1])
+        terminals = [Terminal("_robots:=%d" % robot_id) for robot_id in range(2)]
+        for robot_id, terminal in enumerate(terminals):
+            self.addCleanup(terminal.close)
+            self.drive(terminal, commands, robot_id)
+        first = self.start(2)
+        wait_for(lambda: "Hold a key" in first.text, "the first one")
+        again = self.start(2)
+        wait_for(lambda: again.status() == 1, "the end of the second one of that name")
+        self.assertIn("/teleop_2 already runs", again.text)
+
+    def test_launch_files_name_the_node_by_its_robots(self):
+        for ids, name in (("3", "3"), ("0-2", "0_2"), ("'0 1'", "0_1")):
+            command = "roslaunch --nodes hero_bringup hero_teleop%%s.launch id:=%s" % ids
+            self.assertEqual(subprocess.getoutput(command % ""), "/hero_teleop_" + name)
+            nodes = set(subprocess.getoutput(command % "_joy").split())
+            self.assertEqual(nodes, {"/hero_teleop_joy_" + name, "/hero_teleop_joy_%s_device" % name})
+        self.assertEqual(subprocess.getoutput(command % "" + " name:=ada"), "/ada")
+
     def test_a_closed_terminal_stops_the_robot(self):
         commands = CommandWatch([0])
         terminal = self.start(0)

@@ -134,7 +134,10 @@ class JoystickTeleop:
             command = self._mapping.read(self._newest)
         elif now_s >= self._next_warning_s:
             self._next_warning_s = now_s + REPORT_PERIOD_S
-            rospy.logwarn("nothing on /joy: is a joystick plugged in, and does its driver (package joy) run?")
+            rospy.logwarn(
+                "nothing on %s: is a joystick plugged in, and does its driver (package joy) run?",
+                rospy.resolve_name("/joy"),
+            )
         while self._presses:
             buttons = self._presses.popleft()
             self._output.note_hold(self._mapping.is_enabled(buttons))

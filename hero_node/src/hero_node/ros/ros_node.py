@@ -41,7 +41,8 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
         name already runs, which ROS would end.
     """
     check_master()
-    running = "" if anonymous else find_running_node(name)
+    # A name that is given (__name:=) is never made anonymous.
+    running = find_running_node(name) if not anonymous or "__name" in rospy.names.get_mappings() else ""
     if running:
         raise NodeError(f"{running} already runs: end it, or start this one with another __name:=")
     limit_master_calls()
