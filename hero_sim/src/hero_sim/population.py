@@ -11,7 +11,7 @@ from typing import Any, Dict, List, Optional, Sequence
 import numpy as np
 
 from .errors import OptionError
-from .link.wifi import PROFILES, Radio
+from .link.wifi import PROFILES, Radio, build_network, parse_wifi
 from .robot.models import build_body, parse_models
 from .robot.servo_pins import CORE_2, CORE_3
 from .robot_constants import MAX_ID
@@ -49,7 +49,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("--count", type=int, default=1, metavar="N", help="number of robots (%(default)s)")
     add("--seed", type=int, default=0, help="seed of all random numbers (%(default)s)")
     add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze, box, discs (a square that fits them)")
-    add("--wifi", choices=PROFILES, default="ideal", help="quality of the network (%(default)s)")
+    add(
+        "--wifi",
+        default="ideal",
+        metavar="PROFILE[,channels=C]",
+        help=f"quality of the network: {', '.join(PROFILES)}; robots of a channel share its airtime (ideal; 1 channel)",
+    )
     add("--seconds", type=float, metavar="S", help="end after S simulated seconds")
     add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
     add(
@@ -142,9 +147,10 @@ def place_worlds(
 
 
 def build_radios(options: argparse.Namespace, worlds: int = 1) -> List[Radio]:
-    """Return the Wi-Fi of each robot, world after world."""
-    seeds = [seed for one in _list_worlds(options, worlds) for seed in draw_seeds(one)["radios"]]
-    return [Radio(PROFILES[options.wifi], np.random.RandomState(seed)) for seed in seeds]
+    """Return the Wi-Fi of each robot, world after world: worlds share no channel. Raises: OptionError."""
+    profile, channels = parse_wifi(options.wifi)
+    seeds = (draw_seeds(one)["radios"] for one in _list_worlds(options, worlds))
+    return [radio for own in seeds for radio in build_network(profile, channels, own)]
 
 
 def _list_worlds(options: argparse.Namespace, worlds: int) -> List[argparse.Namespace]:

@@ -58,6 +58,7 @@ class Simulator(LinkHandler):
         self._away_until_ms = [0] * len(swarm.robots)
         self._carrying: Set[int] = set()
         self._full: Set[int] = set()
+        self._congested: Set[int] = set()
 
     def run(self, seconds: Optional[float] = None) -> None:
         """Run until stopping is set, or for this many simulated seconds."""
@@ -134,9 +135,12 @@ class Simulator(LinkHandler):
     def _send_up(self, index: int, pieces: List[bytes]) -> None:
         radio, link, now_ms = self.radios[index], self.link, self.swarm.now_ms
         if not radio.is_transparent(now_ms):
-            for data in pieces:
-                radio.up.put(now_ms, data)
+            # TCP joins what is written at once (Nagle).
+            radio.up.put(now_ms, b"".join(pieces))
             self._carrying.add(index)
+            if radio.is_congested(now_ms):
+                self._congested.add(index)
+                self.writing_blocked(index)
             return
         # The firmware's write ran into its limit of 5 s: what is left of it is lost, half a packet perhaps.
         link.drop_unsent(index)
@@ -152,6 +156,9 @@ class Simulator(LinkHandler):
                 self.link.send(index, up)
             if down:
                 self.swarm.robots[index].receive_bytes(now_ms, down)
+            if index in self._congested and not radio.is_congested(now_ms):
+                self._congested.discard(index)
+                self.writing_resumed(index)
             if not radio.is_carrying:
                 self._carrying.discard(index)
 

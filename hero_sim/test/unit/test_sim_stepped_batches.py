@@ -190,6 +190,9 @@ class FixedDelays:
     def __init__(self, up_ms, down_ms):
         self.up, self.down = FixedDelay(up_ms), FixedDelay(down_ms)
 
+    def is_congested(self, now_ms):
+        return False
+
 
 class FixedDelay:
     def __init__(self, delays_ms):

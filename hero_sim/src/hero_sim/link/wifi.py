@@ -6,9 +6,15 @@ Source: published recordings of one HeRo on Wi-Fi: gaps between odoms p95 44-53 
 """
 
 from collections import deque
-from typing import Deque, Dict, NamedTuple, Sequence, Tuple
+from typing import Deque, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
+
+from ..errors import OptionError
+from ..key_values import parse_values
+from .channel import Channel
+
+MAX_CHANNELS = 100
 
 
 class WifiProfile(NamedTuple):
@@ -28,6 +34,31 @@ PROFILES: Dict[str, WifiProfile] = {
 }
 """ideal adds nothing. router and hotspot are the good and the common end of the recordings, bad is beyond
 their worst: links that are lost for seconds."""
+
+
+def parse_wifi(text: str) -> Tuple[WifiProfile, int]:
+    """Return the profile and the number of channels of `PROFILE[,channels=C]`; 0: no robot takes another's airtime.
+
+    Raises: OptionError.
+    """
+    name, _, values = text.partition(",")
+    if name not in PROFILES:
+        raise OptionError(f"--wifi {text!r}: must be one of {', '.join(PROFILES)}, or with channels: router,channels=3")
+    if name == "ideal" and values:
+        raise OptionError(f"--wifi {text!r}: ideal has no channels; leave them out, or take router")
+    channels = parse_values(f"--wifi {text!r}", values, {"channels": (0, MAX_CHANNELS)}).get("channels", 1)
+    if channels != int(channels):
+        raise OptionError(f"--wifi {text!r}: channels must be a whole number")
+    return PROFILES[name], 0 if name == "ideal" else int(channels)
+
+
+def build_network(profile: WifiProfile, channels: int, seeds: Sequence[int]) -> List["Radio"]:
+    """Return the radio of each robot of a network, one for each seed, spread over its channels in turn."""
+    shared = [Channel(np.random.RandomState([seed, 1])) for seed in seeds[:channels]]
+    return [
+        Radio(profile, np.random.RandomState(seed), shared[row % len(shared)] if shared else None)
+        for row, seed in enumerate(seeds)
+    ]
 
 
 class _Outages:
@@ -51,9 +82,10 @@ class _Outages:
 
 
 class _Direction:
-    def __init__(self, radio: "Radio") -> None:
+    def __init__(self, radio: "Radio", station: object) -> None:
         self._radio = radio
-        self._busy_ms = 0.0  # end of the transmission of the last bytes
+        self._station = station
+        self.busy_ms = 0.0  # end of the transmission of the last bytes
         self._last_ms = 0.0  # their arrival
         self.queue: Deque[Tuple[float, bytes]] = deque()
 
@@ -67,7 +99,10 @@ class _Direction:
         bytes_per_s = self._radio.profile.bytes_per_s
         at_ms = max(float(now_ms), self._radio.stalled_until_ms)
         if bytes_per_s:
-            at_ms = self._busy_ms = max(at_ms, self._busy_ms) + length / bytes_per_s * 1000.0
+            at_ms = self.busy_ms = max(at_ms, self.busy_ms) + length / bytes_per_s * 1000.0
+        if self._radio.channel:
+            self.busy_ms, late_ms = self._radio.channel.carry(at_ms, self._station, length)
+            at_ms = self.busy_ms + late_ms
         # What was sent later may be due earlier; it waits behind the other all the same.
         self._last_ms = max(self._last_ms, self._radio.find_arrival(at_ms))
         return self._last_ms
@@ -79,7 +114,7 @@ class _Direction:
     def clear(self) -> None:
         """Drop what is on its way."""
         self.queue.clear()
-        self._last_ms = 0.0
+        self._last_ms = self.busy_ms = 0.0
 
     def take(self, now_ms: int) -> bytes:
         """Return what has arrived by now."""
@@ -95,24 +130,31 @@ class Radio:
 
     Attributes:
         profile: how good it is.
+        channel: which it shares with others, if any.
         stalled_until_ms: until when it carries nothing.
         up, down: from the robot to the driver, and back.
     """
 
-    def __init__(self, profile: WifiProfile, rng: np.random.RandomState) -> None:
+    def __init__(self, profile: WifiProfile, rng: np.random.RandomState, channel: Optional[Channel] = None) -> None:
         """Delay bytes as profile says, with delays drawn from rng."""
         self.profile = profile
+        self.channel = channel
         self.stalled_until_ms = 0
         self._is_ideal = profile == PROFILES["ideal"]
         self._rng = rng
         self._outages = [_Outages(outages_ms, rng) for outages_ms in profile.outages_ms]
-        self.up = _Direction(self)
-        self.down = _Direction(self)
+        self.up = _Direction(self, self)
+        # Whatever goes down is sent by the access point, one station.
+        self.down = _Direction(self, channel)
 
     @property
     def is_carrying(self) -> bool:
         """Whether bytes are on their way."""
         return bool(self.up.queue or self.down.queue)
+
+    def is_congested(self, now_ms: int) -> bool:
+        """Return whether what the robot sent last still waits for the channel: its next write blocks."""
+        return self.channel is not None and self.up.busy_ms > now_ms
 
     def is_transparent(self, now_ms: int) -> bool:
         """Return whether bytes pass at once, without a queue."""

@@ -17,8 +17,6 @@ from hero_client.robots.swarm_base import BaseSwarm
 from hero_client.values.background_motion import Steps
 from hero_node.command_line import say
 
-from ..errors import OptionError
-from ..link.wifi import PROFILES
 from ..population import build_radios, build_world, check_population
 from ..robot.models import parse_models
 from .robot import StepRobot
@@ -97,8 +95,6 @@ class StepSwarm(StepWorld):
             model=_list_texts(model),
         )
         check_population(options, worlds)
-        if wifi not in PROFILES:
-            raise OptionError(f"--wifi {wifi!r}: must be one of {', '.join(PROFILES)}")
         radios = () if wifi == IDEAL else build_radios(options, worlds)
         models = parse_models(options.model, first_id, count) * worlds
         self.rows = RobotRows(build_world(options, worlds), radios, models)

@@ -38,9 +38,14 @@ class RadioRows:
         return self._up[0][0] if self._up else NEVER_MS
 
     def send_readings(self, now_ms: int, readings: Readings, rows: np.ndarray, parts: Collection[str]) -> None:
-        """Send parts of the readings of the robots at rows, which must not change any more."""
+        """Send parts of the readings of the robots at rows, which must not change any more.
+
+        A robot whose last ones still wait for the channel sends none: its write blocks, and newer ones come next.
+        """
         length = sum(LENGTHS[part] for part in parts)
         for row in rows.tolist():
+            if self._radios[row].is_congested(now_ms):
+                continue
             arrival_ms = math.ceil(self._radios[row].up.send(now_ms, length))
             heapq.heappush(self._up, (arrival_ms, next(self._order), row, readings, parts))
 
