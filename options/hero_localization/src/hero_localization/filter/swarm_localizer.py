@@ -18,6 +18,7 @@ from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Outcome, PoseFilter, is_near
 from .pose_hypothesis import StampedPose
 from .pose_sources import DISAGREEING_S, NO_OFFSET, Conflict, PoseSources, describe_conflict
+from .source_clocks import Clock, SourceClocks
 
 LOST_S = 1.0
 """A robot whose pose was not measured for this long is lost: its pose follows its odometry alone."""
@@ -102,7 +103,8 @@ class _Robot:
 class SwarmLocalizer:
     """Filters of all robots."""
 
-    def __init__(self) -> None:
+    def __init__(self, is_correcting_clocks: bool = True) -> None:
+        self._clocks = SourceClocks(is_correcting_clocks)
         self._robots: Dict[int, _Robot] = {}
         self._now_s = -math.inf
         self._loss_lines = _limit_loss_lines()
@@ -152,6 +154,8 @@ class SwarmLocalizer:
             robot.clock_offset_s = offset_s
             text = "poses from %s come with stamps %.1f s ahead, and are not used: do the clocks agree?"
             return lines + self._name(measurement.source, text % (measurement.source, offset_s))
+        self._clocks.add(robot_id, measurement, robot.filter.odometry)
+        measurement = self._clocks.correct(measurement, now_s)
         before = robot.filter.pose()
         used_s = robot.filter.used_s
         outcome = robot.filter.add_measurement(measurement)
@@ -240,6 +244,8 @@ class SwarmLocalizer:
             text = "%d more lines on robots lost or found again: %s"
             lines.append(text % (sum(self._summed.values()), list_names(list(self._summed))))
             self._summed.clear()
+        for clock in self.list_clocks():
+            lines += self._name("clock " + clock.name, clock.text)
         for robot_id, robot in sorted(self._robots.items()):
             seen_s = max(robot.filter.used_s, robot.untrusted_s)
             if not robot.is_lost and -math.inf < seen_s < now_s - LOST_S:
@@ -253,6 +259,7 @@ class SwarmLocalizer:
         if back_s <= BACK_S:
             return []
         self._robots = {robot_id: _Robot() for robot_id in self._robots}
+        self._clocks.forget_poses()
         self._loss_lines = _limit_loss_lines()
         return [f"time jumped back by {back_s:.1f} s: all robots are localized again"]
 
@@ -262,6 +269,10 @@ class SwarmLocalizer:
             return [line]
         self._summed["hero_%d" % robot_id] += 1
         return []
+
+    def list_clocks(self) -> List[Clock]:
+        """Return the clocks of sources that differ from odometry's by 10 ms or more."""
+        return self._clocks.list_off()
 
     def list_robots(self, now_s: float) -> List[LocalizedRobot]:
         """Return what is known of all robots, in the order of their ids."""

@@ -15,7 +15,7 @@ from hero_client.ros.drivers import share_drivers
 from hero_client.values.readings import is_plausible
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
-from hero_node.parameters import number, robot_ids, words
+from hero_node.parameters import flag, number, robot_ids, words
 
 from ..filter.pose_filter import make_covariance
 from ..filter.pose_hypothesis import StampedPose
@@ -42,7 +42,7 @@ class LocalizationNode:
         self._covariance = make_covariance(parameters["position_sd_m"], parameters["heading_sd_rad"])
         self._chosen: Optional[List[int]] = parameters["robots"]
         self._lock = threading.Lock()  # inputs come on threads of rospy
-        self._localizer = SwarmLocalizer()
+        self._localizer = SwarmLocalizer(parameters["correct_clocks"])
         self._outputs = Outputs(self._frame)
         self._inputs: Dict[int, PoseInput] = {}
         self._next_diagnostics_s = 0.0
@@ -104,11 +104,11 @@ class LocalizationNode:
         now_s = rospy.get_time()
         self._call(self._localizer.find_lost)
         with self._lock:
-            robots = self._localizer.list_robots(now_s)
+            robots, clocks = self._localizer.list_robots(now_s), self._localizer.list_clocks()
         self._outputs.publish(robots)
         if not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
-            self._outputs.publish_diagnostics(robots, self._list_unknown_robots(now_s))
+            self._outputs.publish_diagnostics(robots, self._list_unknown_robots(now_s), clocks)
 
     def _list_unknown_robots(self, now_s: float) -> List[int]:
         """Return the robots whose tags are seen, but which no driver knows."""
@@ -140,6 +140,7 @@ PARAMETERS = {
     "swarm_topic": words("/track/measured_poses", "hero_msgs/RobotPoses of `track`"),
     "position_sd_m": number(0.002, 1e-5, 1.0, "m", SD_TEXT),
     "heading_sd_rad": number(0.01, 1e-5, 10.0, "rad", "the same of their yaw"),
+    "correct_clocks": flag(True, "stamps of measured poses that are 10 ms off odometry's, or more, are corrected"),
     "rate_hz": number(PUBLISH_RATE_HZ, 1.0, 100.0, "Hz", "minimum publish rate; poses of an image come at once"),
 }
 

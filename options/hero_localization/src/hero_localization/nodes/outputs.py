@@ -13,6 +13,7 @@ from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node.geometry import Pose
 
 from ..filter.pose_hypothesis import StampedPose
+from ..filter.source_clocks import Clock
 from ..filter.swarm_localizer import LocalizedRobot
 
 IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
@@ -75,10 +76,13 @@ class Outputs:
         message.pose.covariance = entries.ravel().tolist()
         return message
 
-    def publish_diagnostics(self, robots: Iterable[LocalizedRobot], unknown: Iterable[int]) -> None:
-        """Publish the state of each robot, and a warning for each tag of a robot that no driver knows."""
+    def publish_diagnostics(
+        self, robots: Iterable[LocalizedRobot], unknown: Iterable[int], clocks: Iterable[Clock]
+    ) -> None:
+        """Publish the state of each robot, and warnings: tags of robots that no driver knows, clocks that are off."""
         text = "its tag is seen, but no driver knows the robot: is it on, and is tag %d its own?"
         statuses = [make_status("hero_%d" % robot_id, DiagnosticStatus.WARN, text % robot_id) for robot_id in unknown]
+        statuses += [make_status(f"clock of {clock.name}", DiagnosticStatus.WARN, clock.text) for clock in clocks]
         for robot in robots:
             level = DiagnosticStatus.WARN if robot.problem else DiagnosticStatus.OK
             text = robot.problem or robot.state.name.lower()

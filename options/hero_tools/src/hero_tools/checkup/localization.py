@@ -77,7 +77,8 @@ def describe_nodes(running: Sequence[str], statuses: Sequence[DiagnosticStatus])
         own = list_statuses(name, statuses)
         good = [status for status in own if status.level == DiagnosticStatus.OK]
         if name == LOCALIZER:
-            texts.append(f"{name}: {len(good)} of {len(own)} robots without a problem")
+            robots = [status for status in own if status.name.startswith(f"{name}: hero_")]
+            texts.append(f"{name}: {len(good)} of {len(robots)} robots without a problem")
         else:
             camera = [status for status in own if status.name == name + ": camera"]
             is_usable = camera and camera[0].level < DiagnosticStatus.ERROR

@@ -1,0 +1,145 @@
+"""Clocks of cameras and motion capture that differ from odometry's: found while robots drive, named and corrected."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hero_localization.filter.pose_hypothesis import StampedPose
+from hero_localization.filter.source_clocks import SourceClocks
+from hero_localization.filter.swarm_localizer import SwarmLocalizer
+from hero_node.geometry import Pose
+
+COVARIANCE = np.diag((0.0007**2, 0.0007**2, 0.003**2))
+STEP_S, ARRIVES_S = 0.01, 0.07
+WHEELS = 1.01
+"""Odometry counts too much by this factor."""
+TRACK, TRACK_2 = "/track/measured_poses (/track)", "/track/measured_poses (/track_2)"
+
+
+class Drive:
+    """A robot that drives by chance, or as told; odometry and poses of two cameras, each 30 times a second."""
+
+    def __init__(self, delays_s, seed=0, motion=None, is_correcting=True):
+        self.random, self.motion = np.random.RandomState(seed), motion
+        self.localizer = SwarmLocalizer(is_correcting)
+        self.localizer.add_robots([4])
+        self.delays_s, self.lines, self.next_s = delays_s, [], 0.0
+        self.speed = self.goal = np.zeros(2)
+        self.true, self.counted = [np.zeros(3)], np.zeros(3)
+
+    def _move(self, pose, speed):
+        heading = pose[2] + speed[1] * STEP_S / 2.0
+        return pose + STEP_S * np.array((speed[0] * math.cos(heading), speed[0] * math.sin(heading), speed[1]))
+
+    @property
+    def now_s(self):
+        return (len(self.true) - 1) * STEP_S
+
+    def _take(self, topic, delay_s, robot_id=4):
+        index = len(self.true) - 1 - round(ARRIVES_S / STEP_S)
+        if index >= 0:
+            pose = self.true[index] + self.random.normal(0.0, (0.0003, 0.0003, 0.003))
+            measurement = StampedPose(index * STEP_S + delay_s, Pose(*pose), COVARIANCE, topic)
+            self.lines += self.localizer.add_measurement(robot_id, measurement, self.now_s)
+
+    def run(self, duration_s):
+        """Drive on; return the largest error of the estimate in the last two seconds, m."""
+        errors_m = []
+        for step in range(round(duration_s / STEP_S)):
+            if self.motion is not None:
+                self.goal = np.array(self.motion(self.now_s))
+            elif self.now_s >= self.next_s:
+                self.goal = np.array((self.random.choice((0.0, 0.1, 0.2)), self.random.uniform(-2.0, 2.0)))
+                self.next_s = self.now_s + self.random.uniform(0.5, 2.0)
+            self.speed = self.speed + np.clip(self.goal - self.speed, -20.0 * STEP_S, 20.0 * STEP_S)
+            self.true.append(self._move(self.true[-1], self.speed))
+            self.counted = self._move(self.counted, WHEELS * self.speed)
+            if step % 3 == 0:
+                self.lines += self.localizer.add_odometry(4, self.now_s, Pose(*self.counted), self.now_s)
+                self.lines += self.localizer.find_lost(self.now_s)
+            for index, delay_s in enumerate(self.delays_s):
+                if step % 3 == 1 + index:
+                    self._take((TRACK, TRACK_2)[index], delay_s)
+            (robot,) = self.localizer.list_robots(self.now_s)
+            if robot.estimate is not None and step > duration_s / STEP_S - 200:
+                true = self.true[round(robot.estimate.stamp_s / STEP_S)]
+                errors_m.append(math.dist(robot.estimate.pose[:2], true[:2]))
+        return max(errors_m)
+
+
+def list_clocks(drive):
+    return [(clock.name, clock.text.split(" come ")[1].split(":")[0]) for clock in drive.localizer.list_clocks()]
+
+
+@pytest.mark.parametrize("delay_s", [0.1, -0.1, 0.2])
+def test_a_camera_whose_clock_is_off_is_named_and_corrected(delay_s):
+    drive = Drive([delay_s])
+    drive.run(14.0)
+    drive.motion = lambda now_s: (0.2, 1.0 if now_s % 2.0 < 1.0 else -1.0)
+    assert drive.run(4.0) < 0.003
+    ((name, text),) = list_clocks(drive)
+    assert name == "/track" and text.endswith("which is corrected")
+    side = "late" if delay_s > 0.0 else "early"
+    assert side in text and abs(float(text.split()[2]) - 1e3 * abs(delay_s)) < 8.0
+    named = [line for line in drive.lines if "chrony" in line]
+    assert len(named) == 1 and "poses from /track come with stamps" in named[0]
+
+
+def test_a_clock_that_is_off_is_named_only_where_it_is_not_corrected():
+    drive = Drive([0.1], is_correcting=False)
+    drive.run(14.0)
+    ((_, text),) = list_clocks(drive)
+    assert text.endswith("ms late")
+    drive.motion = lambda now_s: (0.2, 1.0)
+    assert drive.run(4.0) > 0.015
+
+
+def test_clocks_that_agree_are_left_as_they_are():
+    for seed in range(3):
+        drive = Drive([0.0, 0.004], seed)
+        assert drive.run(12.0) < 0.003
+        assert list_clocks(drive) == [] and len(drive.lines) == 1, drive.lines
+
+
+def test_the_camera_whose_clock_is_off_is_told_from_the_other_one():
+    drive = Drive([0.0, 0.03], 1)
+    assert drive.run(15.0) < 0.003
+    ((name, text),) = list_clocks(drive)
+    assert name == "/track_2" and 25.0 < float(text.split()[2]) < 35.0
+
+
+def test_two_cameras_are_compared_on_a_straight_path_too():
+    drive = Drive([0.0, 0.1], 2, lambda now_s: (0.2 if now_s % 6.0 < 5.0 else 0.0, 0.0))
+    drive.run(16.0)
+    assert [name for name, _ in list_clocks(drive)] == ["/track_2"]
+
+
+def test_correction_does_not_look_like_a_hand():
+    drive = Drive([0.1], 3)
+    drive.run(6.0)
+    del drive.lines[:]
+    drive.run(8.0)
+    assert not [line for line in drive.lines if "by hand" in line]
+
+
+def test_wheels_that_slip_in_place_are_no_clock():
+    drive = Drive([0.0])
+    move, drive._move = drive._move, lambda pose, speed: move(pose, speed if pose is drive.counted else 0.0 * speed)
+    drive.run(15.0)
+    assert list_clocks(drive) == []
+
+
+def test_one_clock_is_kept_for_all_topics_of_a_node():
+    clocks = SourceClocks(True)
+    for robot_id in range(50):
+        clocks.correct(StampedPose(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE, "/hero_%d/pose (/vrpn)" % robot_id), 1.0)
+    assert len(clocks._sources) == 1
+
+
+def test_a_clock_that_is_set_right_is_found_again():
+    drive = Drive([0.1])
+    drive.run(12.0)
+    drive.delays_s = [0.0]
+    drive.run(20.0)
+    assert list_clocks(drive) == [] and drive.run(3.0) < 0.003
