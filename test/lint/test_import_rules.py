@@ -54,11 +54,12 @@ ROOMS = {
     "hero_recording.bags": {"errors"},
     "hero_recording.formats": {"bags", "errors"},
     "hero_recording.plots": {"bags"},
-    "hero_swarm.behaviors": {"behavior", "sources", "steering", "user_module"},
-    "hero_swarm.experiments": {"behavior", "behaviors", "control", "metrics", "safety", "sources", "trial"},
+    "hero_swarm.behaviors": {"behavior", "sensors", "sources", "steering", "user_module"},
+    "hero_swarm.experiments": {"behavior", "behaviors", "control", "metrics", "safety", "sensors", "sources", "trial"},
     "hero_swarm.fitting": {"trial"},
-    "hero_swarm.learning": {"behavior", "metrics"},
-    "hero_swarm.metrics": set(),
+    "hero_swarm.learning": {"behavior", "metrics", "sensors", "sources"},
+    "hero_swarm.metrics": {"sources", "user_module"},
+    "hero_swarm.sensors": set(),
 }
 PURE_ROOMS = (
     "hero_driver.rosserial",
@@ -103,6 +104,7 @@ PURE_ROOMS = (
     "hero_swarm.fitting",
     "hero_swarm.metrics",
     "hero_swarm.safety",
+    "hero_swarm.sensors",
     "hero_swarm.trial",
 )
 

@@ -150,6 +150,10 @@ class RobotReadings(Group):
         self._link.wait_for_next("proximity", timeout_s)
         return self._link.read_ranges()
 
+    def watch(self, topic: str) -> None:
+        """Subscribe to a topic, such as "laser", so that the first reading need not wait."""
+        self._link.subscribe(topic)
+
     def fresh_pose(self) -> Optional[Pose]:
         """Return `pose` without waiting, or None if it is not fresh."""
         return self._link.read_pose() if self._link.age_s("odom") <= FRESH_S else None

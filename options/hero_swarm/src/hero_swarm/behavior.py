@@ -18,22 +18,18 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.object_sensing import (
-    NO_OBJECTS,
-    Objects,
-    ObjectsInSight,
-    Sight,
-    Things,
-    sense_objects,
-    sense_sight,
-)
-from hero_client.values.sensing import Binary, Neighborhood, Neighbors, sense_binary, sense_neighbors
+from hero_client.values.object_sensing import NO_OBJECTS, Objects, ObjectsInSight, Sight, Things
+from hero_client.values.sensing import Binary, Neighborhood, Neighbors
 from hero_node.number_checks import is_number
 from hero_node.texts import shorten
 
+from .sensors import Surroundings, is_sensor, read_sensor
+from .sensors.own import Distance, NeighborColors, Odometry, Proximity
+
 __all__ = [
-    "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Neighborhood", "Neighbors", "Objects",
-    "ObjectsInSight", "Random", "Sensed", "Sight", "decide", "derive_seed", "lock", "sense",
+    "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Distance", "NeighborColors", "Neighborhood",
+    "Neighbors", "Objects", "ObjectsInSight", "Odometry", "Proximity", "Random", "Sensed", "Sight", "decide",
+    "derive_seed", "lock", "sense",
 ]  # fmt: skip
 
 MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 100.0
@@ -42,8 +38,6 @@ VELOCITY, PULSES = DRIVES = ("velocity", "pulses")
 
 Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
-
-SENSORS = (Binary, Neighbors, Objects, Sight)
 
 
 class Random:
@@ -78,8 +72,7 @@ class Sensed:
     """Readings of R robots, as attributes: those below, and one for each sensor of the behavior, by its name.
 
     All arrays are read-only.
-    A Binary gives an array (R,) of bool, Neighbors a Neighborhood, a Sight an array (R,) of NOTHING, OBJECT or ROBOT,
-    and Objects an ObjectsInSight.
+    What a sensor gives, its class says; an array has a row for each robot.
 
     Attributes:
         time_s: since the behavior began.
@@ -150,7 +143,7 @@ class Behavior:
 
     def sensors(self) -> Dict[str, Any]:
         """Return the sensors by name."""
-        return {name: value for name, value in self.parameters().items() if isinstance(value, SENSORS)}
+        return {name: value for name, value in self.parameters().items() if is_sensor(value)}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         """Return the commands of all robots and what to remember; memory is None in the first step."""
@@ -161,17 +154,20 @@ class Behavior:
         return None
 
 
-def sense(behavior: Behavior, time_s: float, poses: np.ndarray, random: Random, things: Things = NO_OBJECTS) -> Sensed:
-    """Return what the sensors of a behavior tell about things and poses (W, N, 3), NaN for unknown ones."""
-    readings: Dict[str, Any] = {}
-    for name, sensor in behavior.sensors().items():
-        if isinstance(sensor, Sight):
-            readings[name] = sense_sight(poses, things, sensor)
-        elif isinstance(sensor, Objects):
-            readings[name] = sense_objects(poses, things, sensor)
-        else:
-            read: Any = sense_binary if isinstance(sensor, Binary) else sense_neighbors
-            readings[name] = read(poses, sensor, random)
+def sense(
+    behavior: Behavior, time_s: float, poses: np.ndarray, random: Any, things: Things = NO_OBJECTS, **around: Any
+) -> Sensed:
+    """Return what the sensors of a behavior tell about things and poses (W, N, 3), NaN for unknown ones.
+
+    around: other fields of Surroundings; kept: what each sensor keeps, by its name.
+    Raises: ValueError for a sensor that gives no arrays of robots; whatever a sensor raises.
+    """
+    kept = around.pop("kept", {})
+    common = Surroundings(time_s, poses, random, things, **around)
+    readings = {
+        name: read_sensor(name, sensor, common._replace(kept=kept.setdefault(name, {})))
+        for name, sensor in behavior.sensors().items()
+    }
     return Sensed(time_s, poses, readings)
 
 

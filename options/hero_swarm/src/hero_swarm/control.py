@@ -22,20 +22,24 @@ class Control:
         steps_per_decision: calls of step() of which the first one senses and decides.
         has_decided: whether the last call did.
         sensed: what the behavior sensed then.
-        memory: what it remembers.
+        memory, colors: what it remembers and shows.
         wanted: linear m/s and angular rad/s of all robots (2, R), as it decided last.
     """
 
     sensed: Sensed
 
-    def __init__(self, behavior: Behavior, random: Random, safety: Optional[SafetyFilter] = None) -> None:
-        """Begin; without safety, commands are those of the behavior."""
+    def __init__(
+        self, behavior: Behavior, random: Random, safety: Optional[SafetyFilter] = None, **surroundings: Any
+    ) -> None:
+        """Begin; without safety, commands are those of the behavior. surroundings: what sensors read: see sense()."""
+        self._surroundings = {"kept": {}, **surroundings}
         self._behavior, self._random, self._safety = behavior, random, safety
         safety_hz = 0.0 if safety is None else safety.rate_hz
         self.steps_per_decision = max(1, math.ceil(safety_hz / behavior.rate_hz - 1e-9))
         self.rate_hz = self.steps_per_decision * behavior.rate_hz
         self.has_decided = False
         self.memory: Any = None
+        self.colors: Optional[np.ndarray] = None
         self.wanted = np.empty((2, 0))
         self._steps = 0
 
@@ -49,9 +53,11 @@ class Control:
         self.has_decided = self._steps % self.steps_per_decision == 0
         self._steps += 1
         if self.has_decided:
-            self.sensed = sense(self._behavior, time_s, poses, self._random, things)
+            around = {**self._surroundings, "colors": self.colors}
+            self.sensed = sense(self._behavior, time_s, poses, self._random, things, **around)
             *wanted, self.memory = decide(self._behavior, self.sensed, self.memory, self._random)
             self.wanted = np.array(wanted)
+            self.colors = self._behavior.colors(self.memory)
         linear_m_s, angular_rad_s = self.wanted
         if self._safety is None:
             return linear_m_s, angular_rad_s

@@ -21,6 +21,7 @@ from hero_sim.world.pushing.shapes import PushedBody
 
 from .behavior import PULSES, Behavior, Random, derive_seed, lock
 from .control import Control
+from .metrics.own import State
 from .safety import SafetyFilter
 from .wheel_pulses import find_pulses, list_dead_zones
 
@@ -113,7 +114,8 @@ class Trial:
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
         self.poses, self.velocities = lock(np.array(starts)), lock(np.zeros_like(starts))
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
-        self._control = Control(behavior, random, filter_commands)
+        self._control = Control(behavior, random, filter_commands, arena=arena, robots=self.rows)
+        self._arena, self._decided_ms = arena, -1
         self._delay_s = delay_s
         self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, self.poses)])
         objects = [arena.objects] if objects is None else objects
@@ -130,11 +132,26 @@ class Trial:
         """The objects of all worlds, where they are now."""
         return Things(self.rows.world.object_poses, self._radii_m)
 
+    @property
+    def state(self) -> State:
+        """What metrics measure now; the behavior decides before, unless it has."""
+        self._decide()
+        control, radii_m = self._control, self.rows.world.errors.radius_m[: self.poses.shape[1], 0]
+        of_behavior = control.sensed, control.memory, control.colors
+        objects, time_s = lock(self.things.poses), self.rows.now_ms / 1000.0
+        return State(time_s, self.poses, self.velocities, objects, lock(radii_m), self._arena, *of_behavior)
+
+    def _decide(self) -> None:
+        """Send the commands of now, unless they were sent."""
+        if self._decided_ms != self.rows.now_ms:
+            self._decided_ms = self.rows.now_ms
+            self._drive()
+
     def step(self) -> float:
         """Take one step of the behavior, let its time pass, and return the time (s)."""
         rows, start_ms, start = self.rows, self.rows.now_ms, self.poses
         for number in range(1, self._control.steps_per_decision + 1):
-            self._drive()
+            self._decide()
             rows.advance(start_ms + round(number * 1000.0 / self._control.rate_hz))
             self.poses = lock(rows.world.poses.reshape(start.shape).copy())
         self.velocities = lock((self.poses - start) * self.behavior.rate_hz)
@@ -151,7 +168,7 @@ class Trial:
             rows.send_pulses(self._all, *find_pulses(linear_m_s, angular_rad_s, self._dead_zones_us))
         else:
             rows.send_velocity(self._all, linear_m_s, angular_rad_s)
-        colors = self.behavior.colors(self.memory) if self._control.has_decided else None
+        colors = self._control.colors if self._control.has_decided else None
         if colors is not None:
             rows.send_light(self._all, np.column_stack((colors, np.ones(len(colors)))))
 

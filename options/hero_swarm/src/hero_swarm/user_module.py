@@ -15,6 +15,20 @@ from typing import Any, Optional, Sequence
 from .sources import Sources
 
 
+def load_file(what: str, path: str, sources: Sources) -> ModuleType:
+    """Return the module of a user's file, loaded once; what: what it is for, for errors.
+
+    Raises: ValueError if it is missing, or with file and line for whatever it raises.
+    """
+    if not sources.find(path):
+        raise ValueError(f"{what} {path}: no such file from {os.getcwd()}; give its whole path")
+    try:
+        module: ModuleType = sources.load(path, lambda: load_user_module(path, sources))
+    except OSError as error:
+        raise ValueError(f"{what} {path} cannot be read: {error.strerror}") from error
+    return module
+
+
 def load_user_module(path: str, sources: Sources) -> ModuleType:
     """Return the module of a file; modules beside it take the place of those that an earlier file had beside it.
 

@@ -2,7 +2,6 @@
 
 import importlib
 import inspect
-import os
 from typing import Any, Dict, List, Optional, Type
 
 from hero_node.number_checks import is_number
@@ -10,7 +9,7 @@ from hero_node.yaml_text import YamlError, parse_yaml
 
 from ..behavior import MAX_RATE_HZ, MIN_RATE_HZ, Behavior
 from ..sources import Sources
-from ..user_module import load_user_module
+from ..user_module import load_file
 
 __all__ = ["find_behavior", "list_names", "make_behavior"]
 
@@ -57,12 +56,7 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
     path, _, class_name = name.partition(":")
     if not path.endswith(".py"):
         raise ValueError(f"behavior {name!r}: must be FILE.py, FILE.py:Class, or one of {', '.join(list_names())}")
-    if not sources.find(path):
-        raise ValueError(f"behavior {path}: no such file from {os.getcwd()}; give its whole path")
-    try:
-        loaded = sources.load(path, lambda: load_user_module(path, sources))
-    except OSError as error:
-        raise ValueError(f"behavior {path} cannot be read: {error.strerror}") from error
+    loaded = load_file("behavior", path, sources)
     classes = {
         key: value for key, value in vars(loaded).items()
         if inspect.isclass(value) and issubclass(value, Behavior) and value.__module__ == loaded.__name__

@@ -26,7 +26,7 @@ from hero_sim.world.robot_errors import read_known
 
 from ..behavior import Behavior, Objects
 from ..behaviors import find_behavior
-from ..metrics import METRICS
+from ..metrics.own import State, measure_metric
 from ..sources import Sources
 from ..trial import OPEN, Trial
 from .code_version import check_suite
@@ -53,7 +53,10 @@ def load_checked(experiment: Experiment) -> None:
         make_behavior(experiment, cell)
         settings = json.dumps({**cell.settings, "delay_s": None}, sort_keys=True)
         if settings not in built:
-            build_trial(experiment, cell, experiment.seeds[:1])
+            # Two worlds, as an own metric may give one number for all.
+            trial = build_trial(experiment, cell, [experiment.seeds[0]] * 2)
+            with report_place(cell.label, experiment.sources):
+                measure(experiment, trial.state)
             built.add(settings)
 
 
@@ -101,7 +104,7 @@ def _at(experiment: Experiment, name: str) -> Iterator[None]:
 def make_behavior(experiment: Experiment, cell: Cell) -> Behavior:
     """Return the behavior of a cell. Raises: ExperimentError."""
     with _at(experiment, "behavior"):
-        kind = find_behavior(experiment.behavior_source, experiment.sources)
+        kind = find_behavior(experiment.locate(experiment.behavior), experiment.sources)
         allowed = kind().numbers()
     for name in cell.parameters:
         if name not in allowed:
@@ -169,7 +172,8 @@ def _compute_runs(inputs: Inputs, cell_index: int, seeds: Sequence[int], stem: s
     experiment = _parse(inputs.text, inputs.folder)._replace(sources=inputs.sources)
     cell = experiment.cells[cell_index]
     trial = build_trial(experiment, cell, seeds)
-    place = report_place("%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1]))
+    label = "%s with seeds %d to %d" % (cell.label, seeds[0], seeds[-1])
+    place = report_place(label, experiment.sources)
     with _record_poses(experiment, trial, stem + POSES_ENDING) as poses, place:
         series, ends = _run(experiment, trial, poses)
     _write_metrics(stem + METRICS_ENDING, series, ends)
@@ -187,10 +191,11 @@ def list_sources(experiment: Experiment) -> List[str]:
     return sorted(set(names))
 
 
-def measure(experiment: Experiment, *state: Any) -> Tuple[np.ndarray, np.ndarray]:
-    """Return a sample (W, metrics), and whether the condition that ends a run holds (W,); state: as METRICS take it."""
+def measure(experiment: Experiment, state: State) -> Tuple[np.ndarray, np.ndarray]:
+    """Return a sample (W, metrics), and whether the condition that ends a run holds (W,). Raises: ValueError."""
     names, until = list_sources(experiment), experiment.until
-    sample = np.column_stack([METRICS[name](*state) for name in names])
+    located = map(experiment.locate, names)
+    sample = np.column_stack([measure_metric(name, state, experiment.sources) for name in located])
     holds = np.zeros(len(sample), dtype=bool) if until is None else until.holds(sample[:, names.index(until.metric)])
     return sample, holds
 
@@ -236,7 +241,7 @@ def _run(experiment: Experiment, trial: Trial, poses: Any) -> Tuple[np.ndarray, 
             recorded += 1
         sample = math.floor(now_s / SAMPLE_S + 1e-6)
         if sample < samples and np.isnan(series[sample]).all():
-            series[sample], holds = measure(experiment, trial.poses, trial.velocities, trial.things.poses)
+            series[sample], holds = measure(experiment, trial.state)
             ended = running & holds
             ends[ended], running[ended] = sample, False
         if now_s >= experiment.time_s - 1e-6 or not running.any():

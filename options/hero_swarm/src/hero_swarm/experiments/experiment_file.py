@@ -20,7 +20,8 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tup
 from hero_node.marked_yaml import Entry, EntryError, read_entries
 from hero_sim.world.arena_file import SHIPPED
 
-from ..metrics import FALLING, METRICS
+from ..metrics import FALLING
+from ..metrics.own import MetricNames, is_own
 from ..sources import Sources
 from .errors import ExperimentError
 
@@ -43,6 +44,7 @@ ERRORS = {"perfect": 0.0, "default": 1.0}
 OBJECTS = ("arena", "scattered")
 """Places of the objects at the start: as in the arena, or drawn from each seed."""
 TESTS = ("wilcoxon",)
+METRIC_NAMES = MetricNames()
 _REQUIRED = ("behavior", "time_s", "seeds", "metrics")
 _KEYS = (
     "behavior", "vary", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record", "compare"
@@ -146,11 +148,9 @@ class Experiment(NamedTuple):
     folder: str
     sources: Sources
 
-    @property
-    def behavior_source(self) -> str:
-        """The behavior as find_behavior() takes it from any folder."""
-        is_file = self.behavior.partition(":")[0].endswith(".py")
-        return os.path.join(self.folder, self.behavior) if is_file else self.behavior
+    def locate(self, name: str) -> str:
+        """Return a built-in name, or FILE.py with what follows, as it is found from any folder."""
+        return os.path.join(self.folder, name) if name.partition(":")[0].endswith(".py") else name
 
     def list_code(self) -> Dict[str, bytes]:
         """Return the contents of all files that runs read besides those of list_files(), by paths relative to folder.
@@ -291,7 +291,9 @@ def _parse_seeds(entry: Entry) -> range:
 
 def _parse_bound(entry: Entry) -> Bound:
     """Return the bound of a mapping such as {dispersion_ratio: 1.15} or {order: ">= 0.9"}."""
-    name, value = entry.single(METRICS)
+    name, value = entry.single(METRIC_NAMES)
+    if is_own(name) and not isinstance(value.value, str):
+        value.refuse('a text such as "<= 1.15" or ">= 0.95", as the metric is your own')
     if not isinstance(value.value, str):
         return Bound(name, value.number(-math.inf, math.inf, ""), name in FALLING)
     sign, _, text = value.value.partition(" ")
@@ -306,15 +308,20 @@ def _parse_bound(entry: Entry) -> Bound:
 
 def _parse_metric(entry: Entry) -> Metric:
     if not isinstance(entry.value, dict):
-        name = entry.choice(METRICS)
-        return Metric(name, name)
+        name = entry.choice(METRIC_NAMES)
+        return Metric(_name_column(name), name)
     kind, inner = entry.single(("time_until", "mean_of_last_s"))
     if kind == "time_until":
         bound = _parse_bound(inner)
-        return Metric(f"time_until_{bound.metric}_{bound.value:g}_s", bound.metric, bound=bound)
-    name, value = inner.single(METRICS)
+        return Metric(f"time_until_{_name_column(bound.metric)}_{bound.value:g}_s", bound.metric, bound=bound)
+    name, value = inner.single(METRIC_NAMES)
     last_s = value.number(1.0, MAX_TIME_S, "s")
-    return Metric(f"{name}_mean_of_last_{last_s:g}_s", name, last_s)
+    return Metric(f"{_name_column(name)}_mean_of_last_{last_s:g}_s", name, last_s)
+
+
+def _name_column(metric: str) -> str:
+    """Return the name of a metric; of FILE.py:FUNCTION the function's."""
+    return metric.rpartition(":")[2]
 
 
 def _parse_comparing(entry: Entry, metrics: List[str], cells: Tuple[Cell, ...]) -> Comparing:

@@ -4,7 +4,7 @@ The caller measures poses and moves the robots; time is that since the start of 
 """
 
 import math
-from typing import List, Optional, Sequence, Tuple
+from typing import Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from hero_client.values.object_sensing import NO_OBJECTS, Things
 
 from ..behavior import Random, derive_seed
 from ..control import Control
+from ..metrics.own import State
 from ..safety import SafetyFilter
 from .batch import SAMPLE_S, load_cell_arena, make_behavior, measure, take_values
 from .errors import report_place
@@ -28,17 +29,24 @@ class RobotTrial:
     """
 
     def __init__(
-        self, experiment: Experiment, cell: Cell, seed: int, names: Sequence[str], safety: SafetyFilter
+        self,
+        experiment: Experiment,
+        cell: Cell,
+        seed: int,
+        names: Sequence[str],
+        safety: SafetyFilter,
+        readings: Any = None,
     ) -> None:
-        """Begin; names: of the robots, in the order of their poses."""
+        """Begin; names: of the robots, in the order of their poses; readings: their own, as Surroundings.robots."""
         self.remark = ""
         self._experiment = experiment
         self._label = "%s, seed %d" % (cell.label, seed)
         self.behavior = make_behavior(experiment, cell)
-        self._objects = len(load_cell_arena(experiment, cell).objects)
+        self._arena = load_cell_arena(experiment, cell)
         self._names = names
         self.safety = safety
-        self._control = Control(self.behavior, Random([derive_seed(seed, "behavior")], len(names)), safety)
+        random = Random([derive_seed(seed, "behavior")], len(names))
+        self._control = Control(self.behavior, random, safety, arena=self._arena, robots=readings)
         self._samples: List[np.ndarray] = []
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._reached = False
@@ -60,15 +68,14 @@ class RobotTrial:
         if lost:
             self.remark = f"no pose of {', '.join(lost)} at {time_s:.1f} s"
             return None
-        if len(things.radii_m) < self._objects:
-            self.remark = "poses of %d of the arena's %d objects" % (len(things.radii_m), self._objects)
+        if len(things.radii_m) < len(self._arena.objects):
+            self.remark = "poses of %d of the arena's %d objects" % (len(things.radii_m), len(self._arena.objects))
             return None
-        if time_s >= len(self._samples) * SAMPLE_S:
-            self._sample(time_s, poses, things)
-        if self._reached or time_s >= self._experiment.time_s:
-            return None
-        with report_place(self._label):
-            return self._control.step(time_s, poses[None], things, ages_s[None])
+        with report_place(self._label, self._experiment.sources):
+            speeds = self._control.step(time_s, poses[None], things, ages_s[None])
+            if time_s >= len(self._samples) * SAMPLE_S:
+                self._sample(time_s, poses, things)
+        return None if self._reached or time_s >= self._experiment.time_s else speeds
 
     def _sample(self, time_s: float, poses: np.ndarray, things: Things) -> None:
         if self._last is None:
@@ -76,8 +83,9 @@ class RobotTrial:
         else:
             velocities = (poses - self._last[1]) / max(time_s - self._last[0], 1e-3)
         self._last = (time_s, poses.copy())
-        state = poses[None], velocities[None], things.poses, self.safety.radii_m
-        (sample,), (self._reached,) = measure(self._experiment, *state)
+        measured, control = (poses[None], velocities[None], things.poses, self.safety.radii_m), self._control
+        state = State(time_s, *measured, self._arena, control.sensed, control.memory, control.colors)
+        (sample,), (self._reached,) = measure(self._experiment, state)
         self._samples.append(sample)
 
     def list_values(self) -> Tuple[float, ...]:

@@ -12,7 +12,9 @@ from hero_sim.stepped.robot_rows import RobotRows
 from hero_sim.world.arena import Arena, place_robots
 
 from ..behavior import derive_seed
-from ..metrics import FALLING, METRICS
+from ..metrics import FALLING
+from ..metrics.own import State, measure_metric
+from ..sources import Sources
 
 MAX_ANGULAR_RAD_S = 4.0
 
@@ -58,7 +60,7 @@ class Episode:
         self._neighbors = neighbors
         low_m, high_m = arena.bounds_m.reshape(2, 2)
         self._center_m, self._half_m = (low_m + high_m) / 2.0, (high_m - low_m) / 2.0
-        self._metric = METRICS[metric] if metric else None
+        self._metric, self._sources, self._arena = metric, Sources(), arena
         self._sign = -1.0 if metric in FALLING else 1.0
         self._poses = starts
         self._value = self._measure(starts)
@@ -76,7 +78,11 @@ class Episode:
     def _measure(self, poses: np.ndarray) -> float:
         velocities = (poses - self._poses) * (1000.0 / self._period_ms)
         self._poses = poses
-        return 0.0 if self._metric is None else float(self._metric(poses, velocities, self._rows.world.object_poses)[0])
+        if self._metric is None:
+            return 0.0
+        objects = self._rows.world.object_poses
+        state = State(self._rows.now_ms / 1000.0, poses, velocities, objects, BODY_RADIUS_M, self._arena)
+        return float(measure_metric(self._metric, state, self._sources)[0])
 
     def observe(self) -> np.ndarray:
         """Return what each robot observes, -1 to 1 (N, count_observations()).

@@ -15,16 +15,19 @@ from hero_client import Program, ProgramError, Swarm, read_parameters
 from hero_client.controllers.lateness import Lateness
 from hero_client.swarm import open_swarm
 from hero_client.values.object_sensing import Things
+from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
 from hero_node.ros.ros_clock import read_duration_clock_s
 
 from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior
 from ..control import Control
-from ..metrics import METRICS
+from ..metrics.own import State, measure_metric
 from ..safety import FENCE, MODES, OFF, ROBOTS, SafetyFilter
+from ..sources import Sources
 from .behavior_markers import BehaviorMarkers
 from .other_robots import OtherRobots
+from .own_readings import OwnReadings
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
 
@@ -83,10 +86,12 @@ class BehaviorNode:
         self._others = OtherRobots(ids, self._frame) if self._filter.mode == ROBOTS else None
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
-        self.control = Control(self.behavior, Random([parameters["seed"]], len(ids)), self._filter)
+        random, readings = Random([parameters["seed"]], len(ids)), OwnReadings(swarm, self.behavior.sensors())
+        self.control = Control(self.behavior, random, self._filter, robots=readings)
         self._lateness = Lateness(1.0 / self.control.rate_hz)
         self._start_s = read_duration_clock_s()
         self._last: Optional[Tuple[float, np.ndarray]] = None
+        self._sources = Sources()
         self._next_show_s = 0.0
         self._colors: Optional[np.ndarray] = None
         self._metric = rospy.Publisher("~metric", Float32, queue_size=5)
@@ -140,14 +145,17 @@ class BehaviorNode:
         known = np.isfinite(velocities).all(axis=1)
         if not known.any():
             return
-        value = float(METRICS[self.behavior.metric](poses[None, known], velocities[None, known], things.poses)[0])
+        measured = poses[None, known], velocities[None, known], things.poses, BODY_RADIUS_M, None
+        control = self.control
+        state = State(now_s - self._start_s, *measured, control.sensed, control.memory, control.colors)
+        value = float(measure_metric(self.behavior.metric, state, self._sources)[0])
         self._metric.publish(Float32(value))
         markers = self._drawing.draw(poses, self.control.sensed, value)
         if self._markers.get_num_connections():
             self._markers.publish(MarkerArray(markers))
 
     def _show_colors(self) -> None:
-        colors = self.behavior.colors(self.control.memory)
+        colors = self.control.colors
         if colors is None:
             return
         for row, (robot, color) in enumerate(zip(self._swarm, colors)):

@@ -18,7 +18,7 @@ from hero_client.controllers.lateness import Lateness
 from hero_node.processes import end_process
 from hero_node.ros.ros_clock import read_duration_clock_s
 
-from ..experiments.batch import place_robots
+from ..experiments.batch import make_behavior, place_robots
 from ..experiments.errors import ExperimentError
 from ..experiments.experiment_file import Experiment
 from ..experiments.results_folder import REAL, ResultsFolder, Run
@@ -26,6 +26,7 @@ from ..experiments.robot_trial import RobotTrial
 from ..experiments.start_drive import PERIOD_S, StartDrive
 from ..safety import ROBOTS, SafetyFilter
 from .other_robots import OtherRobots
+from .own_readings import OwnReadings
 from .pose_source import ObjectSource, PoseSource
 from .wheel_commands import WheelCommands
 
@@ -72,7 +73,8 @@ def run_on_robots(
                 break
             safety = SafetyFilter(ROBOTS)
             safety.set_models([robot.model for robot in swarm])
-            trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], safety)
+            readings = OwnReadings(swarm, make_behavior(experiment, cell).sensors())
+            trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], safety, readings)
             commands = WheelCommands(swarm, trial.behavior.drive, options.calibration)
             name = "cell_%d_seed_%d" % (cell_index + 1, seed)
             with _record(program, folder.path, name, ids, experiment.time_s):

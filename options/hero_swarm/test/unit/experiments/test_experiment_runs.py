@@ -189,7 +189,7 @@ def test_an_error_of_the_behavior_names_its_line_and_the_runs(tmp_path):
     text = FILE.replace("behavior: aggregation", "behavior: %s" % own)
     with pytest.raises(
         ExperimentError,
-        match=r"robots 3, errors (perfect|default) with seeds 11 to 15: IndexError: .*\(own.py, line 5\)",
+        match=r"robots 3, errors perfect: IndexError: .*\(own.py, line 5\)",
     ):
         run(write(tmp_path, text))
 

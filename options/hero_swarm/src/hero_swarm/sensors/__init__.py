@@ -1,0 +1,66 @@
+"""Sensors of behaviors: named tuples of their limits, which read() turns into arrays with a row per robot. Pure.
+
+A sensor of a user is a named tuple with read(around), which returns an array (R, ...) or a named tuple of arrays.
+"""
+
+from typing import Any, Callable, Dict, NamedTuple, Optional
+
+import numpy as np
+
+from hero_client.values.object_sensing import NO_OBJECTS, Objects, Sight, Things, sense_objects, sense_sight
+from hero_client.values.sensing import Binary, Neighbors, sense_binary, sense_neighbors
+from hero_sim.world.arena import Arena
+
+
+class Surroundings(NamedTuple):
+    """All that sensors may read. R robots are the rows of W worlds with N robots each, world after world.
+
+    Attributes:
+        time_s: since the behavior began.
+        poses: x m, y m, yaw rad in the common frame (W, N, 3), NaN for a robot whose pose is not known.
+        random: the behavior's random numbers.
+        things: objects.
+        arena: with its areas and lamps; None where it is not known.
+        robots: own readings of the robots as attributes, named as those of RobotRows; None without any.
+        colors: what robots showed in the last step, red green blue from 0 to 1 (R, 3); None: nothing.
+        kept: what the sensor keeps from step to step.
+    """
+
+    time_s: float
+    poses: np.ndarray
+    random: Any
+    things: Things = NO_OBJECTS
+    arena: Optional[Arena] = None
+    robots: Any = None
+    colors: Optional[np.ndarray] = None
+    kept: Dict[str, Any] = {}
+
+
+_READERS: Dict[type, Callable[[Any, Surroundings], Any]] = {
+    Binary: lambda sensor, around: sense_binary(around.poses, sensor, around.random),
+    Neighbors: lambda sensor, around: sense_neighbors(around.poses, sensor, around.random),
+    Objects: lambda sensor, around: sense_objects(around.poses, around.things, sensor),
+    Sight: lambda sensor, around: sense_sight(around.poses, around.things, sensor),
+}
+
+
+def is_sensor(value: Any) -> bool:
+    """Return whether a value is a sensor."""
+    return isinstance(value, tuple) and (type(value) in _READERS or callable(getattr(value, "read", None)))
+
+
+def read_sensor(name: str, sensor: Any, around: Surroundings) -> Any:
+    """Return what a sensor gives, an array (R, ...) or a named tuple of arrays.
+
+    Raises: ValueError with its name for anything else, or whatever it raises.
+    """
+    reader = _READERS.get(type(sensor))
+    reading = sensor.read(around) if reader is None else reader(sensor, around)
+    robots = around.poses.shape[0] * around.poses.shape[1]
+    arrays = reading if isinstance(reading, tuple) else (reading,)
+    wrong = [array for array in arrays if not isinstance(array, np.ndarray) or array.dtype.kind not in "bif"]
+    if wrong or (not isinstance(reading, tuple) and reading.shape[:1] != (robots,)):
+        given = f"shape {reading.shape}" if not wrong else repr(wrong[0])[:60]
+        text = "sensor %s gives %s: read() must return an array of numbers with a row for each of %d robots"
+        raise ValueError(text % (name, given, robots))
+    return reading

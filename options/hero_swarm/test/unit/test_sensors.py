@@ -1,0 +1,101 @@
+"""Sensors of the robots themselves, and of users, in behaviors: values, order, and what is refused."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from hero_sim.world.arena import build_rectangle
+from hero_swarm.behavior import Behavior, Distance, NeighborColors, Neighbors, Odometry, Proximity
+from hero_swarm.trial import Trial
+
+STARTS = np.array([[(0.1, 0.0, 0.0), (-0.5, 0.3, 1.0)]] * 2)
+
+
+class Sensing(Behavior):
+    near = Neighbors(range_m=5.0)
+    eyes = Proximity()
+    ahead = Distance()
+    wheels = Odometry()
+    lights = NeighborColors()
+
+    def step(self, sensed, memory, random):
+        return 0.05, np.where(sensed.numbers == 0, 0.0, 1.0), sensed
+
+    def colors(self, memory):
+        return np.column_stack((memory.numbers == 0, memory.numbers == 1, memory.numbers * 0)).astype(float)
+
+
+def watch(steps):
+    trial = Trial(Sensing(), build_rectangle(0.4, 2.0, 1), robots=2, seeds=[1, 2], starts=STARTS, errors=0.0)
+    for _ in range(steps):
+        trial.step()
+    return trial, trial.state.sensed
+
+
+def test_infrared_sensors_see_the_wall_in_front_first():
+    _, sensed = watch(1)
+    eyes = sensed.eyes
+    assert eyes.ranges_m.shape == eyes.counts.shape == (4, 8)
+    assert eyes.ranges_m[0, 0] == pytest.approx(0.1, abs=0.01), "the wall is 0.1 m ahead of the first robot's center"
+    assert eyes.counts[0].argmax() == 0 and eyes.counts[0, 0] > 5.0 * eyes.counts[0, 4]
+    assert np.isnan(sensed.ahead).all(), "a stock robot has no such sensor"
+
+
+def test_odometry_is_what_the_wheels_rolled():
+    trial, sensed = watch(30)
+    moved_m = np.hypot(*(trial.poses - STARTS)[..., :2].reshape(-1, 2).T)
+    assert np.hypot(*sensed.wheels.poses[:, :2].T)[1::2] == pytest.approx(moved_m[1::2], abs=0.01)
+    assert sensed.wheels.angular_rad_s[1] > 0.5 > abs(sensed.wheels.angular_rad_s[0])
+
+
+def test_colors_of_neighbors_are_those_of_the_last_step():
+    _, first = watch(0)
+    assert (first.lights == 0.0).all()
+    _, sensed = watch(2)
+    assert sensed.lights.shape == (4, 2, 3)
+    assert sensed.lights[0].tolist() == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    assert sensed.lights[sensed.near.seen][:, :2].tolist() == [[0.0, 1.0], [1.0, 0.0]] * 2
+
+
+def test_what_sensors_gave_stays_as_it_was():
+    trial, sensed = watch(1)
+    before = sensed.wheels.poses.copy(), sensed.eyes.counts.copy()
+    for _ in range(20):
+        trial.step()
+    assert (sensed.wheels.poses == before[0]).all() and (sensed.eyes.counts == before[1]).all()
+    with pytest.raises(ValueError, match="read-only"):
+        sensed.wheels.poses[0] = 0.0
+
+
+class Compass(NamedTuple):
+    """A sensor of a user, which counts its steps."""
+
+    gain: float = 1.0
+
+    def read(self, around):
+        around.kept["steps"] = around.kept.get("steps", 0) + 1
+        return self.gain * around.poses[..., 2].ravel() + around.kept["steps"]
+
+
+class Turning(Behavior):
+    compass = Compass(gain=2.0)
+
+    def step(self, sensed, memory, random):
+        return 0.0, 0.0, sensed.compass
+
+
+def test_a_user_writes_a_sensor_as_a_named_tuple_with_read():
+    trial = Trial(Turning(), robots=2, seeds=[1, 2], starts=STARTS, errors=0.0)
+    trial.step()
+    trial.step()
+    assert trial.memory == pytest.approx(2.0 * STARTS[..., 2].ravel() + 2.0)
+    assert list(Turning().sensors()) == ["compass"]
+
+
+@pytest.mark.parametrize("given", ["text", None, np.zeros(3), np.array(["a"] * 4), 1.0])
+def test_a_sensor_that_gives_no_row_per_robot_is_named(given, monkeypatch):
+    monkeypatch.setattr(Compass, "read", lambda sensor, around: given)
+    trial = Trial(Turning(), robots=2, seeds=[1, 2], starts=STARTS)
+    with pytest.raises(ValueError, match=r"sensor compass gives .*: read\(\) must return an array .* each of 4 robots"):
+        trial.step()
