@@ -3,7 +3,7 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-ROOMS = ("rosserial", "transport", "fleet", "corrections", "commands", "ros")
+ROOMS = ("rosserial", "transport", "fleet", "corrections", "commands", "ros", "stops", "reports")
 
 setup(
     **generate_distutils_setup(

@@ -5,7 +5,7 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_node", "hero_node.ros"],
+        packages=["hero_node", "hero_node.files", "hero_node.parameters", "hero_node.ros"],
         package_dir={"": "src"},
         package_data={"hero_node": ["py.typed"]},
     )

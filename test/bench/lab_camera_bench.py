@@ -29,7 +29,7 @@ from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagLayout, find_smallest_side
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 FRAME_S = 1.0 / 30.0
 TAGS = 50

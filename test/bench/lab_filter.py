@@ -11,8 +11,8 @@ import numpy as np
 
 from hero_localization.filter.pose_filter import Outcome, PoseFilter, make_covariance
 from hero_localization.filter.pose_hypothesis import StampedPose
-from hero_node.geometry import Pose, wrap_angle
-from hero_sim.stepped.swarm import StepSwarm
+from hero_node import Pose, wrap_angle
+from hero_sim.stepped import StepSwarm
 
 AGES_S = (0.0, 0.008, 0.02, 0.05, 0.1, 0.15, 0.2)
 AGE_ROBOTS, AGE_S = 6, 12.0

@@ -32,9 +32,9 @@ from hero_localization.tracking.detectors import create_detector
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagLayout, fit_squares, locate
 from hero_localization.tracking.tag_search import TagSearch
-from hero_node.geometry import Pose, measure_distance, wrap_angle
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.arena_file import load_arena
+from hero_node import Pose, measure_distance, wrap_angle
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import load_arena
 
 OPTIONS = CameraOptions()
 DELAY_S = OPTIONS.delay_s + OPTIONS.delay_jitter_s / 2.0

@@ -19,16 +19,15 @@ from running_suite import RunningSuite
 
 from hero_client import CommonFrame, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
-from hero_client.controllers.avoidance import WanderLaw
-from hero_client.controllers.orca import AvoidanceLaw
+from hero_client.controllers import AvoidanceLaw, WanderLaw
 from hero_examples.explore import Explorer, explore_together
 from hero_examples.random_walk import Walker
 from hero_examples.swarm_go_to import STEP_HZ, Formation
 from hero_localization.mapping.occupancy_grid import OccupancyGrid
 from hero_localization.mapping.swarm_map import SwarmMap
 from hero_localization.stepped_localization import StepLocalization
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.arena_file import load_arena
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import load_arena
 
 PARTS = ("formations", "goals", "maps", "cpu")
 ROBOTS = 10

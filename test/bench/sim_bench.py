@@ -25,9 +25,8 @@ from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
 from hero_sim.population import build_world
 from hero_sim.robot.models import HERO
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.kinematics import split_to_wheels
-from hero_sim.world.world import STEP_MS
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import STEP_MS, split_to_wheels
 
 _STOCK_ODOM_HZ = 29.27
 _SPEEDS = (0.08, 0.6)

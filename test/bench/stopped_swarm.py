@@ -21,7 +21,7 @@ import numpy as np
 from hero_driver.rosserial import packets
 from hero_sim.main import build_parser, simulate
 from hero_sim.robot.models import HERO
-from hero_sim.world.world import STEP_MS
+from hero_sim.world import STEP_MS
 
 REST_M_S = 0.005
 MOVING_M = 0.01

@@ -13,9 +13,10 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 import numpy as np
 from measuring import measure_machine_us, print_machine
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 from hero_sim.world.arena import build_rectangle
-from hero_swarm.behavior import Behavior, Command, Random, Sensed
+from hero_swarm import Behavior
+from hero_swarm.behavior import Command, Random, Sensed
 from hero_swarm.behaviors import find_behavior
 from hero_swarm.metrics import METRICS, cluster_fraction, dispersion_ratio, time_until
 from hero_swarm.metrics.graphs import measure_distances

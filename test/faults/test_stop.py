@@ -15,7 +15,7 @@ from simulated_robots import SPEED_M_S, GroundTruth, drive, start_simulator, wai
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, Trigger
 
-from hero_client.ros.drivers import Drivers
+from hero_client.ros import Drivers
 from hero_msgs.msg import Robot
 from hero_sim.srv import InjectFault
 from hero_test.driver_case import make_publisher, receives_topic

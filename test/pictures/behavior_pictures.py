@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "options/hero_swarm/test/unit"))
 from test_behaviors import CASES, OPEN, place  # noqa: E402
 
-from hero_client.values.robot_constants import BODY_RADIUS_M  # noqa: E402
+from hero_client.values import BODY_RADIUS_M  # noqa: E402
 from hero_swarm.behaviors import find_behavior, list_names  # noqa: E402
 from hero_swarm.trial import Trial  # noqa: E402
 

@@ -14,7 +14,7 @@ from geometry_msgs.msg import PoseStamped
 from picture_program import make_pictures
 
 from hero_client import Robot
-from hero_sim.world.arena_file import load_arena
+from hero_sim.world import load_arena
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "test" / "bench"))

@@ -12,7 +12,7 @@ import rospy
 import rostest
 
 from hero_client import FrameError, Robot, RobotNotReadyError, StaleDataError, Swarm
-from hero_client.values.robot_constants import MODELS
+from hero_client.values import MODELS
 from hero_sim.srv import InjectFault
 from hero_test.light_watch import LightWatch
 from hero_test.swarm_watch import SwarmWatch

@@ -16,10 +16,10 @@ import rospy
 import rostest
 from sensor_msgs.msg import Joy
 
-from hero_client.ros.drivers import Drivers
+from hero_client.ros import Drivers
 from hero_client.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.errors import NodeError
+from hero_node import NodeError
 from hero_node.ros.ros_node import start_ros_node
 from hero_test.example_program import ExampleProgram
 from hero_test.processes import find_pid, find_program, suspended

@@ -10,7 +10,7 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist
 
-from hero_client.ros.drivers import Drivers
+from hero_client.ros import Drivers
 from hero_client.swarm import Swarm
 from hero_monitor.background import Background
 from hero_monitor.control.commander import Commander

@@ -9,17 +9,17 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, List
 
 if TYPE_CHECKING:  # for editors and mypy, to which a name with `as` is public
-    from hero_node.clock import Clock as Clock
-    from hero_node.command_line import run as run
-    from hero_node.errors import HeroError as HeroError
-    from hero_node.errors import NodeError as NodeError
-    from hero_node.errors import ProgramError as ProgramError
-    from hero_node.geometry import Pose as Pose
-    from hero_node.geometry import Velocity as Velocity
-    from hero_node.ros.private_parameters import read_parameters as read_parameters
-    from hero_node.ros.program import Program as Program
-    from hero_node.ros.script import rate as rate
-    from hero_node.ros.script import start_node as start_node
+    from hero_node import Clock as Clock
+    from hero_node import HeroError as HeroError
+    from hero_node import NodeError as NodeError
+    from hero_node import Pose as Pose
+    from hero_node import ProgramError as ProgramError
+    from hero_node import Velocity as Velocity
+    from hero_node import run as run
+    from hero_node.ros import Program as Program
+    from hero_node.ros import rate as rate
+    from hero_node.ros import read_parameters as read_parameters
+    from hero_node.ros import start_node as start_node
 
     from .apps.go_to_goal_server import GoToGoalServer as GoToGoalServer
     from .robot import Robot as Robot

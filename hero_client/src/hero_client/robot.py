@@ -17,8 +17,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
 from hero_msgs.msg import Encoder
-from hero_node.command_line import print_error
-from hero_node.ros.script import start_node
+from hero_node import print_error
+from hero_node.ros import start_node
 
 from .robots.group import check_robot_id
 from .robots.robot_base import COMMAND_S, BaseRobot

@@ -5,10 +5,8 @@ from typing import Iterable, List, Optional
 import rospy
 
 from hero_msgs.msg import RobotArray
-from hero_node.errors import ProgramError
-from hero_node.ros.program import Program
-from hero_node.ros.ros_clock import ROS_CLOCK
-from hero_node.ros.script import start_node
+from hero_node import ProgramError
+from hero_node.ros import ROS_CLOCK, Program, start_node
 
 from .robot import Robot
 from .robots.group import check_robot_id

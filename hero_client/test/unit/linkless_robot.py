@@ -7,9 +7,7 @@ from hero_client.robots.swarm_base import BaseSwarm
 from hero_client.values.background_motion import BackgroundMotion
 from hero_client.values.errors import StaleDataError
 from hero_client.values.robot_constants import HERO
-from hero_node.clock import Clock
-from hero_node.errors import HeroError
-from hero_node.geometry import Pose, Velocity, wrap_angle
+from hero_node import Clock, HeroError, Pose, Velocity, wrap_angle
 
 STEP_S = 0.01
 

@@ -14,7 +14,7 @@ from hero_client.controllers.avoidance import (
     split_sectors,
     wander,
 )
-from hero_node.geometry import STOP, Velocity
+from hero_node import STOP, Velocity
 
 INF = math.inf
 AHEAD = Velocity(0.05, 0.1)

@@ -6,16 +6,10 @@ import random
 
 import pytest
 
-from hero_client.controllers.avoidance import (
-    WanderLaw,
-    WanderMemory,
-    find_in_path,
-    split_sectors,
-    wander,
-)
+from hero_client.controllers.avoidance import WanderLaw, WanderMemory, find_in_path, split_sectors, wander
 from hero_client.controllers.unicycle import FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import STOP, Pose, wrap_angle
+from hero_node import STOP, Pose, wrap_angle
 
 INF = math.inf
 FREE = [INF] * 8

@@ -10,7 +10,7 @@ from hero_client.ros import drivers
 from hero_client.ros.drivers import FORGET_S, REPEAT_PERIOD_S, SETTLE_LOOKS, SILENT_S, Drivers
 from hero_client.ros.stop_status import CROSSING_S, TIME_LIMIT_S
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.errors import NodeError, ProgramError
+from hero_node import NodeError, ProgramError
 from hero_node.texts import NAMES_SHOWN
 
 A, B = "/hero_driver", "/lab/driver"

@@ -8,8 +8,7 @@ import pytest
 from hero_client.robots.group import check_robot_id
 from hero_client.robots.robot_base import BaseRobot
 from hero_client.values.errors import StaleDataError
-from hero_node.clock import Clock
-from hero_node.geometry import Pose
+from hero_node import Clock, Pose
 
 
 class FakeClock(Clock):

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from hero_client.controllers.formation_drive import FormationDrive
-from hero_node.geometry import STOP, Pose, Velocity
+from hero_node import STOP, Pose, Velocity
 
 AHEAD_M, PERIOD_S = 0.04, 0.1
 FORWARD = Velocity(0.1, 0.0)

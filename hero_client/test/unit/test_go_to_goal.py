@@ -9,7 +9,7 @@ from hero_client.controllers.go_to_goal import PROGRESS_S, Goal, GoToGoalControl
 from hero_client.controllers.lateness import HOLD_S
 from hero_client.controllers.motion import BLOCKED_S, SILENT_STEPS, STALL_S, State
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
-from hero_node.geometry import STOP, Pose
+from hero_node import STOP, Pose
 
 HERE = Pose(0.0, 0.0, 0.0)
 

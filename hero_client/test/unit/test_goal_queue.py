@@ -6,15 +6,9 @@ from types import SimpleNamespace
 import pytest
 from linkless_robot import make_robot
 
-from hero_client.apps.goals import (
-    FEEDBACK_PERIOD_S,
-    MAX_QUEUED_GOALS,
-    GoalQueue,
-    GoalRequest,
-    InvalidGoalError,
-)
+from hero_client.apps.goals import FEEDBACK_PERIOD_S, MAX_QUEUED_GOALS, GoalQueue, GoalRequest, InvalidGoalError
 from hero_client.controllers.go_to_goal import Goal
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 class NotedQueue(GoalQueue):

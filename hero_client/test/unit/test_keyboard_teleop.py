@@ -3,7 +3,7 @@
 from hero_client.apps.keyboard import split_keys
 from hero_client.apps.keyboard_teleop import END_KEY, MOTIONS, STOP_KEYS, KeyDrive, read_stops
 from hero_client.apps.teleop_output import PAUSE_S, PauseDetector
-from hero_node.geometry import STOP
+from hero_node import STOP
 
 
 def test_a_single_press_drives_until_its_time_is_out():

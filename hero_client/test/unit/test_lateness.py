@@ -3,7 +3,7 @@
 import pytest
 
 from hero_client.controllers.lateness import HOLD_S, REPORT_PERIOD_S, Lateness
-from hero_node.geometry import Velocity
+from hero_node import Velocity
 
 
 def run(lateness, period_s, steps, start_s=0.0, pose_age_s=0.0):

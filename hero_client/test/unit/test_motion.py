@@ -6,18 +6,10 @@ import random
 import pytest
 
 from hero_client.controllers.go_to_goal import FREE_S, PROGRESS_S, Goal, GoToGoalController
-from hero_client.controllers.motion import (
-    BLOCKED_S,
-    FROZEN_S,
-    MAX_STEP_S,
-    SETTLE_S,
-    STALL_S,
-    MotionController,
-    State,
-)
+from hero_client.controllers.motion import BLOCKED_S, FROZEN_S, MAX_STEP_S, SETTLE_S, STALL_S, MotionController, State
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import STOP, Pose, Velocity, transform_pose
+from hero_node import STOP, Pose, Velocity, transform_pose
 
 HERE = Pose(0.0, 0.0, 0.0)
 FREE = [math.inf] * 8

@@ -6,17 +6,10 @@ import numpy as np
 import pytest
 from test_controllers import STEP_S, Body
 
-from hero_client.controllers.orca import (
-    AvoidanceLaw,
-    avoid_sensed,
-    half_plane,
-    nearest_allowed,
-    steer,
-    steered_point,
-)
+from hero_client.controllers.orca import AvoidanceLaw, avoid_sensed, half_plane, nearest_allowed, steer, steered_point
 from hero_client.controllers.swarm_go_to import SwarmGoToController
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import STOP, Pose
+from hero_node import STOP, Pose
 
 
 def test_the_steered_point_moves_with_the_velocity_that_is_asked_for():

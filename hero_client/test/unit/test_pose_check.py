@@ -3,7 +3,7 @@
 import math
 
 from hero_client.controllers.pose_check import FROZEN, FROZEN_M, FROZEN_S, FrozenCheck, PoseCheck
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 OFF = Pose(3.0, -2.0, 0.0)
 

@@ -10,7 +10,7 @@ from sensor_msgs.msg import LaserScan
 
 from hero_client.values.colors import parse_color
 from hero_client.values.readings import MAX_RANGES, find_nearest, front_first, read_pose, read_ranges
-from hero_node.geometry import Pose, invert_pose, transform_pose
+from hero_node import Pose, invert_pose, transform_pose
 
 INF = math.inf
 EIGHTH_RAD = math.pi / 4

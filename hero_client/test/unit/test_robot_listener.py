@@ -9,7 +9,7 @@ from nav_msgs.msg import Odometry
 from hero_client.ros import robot_listener
 from hero_client.ros.robot_listener import RateMeter, RobotTrack
 from hero_client.values.readings import read_ranges
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 def test_a_rate_is_the_count_divided_by_the_time():

@@ -17,7 +17,7 @@ from hero_client.ros.ros_link import RosLink, ThreadMotion
 from hero_client.values.background_motion import FullWait
 from hero_client.values.errors import FrameError, GoalError, RobotError, StaleDataError
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 class Time:

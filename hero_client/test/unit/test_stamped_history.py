@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hero_client.values.stamped_history import StampedHistory, interpolate_pose
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 @pytest.fixture

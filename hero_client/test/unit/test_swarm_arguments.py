@@ -9,7 +9,7 @@ from hero_client import swarm as swarm_module
 from hero_client.swarm import Swarm
 from hero_client.values.errors import RobotNotReadyError
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 
 
 def test_a_program_opens_its_swarm_or_waits_for_robots(monkeypatch):

@@ -5,14 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.controllers.orca import (
-    AvoidanceLaw,
-    avoid_others,
-    avoid_sensed,
-    half_plane,
-    nearest_allowed,
-    steer,
-)
+from hero_client.controllers.orca import AvoidanceLaw, avoid_others, avoid_sensed, half_plane, nearest_allowed, steer
 from hero_client.controllers.swarm_go_to import (
     ASIDE_S,
     DOCKING_M,
@@ -23,7 +16,7 @@ from hero_client.controllers.swarm_go_to import (
     _Jam,
 )
 from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import STOP, Pose
+from hero_node import STOP, Pose
 
 LAW = AvoidanceLaw()
 STEP_S = 0.1

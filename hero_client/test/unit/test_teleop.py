@@ -16,8 +16,7 @@ from hero_client.apps.robot_choice import ChoiceButtons, RobotChoice
 from hero_client.apps.teleop_output import HOLD_ENDED, PAUSE_S, TeleopOutput
 from hero_client.controllers.formation_drive import FormationDrive
 from hero_client.ros.stop_status import StopStatus
-from hero_node.errors import ProgramError
-from hero_node.geometry import Pose, Velocity
+from hero_node import Pose, ProgramError, Velocity
 
 MAPPING = JoystickMapping(0.1, 2.0, 1, 0, 4, 1)
 

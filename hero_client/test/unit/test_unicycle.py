@@ -5,7 +5,7 @@ import math
 import pytest
 
 from hero_client.controllers.unicycle import FOLLOW, GO_TO, TOLERANCE_RAD, follow, go_to_point, go_to_pose
-from hero_node.geometry import STOP, Pose, measure_distance, wrap_angle
+from hero_node import STOP, Pose, measure_distance, wrap_angle
 
 STEP_S = 0.02
 PLACES = [(0.6, 0.0), (0.3, 0.4), (-0.2, 0.5), (-0.5, -0.1), (0.1, -0.4)]

@@ -8,15 +8,15 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, Mapping, Tuple
 
-from hero_node.calibration_file import KeptCalibration, read_calibrations
-from hero_node.errors import ProgramError
-from hero_node.number_checks import is_whole_number
+from hero_node import ProgramError
+from hero_node.files import KeptCalibration, read_calibrations
 from hero_node.parameters import (
     Parameter,
     check_parameters,
     choice,
     declare,
     find_declared,
+    is_whole_number,
     make_error,
     number,
     whole_number,

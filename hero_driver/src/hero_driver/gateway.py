@@ -19,15 +19,15 @@ from .fleet.admission import Admission, RateLimit
 from .fleet.namespaces import Identity
 from .fleet.registry import Decision, FleetRegistry, RobotRecord, RobotState, Verdict
 from .peer import Peer
-from .robot_log import RobotLog
-from .robot_status import RobotStatus, describe_robot
+from .reports.robot_log import RobotLog
+from .reports.robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
 from .ros.robot_bridge import BridgeContext, RobotBridge
 from .ros.transform_publisher import TransformPublisher
 from .ros.worker import Worker
 from .rosserial.payloads import Log
 from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
-from .stop_delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
+from .stops.delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
 from .transport.event_loop import THE_DRIVER_ENDS, EventLoop
 from .transport.link import READ_LENGTH, Link, LinkHandler
 

@@ -21,16 +21,20 @@ from typing import Any, Callable, List, Optional
 import rosgraph
 import rospy
 
-from hero_node.command_line import print_error
-from hero_node.errors import NodeError, ProgramError
-from hero_node.ros.connections import limit_xmlrpc_connections, open_tcpros_server
-from hero_node.ros.master import find_running_node, read_master_uri
-from hero_node.ros.master_watch import MasterWatch
-from hero_node.ros.ros_node import end_ros_node, init_ros_node
+from hero_node import NodeError, ProgramError, print_error
+from hero_node.ros import (
+    MasterWatch,
+    end_ros_node,
+    find_running_node,
+    init_ros_node,
+    limit_xmlrpc_connections,
+    open_tcpros_server,
+    read_master_uri,
+)
 
 from .config import FORMER_STOP, DriverConfig, read_config
 from .gateway import NS_PER_S, STOP_LIMIT_S, Gateway
-from .reports import FleetStatus, Reporter
+from .reports.reporter import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, tell_of_lost_log_lines
 from .ros.rospy_internals import (
     LATEST_S,
@@ -41,8 +45,8 @@ from .ros.rospy_internals import (
 )
 from .ros.thread_watch import ThreadWatch
 from .ros.worker import Worker
-from .stop_interface import StopInterface
-from .stop_store import StopStore
+from .stops.interface import StopInterface
+from .stops.store import StopStore
 from .transport.event_loop import EventLoop, NoAnswerError
 from .transport.link import HostNotFoundError
 

@@ -10,7 +10,7 @@ import struct
 from types import SimpleNamespace
 from unittest import mock
 
-from hero_driver import command_sender, stop_delivery
+from hero_driver import command_sender
 from hero_driver.commands.command_settings import CommandSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.corrections.correction_settings import CorrectionSettings
@@ -19,16 +19,10 @@ from hero_driver.peer import Peer
 from hero_driver.ros import robot_bridge, robot_commands
 from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import Session, SessionLimits
+from hero_driver.stops import delivery
 from hero_driver.transport.event_loop import POLL_INTERVAL_S
 from hero_test.fake_motors import FakeMotors
-from hero_test.fake_robot import (
-    ENCODER_INTERVAL_S,
-    READ_CYCLE_S,
-    STOCK_DECLARATIONS,
-    SUB,
-    WINDOW_LENGTH,
-    FakeRobot,
-)
+from hero_test.fake_robot import ENCODER_INTERVAL_S, READ_CYCLE_S, STOCK_DECLARATIONS, SUB, WINDOW_LENGTH, FakeRobot
 
 VELOCITY = "/hero_1/velocity_controller/cmd_vel"
 POSITION = "/hero_1/position_controller/cmd_vel"
@@ -62,7 +56,7 @@ class Clock:
     def is_the_drivers(self):
         """Let the driver's parts see this time."""
         with contextlib.ExitStack() as stack:
-            for module in (command_sender, stop_delivery, robot_commands):
+            for module in (command_sender, delivery, robot_commands):
                 stack.enter_context(mock.patch.object(module, "time", self))
             yield self
 
@@ -115,7 +109,7 @@ class CommandedRobot:
             self.bridge.declare(event, event.info.name)
             self._names[event.info.topic_id] = event.info.name
         self.sender = command_sender.CommandSender(clock.call_later, self)
-        self.stops = stop_delivery.StopDelivery(clock.call_later, self)
+        self.stops = delivery.StopDelivery(clock.call_later, self)
         clock.call_later(phase_s, self._read)
         clock.call_later(0.0, self._watch_commanders)
         if has_readings:

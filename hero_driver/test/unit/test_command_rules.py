@@ -15,7 +15,7 @@ from hero_driver.corrections.wheel_motion import REST_TICKS, SETTLED_TICKS, Whee
 from hero_driver.robot_constants import MAX_WATCHDOG_S, MAX_WHEEL_SPEED_M_S
 from hero_driver.ros import robot_commands
 from hero_driver.ros.robot_commands import LIGHT_SUFFIX, TUNING_HEARD_S, TURNS_S, RobotCommands
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 VELOCITY, POSITION = "/hero_1/velocity_controller/cmd_vel", "/hero_1/position_controller/cmd_vel"
 TWIST = "geometry_msgs/Twist"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hero_driver.config import PARAMETERS, DriverConfig, read_config
 from hero_driver.corrections.tick_odometry import WheelGeometry
 from hero_driver.transport.link import Address
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 
 NUMBERS = [name for name, parameter in PARAMETERS.items() if parameter.limits]
 CHOICES = [name for name, parameter in PARAMETERS.items() if parameter.choices]

@@ -11,7 +11,7 @@ from robot_messages import NOW_NS, read_odometry, read_stamp_ns, read_transform
 from hero_driver.corrections.robot_corrections import TRANSFORMS
 from hero_driver.ros.message_types import apply_aliases
 from hero_driver.rosserial.session import MessagesReceived, Session, SessionLimits, Topic
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 START_NS = 1795240942 * 10**9 + 831 * 10**6
 """When recording A was made; its server gave the robot this time."""

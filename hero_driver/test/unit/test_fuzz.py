@@ -13,7 +13,7 @@ from hero_driver.fleet.log_lines import MAX_TEXT_LENGTH, read_log_line
 from hero_driver.fleet.namespaces import identify
 from hero_driver.rosserial.packets import DEFAULT_MAX_PAYLOAD_LENGTH, OVERHEAD_LENGTH, PacketReader
 from hero_driver.rosserial.session import MessagesReceived, SessionEnded
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 
 MAX_TOPICS = 8
 

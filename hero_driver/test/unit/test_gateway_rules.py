@@ -7,7 +7,6 @@ import pytest
 from test_gateway import HELLO, HOST, OTHER_HOST, PUBLISHED, STOCK_DECLARATIONS, FakeLink, FakeRobot
 
 from hero_driver import gateway as gateway_module
-from hero_driver import stop_delivery
 from hero_driver.commands.stop_progress import StopState
 from hero_driver.config import read_config
 from hero_driver.fleet.admission import GARBAGE_BURST_LENGTH
@@ -15,6 +14,7 @@ from hero_driver.gateway import Gateway
 from hero_driver.rosserial.packets import encode_packet
 from hero_driver.rosserial.payloads import TopicInfo
 from hero_driver.rosserial.session import Topic, TopicKind
+from hero_driver.stops import delivery
 from hero_driver.transport.link import READ_LENGTH
 from hero_msgs.msg import Robot
 
@@ -50,7 +50,7 @@ class Driver:
     def __init__(self, monkeypatch, **parameters):
         self.now_s, self.later, self.soon, self.lines, self.changes = 100.0, [], [], [], 0
         self.keys = []  # of throttled lines
-        for module in (gateway_module, stop_delivery):
+        for module in (gateway_module, delivery):
             monkeypatch.setattr(module.time, "monotonic", lambda: self.now_s)
         log = SimpleNamespace(
             log_throttled=self.log_throttled,

@@ -20,7 +20,7 @@ from robot_messages import (
 )
 
 from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 PERIOD_NS = 34 * MS
 TICK_M = math.pi * 0.0492 / 288.0

@@ -9,12 +9,12 @@ from corrected_robot import make_corrections
 from diagnostic_msgs.msg import DiagnosticStatus
 from diagnostic_updater import DiagnosticStatusWrapper
 
-from hero_driver import reports
 from hero_driver.commands.stop_progress import StopState
 from hero_driver.fleet.namespaces import Identity
 from hero_driver.fleet.registry import RobotRecord, RobotState
-from hero_driver.reports import FleetStatus, Reporter
-from hero_driver.robot_status import DUPLICATES_SHOWN, describe_robot
+from hero_driver.reports import reporter as reporter_module
+from hero_driver.reports.reporter import FleetStatus, Reporter
+from hero_driver.reports.robot_status import DUPLICATES_SHOWN, describe_robot
 from hero_msgs.msg import Robot, RobotArray
 
 NOW_S = 1000.0
@@ -59,7 +59,7 @@ class Updater:
 def make_reporter(monkeypatch):
     monkeypatch.setattr(rospy, "Publisher", Publisher)
     monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time(1795240942)))
-    monkeypatch.setattr(reports.diagnostic_updater, "Updater", Updater)
+    monkeypatch.setattr(reporter_module.diagnostic_updater, "Updater", Updater)
     return Reporter()
 
 
@@ -152,7 +152,7 @@ def test_a_damaged_calibration_is_reported_beside_all_else(reporter):
         corrections = make_corrections("/hero_7", [], calibration_problems=problems)
         bridge = SimpleNamespace(last_error="", commands=commands, corrections=corrections)
         status = describe_robot(make_record(**changes), bridge, None, StopState.NOT_STOPPED, {}, NOW_S)
-        return status.message.last_error, reports._assess(status)
+        return status.message.last_error, reporter_module._assess(status)
 
     text = "not calibrated: hero_7.yaml: broken; correct it, then restart the driver"
     problems = {"hero_7": "hero_7.yaml: broken; correct it"}

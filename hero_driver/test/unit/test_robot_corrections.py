@@ -20,7 +20,7 @@ from robot_messages import (
 )
 
 from hero_driver.corrections.robot_corrections import OFFSET_MAX_S, OFFSET_SAMPLES
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 UPTIME_NS = 2 * NS_PER_S
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_driver.robot_log import LINES_PER_S, RobotLog
+from hero_driver.reports.robot_log import LINES_PER_S, RobotLog
 from hero_driver.ros.log_relay import LogRelay
 from hero_driver.rosserial.payloads import LOG_INFO, Log
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.commands.service_requests import find_request_error, is_success, read_set_odom_pose
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 GOOD = {
     "hero_msgs/SetOdom": ("<3d", (1.0, 2.0, 0.5)),

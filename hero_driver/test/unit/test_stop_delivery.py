@@ -10,14 +10,7 @@ from hypothesis import strategies as st
 from hero_driver.commands.stop_progress import StopState
 from hero_driver.corrections.message_layouts import MD5SUMS
 from hero_driver.rosserial.errors import RosserialError
-from hero_driver.stop_delivery import (
-    BURST_LIGHTS,
-    LIGHT_MD5,
-    LIGHT_TYPE,
-    describe_doubt,
-    encode_stop,
-    is_light,
-)
+from hero_driver.stops.delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, describe_doubt, encode_stop, is_light
 from hero_test.fake_motors import LAG_S, FakeMotors
 
 phases = st.floats(0.0, 0.051)

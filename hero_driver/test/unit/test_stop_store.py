@@ -6,7 +6,7 @@ import os
 import pytest
 import rospkg
 
-from hero_driver.stop_store import StopStore
+from hero_driver.stops.store import StopStore
 
 MASTER = "http://localhost:11311"
 TIME_S = 1700000000

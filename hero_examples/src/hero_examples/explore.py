@@ -7,12 +7,18 @@ import rospy
 from geometry_msgs.msg import PoseArray
 
 from hero_client import CommonFrame, Program, open_swarm, read_parameters
-from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
-from hero_client.controllers.go_to_goal import Goal, GoToGoalController
-from hero_client.controllers.lateness import Lateness
-from hero_client.controllers.motion import State
-from hero_client.values.readings import is_blind
-from hero_node.geometry import STOP
+from hero_client.controllers import (
+    Goal,
+    GoToGoalController,
+    Lateness,
+    State,
+    WanderLaw,
+    WanderMemory,
+    shorten_for_body,
+    wander,
+)
+from hero_client.values import is_blind
+from hero_node import STOP
 from hero_node.parameters import flag, number, robot_ids, whole_number
 
 NEAR_M = 0.35

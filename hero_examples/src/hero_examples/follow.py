@@ -3,10 +3,9 @@
 import rospy
 
 from hero_client import CommonFrame, Program, ProgramError, Swarm, read_parameters
-from hero_client.controllers.lateness import Lateness
-from hero_client.controllers.unicycle import FollowLaw, follow
-from hero_client.values.robot_constants import MAX_LINEAR_M_S
-from hero_node.geometry import STOP
+from hero_client.controllers import FollowLaw, Lateness, follow
+from hero_client.values import MAX_LINEAR_M_S
+from hero_node import STOP
 from hero_node.parameters import number, robot_ids
 
 

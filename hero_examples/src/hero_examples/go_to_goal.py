@@ -3,8 +3,7 @@
 import rospy
 
 from hero_client import GoToGoalServer, Program, ProgramError, open_swarm, read_parameters
-from hero_client.controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal
-from hero_client.controllers.motion import DEFAULT_TIMEOUT_S
+from hero_client.controllers import DEFAULT_TIMEOUT_S, DEFAULT_TOLERANCE_M, Goal
 from hero_node.parameters import flag, number, parse_poses, robot_ids
 
 

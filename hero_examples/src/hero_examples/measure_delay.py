@@ -5,8 +5,7 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from hero_client import Program, open_swarm, read_parameters
-from hero_node.geometry import wrap_angle, yaw_of
-from hero_node.optional import import_optional
+from hero_node import import_optional, wrap_angle, yaw_of
 from hero_node.parameters import robot_ids, whole_number
 
 

@@ -5,10 +5,9 @@ import random
 import rospy
 
 from hero_client import Program, open_swarm, read_parameters
-from hero_client.controllers.avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
-from hero_client.values.readings import is_blind
-from hero_client.values.robot_constants import MAX_LINEAR_M_S
-from hero_node.geometry import STOP
+from hero_client.controllers import WanderLaw, WanderMemory, shorten_for_body, wander
+from hero_client.values import MAX_LINEAR_M_S, is_blind
+from hero_node import STOP
 from hero_node.parameters import number, robot_ids, whole_number
 
 

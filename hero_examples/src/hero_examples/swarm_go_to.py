@@ -4,9 +4,8 @@ import rospy
 
 from hero_client import CommonFrame, Program, ProgramError, open_swarm, read_parameters
 from hero_client.apps.formations import assign_goals, place_formation
-from hero_client.controllers.orca import AvoidanceLaw
-from hero_client.controllers.swarm_go_to import SwarmGoToController
-from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_client.controllers import AvoidanceLaw, SwarmGoToController
+from hero_client.values import MAX_LINEAR_M_S
 from hero_node.parameters import flag, number, robot_ids, whole_number
 
 STEP_HZ = 10.0

@@ -2,13 +2,8 @@
 
 from hero_client import Program, open_swarm, read_parameters
 from hero_client.apps.keyboard import Keyboard
-from hero_client.apps.keyboard_teleop import (
-    MAX_ANGULAR_RAD_S,
-    MIN_ANGULAR_RAD_S,
-    MIN_LINEAR_M_S,
-    KeyboardTeleop,
-)
-from hero_client.values.robot_constants import MAX_LINEAR_M_S
+from hero_client.apps.keyboard_teleop import MAX_ANGULAR_RAD_S, MIN_ANGULAR_RAD_S, MIN_LINEAR_M_S, KeyboardTeleop
+from hero_client.values import MAX_LINEAR_M_S
 from hero_node.parameters import number, robot_ids
 
 

@@ -3,7 +3,7 @@
 from hero_client import Program, ProgramError, open_swarm, read_parameters
 from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
 from hero_client.apps.robot_choice import ChoiceButtons
-from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_node.parameters import number, robot_ids, whole_number
 
 

@@ -6,10 +6,10 @@ import pytest
 import true_paths
 
 from hero_client import CommonFrame
-from hero_client.controllers.motion import State
+from hero_client.controllers import State
 from hero_client.values.readings import NOT_CALIBRATED
-from hero_node.geometry import Pose
-from hero_sim.stepped.swarm import StepSwarm
+from hero_node import Pose
+from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples import explore as explore_program

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import true_paths
 
-from hero_client.values.readings import Obstacle
+from hero_client.values import Obstacle
 from hero_examples import all_robots, avoid, drive_a_square, keep_distance, move, read_sensors
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.arena_file import load_arena
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import load_arena
 
 pytest.importorskip("rospy", reason="the scripts' robots are on ROS")
 

@@ -5,10 +5,9 @@ import pytest
 import true_paths
 
 from hero_client import CommonFrame
-from hero_client.controllers.lateness import Lateness
-from hero_client.controllers.unicycle import FollowLaw
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.stepped.swarm import StepSwarm
+from hero_client.controllers import FollowLaw, Lateness
+from hero_client.values import BODY_RADIUS_M
+from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples import follow

@@ -8,10 +8,10 @@ import pytest
 import true_paths
 
 from hero_client.apps.goals import MAX_QUEUED_GOALS, GoalQueue, GoalRequest, InvalidGoalError
-from hero_client.controllers.go_to_goal import Goal
+from hero_client.controllers import Goal
 from hero_client.values.errors import GoalError
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.arena_file import load_arena
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import load_arena
 
 WORLDS = 30
 TOLERANCE_M = 0.01

@@ -3,7 +3,7 @@
 import pytest
 import true_paths
 
-from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples import led_show

@@ -13,7 +13,7 @@ from rospy import Time
 
 from hero_client import ProgramError
 from hero_examples import measure_delay
-from hero_node.geometry import wrap_angle
+from hero_node import wrap_angle
 
 
 class Stage:

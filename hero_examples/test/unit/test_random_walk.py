@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import true_paths
 
-from hero_client.controllers.avoidance import WanderLaw, WanderMemory
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.arena import build_default
-from hero_sim.world.arena_file import load_arena
+from hero_client.controllers import WanderLaw, WanderMemory
+from hero_client.values import BODY_RADIUS_M
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import build_default, load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples.random_walk import Walker

@@ -8,10 +8,10 @@ import true_paths
 
 from hero_client import CommonFrame, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
-from hero_client.controllers.orca import AvoidanceLaw
+from hero_client.controllers import AvoidanceLaw
 from hero_client.values.errors import GoalError
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.arena_file import load_arena
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples.swarm_go_to import STEP_HZ, Formation

@@ -7,7 +7,7 @@ import pytest
 import true_paths
 
 from hero_client.controllers.formation_drive import AHEAD_M
-from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="teleoperation imports rospy")
 from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop

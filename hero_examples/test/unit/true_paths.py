@@ -5,8 +5,8 @@ A path is an array (T, N, 3) of one world: rows 50 ms apart, robots, and x m, y 
 
 import numpy as np
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.world.arena import measure_clearance
+from hero_client.values import BODY_RADIUS_M
+from hero_sim.world import measure_clearance
 
 TOUCH_M = 0.001
 """Nearer than this two bodies touch; the simulator lets nothing overlap."""

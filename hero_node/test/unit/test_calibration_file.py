@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from hero_node import calibration_file
-from hero_node.calibration_file import (
+from hero_node.files import calibration_file
+from hero_node.files.calibration_file import (
     RESULTS,
     SETTINGS,
     CalibrationFileError,

@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from hero_node import file_limit
-from hero_node.number_checks import check_finite, check_speed, is_number, is_whole_number
+from hero_node import processes
+from hero_node.parameters.number_checks import check_finite, check_speed, is_number, is_whole_number
 
 NAN, INF = float("nan"), float("inf")
 
@@ -36,9 +36,9 @@ def test_goals_and_speeds_are_finite_numbers_also_of_numpy():
 
 def test_the_limit_of_files_is_raised_to_what_needs_no_privileges(monkeypatch):
     calls = []
-    monkeypatch.setattr(file_limit.resource, "setrlimit", lambda *arguments: calls.append(arguments))
+    monkeypatch.setattr(processes.resource, "setrlimit", lambda *arguments: calls.append(arguments))
     for limits, expected in (((1024, 4096), 4096), ((4096, 4096), 4096), ((1024, resource.RLIM_INFINITY), sys.maxsize)):
-        monkeypatch.setattr(file_limit.resource, "getrlimit", lambda kind, limits=limits: limits)
-        assert file_limit.raise_file_limit() == expected
+        monkeypatch.setattr(processes.resource, "getrlimit", lambda kind, limits=limits: limits)
+        assert processes.raise_file_limit() == expected
     hard = [(resource.RLIMIT_NOFILE, (limit, limit)) for limit in (4096, resource.RLIM_INFINITY)]
     assert calls == hard

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from hero_node.errors import ProgramError
-from hero_node.parameters import (
+from hero_node.parameters.declared import (
     MAX_COORDINATE_M,
     MAX_ROBOTS_IN_RANGE,
     check_parameters,

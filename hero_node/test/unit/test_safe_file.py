@@ -6,8 +6,8 @@ import threading
 
 import pytest
 
-from hero_node import safe_file
-from hero_node.safe_file import hold_file, lock_file, read_file, replace_file, write_file
+from hero_node.files import safe_file
+from hero_node.files.safe_file import hold_file, lock_file, read_file, replace_file, write_file
 
 
 def fail_to_sync(fd):

@@ -5,7 +5,7 @@ import textwrap
 import pytest
 import yaml
 
-from hero_node.yaml_edit import replace_values
+from hero_node.files.yaml_edit import replace_values
 
 TEXT = textwrap.dedent(
     """\

@@ -2,8 +2,8 @@
 
 import pytest
 
+from hero_node.files.yaml_text import MAX_CHARACTERS, YamlError, parse_yaml, read_text
 from hero_node.texts import shorten
-from hero_node.yaml_text import MAX_CHARACTERS, YamlError, parse_yaml, read_text
 
 
 @pytest.mark.slow

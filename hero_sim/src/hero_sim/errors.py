@@ -1,6 +1,6 @@
 """Errors of the simulator."""
 
-from hero_node.errors import HeroError
+from hero_node import HeroError
 
 
 class CommandError(HeroError):

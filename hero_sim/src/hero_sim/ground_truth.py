@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from .scene import FRAME, START_S, draw_arena, draw_objects, draw_robots
 from .scene_markers import make_markers

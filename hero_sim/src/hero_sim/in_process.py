@@ -14,11 +14,8 @@ from typing import Any, Dict, Iterable, Mapping, Optional, Sequence
 import yaml
 
 import hero_client
-from hero_client.values.background_motion import Steps
-from hero_client.values.errors import RobotNotReadyError
-from hero_node import command_line
-from hero_node.command_line import call, find_line, say
-from hero_node.errors import HeroError, ProgramError
+from hero_client.values import RobotNotReadyError, Steps
+from hero_node import HeroError, ProgramError, call, command_line, find_line, say
 from hero_node.parameters import check_parameters
 
 from .population import add_options

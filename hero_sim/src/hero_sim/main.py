@@ -5,7 +5,7 @@ import contextlib
 import signal
 from typing import Callable, Iterator, Optional, Sequence, Tuple
 
-from hero_node.command_line import WRONG_ARGUMENTS, call
+from hero_node import WRONG_ARGUMENTS, call
 
 from .build import build_simulator
 from .errors import OptionError

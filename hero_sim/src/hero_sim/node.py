@@ -14,11 +14,8 @@ from typing import Tuple
 
 import rospy
 
-from hero_node.command_line import call
-from hero_node.errors import NodeError
-from hero_node.ros.master import find_running_node, read_master_uri
-from hero_node.ros.master_watch import MasterWatch
-from hero_node.ros.ros_node import end_ros_node, init_ros_node
+from hero_node import NodeError, call
+from hero_node.ros import MasterWatch, end_ros_node, find_running_node, init_ros_node, read_master_uri
 
 from . import main as command_line
 from .errors import OptionError

@@ -3,7 +3,7 @@
 import math
 from typing import List, NamedTuple, Sequence, Tuple
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from .robot_constants import BODY_RADIUS_M
 from .world.arena import Arena

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_sim.errors import OptionError
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm

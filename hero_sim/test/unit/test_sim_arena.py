@@ -4,7 +4,7 @@ import os
 import numpy as np
 import pytest
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_sim import scene
 from hero_sim.errors import OptionError
 from hero_sim.robot_constants import BODY_RADIUS_M

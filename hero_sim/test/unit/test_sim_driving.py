@@ -5,7 +5,7 @@ import pytest
 from driver_side import POSITION, RECEIVED, SENT, VELOCITY, DriverSide, read_encoder, read_odom
 
 from hero_driver.rosserial import packets
-from hero_node.geometry import Pose, find_frame
+from hero_node import Pose, find_frame
 from hero_sim.robot.imu_hat import ImuHat
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_node.errors import NodeError
+from hero_node import NodeError
 from hero_sim import node
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hero_driver.rosserial import packets, payloads
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_sim.robot import messages
 from hero_sim.robot.declarations import STOCK_TOPICS, encode_declarations
 from hero_sim.robot.models import MODELS

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from driver_side import DriverSide
 
-from hero_client.values.robot_constants import MODELS as DIMENSIONS
+from hero_client.values import MODELS as DIMENSIONS
+from hero_driver.corrections import PLUS_WHEELS, WheelGeometry
 from hero_driver.corrections.message_layouts import drop_tick_difference, read_encoder
-from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5, PLUS_WHEELS
-from hero_driver.corrections.tick_odometry import TickOdometry, WheelGeometry
+from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5
+from hero_driver.corrections.tick_odometry import TickOdometry
 from hero_driver.rosserial import packets, payloads
 from hero_sim.robot.models import MODELS
 from hero_sim.world.arena import build_rectangle

@@ -9,7 +9,7 @@ import pytest
 from driver_side import parse_options
 
 from hero_client import CommonFrame, GoalError, StaleDataError
-from hero_client.controllers.avoidance import WanderMemory, wander
+from hero_client.controllers import WanderMemory, wander
 from hero_sim import main
 from hero_sim.errors import OptionError
 from hero_sim.population import build_world

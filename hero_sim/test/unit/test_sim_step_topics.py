@@ -11,7 +11,7 @@ from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_node.geometry import yaw_of
+from hero_node import yaw_of
 from hero_sim.stepped.ros_messages import FLOAT, LASER_SCAN, MARKER_ARRAY, ODOMETRY, TF_MESSAGE, TWIST
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.stepped.topics import ARENA, MARKERS, OBJECTS, StepTopics

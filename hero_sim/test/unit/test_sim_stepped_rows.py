@@ -9,17 +9,13 @@ import pytest
 from driver_side import RECEIVED, SENT
 from stepped_worlds import build_world
 
-from hero_driver.commands.velocity_shaper import (
-    COMMAND_INTERVAL_S,
-    STOP_PAYLOADS,
-    VelocityShaper,
-    check_twist,
-)
+from hero_driver.commands import COMMAND_INTERVAL_S
+from hero_driver.commands.velocity_shaper import STOP_PAYLOADS, VelocityShaper, check_twist
+from hero_driver.corrections import PLUS_WHEELS, WheelGeometry
 from hero_driver.corrections.message_layouts import make_proximity
-from hero_driver.corrections.robot_models import PLUS_WHEELS
-from hero_driver.corrections.tick_odometry import TickOdometry, WheelGeometry
+from hero_driver.corrections.tick_odometry import TickOdometry
 from hero_driver.rosserial import packets, payloads
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_sim.robot.commands import CommandTable
 from hero_sim.robot.firmware import Firmware
 from hero_sim.robot.flash import Flash

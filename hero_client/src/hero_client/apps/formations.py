@@ -14,10 +14,9 @@ from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.errors import ProgramError
-from hero_node.number_checks import is_number, is_whole_number
-from hero_node.texts import shorten
-from hero_node.yaml_text import YamlError, parse_yaml
+from hero_node import ProgramError, shorten
+from hero_node.files import YamlError, parse_yaml
+from hero_node.parameters import is_number, is_whole_number
 
 from ..values.assignment import assign_rows
 

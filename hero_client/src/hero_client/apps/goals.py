@@ -11,8 +11,7 @@ import queue
 from abc import ABC, abstractmethod
 from typing import Any, Callable, NamedTuple, Tuple
 
-from hero_node.errors import HeroError
-from hero_node.geometry import yaw_of
+from hero_node import HeroError, yaw_of
 from hero_node.parameters import MAX_COORDINATE_M
 
 from ..controllers.go_to_goal import Goal, GoToGoalController

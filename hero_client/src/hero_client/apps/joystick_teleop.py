@@ -10,9 +10,8 @@ from typing import Deque, Dict, NamedTuple, Optional, Sequence
 import rospy
 from sensor_msgs.msg import Joy
 
-from hero_node.errors import ProgramError
-from hero_node.geometry import STOP, Velocity
-from hero_node.ros.program import Program
+from hero_node import STOP, ProgramError, Velocity
+from hero_node.ros import Program
 
 from ..controllers.formation_drive import FormationDrive
 from ..controllers.lateness import Lateness

@@ -10,7 +10,7 @@ import termios
 import tty
 from typing import IO, Any, List, Optional, Tuple
 
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 
 ESCAPE = "\x1b"
 

@@ -10,8 +10,8 @@ import os
 import sys
 from typing import Dict, List, Optional, Tuple
 
-from hero_node.geometry import STOP, Velocity
-from hero_node.ros.program import Program
+from hero_node import STOP, Velocity
+from hero_node.ros import Program
 
 from ..robot import Robot
 from ..ros.stop_status import paint

@@ -5,7 +5,7 @@ Every motion, one stop after it, and no motion of before a pause, a stop or a re
 
 from typing import Iterable, Set
 
-from hero_node.geometry import STOP, Velocity
+from hero_node import STOP, Velocity
 
 from ..robots.robot_base import BaseRobot
 

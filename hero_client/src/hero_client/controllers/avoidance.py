@@ -7,7 +7,7 @@ nan: not known, which counts as an obstacle.
 import math
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
-from hero_node.geometry import STOP, Velocity, clamp, wrap_angle
+from hero_node import STOP, Velocity, clamp, wrap_angle
 
 from ..values.readings import Obstacle
 from ..values.robot_constants import BODY_RADIUS_M, MIN_RANGE_M

@@ -7,7 +7,7 @@ Bastin, 1995), so robots may begin with any headings. Places and velocities are 
 import cmath
 from typing import List, Sequence
 
-from hero_node.geometry import Pose, Velocity, clamp
+from hero_node import Pose, Velocity, clamp
 
 AHEAD_M = 0.04
 GAIN_1_S = 1.5

@@ -6,8 +6,8 @@ Poses and the goal are in one frame, normally hero_N/odom.
 import math
 from typing import NamedTuple, Optional, Sequence
 
-from hero_node.geometry import STOP, Pose, Velocity, wrap_angle
-from hero_node.number_checks import check_finite
+from hero_node import STOP, Pose, Velocity, wrap_angle
+from hero_node.parameters import check_finite
 
 from ..values.readings import NOT_CALIBRATED, find_nearest, is_blind
 from .avoidance import bend_around

@@ -7,7 +7,7 @@ age of its pose and the period of the loop; the distance must stay within what c
 import math
 from typing import List, Sequence
 
-from hero_node.geometry import Velocity
+from hero_node import Velocity
 
 PERIOD_S = 0.1
 """Period that the laws of hero_client are made for."""

@@ -10,7 +10,7 @@ import enum
 import math
 from typing import Optional, Sequence
 
-from hero_node.geometry import STOP, Pose, Velocity
+from hero_node import STOP, Pose, Velocity
 
 from ..values.readings import Obstacle
 from ..values.robot_constants import BODY_RADIUS_M

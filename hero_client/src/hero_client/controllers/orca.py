@@ -16,7 +16,7 @@ from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.geometry import Pose, Velocity
+from hero_node import Pose, Velocity
 
 from ..values.robot_constants import BODY_RADIUS_M
 

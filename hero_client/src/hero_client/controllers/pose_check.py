@@ -8,7 +8,7 @@ import math
 from collections import deque
 from typing import Deque, Optional, Tuple
 
-from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
 DRIVE_M = 0.04
 """Headings are compared over drives of this length: measured poses are a few millimeters off."""

@@ -3,7 +3,7 @@
 import math
 from typing import Optional, Sequence
 
-from hero_node.geometry import Pose, Velocity, clamp, invert_pose, transform_pose, wrap_angle
+from hero_node import Pose, Velocity, clamp, invert_pose, transform_pose, wrap_angle
 
 from .motion import DEFAULT_TIMEOUT_S, MotionController
 

@@ -5,7 +5,7 @@ from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.geometry import STOP, Pose, Velocity
+from hero_node import STOP, Pose, Velocity
 
 from .lateness import Lateness
 from .motion import AIM_SHARE

@@ -6,7 +6,7 @@ Poses and goals are in one common frame, m and rad (REP 103).
 import math
 from typing import NamedTuple
 
-from hero_node.geometry import STOP, Pose, Velocity, clamp, measure_distance, wrap_angle
+from hero_node import STOP, Pose, Velocity, clamp, measure_distance, wrap_angle
 
 
 class GoToLaw(NamedTuple):

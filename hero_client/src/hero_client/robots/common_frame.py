@@ -3,9 +3,7 @@
 from collections import defaultdict
 from typing import Dict, List, Optional
 
-from hero_node.clock import Clock
-from hero_node.errors import ProgramError
-from hero_node.geometry import Pose
+from hero_node import Clock, Pose, ProgramError
 
 from ..controllers.pose_check import FrozenCheck
 from ..values.errors import FrameError, StaleDataError

@@ -6,8 +6,7 @@ from numbers import Real
 from operator import index
 from typing import Optional, Protocol, Sequence, SupportsIndex, TypeVar
 
-from hero_node.clock import Clock
-from hero_node.texts import list_names
+from hero_node import Clock, list_names
 
 from ..values.background_motion import SEND_TIME_S, BackgroundMotion, FullWait, Sleep, Steps, run_steps
 from ..values.errors import RobotNotReadyError

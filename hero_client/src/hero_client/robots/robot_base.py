@@ -9,8 +9,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Callable, Generator, Optional
 
-from hero_node.geometry import Pose, clamp, transform_pose
-from hero_node.number_checks import check_finite, check_speed
+from hero_node import Pose, clamp, transform_pose
+from hero_node.parameters import check_finite, check_speed
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController, make_goal
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State

@@ -7,7 +7,7 @@ import math
 from contextlib import suppress
 from typing import List, Optional, Tuple
 
-from hero_node.geometry import Pose, Velocity, transform_pose, wrap_angle
+from hero_node import Pose, Velocity, transform_pose, wrap_angle
 
 from ..values.errors import NotCalibratedError, StaleDataError
 from ..values.readings import FRESH_S, NOT_CALIBRATED, Obstacle, find_nearest, is_blind, is_free

@@ -7,10 +7,8 @@ from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequen
 
 import numpy as np
 
-from hero_node.clock import Clock
-from hero_node.errors import HeroError
-from hero_node.geometry import STOP, Pose
-from hero_node.number_checks import check_finite
+from hero_node import STOP, Clock, HeroError, Pose
+from hero_node.parameters import check_finite
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M
 from ..controllers.motion import DEFAULT_TIMEOUT_S, SILENT_STEPS

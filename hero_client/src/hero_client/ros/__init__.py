@@ -1,1 +1,6 @@
 """Robots and drivers over ROS topics and services."""
+
+from .drivers import Drivers, share_drivers
+from .localized_poses import share_poses
+from .robot_listener import NewestMessage, RobotListener, RobotTrack, follow
+from .stop_status import StopStatus, paint

@@ -17,9 +17,8 @@ import rospy
 from std_msgs.msg import Bool
 
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.errors import NodeError, ProgramError
-from hero_node.ros.master import ask_master
-from hero_node.texts import list_names
+from hero_node import NodeError, ProgramError, list_names
+from hero_node.ros import ask_master
 
 from ..values.robot_states import STATES
 from .stop_status import TIME_LIMIT_S, Replies, StopRequest, StopStatus

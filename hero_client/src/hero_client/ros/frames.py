@@ -10,8 +10,7 @@ from functools import lru_cache
 import rospy
 import tf2_ros
 
-from hero_node.geometry import Pose, pose_of
-from hero_node.texts import one_line
+from hero_node import Pose, one_line, pose_of
 
 from ..values.errors import FrameError, StaleDataError
 from ..values.readings import FRESH_S

@@ -8,9 +8,8 @@ from typing import Dict, NamedTuple, Optional, Set
 import rospy
 
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.errors import NodeError
-from hero_node.geometry import Pose
-from hero_node.ros.master import ask_master
+from hero_node import NodeError, Pose
+from hero_node.ros import ask_master
 
 from ..values.errors import FrameError, StaleDataError
 from ..values.readings import FRESH_S, is_plausible

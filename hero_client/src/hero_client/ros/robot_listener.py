@@ -11,7 +11,7 @@ import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_node.geometry import Pose, measure_distance, wrap_angle
+from hero_node import Pose, measure_distance, wrap_angle
 
 from ..values.readings import Obstacle, find_nearest, is_free, read_pose, read_ranges
 

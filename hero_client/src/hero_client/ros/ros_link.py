@@ -12,10 +12,8 @@ from std_msgs.msg import ColorRGBA, Float32
 
 from hero_msgs.msg import Encoder, Neighbors
 from hero_msgs.srv import SetOdom
-from hero_node.errors import HeroError
-from hero_node.geometry import Pose, Velocity, pose_of
-from hero_node.ros.ros_clock import ROS_CLOCK
-from hero_node.texts import one_line
+from hero_node import HeroError, Pose, Velocity, one_line, pose_of
+from hero_node.ros import ROS_CLOCK
 
 from ..values.background_motion import BackgroundMotion, Steps, run_steps
 from ..values.errors import RobotError, StaleDataError

@@ -6,7 +6,7 @@ Pure: knows neither topics nor a clock; times are monotonic.
 from typing import List, Mapping, NamedTuple, Optional, Sequence, Set
 
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.texts import list_names
+from hero_node import list_names
 
 TIME_LIMIT_S = 1.4
 """Then users are shown which robots did not stop, on any screen within 1.5 s. A driver reports once per second, and

@@ -1,6 +1,6 @@
 """Errors of robots. The text is one line: what, why, and what to do. Pure."""
 
-from hero_node.errors import HeroError
+from hero_node import HeroError
 
 
 class FrameError(HeroError):

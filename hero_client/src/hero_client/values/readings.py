@@ -6,7 +6,7 @@ Messages are only read; their meaning: REP 105 (frames), REP 117 (ranges).
 import math
 from typing import Any, List, NamedTuple, Optional, Sequence
 
-from hero_node.geometry import Pose, pose_of, wrap_angle
+from hero_node import Pose, pose_of, wrap_angle
 
 FRESH_S = 1.0
 """Older data count as missing. Odometry comes 29 times a second and proximity 5 times, but Wi-Fi makes gaps: in each

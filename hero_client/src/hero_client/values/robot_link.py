@@ -2,8 +2,7 @@
 
 from typing import List, Optional, Protocol, Tuple
 
-from hero_node.clock import Clock
-from hero_node.geometry import Pose, Velocity
+from hero_node import Clock, Pose, Velocity
 
 from .background_motion import BackgroundMotion, Steps
 from .robot_constants import RobotModel

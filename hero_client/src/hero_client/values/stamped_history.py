@@ -4,7 +4,7 @@ import bisect
 import math
 from typing import Callable, Generic, List, Optional, TypeVar
 
-from hero_node.geometry import Pose, wrap_angle
+from hero_node import Pose, wrap_angle
 
 T = TypeVar("T")
 

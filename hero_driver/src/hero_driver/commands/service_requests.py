@@ -8,7 +8,7 @@ import math
 import struct
 from typing import NamedTuple, Optional
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..robot_constants import PULSE_RANGE_US
 

@@ -1,6 +1,6 @@
 """The stop of one robot: when to send it, and what the robot's wheels show. Pure: times and readings go in.
 
-See stop_delivery for what is sent and why. Wheels are classified by readings in time and by time since the robot
+See stops.delivery for what is sent and why. Wheels are classified by readings in time and by time since the robot
 acknowledged a stop: delayed readings come all at once, and an ordinary stop takes 0.25 to 0.35 s. Late readings are
 ignored, whatever they show: a robot whose wheels turn is reported as soon as readings are in time.
 """

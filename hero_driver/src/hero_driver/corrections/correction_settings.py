@@ -3,9 +3,8 @@
 from dataclasses import dataclass, field
 from typing import Any, Mapping, NamedTuple, Optional, Tuple
 
-from hero_node.calibration_file import HERO_PLUS, STOCK
-from hero_node.number_checks import is_number
-from hero_node.parameters import Parameter, choice, declare, make_error, number, parse_given_ids, words
+from hero_node.files import HERO_PLUS, STOCK
+from hero_node.parameters import Parameter, choice, declare, is_number, make_error, number, parse_given_ids, words
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from .robot_models import PLUS_ENCODER_MD5, PLUS_WHEELS

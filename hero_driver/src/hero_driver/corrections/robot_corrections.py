@@ -6,20 +6,10 @@ Takes payloads and times of arrival, and publishes payloads. Topics that are not
 import collections
 import functools
 import itertools
-from typing import (
-    Any,
-    Callable,
-    DefaultDict,
-    Deque,
-    Iterator,
-    List,
-    Protocol,
-    Set,
-    Tuple,
-)
+from typing import Any, Callable, DefaultDict, Deque, Iterator, List, Protocol, Set, Tuple
 
-from hero_node.calibration_file import HERO_PLUS
-from hero_node.geometry import Pose
+from hero_node import Pose
+from hero_node.files import HERO_PLUS
 
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts

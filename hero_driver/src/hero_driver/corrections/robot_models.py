@@ -6,7 +6,7 @@ one field more, a distance sensor on the hat, and a bump shield. Its firmware lo
 
 from typing import AbstractSet
 
-from hero_node.calibration_file import STOCK
+from hero_node.files import STOCK
 
 from ..robot_constants import TICKS_PER_TURN
 from .tick_odometry import WheelGeometry

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Deque, Optional, Tuple
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..robot_constants import MAX_WHEEL_SPEED_M_S, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 

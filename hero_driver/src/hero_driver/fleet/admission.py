@@ -4,9 +4,8 @@ import ipaddress
 from dataclasses import dataclass
 from typing import Any, Optional, Tuple, Union
 
-from hero_node.connection_table import ConnectionTable
+from hero_node import ConnectionTable, TokenBuckets
 from hero_node.parameters import Parameter, declare, make_error, whole_number
-from hero_node.token_bucket import TokenBuckets
 
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
 

@@ -9,8 +9,7 @@ import sys
 import time
 from typing import Dict, List, Tuple
 
-from hero_node.command_line import print_error
-from hero_node.token_bucket import TokenBuckets
+from hero_node import TokenBuckets, print_error
 
 from .rospy_internals import ROSOUT_LOGGER, list_log_handlers
 from .worker import Worker

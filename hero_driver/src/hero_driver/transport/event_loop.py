@@ -14,7 +14,7 @@ import threading
 import time
 from typing import Callable, Dict, List, Optional, Protocol, Sequence, Set, Tuple, TypeVar
 
-from hero_node.file_limit import raise_file_limit
+from hero_node import raise_file_limit
 
 from .call_queue import CallQueue
 from .dialer import start_dialer

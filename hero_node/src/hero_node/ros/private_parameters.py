@@ -11,7 +11,7 @@ import rosgraph
 import rospy
 
 from ..errors import ProgramError
-from ..parameters import check_parameters
+from ..parameters.declared import check_parameters
 
 
 def _list_own() -> List[str]:

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Callable, Dict, Optional, Tuple
 
 from hero_driver.rosserial import packets
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..errors import CommandError
 from ..robot_constants import MAX_PARAMETER

@@ -7,8 +7,8 @@ import json
 import os
 from typing import Optional, Sequence
 
-from hero_node.number_checks import is_number
-from hero_node.safe_file import read_file, write_file
+from hero_node.files import read_file, write_file
+from hero_node.parameters import is_number
 
 from ..errors import CommandError, OptionError
 from ..robot_constants import MAX_PARAMETER

@@ -11,7 +11,7 @@ import struct
 from typing import List, Sequence, Tuple
 
 from hero_driver.rosserial import packets
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 from .models import HERO, RobotModel

@@ -9,7 +9,7 @@ from typing import Callable, List, Sequence
 
 import numpy as np
 
-from hero_node.geometry import clamp
+from hero_node import clamp
 
 from ..robot_constants import (
     COMMAND_GAP_MS,

@@ -8,7 +8,7 @@ With a motor like that of the measured build, the distance of its wheels over 3 
 
 from typing import NamedTuple
 
-from hero_node.geometry import clamp
+from hero_node import clamp
 
 SAMPLE_MS = 50
 

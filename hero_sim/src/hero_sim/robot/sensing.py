@@ -10,7 +10,7 @@ from typing import List, Tuple
 import numpy as np
 
 from hero_driver.rosserial import packets
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..robot_constants import LED_WATCHDOG_MS
 from ..world.body import Body

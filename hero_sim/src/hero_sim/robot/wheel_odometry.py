@@ -8,7 +8,7 @@ velocity controller reads too (47 times a second), a third and more of the path 
 import math
 from typing import List, Tuple
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..robot_constants import TICK_M
 from ..world.kinematics import join_wheels

@@ -6,14 +6,21 @@ from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from hero_client.values.background_motion import BackgroundMotion, Steps
-from hero_client.values.errors import FrameError, StaleDataError
-from hero_client.values.readings import FRESH_S
-from hero_client.values.robot_constants import RobotModel
-from hero_client.values.robot_link import MAP, RobotLink
-from hero_client.values.sensing import Neighbor, Neighbors, list_neighbors, sense_neighbors
-from hero_node.command_line import say
-from hero_node.geometry import Pose, Velocity, find_frame
+from hero_client.values import (
+    FRESH_S,
+    MAP,
+    BackgroundMotion,
+    FrameError,
+    Neighbor,
+    Neighbors,
+    RobotLink,
+    RobotModel,
+    StaleDataError,
+    Steps,
+    list_neighbors,
+    sense_neighbors,
+)
+from hero_node import Pose, Velocity, find_frame, say
 
 from .step_clock import StepClock, StepMotion
 

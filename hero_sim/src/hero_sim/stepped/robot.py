@@ -2,9 +2,8 @@
 
 from typing import Any, Callable, Tuple
 
-from hero_client.robots.robot_base import BaseRobot
-from hero_node.errors import ProgramError
-from hero_node.geometry import Pose
+from hero_client.robots import BaseRobot
+from hero_node import Pose, ProgramError
 
 from .link import StepLink
 from .step_clock import StepClock

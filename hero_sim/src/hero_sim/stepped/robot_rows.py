@@ -11,8 +11,7 @@ from typing import Callable, Collection, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_driver.corrections.robot_models import PLUS_WHEELS
-from hero_driver.corrections.tick_odometry import WheelGeometry
+from hero_driver.corrections import PLUS_WHEELS, WheelGeometry
 from hero_driver.robot_constants import SERVO_CENTER_US
 
 from ..link.wifi import Radio

@@ -7,7 +7,7 @@ import math
 import struct
 from typing import Dict, Iterable, List, NamedTuple, Sequence, Tuple
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..robot.messages import LENGTH_FORM, POSE_FORM, TWIST_FORM, encode_header, encode_text
 from ..scene import Shape

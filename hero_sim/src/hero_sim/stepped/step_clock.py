@@ -9,9 +9,8 @@ import itertools
 import math
 from typing import Any, List, Optional, Tuple
 
-from hero_client.values.background_motion import BackgroundMotion, FullWait, Steps
-from hero_node.clock import Clock
-from hero_node.errors import HeroError
+from hero_client.values import BackgroundMotion, FullWait, Steps
+from hero_node import Clock, HeroError
 
 from .robot_rows import RobotRows
 

@@ -13,9 +13,9 @@ import argparse
 import sys
 from typing import List, Optional, Sequence, Union
 
-from hero_client.robots.swarm_base import BaseSwarm
-from hero_client.values.background_motion import Steps
-from hero_node.command_line import say
+from hero_client.robots import BaseSwarm
+from hero_client.values import Steps
+from hero_node import say
 
 from ..population import build_radios, build_world, check_population
 from ..robot.models import parse_models

@@ -10,7 +10,7 @@ from typing import Callable, Dict, List, Sequence
 import numpy as np
 
 from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, SCAN_TIME_S
-from hero_node.geometry import Pose, find_frame
+from hero_node import Pose, find_frame
 
 from ..scene import FRAME, START_S, draw_arena, draw_objects, draw_robots
 from .robot_rows import RobotRows

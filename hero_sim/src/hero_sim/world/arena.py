@@ -8,7 +8,7 @@ from typing import List, NamedTuple, Sequence, Tuple, Union
 
 import numpy as np
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M

@@ -12,10 +12,8 @@ from typing import Any, Callable, Dict, List
 import numpy as np
 import yaml
 
-from hero_node.geometry import Pose
-from hero_node.safe_file import read_file
-from hero_node.texts import shorten
-from hero_node.yaml_text import decode_text, parse_yaml
+from hero_node import Pose, shorten
+from hero_node.files import decode_text, parse_yaml, read_file
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M

@@ -7,7 +7,7 @@ from typing import Dict, List
 
 import numpy as np
 
-from hero_node.geometry import Pose, find_frame
+from hero_node import Pose, find_frame
 
 from .kinematics import join_wheels
 from .world import STEP_MS, World, drive_servos

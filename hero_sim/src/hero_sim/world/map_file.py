@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Tuple
 
 import numpy as np
 
-from hero_node.texts import shorten
+from hero_node import shorten
 
 from .arena import Arena
 

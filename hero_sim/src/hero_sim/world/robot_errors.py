@@ -8,7 +8,7 @@ from typing import Callable, Collection, Dict, Iterable, List, NamedTuple
 
 import numpy as np
 
-from hero_node.safe_file import read_file
+from hero_node.files import read_file
 
 from ..errors import OptionError
 from ..key_values import parse_values

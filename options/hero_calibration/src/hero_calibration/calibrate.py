@@ -14,7 +14,7 @@ from typing import Sequence
 import rospy
 
 from hero_node.parameters import robot_ids_option
-from hero_node.ros.program import Program
+from hero_node.ros import Program
 
 from .calibration import DEFAULT_PARTS, INFRARED, PARTS, WHEELS, Calibration
 from .errors import CalibrationError, EndedError

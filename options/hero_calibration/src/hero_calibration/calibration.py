@@ -5,9 +5,8 @@ import os
 import time
 from typing import Any, Dict, List, Optional, Sequence
 
-from hero_node.calibration_file import KeptCalibration
-from hero_node.command_line import say
-from hero_node.safe_file import replace_file
+from hero_node import say
+from hero_node.files import KeptCalibration, replace_file
 
 from . import store
 from .errors import CalibrationError, EndedError

@@ -1,6 +1,6 @@
 """The errors that end a calibration, of one robot or of all: one line with the thing, the value and the remedy."""
 
-from hero_node.errors import HeroError
+from hero_node import HeroError
 
 
 class CalibrationError(HeroError):

@@ -3,10 +3,16 @@
 import os
 from contextlib import suppress
 
-from hero_node.calibration_file import PREVIOUS, CalibrationFileError, KeptCalibration, read_calibration
-from hero_node.safe_file import lock_file, write_file
-from hero_node.yaml_edit import replace_values
-from hero_node.yaml_text import read_text
+from hero_node.files import (
+    PREVIOUS,
+    CalibrationFileError,
+    KeptCalibration,
+    lock_file,
+    read_calibration,
+    read_text,
+    replace_values,
+    write_file,
+)
 
 from .errors import CalibrationError
 

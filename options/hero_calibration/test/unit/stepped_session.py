@@ -3,7 +3,7 @@
 from hero_calibration.errors import CalibrationError
 from hero_calibration.robots.probe import Probe
 from hero_calibration.robots.session import Session
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 class StepProbe(Probe):

@@ -13,7 +13,7 @@ from hero_calibration.models import infrared_model as model
 from hero_calibration.models.encoder_readings import TICK_M
 from hero_calibration.models.infrared_model import Facing
 from hero_calibration.procedures import infrared
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 
 
 def servo_speeds(pulses_us, center_us, zone_us=30.0, gain=1.0, sign=1.0, noise_m_s=0.0, seed=0):

@@ -17,14 +17,13 @@ from hero_calibration.procedures.motors import MotorResult, calibrate_motors
 from hero_calibration.procedures.placement import place_robots
 from hero_calibration.procedures.restore import restore
 from hero_calibration.procedures.velocity import VelocityResult, calibrate_velocity
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.calibration_file import KeptCalibration, read_calibration
+from hero_client.values import BODY_RADIUS_M
+from hero_node.files import KeptCalibration, read_calibration
 from hero_sim.link.wifi import PROFILES, Radio
 from hero_sim.robot.ranges import FACTORY_CALIBRATION_COUNTS_M2, calibrate
-from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.arena import Arena
-from hero_sim.world.robot_errors import SERVO_CENTER_US, draw_errors, set_known
-from hero_sim.world.world import World
+from hero_sim.stepped import RobotRows
+from hero_sim.world import Arena, World, draw_errors
+from hero_sim.world.robot_errors import SERVO_CENTER_US, set_known
 
 SEEDS = (0, 1)
 APART_M = 0.6

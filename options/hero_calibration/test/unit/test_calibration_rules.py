@@ -23,9 +23,9 @@ from hero_calibration.procedures.velocity import VelocityResult, evaluate_test
 from hero_calibration.procedures.wheels import CAMERA_SD, DIAMETER_M, NOMINAL_M, Leg, fit_wheels, follow_ticks
 from hero_calibration.robots.probe import STALE_S, Probe
 from hero_calibration.robots.session import SETTLE_S, Session
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.calibration_file import KeptCalibration
-from hero_node.geometry import Pose
+from hero_client.values import BODY_RADIUS_M
+from hero_node import Pose
+from hero_node.files import KeptCalibration
 
 
 class FakeProbe(Probe):

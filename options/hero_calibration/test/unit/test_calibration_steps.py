@@ -12,7 +12,7 @@ from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models.encoder_readings import TICK_M, Readings
 from hero_calibration.procedures import infrared, motors, velocity, wheels
 from hero_calibration.robots.session import SETTLE_S
-from hero_node.geometry import Pose, transform_pose
+from hero_node import Pose, transform_pose
 
 STEP_S = 0.034
 STARTS_S = [2.0, 2.45, 2.9, 3.35]

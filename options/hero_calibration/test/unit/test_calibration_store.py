@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hero_calibration import store
 from hero_calibration.errors import CalibrationError
-from hero_node.calibration_file import SETTINGS, CalibrationFileError, KeptCalibration, read_calibration
+from hero_node.files import SETTINGS, CalibrationFileError, KeptCalibration, read_calibration
 
 WHOLE = KeptCalibration(
     3,

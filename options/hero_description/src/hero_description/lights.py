@@ -14,8 +14,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_node.parameters import Parameter, parse_given_ids
-from hero_node.ros.private_parameters import read_parameters
-from hero_node.ros.program import Program
+from hero_node.ros import Program, read_parameters
 
 from .rviz_config import LIGHTS_TOPIC, color_of
 

@@ -13,10 +13,9 @@ from typing import Any, Sequence
 
 import rospy
 
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 from hero_node.parameters import Parameter, choice, flag, parse_given_ids
-from hero_node.ros.private_parameters import read_parameters
-from hero_node.ros.program import Program
+from hero_node.ros import Program, read_parameters
 
 from .hero_plus import make_hero_plus
 from .rviz_config import FRAMES, PLUS_DESCRIPTION, make_config

@@ -1,6 +1,6 @@
 """Errors of a camera, its detector and its calibration."""
 
-from hero_node.errors import HeroError
+from hero_node import HeroError
 
 
 class LocalizationError(HeroError):

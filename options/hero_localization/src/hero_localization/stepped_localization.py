@@ -11,9 +11,9 @@ from typing import Deque, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from hero_client.values.errors import FrameError
-from hero_node.geometry import Pose
-from hero_sim.stepped.swarm import StepSwarm
+from hero_client.values import FrameError
+from hero_node import Pose
+from hero_sim.stepped import StepSwarm
 
 from .filter.pose_filter import PoseFilter, make_covariance
 from .filter.pose_hypothesis import StampedPose

@@ -18,8 +18,8 @@ from std_srvs.srv import Trigger
 
 from hero_client import FrameError, Robot, StaleDataError, Swarm
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.geometry import yaw_of
-from hero_sim.world.arena_file import load_arena
+from hero_node import yaw_of
+from hero_sim.world import load_arena
 from hero_test.waiting import wait_for
 
 TOLERANCE_M = 0.01

@@ -26,7 +26,7 @@ from hero_localization.prints.tag_images import draw_tag
 from hero_localization.simulated_camera.camera_node import list_references
 from hero_localization.tracking import settings as camera_file
 from hero_msgs.msg import ObjectPoses, RobotPose, RobotPoses
-from hero_sim.world.arena import build_default
+from hero_sim.world import build_default
 from hero_test.processes import Program, find_program
 from hero_test.waiting import wait_for
 

@@ -22,10 +22,7 @@ from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
 from hero_localization.tracking.tag_corners import TagCorners  # noqa: E402
 from hero_localization.tracking.tracker import find_moved_references  # noqa: E402
-from hero_node.geometry import (  # noqa: E402 - without OpenCV there is no calibration
-    Pose,
-    transform_pose,
-)
+from hero_node import Pose, transform_pose  # noqa: E402
 
 LENS = Intrinsics(
     1920,

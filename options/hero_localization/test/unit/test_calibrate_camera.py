@@ -15,7 +15,7 @@ from hero_localization.camera.frame_source import Frame
 from hero_localization.errors import CalibrationError, DetectorError
 from hero_localization.nodes import calibrate_camera
 from hero_localization.tracking import settings
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 FOUND = {
     0: RobotCalibration(Pose(0.001, -0.002, math.radians(3.0)), 0.060, 0.001, 0.001, []),

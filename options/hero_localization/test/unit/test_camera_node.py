@@ -11,7 +11,7 @@ pytest.importorskip("cv2")
 from hero_localization.errors import SettingsError
 from hero_localization.simulated_camera import camera_node
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
-from hero_node.command_line import run
+from hero_node import run
 
 
 def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):

@@ -8,7 +8,7 @@ from test_swarm_localizer import COVARIANCE, PERIOD_S, Swarm
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState
 from hero_localization.nodes.outputs import make_robot_pose
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 HOME = (1.0, 2.0, 0.0)
 FAR = (1.0, 2.5, 0.0)

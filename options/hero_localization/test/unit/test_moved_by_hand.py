@@ -7,7 +7,7 @@ import pytest
 
 from hero_localization.filter.pose_filter import MOVED_S, Outcome, PoseFilter, make_covariance
 from hero_localization.filter.pose_hypothesis import StampedPose
-from hero_node.geometry import Pose, measure_distance
+from hero_node import Pose, measure_distance
 
 RATES_HZ = (5.0, 10.0, 29.0, 31.0, 60.0, 100.0, 120.0, 240.0)
 CAMERAS = (*((rate_hz,) for rate_hz in RATES_HZ), (30.0, 30.0), (30.0, 29.7), (60.0, 100.0))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from hero_localization.mapping.occupancy_grid import BEAMS, OccupancyGrid
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
-from hero_sim.world import range_sensors
-from hero_sim.world.arena import Segments, build_rectangle
+from hero_sim.world import Segments, range_sensors
+from hero_sim.world.arena import build_rectangle
 
 ROOM_M = 0.5
 """Half side."""

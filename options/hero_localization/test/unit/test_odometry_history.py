@@ -14,7 +14,7 @@ from hero_localization.filter.odometry_history import (
     OdometryHistory,
 )
 from hero_localization.filter.pose_hypothesis import REPLAYED_S
-from hero_node.geometry import Pose, transform_pose
+from hero_node import Pose, transform_pose
 
 ORIGIN = Pose(0.0, 0.0, 0.0)
 

@@ -7,7 +7,7 @@ import pytest
 
 from hero_localization.filter.pose_filter import SYSTEMATIC, Outcome, PoseFilter
 from hero_localization.filter.pose_hypothesis import StampedPose
-from hero_node.geometry import Pose, transform_pose
+from hero_node import Pose, transform_pose
 
 COVARIANCE = np.diag((1e-6, 1e-6, 3.6e-5))
 ZERO = Pose(0.0, 0.0, 0.0)

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hero_client.values.stamped_history import interpolate_pose
+from hero_client.values import interpolate_pose
 from hero_localization.filter.pose_filter import Outcome, PoseFilter
 from hero_localization.filter.pose_hypothesis import REPLAYED_S, StampedPose
-from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node import Pose, invert_pose, transform_pose, wrap_angle
 
 ODOMETRY_S = 0.034
 CAMERA_S = 1.0 / 30.0

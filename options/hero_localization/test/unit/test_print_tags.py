@@ -16,7 +16,7 @@ from hero_localization.prints import print_tags  # noqa: E402 - there is nothing
 from hero_localization.prints.boards import COLUMNS, ROWS, SQUARE_M  # noqa: E402
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
-from hero_node.errors import ProgramError  # noqa: E402
+from hero_node import ProgramError  # noqa: E402
 
 DOTS_PER_MM = 8.0
 A4_MM = print_tags.PAPERS_MM["a4"]

@@ -24,8 +24,8 @@ from hero_localization.tracking.tag_pose import TagLayout
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
 from hero_node import geometry
-from hero_sim.stepped.swarm import StepSwarm
-from hero_sim.world.arena_file import load_arena
+from hero_sim.stepped import StepSwarm
+from hero_sim.world import load_arena
 
 HEIGHT_M = 0.9
 OPTIONS = CameraOptions(

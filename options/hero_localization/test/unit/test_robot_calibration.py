@@ -8,7 +8,7 @@ import pytest
 from hero_localization.calibration import robot_calibration
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
 from hero_localization.errors import CalibrationError
-from hero_node.geometry import Pose, transform_pose, wrap_angle
+from hero_node import Pose, transform_pose, wrap_angle
 
 STEP_S = 0.01
 FULL = (

@@ -5,7 +5,7 @@ import pytest
 import rospy
 
 from hero_localization.nodes.outputs import make_robot_pose
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 def test_the_published_deviations_are_those_of_one_axis_and_of_yaw():

@@ -28,8 +28,8 @@ from hero_localization.simulated_camera.view import (  # noqa: E402
     tag_corners,
 )
 from hero_localization.tracking import settings as camera_file  # noqa: E402
-from hero_sim.world.arena import build_default, build_rectangle  # noqa: E402
-from hero_sim.world.arena_file import load_arena  # noqa: E402
+from hero_sim.world import build_default, load_arena  # noqa: E402
+from hero_sim.world.arena import build_rectangle  # noqa: E402
 
 SMALL = CameraOptions(
     width_px=640,

@@ -8,7 +8,7 @@ import pytest
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.source_clocks import SourceClocks
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 COVARIANCE = np.diag((0.0007**2, 0.0007**2, 0.003**2))
 STEP_S, ARRIVES_S = 0.01, 0.07

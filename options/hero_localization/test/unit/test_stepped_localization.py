@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.errors import FrameError, GoalError
+from hero_client.values import FrameError
+from hero_client.values.errors import GoalError
 from hero_localization.mapping.occupancy_grid import OccupancyGrid
 from hero_localization.mapping.swarm_map import SwarmMap
 from hero_localization.stepped_localization import CameraModel, StepLocalization
-from hero_node.geometry import Pose
-from hero_sim.stepped.swarm import StepSwarm
+from hero_node import Pose
+from hero_sim.stepped import StepSwarm
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import pytest
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_msgs.msg import RobotPose
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 COVARIANCE = np.diag((1e-6, 1e-6, 1e-4))
 PERIOD_S = 0.05

@@ -10,9 +10,8 @@ from PIL import Image
 from hero_localization.mapping.map_files import save_map
 from hero_localization.mapping.occupancy_grid import OccupancyGrid
 from hero_localization.mapping.swarm_map import SwarmMap
-from hero_node.geometry import Pose
-from hero_sim.world.arena import measure_clearance
-from hero_sim.world.arena_file import load_arena
+from hero_node import Pose
+from hero_sim.world import load_arena, measure_clearance
 
 AHEAD = [0.1, *[math.inf] * 7]
 """Something 0.1 m in front of the robot."""

@@ -16,7 +16,7 @@ from hero_localization.tracking.tag_pose import (
     fit_squares,
     locate,
 )
-from hero_node.geometry import Pose, transform_pose, wrap_angle
+from hero_node import Pose, transform_pose, wrap_angle
 
 LENS = Intrinsics(
     1920,

@@ -8,7 +8,7 @@ from hero_localization.tracking.settings import Settings
 from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import TagLayout
 from hero_localization.tracking.tracker import Problem, Tracker
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 MATRIX = (1390.0, 0.0, 960.0, 0.0, 1390.0, 540.0, 0.0, 0.0, 1.0)
 CAMERA = Camera(

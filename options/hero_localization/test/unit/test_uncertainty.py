@@ -10,8 +10,8 @@ from test_pose_filter import start_filter
 from hero_localization.filter.pose_filter import Outcome, PoseFilter, make_covariance
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.nodes.outputs import make_robot_pose
-from hero_node.geometry import Pose, transform_pose, wrap_angle
-from hero_sim.stepped.swarm import StepSwarm
+from hero_node import Pose, transform_pose, wrap_angle
+from hero_sim.stepped import StepSwarm
 
 COUNT = 24
 SEEN_S, COVERED_S, STEP_S = 1.0, 10.0, 0.05

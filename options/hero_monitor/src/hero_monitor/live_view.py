@@ -13,10 +13,8 @@ from concurrent.futures import Future
 from contextlib import ExitStack
 from typing import Any, Deque, Dict, List, Sequence, Set
 
-from hero_node.errors import ProgramError
-from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.stepped.ros_messages import MessageType
-from hero_sim.stepped.topics import LATCHED, StepTopics
+from hero_node import ProgramError
+from hero_sim.stepped import LATCHED, MessageType, RobotRows, StepTopics
 
 from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
 from .foxglove.hub import TopicMessage, TopicType

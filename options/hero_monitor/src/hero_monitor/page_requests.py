@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, Sequence, Tuple, Union
 import rospy
 
 from hero_client.apps.formations import FormationError
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from .background import Background
 from .control.client_commands import find_press, read_command

@@ -7,10 +7,9 @@ import stat
 from dataclasses import dataclass
 from typing import Any, List, Optional, Sequence
 
-from hero_node.addresses import is_loopback
-from hero_node.errors import ProgramError
+from hero_node import ProgramError, is_loopback
 from hero_node.parameters import Parameter, declare, find_declared, flag, make_error, number, whole_number
-from hero_node.ros.private_parameters import read_parameters
+from hero_node.ros import read_parameters
 
 from .serving.access import TOKEN_LENGTH_MIN
 

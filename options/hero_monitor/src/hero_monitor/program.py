@@ -10,10 +10,8 @@ from typing import Any, Dict, Set
 
 import rospy
 
-from hero_node.errors import ProgramError
-from hero_node.file_limit import raise_file_limit
-from hero_node.optional import import_optional
-from hero_node.ros.program import Program
+from hero_node import ProgramError, import_optional, raise_file_limit
+from hero_node.ros import Program
 
 from .background import Background
 from .control.commander import STOP_PERIOD_S, Commander

@@ -17,8 +17,7 @@ from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.ros.robot_listener import RobotTrack
-from hero_client.ros.stop_status import StopStatus
+from hero_client.ros import RobotTrack, StopStatus
 from hero_monitor.fleet_feed import feed as feed_module
 from hero_monitor.fleet_feed import robot_feed as robot_feed_module
 from hero_monitor.fleet_feed.feed import (
@@ -33,16 +32,11 @@ from hero_monitor.fleet_feed.feed import (
     find_true_poses,
 )
 from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S, LocalizationWatch, list_losses
-from hero_monitor.fleet_feed.page_state import (
-    LOG_LINES_KEPT,
-    MAX_LINE_LENGTH,
-    encode_range,
-    shorten,
-)
+from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH, encode_range, shorten
 from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.fleet_feed.robot_feed import LIGHT_S, REACHED_M, RobotFeed
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 NOW_S = 100.0
 

@@ -9,17 +9,12 @@ import tornado.httputil
 import tornado.web
 
 from hero_monitor.foxglove import endpoint as module
-from hero_monitor.foxglove.endpoint import (
-    CLIENTS_MAX,
-    FoxgloveEndpoint,
-    FoxgloveSocket,
-    TopicSource,
-)
+from hero_monitor.foxglove.endpoint import CLIENTS_MAX, FoxgloveEndpoint, FoxgloveSocket, TopicSource
 from hero_monitor.foxglove.hub import Client, Publisher, TopicMessage, TopicType
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import TOKEN_BURST
-from hero_node.token_bucket import TokenBuckets
+from hero_node import TokenBuckets
 
 TOKEN = "a secret of more than sixteen letters"
 LET_IN = 426

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 import sources
-from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_monitor.control import guard as module
 from hero_monitor.control import programs as programs_module
 from hero_monitor.control.offers import OFFERS
@@ -19,7 +19,7 @@ from hero_monitor.fleet_feed.camera_picture import MAX_DISTANCE_M, CameraPicture
 from hero_monitor.fleet_feed.master_link import MasterLink
 from hero_monitor.fleet_feed.page_state import LogRing, PageState
 from hero_monitor.fleet_feed.placement import Placement
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 def run_guard(monkeypatch, signs, ends_after=10**6, code=0):

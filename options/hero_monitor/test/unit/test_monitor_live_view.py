@@ -10,8 +10,8 @@ import tornado.httpclient
 import tornado.websocket
 
 from hero_monitor.live_view import LiveView
-from hero_node.errors import ProgramError
-from hero_sim.stepped.swarm import StepSwarm
+from hero_node import ProgramError
+from hero_sim.stepped import StepSwarm
 
 SUBPROTOCOL = "foxglove.sdk.v1"
 

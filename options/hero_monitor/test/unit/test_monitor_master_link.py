@@ -8,7 +8,7 @@ import pytest
 from hero_monitor.fleet_feed import master_link
 from hero_monitor.fleet_feed.losses import MASTER_PERIOD_S
 from hero_monitor.fleet_feed.master_link import MasterLink
-from hero_node.errors import NodeError
+from hero_node import NodeError
 
 
 class Watch:

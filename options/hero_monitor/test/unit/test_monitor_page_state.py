@@ -24,7 +24,7 @@ from hero_monitor.fleet_feed.page_state import (
     encode_range,
 )
 from hero_monitor.fleet_feed.placement import APART_M, Placement
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 
 def test_a_page_gets_each_part_of_the_state_once_until_it_changes():

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import pytest
 
 from hero_client.apps.formations import FormationError
-from hero_client.ros.stop_status import StopStatus
+from hero_client.ros import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import commander as commander_module
 from hero_monitor.control.client_commands import PRESS_GAP_MS
@@ -20,8 +20,7 @@ from hero_monitor.control.requests import AGE_MAX_S
 from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.foxglove.hub import Client
 from hero_monitor.page_requests import GOALS_AT_ONCE, INERT_S, PageRequests
-from hero_node.errors import NodeError
-from hero_node.geometry import Pose
+from hero_node import NodeError, Pose
 
 NOW_MS = 5000000
 

@@ -15,7 +15,7 @@ from hero_monitor.parameters import list_host_names, load_parameters, read_token
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
 from hero_monitor.serving.server import STUCK_S, WAITING_MAX, PageSocket
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 from hero_node.parameters import check_parameters
 
 TOKEN = "x" * TOKEN_LENGTH_MIN

@@ -3,8 +3,7 @@
 from contextlib import contextmanager
 from typing import Iterator
 
-from hero_node.errors import HeroError
-from hero_node.texts import make_printable
+from hero_node import HeroError, make_printable
 
 
 class RecordingError(HeroError):

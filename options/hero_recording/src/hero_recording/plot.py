@@ -6,9 +6,9 @@ from typing import Dict, List, Optional, Sequence
 
 import numpy as np
 
-from hero_node.optional import import_optional
+from hero_node import import_optional
+from hero_node.files import replace_file
 from hero_node.parameters import robot_ids_option
-from hero_node.safe_file import replace_file
 
 from .bags.bag_set import BagSet
 from .errors import RecordingError, explain_write_errors

@@ -20,10 +20,9 @@ from typing import Dict, List, Optional, Sequence, Set, Tuple
 import rosgraph
 import roslib.packages
 
-from hero_node import command_line
+from hero_node import command_line, end_process
 from hero_node.parameters import robot_ids_option, within
-from hero_node.processes import end_process
-from hero_node.ros.master import ask_master, check_master
+from hero_node.ros import ask_master, check_master
 
 from .bags.bag_set import ACTIVE_SUFFIX
 from .bags.repair import repair_bag

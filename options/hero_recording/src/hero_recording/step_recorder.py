@@ -9,10 +9,8 @@ Times are simulated; the same run gives the same messages.
 from contextlib import ExitStack
 from typing import Any, Dict, Sequence
 
-from hero_node.optional import import_optional
-from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.stepped.ros_messages import MessageType
-from hero_sim.stepped.topics import LATCHED, StepTopics
+from hero_node import import_optional
+from hero_sim.stepped import LATCHED, MessageType, RobotRows, StepTopics
 
 from .errors import RecordingError, explain_write_errors
 

@@ -9,7 +9,7 @@ import pytest
 import rosbag
 from synthetic_bag import DELAY_S, START_S, make_localized, write_bag
 
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 from hero_recording import export
 from hero_recording.errors import RecordingError
 

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from synthetic_bag import START_S
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 from hero_recording.plots import analysis
 from hero_recording.plots.figures import STATE_COLORS, STYLE, Figures
 from hero_recording.plots.observations import Observations, Origin, RobotObservations, StateReport

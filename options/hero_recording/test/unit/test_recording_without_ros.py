@@ -6,7 +6,7 @@ from synthetic_bag import write_bag
 
 from hero_recording.bags import plain_reader, ros_reader
 from hero_recording.bags.tables import is_exported, read_rows
-from hero_sim.stepped.swarm import StepSwarm
+from hero_sim.stepped import StepSwarm
 
 pytestmark = pytest.mark.option("rosbags.rosbag1")
 

@@ -18,10 +18,9 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.object_sensing import NO_OBJECTS, Objects, ObjectsInSight, Sight, Things
-from hero_client.values.sensing import Binary, Neighborhood, Neighbors
+from hero_client.values import NO_OBJECTS, Binary, Neighborhood, Neighbors, Objects, ObjectsInSight, Sight, Things
+from hero_node import shorten
 from hero_node.number_checks import is_number
-from hero_node.texts import shorten
 
 from .sensors import Surroundings, is_sensor, read_sensor
 from .sensors.own import Distance, NeighborColors, Odometry, Proximity

@@ -8,7 +8,7 @@ from typing import Any, Optional, Tuple
 
 import numpy as np
 
-from hero_client.values.object_sensing import NO_OBJECTS, Things
+from hero_client.values import NO_OBJECTS, Things
 
 from .behavior import Behavior, Random, Sensed, decide, sense
 from .safety import SafetyFilter

@@ -4,8 +4,8 @@ import argparse
 import sys
 from typing import Optional, Sequence
 
-from hero_node.safe_file import write_file
-from hero_sim.world.arena_file import load_arena
+from hero_node.files import write_file
+from hero_sim.world import load_arena
 
 from .experiments.errors import ExperimentError
 from .fitting.robot_fit import describe_fit, fit_robot

@@ -6,9 +6,7 @@ from typing import Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
-from hero_recording.bags.bag_set import BagSet
-from hero_recording.bags.tables import read_rows, to_seconds
-from hero_recording.bags.topics import Message, find_robot_topic
+from hero_recording.bags import BagSet, Message, find_robot_topic, read_rows, to_seconds
 
 from .experiments.errors import ExperimentError
 from .fitting.recording import NO_SCANS, PULSES, VELOCITY, Recording

@@ -11,8 +11,8 @@ from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from hero_client.controllers.half_planes import nearest_allowed_all
-from hero_client.values.robot_constants import HERO, MAX_LINEAR_M_S, MAX_WHEEL_M_S, RobotModel
+from hero_client.controllers import nearest_allowed_all
+from hero_client.values import HERO, MAX_LINEAR_M_S, MAX_WHEEL_M_S, RobotModel
 
 OFF, FENCE, ROBOTS = "off", "fence", "fence and robots"
 MODES = (OFF, FENCE, ROBOTS)

@@ -8,7 +8,7 @@ import sys
 from collections import deque
 from typing import Optional, Sequence
 
-from hero_node.optional import import_optional
+from hero_node import import_optional
 from hero_node.parameters import within
 
 from .experiments.batch import build_trial

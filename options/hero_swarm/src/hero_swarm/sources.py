@@ -4,7 +4,7 @@ import errno
 import os
 from typing import Any, Callable, Container, Dict
 
-from hero_node.safe_file import read_file
+from hero_node.files import read_file
 
 
 class Sources:

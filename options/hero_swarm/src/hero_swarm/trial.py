@@ -11,13 +11,11 @@ from typing import Any, Deque, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.object_sensing import Things
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import Pose
+from hero_client.values import BODY_RADIUS_M, Things
+from hero_node import Pose
 from hero_sim.population import place_worlds
-from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.arena import Arena, measure_clearance
-from hero_sim.world.pushing.shapes import PushedBody
+from hero_sim.stepped import RobotRows
+from hero_sim.world import Arena, PushedBody, measure_clearance
 
 from .behavior import PULSES, Behavior, Random, derive_seed, lock
 from .control import Control

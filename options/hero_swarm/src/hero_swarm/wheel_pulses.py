@@ -8,8 +8,7 @@ from typing import Any, Tuple
 
 import numpy as np
 
-from hero_sim.world.kinematics import split_to_wheels
-from hero_sim.world.robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
+from hero_sim.world import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors, split_to_wheels
 
 
 def list_dead_zones(errors: RobotErrors) -> np.ndarray:

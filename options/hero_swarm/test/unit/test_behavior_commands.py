@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.object_sensing import NO_OBJECTS, Things
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_client.values.sensing import Neighbors
+from hero_client.values import BODY_RADIUS_M, NO_OBJECTS, Neighbors, Things
 from hero_swarm import metrics
 from hero_swarm.behavior import PULSES, Random, derive_seed, sense
 from hero_swarm.behaviors import find_behavior, list_names

@@ -14,14 +14,15 @@ from visualization_msgs.msg import Marker
 
 from hero_client import ProgramError
 from hero_client.ros.localized_poses import PoseListener, PoseReport
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 from hero_msgs.msg import Robot, RobotArray, RobotPose
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_node.parameters import check_parameters
 from hero_node.ros import ros_clock
 from hero_sim.build import build_swarm
 from hero_sim.main import build_parser
-from hero_sim.stepped.swarm import StepSwarm, StepWorld
+from hero_sim.stepped import StepSwarm
+from hero_sim.stepped.swarm import StepWorld
 from hero_swarm.behavior import Behavior, Binary, Neighbors, Sight, sense
 from hero_swarm.metrics import consensus_error
 from hero_swarm.metrics.graphs import measure_distances

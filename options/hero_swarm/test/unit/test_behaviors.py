@@ -5,8 +5,8 @@ import inspect
 import numpy as np
 import pytest
 
-from hero_sim.world.arena import build_rectangle, place_robots
-from hero_sim.world.arena_file import load_arena
+from hero_sim.world import load_arena, place_robots
+from hero_sim.world.arena import build_rectangle
 from hero_swarm import metrics
 from hero_swarm.behavior import Behavior
 from hero_swarm.behaviors import find_behavior, list_names, make_behavior

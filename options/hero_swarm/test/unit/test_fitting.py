@@ -7,13 +7,12 @@ import re
 import numpy as np
 import pytest
 
-from hero_client.values.robot_constants import WHEEL_SEPARATION_M
-from hero_client.values.wheel_paths import follow_wheels
+from hero_client.values import WHEEL_SEPARATION_M, follow_wheels
 from hero_sim.errors import OptionError
-from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.stepped import RobotRows
+from hero_sim.world import KINDS, World, draw_errors, read_known
 from hero_sim.world.arena import build_rectangle
-from hero_sim.world.robot_errors import KINDS, draw_errors, read_known, set_known
-from hero_sim.world.world import World
+from hero_sim.world.robot_errors import set_known
 from hero_swarm.experiments.batch import build_trial, load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
@@ -22,14 +21,7 @@ from hero_swarm.fitting import infrared_fit
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body
 from hero_swarm.fitting.infrared_fit import _list_readings, fit_infrared
 from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
-from hero_swarm.fitting.recording import (
-    PULSES,
-    VELOCITY,
-    Recording,
-    interpolate_poses,
-    measure_wheels,
-    sample_times,
-)
+from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, interpolate_poses, measure_wheels, sample_times
 from hero_swarm.fitting.replay import Motors, build_errors
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
 from hero_swarm.trial import OPEN

@@ -7,7 +7,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from hero_sim.world.arena import build_default, build_rectangle
+from hero_sim.world import build_default
+from hero_sim.world.arena import build_rectangle
 from hero_swarm.learning.episode import Episode, count_observations
 
 ROBOTS = 3

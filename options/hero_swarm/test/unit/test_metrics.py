@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.robot_constants import BODY_RADIUS_M, MODELS
+from hero_client.values import BODY_RADIUS_M, MODELS
 from hero_swarm import metrics
 from hero_swarm.metrics.shapes import ideal_dispersion
 

@@ -8,8 +8,8 @@ import pytest
 pytest.importorskip("rospy", reason="messages and the program need ROS")
 from hero_client import Robot, StaleDataError
 from hero_client.ros.ros_link import MESSAGE_CLASSES, RosLink
-from hero_client.values.sensing import Neighbors
-from hero_sim.stepped.swarm import StepSwarm
+from hero_client.values import Neighbors
+from hero_sim.stepped import StepSwarm
 from hero_swarm.behavior import Random
 from hero_swarm.ros.neighbors_node import make_messages
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.world.arena_file import load_arena
+from hero_client.values import BODY_RADIUS_M
+from hero_sim.world import load_arena
 from hero_swarm import metrics
 from hero_swarm.trial import scatter_objects
 

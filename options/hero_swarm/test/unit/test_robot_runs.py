@@ -9,7 +9,7 @@ pytest.importorskip("rospy", reason="trials on robots need ROS")
 import rospy
 
 from hero_client import StoppedError
-from hero_node.clock import Clock
+from hero_node import Clock
 from hero_node.ros import ros_clock
 from hero_swarm.ros import robot_runs
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.controllers.half_planes import nearest_allowed_all
-from hero_client.values.robot_constants import BODY_RADIUS_M, MAX_WHEEL_M_S, MODELS, WHEEL_SEPARATION_M
-from hero_sim.stepped.swarm import StepSwarm
+from hero_client.controllers import nearest_allowed_all
+from hero_client.values import BODY_RADIUS_M, MAX_WHEEL_M_S, MODELS, WHEEL_SEPARATION_M
+from hero_sim.stepped import StepSwarm
 from hero_swarm.behavior import Behavior
 from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.safety import OFF, ROBOTS, TOLERANCE_M_S, SafetyFilter

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.robot_constants import BODY_RADIUS_M, MAX_LINEAR_M_S
+from hero_client.values import BODY_RADIUS_M, MAX_LINEAR_M_S
 from hero_sim.world.arena import build_rectangle
 from hero_swarm import metrics
 from hero_swarm.behavior import Behavior, Neighbors

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from hero_sim.world.kinematics import join_wheels
-from hero_sim.world.robot_errors import MAX_WHEEL_M_S
+from hero_sim.world import MAX_WHEEL_M_S, join_wheels
 from hero_swarm.behavior import PULSES, VELOCITY, Behavior
 from hero_swarm.trial import Trial
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones

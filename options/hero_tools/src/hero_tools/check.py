@@ -13,10 +13,9 @@ from typing import Dict, List, Optional, Sequence
 
 import rospy
 
-from hero_node import command_line
+from hero_node import command_line, make_printable
 from hero_node.parameters import within
-from hero_node.ros.ros_node import end_ros_node
-from hero_node.texts import make_printable
+from hero_node.ros import end_ros_node
 
 from .checkup import computer, graph, localization, network
 from .checkup.points import FAIL, OK, WARN, Finding, Point, run_points, warn

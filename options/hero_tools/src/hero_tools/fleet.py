@@ -19,12 +19,10 @@ from typing import Dict, Iterator, List, Optional, Sequence, Set
 import rospy
 
 from hero_client.apps.keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard, NoTerminalError
-from hero_client.ros.drivers import Drivers
-from hero_client.ros.robot_listener import RobotListener, RobotTrack, follow
-from hero_client.ros.stop_status import StopStatus, paint
+from hero_client.ros import Drivers, RobotListener, RobotTrack, StopStatus, follow, paint
 from hero_msgs.msg import Robot
 from hero_node.parameters import within
-from hero_node.ros.program import Program
+from hero_node.ros import Program
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title

@@ -3,8 +3,8 @@
 import math
 from typing import Dict, List, NamedTuple, Sequence
 
-from hero_client.ros.robot_listener import RobotTrack
-from hero_client.values.robot_states import STATES, STOP_STATES
+from hero_client.ros import RobotTrack
+from hero_client.values import STATES, STOP_STATES
 from hero_msgs.msg import Robot
 
 ORDERS = ("id", "state", "nearest")

@@ -7,10 +7,9 @@ import json
 import math
 from typing import Any, Dict, List, Optional, Sequence
 
-from hero_client.values.readings import Obstacle, finite
+from hero_client.values import Obstacle, finite
 from hero_msgs.msg import Robot
-from hero_node.geometry import Pose
-from hero_node.texts import make_printable
+from hero_node import Pose, make_printable
 
 from .fleet_rows import RobotRow
 

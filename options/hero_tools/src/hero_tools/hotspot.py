@@ -18,7 +18,7 @@ import subprocess
 import sys
 from typing import List, Optional, Sequence, Tuple
 
-from hero_node.errors import HeroError
+from hero_node import HeroError
 
 CONNECTION = "hero_hotspot"
 ADDRESS = "10.42.0.1"  # robots connect to it by default

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.errors import NodeError
+from hero_node import NodeError
 from hero_tools import check, hotspot
 from hero_tools.checkup import computer, graph, network, points
 from hero_tools.checkup.graph import CONNECT_TIMEOUT_S, LINES_MAX, REPORT_TIMEOUT_S, OwnNode, describe_report

@@ -7,11 +7,9 @@ from types import SimpleNamespace
 import pytest
 from test_fleet_rows import make_row
 
-from hero_client.ros.robot_listener import RobotTrack
-from hero_client.ros.stop_status import StopStatus
+from hero_client.ros import RobotTrack, StopStatus
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.errors import ProgramError
-from hero_node.geometry import Pose
+from hero_node import Pose, ProgramError
 from hero_tools import fleet as module
 from hero_tools.fleet import (
     DRAW_PERIOD_S,

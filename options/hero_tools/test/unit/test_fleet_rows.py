@@ -2,10 +2,10 @@
 
 import pytest
 
-from hero_client.ros.robot_listener import RobotTrack
-from hero_client.values.readings import Obstacle
+from hero_client.ros import RobotTrack
+from hero_client.values import Obstacle
 from hero_msgs.msg import Robot
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_tools import fleet
 from hero_tools.fleet_rows import RobotRow, find_missing, sort_rows
 

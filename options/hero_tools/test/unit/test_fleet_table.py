@@ -6,9 +6,9 @@ import math
 import pytest
 from test_fleet_rows import make_row
 
-from hero_client.values.readings import Obstacle
+from hero_client.values import Obstacle
 from hero_msgs.msg import Robot
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_tools.fleet_table import format_json, format_nearest, format_table, format_title
 
 

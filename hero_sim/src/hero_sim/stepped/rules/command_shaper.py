@@ -10,7 +10,7 @@ from typing import Any, Dict, NamedTuple, Sequence, Tuple, Union
 
 import numpy as np
 
-from hero_driver.commands.velocity_shaper import COMMAND_INTERVAL_S, STOP_REPEATS
+from hero_driver.commands import COMMAND_INTERVAL_S, STOP_REPEATS
 
 Rows = Union[int, Sequence[int], np.ndarray]
 """The row of one robot, or the rows of several (K,), each named once."""

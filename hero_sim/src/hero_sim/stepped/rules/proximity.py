@@ -5,7 +5,7 @@ Pure: numpy only; the corrections of make_proximity() in hero_driver's correctio
 
 import numpy as np
 
-from hero_driver.corrections.message_layouts import CLAMP_TOLERANCE_M
+from hero_driver.corrections import CLAMP_TOLERANCE_M
 from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M
 
 from ...world.range_sensors import BEAMS

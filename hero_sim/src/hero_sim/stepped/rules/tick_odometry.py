@@ -9,7 +9,7 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
-from hero_driver.corrections.tick_odometry import TWIST_WINDOW, WheelGeometry
+from hero_driver.corrections import TWIST_WINDOW, WheelGeometry
 
 from ...world.kinematics import find_heading, follow_arcs, join_wheels
 

@@ -7,7 +7,7 @@ import copy
 import math
 from typing import List, NamedTuple, Sequence, Tuple, Union
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 GRAVITY_M_S2 = 9.81
 

@@ -11,7 +11,7 @@ from typing import List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 
 from ..errors import CalibrationError
 

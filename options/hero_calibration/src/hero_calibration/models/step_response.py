@@ -8,7 +8,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+from hero_client.values import WHEEL_SEPARATION_M
 
 from ..errors import CalibrationError
 from .encoder_readings import TICK_M, Readings

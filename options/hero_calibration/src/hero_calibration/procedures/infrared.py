@@ -6,8 +6,7 @@ from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
-from hero_node.command_line import say
-from hero_node.geometry import Pose, invert_pose, transform_pose
+from hero_node import Pose, invert_pose, say, transform_pose
 
 from ..errors import CalibrationError
 from ..models import infrared_model as model

@@ -4,8 +4,7 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_node.command_line import say
-from hero_node.geometry import Pose, measure_distance
+from hero_node import Pose, measure_distance, say
 
 from ..errors import CalibrationError
 from ..models import dead_zone

@@ -2,7 +2,7 @@
 
 from typing import Callable, Dict, Optional
 
-from hero_node.command_line import say
+from hero_node import say
 
 from ..errors import CalibrationError, EndedError
 from ..models.infrared_model import find_obstacle

@@ -2,8 +2,8 @@
 
 from typing import Dict, List, Optional, Sequence
 
-from hero_node.calibration_file import SETTINGS, KeptCalibration, list_files, read_calibration
-from hero_node.command_line import say
+from hero_node import say
+from hero_node.files import SETTINGS, KeptCalibration, list_files, read_calibration
 
 from ..errors import CalibrationError
 from ..robots.probe import Probe

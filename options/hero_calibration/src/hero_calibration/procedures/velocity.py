@@ -4,7 +4,7 @@ from typing import Dict, List, NamedTuple, Sequence
 
 import numpy as np
 
-from hero_node.command_line import say
+from hero_node import say
 
 from ..models.encoder_readings import Readings
 from ..models.step_response import (

@@ -12,10 +12,8 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.robot_constants import WHEEL_SEPARATION_M
-from hero_client.values.wheel_paths import follow_wheels
-from hero_node.command_line import say
-from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_client.values import WHEEL_SEPARATION_M, follow_wheels
+from hero_node import Pose, invert_pose, say, transform_pose, wrap_angle
 
 from ..errors import CalibrationError, EndedError
 from ..models.encoder_readings import TICK_M

@@ -11,7 +11,7 @@ from typing import Deque, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..errors import CalibrationError
 from ..models.encoder_readings import Readings, make_readings

@@ -9,8 +9,7 @@ from sensor_msgs.msg import LaserScan
 
 from hero_msgs.msg import Encoder, Motor, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
-from hero_node.geometry import Pose, pose_of
-from hero_node.texts import one_line
+from hero_node import Pose, one_line, pose_of
 
 from ..errors import CalibrationError
 from ..models.infrared_model import read_signals

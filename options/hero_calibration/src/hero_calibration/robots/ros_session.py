@@ -5,9 +5,9 @@ from typing import List, Optional, Sequence
 
 import rospy
 
-from hero_client.ros.drivers import share_drivers
+from hero_client.ros import share_drivers
 from hero_msgs.msg import Robot
-from hero_node.ros.program import Program
+from hero_node.ros import Program
 
 from ..errors import CalibrationError
 from .probe import Probe

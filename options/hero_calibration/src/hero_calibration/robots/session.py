@@ -7,9 +7,8 @@ clock of this computer: a subclass has the time, and waits (ros_session).
 from concurrent.futures import ThreadPoolExecutor
 from typing import Callable, Dict, List, Optional, Sequence, TypeVar
 
-from hero_client.values.background_motion import SEND_TIME_S
-from hero_node.clock import Clock
-from hero_node.command_line import say
+from hero_client.values import SEND_TIME_S
+from hero_node import Clock, say
 
 from ..errors import CalibrationError, EndedError
 from .probe import Probe

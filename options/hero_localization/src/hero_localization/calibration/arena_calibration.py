@@ -7,7 +7,7 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
 import cv2
 import numpy as np
 
-from hero_node.geometry import Pose, measure_distance
+from hero_node import Pose, measure_distance
 
 from ..camera.camera_model import Camera, Intrinsics
 from ..errors import CalibrationError

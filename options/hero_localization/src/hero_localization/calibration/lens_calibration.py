@@ -6,8 +6,8 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 import cv2
 import numpy as np
 
-from hero_node.texts import one_line
-from hero_node.yaml_text import YamlError, parse_yaml, read_text
+from hero_node import one_line
+from hero_node.files import YamlError, parse_yaml, read_text
 
 from ..camera.camera_model import Intrinsics
 from ..errors import CalibrationError

@@ -9,7 +9,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.geometry import Pose, wrap_angle
+from hero_node import Pose, wrap_angle
 
 from ..errors import CalibrationError
 from ..filter.heading_check import is_upside_down

@@ -9,7 +9,7 @@ from typing import NamedTuple, Sequence, Union
 
 import numpy as np
 
-from hero_node.texts import shorten
+from hero_node import shorten
 
 from ..errors import CalibrationError
 

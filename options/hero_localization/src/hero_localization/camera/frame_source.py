@@ -13,7 +13,7 @@ import numpy as np
 import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
-from hero_node.geometry import clamp
+from hero_node import clamp
 
 from ..errors import FrameSourceError
 from .camera_model import Intrinsics

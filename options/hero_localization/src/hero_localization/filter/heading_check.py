@@ -4,7 +4,7 @@ import math
 from collections import deque
 from typing import Deque, Optional, Tuple
 
-from hero_node.geometry import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node import Pose, invert_pose, transform_pose, wrap_angle
 
 MIN_DRIVE_M = 0.04
 """Poses are a millimeter off: over this distance, a direction is right to 2 degrees."""

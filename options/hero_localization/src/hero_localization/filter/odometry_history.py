@@ -7,8 +7,8 @@ is continuous.
 import math
 from typing import NamedTuple, Optional
 
-from hero_client.values.stamped_history import StampedHistory, interpolate_pose
-from hero_node.geometry import Pose, find_frame, measure_distance, transform_pose, wrap_angle
+from hero_client.values import StampedHistory, interpolate_pose
+from hero_node import Pose, find_frame, measure_distance, transform_pose, wrap_angle
 
 KEPT_S = 2.0
 """Older poses than this come too late to be used: a camera with its driver delays by 0.05 to 0.3 s."""

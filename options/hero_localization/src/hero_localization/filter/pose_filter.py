@@ -14,7 +14,7 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
-from hero_node.geometry import Pose, find_frame, measure_distance, wrap_angle
+from hero_node import Pose, find_frame, measure_distance, wrap_angle
 
 from .odometry_history import KEPT_S, OdometryHistory
 from .pose_hypothesis import Hypothesis, StampedPose

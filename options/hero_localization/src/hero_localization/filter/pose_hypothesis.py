@@ -16,7 +16,7 @@ from typing import NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_node.geometry import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
 from .odometry_history import Odometry, OdometryHistory
 

@@ -7,7 +7,7 @@ even if another source agrees with it.
 import math
 from typing import Dict, List, NamedTuple, Optional
 
-from hero_node.geometry import Pose, measure_distance, wrap_angle
+from hero_node import Pose, measure_distance, wrap_angle
 
 from .pose_hypothesis import StampedPose
 

@@ -10,7 +10,7 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from hero_node.geometry import Pose, clamp, invert_pose, transform_pose, wrap_angle
+from hero_node import Pose, clamp, invert_pose, transform_pose, wrap_angle
 
 from .odometry_history import KEPT_S, OdometryHistory
 from .pose_hypothesis import StampedPose

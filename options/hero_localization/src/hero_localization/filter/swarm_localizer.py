@@ -10,9 +10,7 @@ from typing import Dict, Iterable, List, NamedTuple, Optional
 
 import numpy as np
 
-from hero_node.geometry import Pose, measure_distance, wrap_angle
-from hero_node.texts import list_names
-from hero_node.token_bucket import TokenBucket
+from hero_node import Pose, TokenBucket, list_names, measure_distance, wrap_angle
 
 from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Outcome, PoseFilter, is_near

@@ -6,7 +6,7 @@ import numpy as np
 import yaml
 from PIL import Image
 
-from hero_node.safe_file import replace_file, write_file
+from hero_node.files import replace_file, write_file
 
 from .occupancy_grid import OccupancyGrid
 

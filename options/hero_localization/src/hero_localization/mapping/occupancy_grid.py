@@ -10,8 +10,8 @@ from typing import Sequence, Tuple
 import numpy as np
 from scipy import ndimage
 
-from hero_client.values.robot_constants import BODY_RADIUS_M, MIN_RANGE_M
-from hero_node.geometry import Pose
+from hero_client.values import BODY_RADIUS_M, MIN_RANGE_M
+from hero_node import Pose
 
 BEAMS = 8
 CONE_RAD = 0.21

@@ -5,8 +5,8 @@ from typing import Deque, Dict, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.stamped_history import StampedHistory, interpolate_pose
-from hero_node.geometry import Pose
+from hero_client.values import StampedHistory, interpolate_pose
+from hero_node import Pose
 
 from .occupancy_grid import OccupancyGrid
 

@@ -17,19 +17,11 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from hero_client import Program, ProgramError, Robot
-from hero_client.values.readings import is_plausible, read_pose
-from hero_node.command_line import say
-from hero_node.errors import HeroError
-from hero_node.geometry import Pose
-from hero_node.optional import import_optional
+from hero_client.values import is_plausible, read_pose
+from hero_node import HeroError, Pose, import_optional, say
 from hero_node.parameters import robot_ids_option
 
-from ..calibration.arena_calibration import (
-    MIN_TAGS,
-    average_tags,
-    calibrate_arena,
-    fit_references,
-)
+from ..calibration.arena_calibration import MIN_TAGS, average_tags, calibrate_arena, fit_references
 from ..calibration.lens_calibration import (
     MIN_VIEWS,
     BoardView,

@@ -12,8 +12,8 @@ from geometry_msgs.msg import Point, PoseStamped, PoseWithCovarianceStamped
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import Odometry
 
-from hero_client.values.readings import is_plausible, read_pose
-from hero_node.geometry import Pose
+from hero_client.values import is_plausible, read_pose
+from hero_node import Pose
 
 from ..filter.pose_hypothesis import StampedPose
 from .outputs import IN_PLANE

@@ -11,10 +11,10 @@ from typing import Any, Callable, Dict, List, Optional
 import rospy
 
 from hero_client import Program, ProgramError, read_parameters
-from hero_client.ros.drivers import share_drivers
-from hero_client.values.readings import is_plausible
+from hero_client.ros import share_drivers
+from hero_client.values import is_plausible
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_node.parameters import flag, number, robot_ids, words
 
 from ..filter.pose_filter import make_covariance

@@ -21,9 +21,9 @@ from std_msgs.msg import Float32
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from hero_client import Program, ProgramError, read_parameters
-from hero_client.values.readings import front_first, is_plausible, read_ranges
+from hero_client.values import front_first, is_plausible, read_ranges
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_node.parameters import number, words
 
 from ..mapping.map_files import save_map

@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformSt
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from ..filter.pose_hypothesis import StampedPose
 from ..filter.source_clocks import Clock

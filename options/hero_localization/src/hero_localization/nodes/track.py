@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from hero_client import Program, read_parameters
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_node.parameters import number, words
 
 from ..camera.frame_source import Frame, open_source

@@ -10,9 +10,9 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.optional import import_optional
+from hero_node import import_optional
+from hero_node.files import replace_file
 from hero_node.parameters import given_ids_option
-from hero_node.safe_file import replace_file
 
 from ..errors import LocalizationError
 from .tag_images import DEFAULT_SIZE_M, FAMILIES, REFERENCE_SIZE_M, draw_tag

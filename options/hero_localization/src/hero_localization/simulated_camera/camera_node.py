@@ -19,20 +19,13 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
 from hero_node.parameters import within
-from hero_node.ros.master import check_master
-from hero_sim.world.arena import Arena, build_default
-from hero_sim.world.arena_file import load_arena
+from hero_node.ros import check_master
+from hero_sim.world import Arena, build_default, load_arena
 
 from ..errors import SettingsError
 from ..prints.tag_images import FAMILIES
 from .board_renderer import BoardRenderer, list_board_places
-from .lab_setup import (
-    describe_references,
-    find_first_reference,
-    hang_above,
-    list_references,
-    write_camera_file,
-)
+from .lab_setup import describe_references, find_first_reference, hang_above, list_references, write_camera_file
 from .renderer import CameraRenderer
 from .view import CameraOptions, PrintedTag, list_frames
 

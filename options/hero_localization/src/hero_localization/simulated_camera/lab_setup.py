@@ -4,8 +4,8 @@ from typing import List, Sequence
 
 import numpy as np
 
-from hero_node.geometry import Pose
-from hero_sim.world.arena import Arena
+from hero_node import Pose
+from hero_sim.world import Arena
 
 from ..camera.camera_model import Camera
 from ..errors import SettingsError

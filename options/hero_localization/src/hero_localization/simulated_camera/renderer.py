@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from hero_sim.robot_constants import BODY_RADIUS_M
-from hero_sim.world.arena import Arena
+from hero_sim.world import Arena
 
 from ..prints.tag_images import draw_tag
 from .view import CIRCLE, CameraOptions, PrintedTag, hand_outlines, list_rays, plane_homography, tag_corners

@@ -8,7 +8,7 @@ from typing import Iterator, List, NamedTuple, Tuple
 import cv2
 import numpy as np
 
-from hero_node.geometry import Pose, transform_pose
+from hero_node import Pose, transform_pose
 
 from ..camera.camera_model import Camera, Intrinsics
 from ..tracking.tag_pose import list_corners

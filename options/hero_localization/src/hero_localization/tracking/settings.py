@@ -10,13 +10,10 @@ from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Opt
 
 import numpy as np
 
-from hero_client.values.readings import is_plausible
-from hero_node.geometry import Pose
-from hero_node.number_checks import is_number, is_whole_number
-from hero_node.safe_file import lock_file, write_file
-from hero_node.texts import shorten
-from hero_node.yaml_edit import replace_values
-from hero_node.yaml_text import YamlError, parse_yaml, read_text
+from hero_client.values import is_plausible
+from hero_node import Pose, shorten
+from hero_node.files import YamlError, lock_file, parse_yaml, read_text, replace_values, write_file
+from hero_node.parameters import is_number, is_whole_number
 
 from ..camera.camera_model import Camera, Intrinsics
 from ..camera.device_controls import POWER_LINES_HZ, DeviceControls

@@ -10,7 +10,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_node.geometry import Pose, find_frame
+from hero_node import Pose, find_frame
 
 from ..camera.camera_model import Camera
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M

@@ -6,7 +6,7 @@ from typing import Deque, Dict, List, Mapping, NamedTuple, Optional, Sequence, S
 
 import numpy as np
 
-from hero_node.geometry import Pose, measure_distance, transform_pose
+from hero_node import Pose, measure_distance, transform_pose
 
 from ..camera.camera_model import Camera
 from .settings import Settings

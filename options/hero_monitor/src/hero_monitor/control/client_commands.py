@@ -5,8 +5,8 @@ import re
 import struct
 from typing import Any, Dict, Optional, Tuple
 
-from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
-from hero_node.geometry import clamp
+from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_node import clamp
 
 _VELOCITY_TOPIC = re.compile(r"/(hero_[0-9]+)(?:/velocity_controller)?/cmd_vel")
 _STOP_TOPIC = re.compile(r"/(?:[A-Za-z0-9_/]+/)?stop_request")

@@ -11,11 +11,10 @@ from typing import Dict, Optional, Tuple
 import rospy
 from geometry_msgs.msg import PoseStamped, Twist
 
-from hero_client.ros.drivers import Drivers
-from hero_client.values.background_motion import SEND_TIME_S
-from hero_node.errors import NodeError
-from hero_node.geometry import Pose
-from hero_node.ros.master import ask_master
+from hero_client.ros import Drivers
+from hero_client.values import SEND_TIME_S
+from hero_node import NodeError, Pose
+from hero_node.ros import ask_master
 
 from ..background import Background
 from .dead_man import DeadMan

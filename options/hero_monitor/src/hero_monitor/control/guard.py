@@ -13,7 +13,7 @@ import subprocess
 import sys
 from typing import Sequence
 
-from hero_node.processes import end_process
+from hero_node import end_process
 
 POLL_S = 0.1
 SILENT_POLLS = 50

@@ -4,9 +4,9 @@ import json
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 from hero_client.apps.formations import Point, place_formation
-from hero_client.controllers.orca import AvoidanceLaw
-from hero_client.values.robot_constants import MAX_LINEAR_M_S
-from hero_node.errors import ProgramError
+from hero_client.controllers import AvoidanceLaw
+from hero_client.values import MAX_LINEAR_M_S
+from hero_node import ProgramError
 from hero_node.parameters import Parameter, choice, flag, number, whole_number
 
 from .requests import MAX_GOAL_M, RequestError

@@ -20,7 +20,7 @@ from typing import Any, Callable, Dict, List, Optional, Sequence
 import roslib.packages
 
 from hero_client.apps.formations import Point
-from hero_node.texts import make_printable
+from hero_node import make_printable
 
 from . import guard
 from .offers import OFFERS

@@ -11,8 +11,8 @@ import math
 import time
 from typing import Any, Callable, Dict, Union
 
-from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
-from hero_node.number_checks import is_number
+from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
+from hero_node.parameters import is_number
 
 from .dead_man import HOLD_TIMEOUT_S
 

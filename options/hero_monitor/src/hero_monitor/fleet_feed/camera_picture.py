@@ -7,8 +7,8 @@ it comes, more on a busy computer: the page draws robots on it where they were w
 import math
 from typing import Any, Dict, List, Optional
 
-from hero_client.values.stamped_history import StampedHistory, interpolate_pose
-from hero_node.geometry import Pose
+from hero_client.values import StampedHistory, interpolate_pose
+from hero_node import Pose
 
 from .page_state import MAX_DISTANCE_M, encode_pose
 

@@ -7,7 +7,7 @@ from typing import Any, Dict, List, Tuple
 
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 
 from .page_state import encode_color, encode_pose, shorten
 

@@ -20,14 +20,10 @@ from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.ros.drivers import Drivers
-from hero_client.ros.robot_listener import NewestMessage, follow
-from hero_client.ros.stop_status import StopStatus
-from hero_client.values.readings import finite, is_plausible, read_pose
-from hero_client.values.robot_states import STATES, STOP_STATES
+from hero_client.ros import Drivers, NewestMessage, StopStatus, follow
+from hero_client.values import STATES, STOP_STATES, finite, is_plausible, read_pose
 from hero_msgs.msg import Robot, RobotPose, RobotPoses
-from hero_node.geometry import Pose, pose_of
-from hero_node.texts import make_printable
+from hero_node import Pose, make_printable, pose_of
 
 from ..background import Background
 from .camera_picture import CameraPicture

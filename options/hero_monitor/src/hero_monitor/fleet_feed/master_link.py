@@ -10,7 +10,7 @@ from typing import Optional
 import rosgraph
 import rospy
 
-from hero_node.ros.master_watch import MasterWatch
+from hero_node.ros import MasterWatch
 
 from ..background import Background
 from .losses import MASTER_PERIOD_S, MASTER_SILENT_S

@@ -7,7 +7,7 @@ import array
 import re
 from typing import Any, Dict, Optional
 
-from hero_client.values.readings import read_pose
+from hero_client.values import read_pose
 
 from .page_state import encode_pose
 

@@ -9,8 +9,7 @@ import math
 from collections import deque
 from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
 
-from hero_node.geometry import Pose
-from hero_node.texts import make_printable
+from hero_node import Pose, make_printable
 
 MAX_LINE_LENGTH = 400
 LOG_LINES_KEPT = 500

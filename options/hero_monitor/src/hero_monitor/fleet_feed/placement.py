@@ -7,7 +7,7 @@ Robots without a place are drawn side by side, and the page says so.
 
 from typing import Dict, Iterable, List, Tuple
 
-from hero_node.geometry import Pose, find_frame, invert_pose, transform_pose
+from hero_node import Pose, find_frame, invert_pose, transform_pose
 
 APART_M = 1.0
 """Between the origins of robots that are drawn side by side: farther than a short drive."""

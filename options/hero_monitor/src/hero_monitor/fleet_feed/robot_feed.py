@@ -6,9 +6,9 @@ from typing import Optional, Tuple
 from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import ColorRGBA
 
-from hero_client.ros.robot_listener import NewestMessage, RobotListener
-from hero_client.values.readings import read_pose
-from hero_node.geometry import Pose, measure_distance
+from hero_client.ros import NewestMessage, RobotListener
+from hero_client.values import read_pose
+from hero_node import Pose, measure_distance
 
 from .page_state import encode_color
 from .placement import Placement

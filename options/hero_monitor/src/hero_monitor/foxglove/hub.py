@@ -2,23 +2,10 @@
 
 import json
 from collections import defaultdict, deque
-from typing import (
-    Any,
-    Callable,
-    DefaultDict,
-    Deque,
-    Dict,
-    Iterable,
-    List,
-    NamedTuple,
-    Optional,
-    Set,
-    Tuple,
-    Union,
-)
+from typing import Any, Callable, DefaultDict, Deque, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple, Union
 
-from hero_node.number_checks import is_whole_number
-from hero_node.texts import shorten
+from hero_node import shorten
+from hero_node.parameters import is_whole_number
 
 from .protocol import (
     WARNING,

@@ -11,8 +11,8 @@ from typing import Deque, Dict, List, Optional, Set, Tuple
 import roslib.message
 import rospy
 
-from hero_node.errors import NodeError
-from hero_node.ros.master import ask_master
+from hero_node import NodeError
+from hero_node.ros import ask_master
 
 from ..background import Background
 from .hub import TopicMessage, TopicType

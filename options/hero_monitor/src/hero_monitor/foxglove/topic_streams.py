@@ -17,8 +17,8 @@ from xml.parsers.expat import ExpatError
 
 from rosgraph.network import ROSHandshakeException, read_ros_handshake_header, write_ros_handshake_header
 
-from hero_node.ros.master import MASTER_TIMEOUT_S, SUCCESS, LimitedTransport
-from hero_node.tcpros import TooLongError, find_messages
+from hero_node import TooLongError, find_messages
+from hero_node.ros import MASTER_TIMEOUT_S, SUCCESS, LimitedTransport
 
 READ_LENGTH = 65536
 READS_MAX = 200

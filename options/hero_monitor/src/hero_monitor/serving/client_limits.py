@@ -8,7 +8,7 @@ with the most. Times enter as now_s, any clock that never steps.
 import ipaddress
 from typing import Dict, Protocol
 
-from hero_node.connection_table import ConnectionTable
+from hero_node import ConnectionTable
 
 CONNECTIONS_MAX = 400
 UNTRUSTED_PER_ADDRESS_MAX = 50

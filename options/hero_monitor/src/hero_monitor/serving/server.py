@@ -21,7 +21,7 @@ import tornado.netutil
 import tornado.web
 import tornado.websocket
 
-from hero_node.token_bucket import TokenBuckets
+from hero_node import TokenBuckets
 
 from ..fleet_feed.page_state import encode
 from .access import Access

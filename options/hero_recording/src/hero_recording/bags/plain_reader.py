@@ -4,7 +4,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Sequence, Tuple
 
-from hero_node.optional import import_optional
+from hero_node import import_optional
 
 from .topics import Message, RawMessage
 

@@ -8,8 +8,8 @@ import math
 from operator import attrgetter
 from typing import Any, Callable, Dict, List, Tuple
 
-from hero_client.values.robot_states import STATES
-from hero_node.geometry import yaw_of
+from hero_client.values import STATES
+from hero_node import yaw_of
 
 from .topics import find_robot_topic, is_fleet_topic
 

@@ -5,7 +5,7 @@ import io
 from pathlib import Path
 from typing import Any, Dict, Tuple
 
-from hero_node.optional import import_optional
+from hero_node import import_optional
 
 from ..bags.bag_set import BagSet
 from ..bags.topics import RawMessage

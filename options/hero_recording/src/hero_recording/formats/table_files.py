@@ -9,7 +9,7 @@ from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
 
-from hero_node.optional import import_optional
+from hero_node import import_optional
 
 from ..bags.tables import TABLES, TEXT_COLUMNS, Row
 from ..errors import explain_write_errors

@@ -7,7 +7,7 @@ import math
 from collections import defaultdict
 from typing import Any, DefaultDict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
-from hero_node.geometry import pose_of, yaw_of
+from hero_node import pose_of, yaw_of
 
 from ..bags.tables import TABLES, Row, read_rows
 from ..bags.topics import (

@@ -4,8 +4,8 @@ import importlib
 import inspect
 from typing import Any, Dict, List, Optional, Type
 
-from hero_node.number_checks import is_number
-from hero_node.yaml_text import YamlError, parse_yaml
+from hero_node.files import YamlError, parse_yaml
+from hero_node.parameters import is_number
 
 from ..behavior import MAX_RATE_HZ, MIN_RATE_HZ, Behavior
 from ..sources import Sources

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hero_sim.world.kinematics import join_wheels
+from hero_sim.world import join_wheels
 
 from ..behavior import PULSES, VELOCITY, Behavior, Binary, Command, Random, Sensed
 

@@ -4,9 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hero_client.values.object_sensing import OBJECT, ROBOT
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.world.kinematics import join_wheels
+from hero_client.values import BODY_RADIUS_M, OBJECT, ROBOT
+from hero_sim.world import join_wheels
 
 from ..behavior import Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
 from ..steering import steer

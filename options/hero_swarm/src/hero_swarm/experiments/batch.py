@@ -18,11 +18,9 @@ from typing import Any, Iterator, List, NamedTuple, Sequence, Tuple
 import numpy as np
 from tqdm import tqdm
 
-from hero_node.errors import HeroError
-from hero_node.safe_file import make_new_name, name_file, write_file
-from hero_sim.world.arena import Arena
-from hero_sim.world.arena_file import load_arena
-from hero_sim.world.robot_errors import read_known
+from hero_node import HeroError
+from hero_node.files import make_new_name, name_file, write_file
+from hero_sim.world import Arena, load_arena, read_known
 
 from ..behavior import Behavior, Objects
 from ..behaviors import find_behavior

@@ -19,9 +19,7 @@ from concurrent.futures import (
 )
 from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
 
-from hero_node.addresses import is_loopback
-from hero_node.optional import import_optional
-from hero_node.texts import one_line
+from hero_node import import_optional, is_loopback, one_line
 
 from .errors import ExperimentError
 

@@ -5,7 +5,7 @@ import traceback
 from contextlib import contextmanager
 from typing import Iterator
 
-from hero_node.errors import HeroError
+from hero_node import HeroError
 
 from ..sources import Sources
 

@@ -17,8 +17,8 @@ import math
 import os
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from hero_node.marked_yaml import Entry, EntryError, read_entries
-from hero_sim.world.arena_file import SHIPPED
+from hero_node.files import Entry, EntryError, read_entries
+from hero_sim.world import SHIPPED
 
 from ..metrics import FALLING
 from ..metrics.own import MetricNames, is_own

@@ -6,7 +6,7 @@ from typing import Dict, Optional, Sequence
 
 import numpy as np
 
-from hero_node.safe_file import write_file
+from hero_node.files import write_file
 
 from .batch import METRICS_ENDING, SAMPLE_S, list_sources
 from .experiment_file import Experiment

@@ -27,8 +27,8 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, NamedTuple, Se
 
 import numpy as np
 
-from hero_node.safe_file import hold_file, name_file, read_file, write_file
-from hero_node.texts import one_line
+from hero_node import one_line
+from hero_node.files import hold_file, name_file, read_file, write_file
 
 from .errors import ExperimentError
 from .experiment_file import Cell, Experiment

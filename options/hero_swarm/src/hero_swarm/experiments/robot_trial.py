@@ -8,7 +8,7 @@ from typing import Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values.object_sensing import NO_OBJECTS, Things
+from hero_client.values import NO_OBJECTS, Things
 
 from ..behavior import Random, derive_seed
 from ..control import Control

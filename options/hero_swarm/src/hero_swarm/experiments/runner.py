@@ -14,8 +14,8 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequ
 
 from tqdm import tqdm
 
+from hero_node.files import YamlError, read_text
 from hero_node.parameters import given_ids_option, within
-from hero_node.yaml_text import YamlError, read_text
 
 from . import engines
 from .batch import Inputs, compute_batch, load_checked

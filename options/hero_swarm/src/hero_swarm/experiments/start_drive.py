@@ -4,11 +4,9 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
-from hero_client.controllers.orca import AvoidanceLaw
-from hero_client.controllers.swarm_go_to import SwarmGoToController
-from hero_client.controllers.unicycle import go_to_pose
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import STOP, Pose
+from hero_client.controllers import AvoidanceLaw, SwarmGoToController, go_to_pose
+from hero_client.values import BODY_RADIUS_M
+from hero_node import STOP, Pose
 
 PERIOD_S = 0.05
 """Time between two steps."""

@@ -5,15 +5,11 @@ from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
-from hero_client.values.readings import MAX_POSITION_M, is_plausible
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_node.geometry import Pose
-from hero_node.safe_file import read_file
-from hero_node.texts import shorten
-from hero_node.yaml_text import decode_text
+from hero_client.values import BODY_RADIUS_M, MAX_POSITION_M, is_plausible
+from hero_node import Pose, shorten
+from hero_node.files import decode_text, read_file
 from hero_sim.errors import OptionError
-from hero_sim.world.arena import Arena, place_robots
-from hero_sim.world.pushing.shapes import PushedBody
+from hero_sim.world import Arena, PushedBody, place_robots
 
 from ..behavior import derive_seed
 from ..metrics.graphs import measure_distances

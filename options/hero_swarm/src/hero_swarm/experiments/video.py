@@ -16,8 +16,8 @@ from matplotlib.collections import EllipseCollection, LineCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.world.pushing.shapes import list_outlines
+from hero_client.values import BODY_RADIUS_M
+from hero_sim.world import list_outlines
 
 from ..trial import OPEN, Trial
 from .errors import ExperimentError

@@ -10,8 +10,7 @@ from typing import Iterator, List
 import numpy as np
 from scipy.optimize import least_squares
 
-from hero_client.values.robot_constants import WHEEL_SEPARATION_M
-from hero_client.values.wheel_paths import follow_wheels
+from hero_client.values import WHEEL_SEPARATION_M, follow_wheels
 
 from .recording import Recording, measure_wheels
 

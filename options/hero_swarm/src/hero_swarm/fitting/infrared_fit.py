@@ -6,12 +6,13 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from hero_sim.robot_constants import BODY_RADIUS_M
-from hero_sim.world.arena import Arena, Segments
-from hero_sim.world.range_sensors import (
+from hero_sim.world import (
     ALPHA_COUNTS_M2,
     BEAMS,
     BETA_COUNTS,
     NOISE_COUNTS,
+    Arena,
+    Segments,
     Sight,
     find_offset,
     measure_brightness,

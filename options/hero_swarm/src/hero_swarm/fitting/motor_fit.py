@@ -8,7 +8,7 @@ from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from hero_sim.robot.firmware import SPIN_MS
+from hero_sim.robot import SPIN_MS
 
 from .body_fit import follow_body
 from .recording import PULSES, SAMPLE_S, Recording, interpolate_poses, measure_wheels, sample_times

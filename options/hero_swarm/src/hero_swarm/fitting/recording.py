@@ -4,7 +4,7 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from hero_client.values.robot_constants import WHEEL_SEPARATION_M
+from hero_client.values import WHEEL_SEPARATION_M
 
 VELOCITY, PULSES = 0, 1
 """Kinds of commands."""

@@ -6,9 +6,8 @@ from typing import Dict, NamedTuple, Sequence
 
 import numpy as np
 
-from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.robot_errors import KINDS, RobotErrors, draw_errors
-from hero_sim.world.world import STEP_MS, World
+from hero_sim.stepped import RobotRows
+from hero_sim.world import KINDS, STEP_MS, RobotErrors, World, draw_errors
 
 from ..trial import OPEN
 from .recording import PULSES, Recording, sample_times

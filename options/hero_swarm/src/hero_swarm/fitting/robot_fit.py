@@ -4,9 +4,8 @@ from typing import Dict, List, NamedTuple, Optional
 
 import numpy as np
 
-from hero_client.values.robot_constants import WHEEL_SEPARATION_M
-from hero_sim.world.arena import Arena
-from hero_sim.world.range_sensors import BEAMS
+from hero_client.values import WHEEL_SEPARATION_M
+from hero_sim.world import BEAMS, Arena
 
 from .body_fit import fit_body
 from .infrared_fit import InfraredFit, fit_infrared

@@ -4,12 +4,11 @@ from typing import Optional
 
 import numpy as np
 
-from hero_client.values.robot_constants import BODY_RADIUS_M, MAX_LINEAR_M_S
-from hero_client.values.sensing import Neighbors, sense_neighbors
+from hero_client.values import BODY_RADIUS_M, MAX_LINEAR_M_S, Neighbors, sense_neighbors
 from hero_driver.robot_constants import MAX_RIM_RANGE_M
 from hero_sim.population import place_worlds
-from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.world.arena import Arena, place_robots
+from hero_sim.stepped import RobotRows
+from hero_sim.world import Arena, place_robots
 
 from ..behavior import derive_seed
 from ..metrics import FALLING

@@ -15,8 +15,7 @@ import numpy as np
 from gymnasium.spaces import Box
 from pettingzoo import ParallelEnv
 
-from hero_sim.world.arena import build_default
-from hero_sim.world.arena_file import load_arena
+from hero_sim.world import build_default, load_arena
 
 from .episode import Episode, count_observations
 

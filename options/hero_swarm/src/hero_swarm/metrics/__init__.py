@@ -4,7 +4,7 @@ from typing import Callable, Dict
 
 import numpy as np
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 
 from .graphs import algebraic_connectivity, cluster_fraction, collisions, nearest_neighbor
 from .motion import consensus_error, order, rotation

@@ -4,7 +4,7 @@ from typing import Union
 
 import numpy as np
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 
 
 def measure_distances(places_m: np.ndarray) -> np.ndarray:

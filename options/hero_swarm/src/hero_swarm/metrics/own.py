@@ -9,7 +9,7 @@ from typing import Any, Collection, Iterator, NamedTuple, Optional
 
 import numpy as np
 
-from hero_node.texts import shorten
+from hero_node import shorten
 
 from ..sources import Sources
 from ..user_module import load_file

@@ -6,7 +6,7 @@ from typing import List, Tuple
 
 import numpy as np
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 
 Point = Tuple[float, ...]
 

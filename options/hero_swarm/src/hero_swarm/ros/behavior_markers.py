@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 
 from ..behavior import Behavior, Binary, Sensed, Sight
 

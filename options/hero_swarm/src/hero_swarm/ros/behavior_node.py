@@ -12,12 +12,11 @@ from std_msgs.msg import Float32
 from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program, ProgramError, Swarm, read_parameters
-from hero_client.controllers.lateness import Lateness
+from hero_client.controllers import Lateness
 from hero_client.swarm import open_swarm
-from hero_client.values.object_sensing import Things
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M, Things
 from hero_node.parameters import choice, number, robot_ids, whole_number, words
-from hero_node.ros.ros_clock import read_duration_clock_s
+from hero_node.ros import read_duration_clock_s
 
 from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior

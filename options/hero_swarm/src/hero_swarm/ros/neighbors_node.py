@@ -10,9 +10,9 @@ import numpy as np
 import rospy
 
 from hero_client import Program, read_parameters
-from hero_client.ros.drivers import share_drivers
+from hero_client.ros import share_drivers
 from hero_client.swarm import ready_ids
-from hero_client.values.sensing import Neighbors, list_neighbors, sense_neighbors
+from hero_client.values import Neighbors, list_neighbors, sense_neighbors
 from hero_msgs.msg import Neighbor as NeighborMessage
 from hero_msgs.msg import Neighbors as NeighborsMessage
 from hero_node.parameters import flag, number, robot_ids, whole_number, words

@@ -5,11 +5,10 @@ from typing import List, Sequence, Set
 
 import numpy as np
 
-from hero_client.ros.drivers import share_drivers
-from hero_client.ros.localized_poses import share_poses
-from hero_client.values.robot_constants import HERO, MODELS
+from hero_client.ros import share_drivers, share_poses
+from hero_client.values import HERO, MODELS
 from hero_msgs.msg import Robot
-from hero_node.texts import list_names
+from hero_node import list_names
 
 from .pose_source import SIMULATOR_FRAME, PoseSource
 

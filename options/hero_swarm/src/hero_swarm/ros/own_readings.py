@@ -6,7 +6,7 @@ from typing import Any, Callable, Mapping
 import numpy as np
 
 from hero_client import Swarm
-from hero_client.values.errors import StaleDataError
+from hero_client.values import StaleDataError
 
 from ..sensors.own import Distance, Odometry, Proximity
 

@@ -8,11 +8,10 @@ import numpy as np
 import rospy
 from nav_msgs.msg import Odometry
 
-from hero_client.ros.localized_poses import share_poses
-from hero_client.values.errors import FrameError, StaleDataError
-from hero_client.values.object_sensing import NO_OBJECTS, Things
+from hero_client.ros import share_poses
+from hero_client.values import NO_OBJECTS, FrameError, StaleDataError, Things
 from hero_msgs.msg import ObjectPoses
-from hero_node.geometry import Pose, pose_of
+from hero_node import Pose, pose_of
 
 from ..safety import MAX_AGE_S
 

@@ -14,9 +14,9 @@ import numpy as np
 import rospy
 
 from hero_client import Program, StoppedError, Swarm
-from hero_client.controllers.lateness import Lateness
-from hero_node.processes import end_process
-from hero_node.ros.ros_clock import read_duration_clock_s
+from hero_client.controllers import Lateness
+from hero_node import end_process
+from hero_node.ros import read_duration_clock_s
 
 from ..experiments.batch import make_behavior, place_robots
 from ..experiments.errors import ExperimentError

@@ -7,9 +7,9 @@ import rospy
 
 from hero_client import Swarm
 from hero_msgs.msg import Motor
-from hero_node.calibration_file import read_calibrations
-from hero_node.texts import list_names
-from hero_sim.stepped.swarm import StepSwarm
+from hero_node import list_names
+from hero_node.files import read_calibrations
+from hero_sim.stepped import StepSwarm
 
 from ..behavior import PULSES
 from ..wheel_pulses import find_pulses, list_dead_zones

@@ -7,9 +7,19 @@ from typing import Any, Callable, Dict, NamedTuple, Optional
 
 import numpy as np
 
-from hero_client.values.object_sensing import NO_OBJECTS, Objects, Sight, Things, sense_objects, sense_sight
-from hero_client.values.sensing import Binary, Neighbors, sense_binary, sense_neighbors
-from hero_sim.world.arena import Arena
+from hero_client.values import (
+    NO_OBJECTS,
+    Binary,
+    Neighbors,
+    Objects,
+    Sight,
+    Things,
+    sense_binary,
+    sense_neighbors,
+    sense_objects,
+    sense_sight,
+)
+from hero_sim.world import Arena
 
 
 class Surroundings(NamedTuple):

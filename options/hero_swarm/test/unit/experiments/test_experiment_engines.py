@@ -9,7 +9,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 
 import pytest
 
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 from hero_swarm.experiments import engines
 from hero_swarm.experiments.errors import ExperimentError
 

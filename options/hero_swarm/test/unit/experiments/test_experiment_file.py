@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_node.yaml_text import MAX_CHARACTERS
+from hero_node.files.yaml_text import MAX_CHARACTERS
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Bound, Start, parse_experiment
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 from hero_swarm import metrics, show
 from hero_swarm.experiments import batch, report, runner
 from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
-from hero_sim.world.arena_file import load_arena
-from hero_sim.world.pushing.shapes import list_outlines
+from hero_client.values import BODY_RADIUS_M
+from hero_sim.world import list_outlines, load_arena
 from hero_swarm.behavior import Behavior
 from hero_swarm.experiments import video
 from hero_swarm.experiments.errors import ExperimentError

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M
 from hero_sim.world.arena import build_default
 from hero_swarm.behavior import Behavior, Neighbors
 from hero_swarm.experiments import report, runner

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hero_sim.population import place_worlds
-from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.stepped import RobotRows
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.robot_trial import RobotTrial

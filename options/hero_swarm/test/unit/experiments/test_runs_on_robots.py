@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="the program needs ROS")
-from hero_client.values.object_sensing import NO_OBJECTS
-from hero_client.values.robot_constants import MODELS
-from hero_sim.stepped.swarm import StepSwarm
+from hero_client.values import MODELS, NO_OBJECTS
+from hero_sim.stepped import StepSwarm
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
 from hero_swarm.ros import robot_runs

@@ -13,12 +13,11 @@ import rosgraph.roslogging
 import rospy
 from rosgraph_msgs.msg import Log
 
-from hero_client.ros.drivers import Drivers
-from hero_client.values.robot_states import STATES
+from hero_client.ros import Drivers
+from hero_client.values import STATES
 from hero_msgs.msg import Robot, RobotArray
-from hero_node.addresses import is_loopback
-from hero_node.errors import NodeError
-from hero_node.ros.master import ask_master, read_master_uri
+from hero_node import NodeError, is_loopback
+from hero_node.ros import ask_master, read_master_uri
 
 from .network import HOST_REMEDY, Address, find_source_address, is_own, resolve
 from .points import Finding, fail, ok, wait_until, warn

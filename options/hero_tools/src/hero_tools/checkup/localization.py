@@ -8,7 +8,7 @@ from typing import Dict, List, Sequence
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
-from hero_node.ros.master import ask_master
+from hero_node.ros import ask_master
 
 from .points import Finding, ok, wait_until, warn
 

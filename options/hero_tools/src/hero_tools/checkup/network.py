@@ -9,7 +9,7 @@ import socket
 from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional, Sequence, Set
 
-from hero_node.addresses import is_loopback
+from hero_node import is_loopback
 
 from .points import Finding, ask_system, fail, ok, warn
 

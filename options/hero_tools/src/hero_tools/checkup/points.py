@@ -6,7 +6,7 @@ import threading
 import time
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence
 
-from hero_node.texts import one_line
+from hero_node import one_line
 
 OK = "OK"
 WARN = "WARN"

@@ -9,7 +9,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_node.optional import import_optional
+from hero_node import import_optional
 
 from ..errors import ExperimentError
 

@@ -12,8 +12,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_msgs.msg import Robot, RobotArray
 
-from .commands.stop_progress import StopState
-from .fleet.registry import RobotState
+from ..commands.stop_progress import StopState
+from ..fleet.registry import RobotState
 from .robot_status import RobotStatus
 
 LARGE_CLOCK_OFFSET_S = 0.5

@@ -1,7 +1,7 @@
 """The emergency stop in ROS: the service ~stop, the topic ~stop_request, and the stop kept over restarts.
 
 Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow, and ask
-until ~robots says that the robots are stopped. Whether they are is kept on disk (stop_store).
+until ~robots says that the robots are stopped. Whether they are is kept on disk (store).
 """
 
 import queue
@@ -12,12 +12,12 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from .commands.stop_progress import StopState
-from .ros.log_relay import LogRelay
-from .ros.rospy_internals import find_connection, is_latched_before, list_publishers
-from .ros.worker import Worker
-from .stop_store import StopStore
-from .transport.event_loop import EventLoop, NoAnswerError
+from ..commands.stop_progress import StopState
+from ..ros.log_relay import LogRelay
+from ..ros.rospy_internals import find_connection, is_latched_before, list_publishers
+from ..ros.worker import Worker
+from ..transport.event_loop import EventLoop, NoAnswerError
+from .store import StopStore
 
 ANSWER_WAIT_S = 0.5
 """The thread of the sockets answers within milliseconds; a service call must not hang where it does not."""

@@ -8,9 +8,9 @@ from typing import Any, Collection, Dict, List, NamedTuple, NoReturn, Optional, 
 
 import yaml
 
-from .errors import HeroError
-from .number_checks import is_number, is_whole_number
-from .texts import make_printable, one_line, shorten
+from ..errors import HeroError
+from ..parameters.number_checks import is_number, is_whole_number
+from ..texts import make_printable, one_line, shorten
 from .yaml_text import MAX_CHARACTERS
 
 MAX_DEPTH = 20

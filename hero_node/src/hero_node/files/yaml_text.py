@@ -4,8 +4,8 @@ from typing import Any, Type
 
 import yaml
 
+from ..texts import one_line
 from .safe_file import read_file
-from .texts import one_line
 
 MAX_CHARACTERS = 500_000
 """PyYAML reads about 160,000 in a second, in which nothing else of the program runs; real files have some thousand."""

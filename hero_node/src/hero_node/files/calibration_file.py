@@ -8,10 +8,10 @@ import os
 import re
 from typing import Any, Dict, List, NamedTuple, Tuple
 
-from .errors import HeroError
+from ..errors import HeroError
+from ..parameters.number_checks import is_number
+from ..texts import make_printable, shorten
 from .marked_yaml import Entry, EntryError, read_entries
-from .number_checks import is_number
-from .texts import make_printable, shorten
 from .yaml_text import YamlError, read_text
 
 STOCK, HERO_PLUS = "hero", "hero_plus"

@@ -9,7 +9,7 @@ import difflib
 import math
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type, TypeVar
 
-from .errors import ProgramError
+from ..errors import ProgramError
 from .number_checks import is_number
 
 T = TypeVar("T")

@@ -7,10 +7,10 @@ import rospy
 
 from hero_msgs.msg import Robot
 
-from .commands.stop_progress import StopState
-from .fleet.registry import RobotRecord
-from .peer import Peer
-from .ros.robot_bridge import RobotBridge
+from ..commands.stop_progress import StopState
+from ..fleet.registry import RobotRecord
+from ..peer import Peer
+from ..ros.robot_bridge import RobotBridge
 
 DUPLICATES_SHOWN = 8
 """Of one robot, in reports: one address could fill them with hundreds."""

@@ -3,11 +3,11 @@
 import math
 from typing import Callable
 
-from .fleet import log_lines
-from .fleet.registry import RobotRecord
-from .peer import Peer
-from .ros.log_relay import LogRelay
-from .rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
+from ..fleet import log_lines
+from ..fleet.registry import RobotRecord
+from ..peer import Peer
+from ..ros.log_relay import LogRelay
+from ..rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_WARN, Log
 
 LEVELS = {LOG_DEBUG: "debug", LOG_INFO: "info", LOG_WARN: "warn", LOG_ERROR: "error", LOG_FATAL: "fatal"}
 

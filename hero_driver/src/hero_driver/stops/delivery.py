@@ -19,15 +19,15 @@ Runs on the thread of the sockets and never blocks, except stop_without_loop(), 
 import time
 from typing import Callable, Iterable, List, Optional
 
-from .commands.stop_progress import StopProgress, StopState
-from .commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
-from .corrections.message_layouts import MD5SUMS
-from .peer import Peer, PeerOwner
-from .ros.message_types import apply_aliases
-from .ros.robot_commands import LIGHT_SUFFIX, NO_LIGHT
-from .rosserial.errors import RosserialError
-from .rosserial.session import Topic
-from .transport.event_loop import CallLater
+from ..commands.stop_progress import StopProgress, StopState
+from ..commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
+from ..corrections.message_layouts import MD5SUMS
+from ..peer import Peer, PeerOwner
+from ..ros.message_types import apply_aliases
+from ..ros.robot_commands import LIGHT_SUFFIX, NO_LIGHT
+from ..rosserial.errors import RosserialError
+from ..rosserial.session import Topic
+from ..transport.event_loop import CallLater
 
 BURST_LIGHTS = 62
 """Light commands in front of the zeros that end a self-tuning: 1488 bytes. Measured: 40 of 40 tunings ended."""
