@@ -148,6 +148,17 @@ def test_colors_titles_and_overwritten_text_are_not_compared():
     assert clean_output("\x1b[1mbold\x1b[0m\x1b]2;title\x07 \r\n10 %\r20 %\r\na\tb") == "bold\n20 %\na   b\n"
 
 
+@pytest.mark.parametrize(
+    "warning",
+    ["commands are late by 0.3 s: this PC is busy; robots", "poses are 0.1 s old: is Wi-Fi or this PC overloaded?"],
+)
+def test_a_busy_pc_adds_no_line_to_the_output_of_a_page(warning):
+    shown = clean_output(
+        f"\x1b[33m[WARN] [1795735734.944141]: {warning}\x1b[0m\r\nback at 0\r\n[WARN] [1.0]: no ROS\r\n"
+    )
+    assert shown == "back at 0\n[WARN] [1.0]: no ROS\n"
+
+
 def test_an_ellipsis_matches_text_in_a_line_or_any_lines():
     import re
 

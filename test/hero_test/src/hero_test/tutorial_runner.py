@@ -50,10 +50,12 @@ SHOWN_LINES = 30
 """Of a wrong output, at its beginning and at its end."""
 COLUMNS = 400  # so that nothing wraps
 
-RECONNECTION = re.compile(
-    r"\[WARN\] \[[\d.]+\]: (Inbound TCP/IP connection failed|Could not process inbound connection)"
+UNSHOWN_LINE = re.compile(
+    r"\[WARN\] \[[\d.]+\]: (Inbound TCP/IP connection failed|Could not process inbound connection"
+    r"|commands are late by [\d.]+ s: |poses are [\d.]+ s old: )"
 )
-"""rospy's warnings of a subscriber that connected twice at once, or too late; no page shows them."""
+"""Warnings that no page shows: rospy's of a subscriber that connected twice at once, or too late, and hero_client's on
+a busy PC. A robot that is slow for a moment still does what its page shows."""
 
 CONTROL_SEQUENCE = re.compile(r"\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b\[[0-9;?]*[A-Za-z]|\x1b[=>]|\x07")
 
@@ -201,7 +203,7 @@ def clean_output(raw: str) -> str:
     """Return what the terminal shows in the end, without control sequences and overwritten text."""
     lines = CONTROL_SEQUENCE.sub("", raw).replace("\r\n", "\n").split("\n")
     shown = [line.rstrip("\r").rsplit("\r", 1)[-1].rstrip() for line in lines]
-    text = "\n".join(line for line in shown if not RECONNECTION.match(line)).expandtabs(4)
+    text = "\n".join(line for line in shown if not UNSHOWN_LINE.match(line)).expandtabs(4)
     return text if text.endswith("\n") or not text else text + "\n"
 
 
