@@ -1,7 +1,7 @@
 """What lies in this repository (packages, modules, imports), for the tests of its rules. Changes nothing.
 
-Run as a program it prints the modules that script/lint gives to mypy: `strict` before those that know nothing of ROS,
-and those that must fit a Protocol of theirs; `others` before all others.
+Run as a program it prints the modules that script/lint gives to mypy: `strict` before those of packages that users run,
+`others` before those of tests.
 """
 
 import ast
@@ -31,15 +31,6 @@ OTHER_PACKAGES = {
 
 WITHOUT_ROSDEP_KEY = {"apriltag", "distributed", "gymnasium", "pettingzoo"}
 """Optional modules: no package.xml can name them."""
-
-FIT_A_PROTOCOL = (
-    "hero_client.robot",
-    "hero_client.ros.ros_link",
-    "hero_client.swarm",
-    "hero_node.ros.program",
-    "hero_node.ros.ros_clock",
-)
-"""For mypy, what they take from ROS is Any."""
 
 
 class Import(NamedTuple):
@@ -179,6 +170,5 @@ def read_dependencies(package: str, *kinds: str) -> List[str]:
 
 
 if __name__ == "__main__":
-    strict = {*list_pure_modules(), *(list_source_modules()[name] for name in FIT_A_PROTOCOL)}
     for checked in sorted(list_source_modules().values()):
-        print("strict" if checked in strict else "others", checked.relative_to(ROOT))
+        print("others" if package_of(checked) == "hero_test" else "strict", checked.relative_to(ROOT))

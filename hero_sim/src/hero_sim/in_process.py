@@ -108,7 +108,7 @@ def replace_ros(swarm: StepSwarm) -> None:
         setattr(hero_client, name, replacement)
     for name in ("time", "monotonic"):
         setattr(time, name, lambda: swarm.now_s)
-    time.sleep = swarm.sleep
+    time.sleep = swarm.sleep  # type: ignore[assignment]  # its answer is left alone
 
 
 if __name__ == "__main__":

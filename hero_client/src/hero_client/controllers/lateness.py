@@ -5,7 +5,7 @@ age of its pose and the period of the loop; the distance must stay within what c
 """
 
 import math
-from typing import List, Sequence
+from typing import Iterable, List
 
 from hero_node import Velocity
 
@@ -58,7 +58,7 @@ class Lateness:
         share = self.find_share(pose_age_s)
         return Velocity(command.linear_m_s * share, command.angular_rad_s * share)
 
-    def find_shares(self, pose_ages_s: Sequence[float]) -> List[float]:
+    def find_shares(self, pose_ages_s: Iterable[float]) -> List[float]:
         """Return find_share() of each robot; ages of robots without a pose, which are not finite, do not count."""
         return [self.find_share(age_s if math.isfinite(age_s) else 0.0) for age_s in pose_ages_s]
 

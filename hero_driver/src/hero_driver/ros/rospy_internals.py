@@ -146,7 +146,7 @@ def read_caller(connection: Any) -> str:
     return "" if connection is None else str(connection.header.get("callerid", ""))
 
 
-def replace_reading(connection: Any, read: Callable[[], List[Any]]) -> None:
+def replace_reading(connection: Any, read: Callable[[], Any]) -> None:
     """Make rospy's thread call read() instead of its own, once it has passed on all that it has read.
 
     Waking that thread, and then the thread of the sockets, for every command costs several times what the command

@@ -9,7 +9,7 @@ import contextlib
 import threading
 from typing import Callable, Deque
 
-Call = Callable[[], None]
+Call = Callable[[], object]
 
 
 class CallQueue:

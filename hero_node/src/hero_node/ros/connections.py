@@ -47,7 +47,7 @@ class LimitedXmlRpcServer(rosgraph.xmlrpc.ThreadingXMLRPCServer):
 
 def limit_xmlrpc_connections() -> None:
     """Keep connections that send no whole call from taking all threads; for the time before rospy.init_node()."""
-    rosgraph.xmlrpc.ThreadingXMLRPCServer = LimitedXmlRpcServer
+    rosgraph.xmlrpc.ThreadingXMLRPCServer = LimitedXmlRpcServer  # type: ignore[misc, assignment]
 
 
 def open_tcpros_server(warn: Callable[[str, str], None]) -> None:

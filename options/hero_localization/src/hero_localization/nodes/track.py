@@ -149,7 +149,7 @@ class TrackNode:
             text = "no image for %.0f s: is the camera's driver running?"
             return [("camera", text % silent_s, True)]
         warnings = [("camera controls", self._source.warning, False)] if self._source.warning else []
-        return warnings + [tuple(problem) for problem in self._tracker.list_problems()]
+        return [*warnings, *self._tracker.list_problems()]
 
     def close(self) -> None:
         """End the detector and leave the camera; may be called twice."""

@@ -89,8 +89,8 @@ class RobotScene:
         random = np.random.RandomState(options.seed)
         errors = np.array((MOUNT_ERROR_M, MOUNT_ERROR_M, MOUNT_ERROR_RAD)) * (not options.perfect)
         tags = [
-            PrintedTag(robot_id, options.tag_size, 0.076, *(random.standard_normal(3) * errors), family=options.family)
-            for robot_id in self._ids
+            PrintedTag(robot_id, options.tag_size, 0.076, x_m, y_m, yaw_rad, options.family)
+            for robot_id, (x_m, y_m, yaw_rad) in zip(self._ids, random.standard_normal((len(self._ids), 3)) * errors)
         ]
         references = []
         for tag in list_references(arena, options.family):

@@ -89,7 +89,8 @@ def open_stream(topic: str, node_uri: str, own_name: str) -> Stream:
     with contextlib.ExitStack() as opened:
         try:
             with xmlrpc.client.ServerProxy(node_uri, transport=LimitedTransport()) as node:
-                code, text, protocol = node.requestTopic(own_name, topic, [["TCPROS"]])
+                answer: Any = node.requestTopic(own_name, topic, [["TCPROS"]])
+            code, text, protocol = answer
             if code != SUCCESS or not protocol:
                 raise OSError(f"{topic}: {text}")
             _, host, port = protocol

@@ -12,6 +12,8 @@ const LATE_MS = 1000;
 export const isLate = (event) => event.isTrusted && performance.now() - event.timeStamp > LATE_MS;
 
 export class Connection {
+  onOpen; onUpdates; onChange; onPause;
+
   /** onOpen(), onUpdates(updates), onChange(): the health has changed; onPause(): this page was suspended. */
   constructor(handlers) {
     Object.assign(this, handlers);

@@ -1,5 +1,6 @@
 // Elements of the page, and changes that leave alone what is right already: selection and screen readers stay undisturbed.
 
+/** @returns {any} */
 export const element = (id) => document.getElementById(id);
 
 /** Return a new element with these properties and children, which are elements or texts. */
@@ -18,6 +19,8 @@ export const setPressed = (button, isOn) => button.setAttribute("aria-pressed", 
 
 /** Lines of a list by key: those that are new are made, those that have gone are removed, all others stay. */
 export class Lines {
+  list; makeLine; lines;
+
   /** makeLine(key) returns an object whose `line` is the element. */
   constructor(list, makeLine) {
     Object.assign(this, { list, makeLine, lines: new Map() });

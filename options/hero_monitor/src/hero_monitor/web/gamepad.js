@@ -11,6 +11,8 @@ const DEAD_ZONE = 0.15;
 const shape = (value) => (Math.abs(value) < DEAD_ZONE ? 0 : -value);
 
 export class GamepadInput {
+  panel; stop; move;
+
   /** move: choose so many robots further; 0 for all. */
   constructor({ panel, stop, move }) {
     Object.assign(this, { panel, stop, move });

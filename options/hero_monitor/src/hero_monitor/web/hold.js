@@ -19,11 +19,13 @@ export function listenToHold(button, keys, begin, end) {
 }
 
 export class HoldButton {
+  button; holdMs; mayHold; onHeld; onShort;
+
   /** mayHold(): whether a hold may begin or continue. */
   constructor(button, holdMs, { mayHold, onHeld, onShort }) {
     Object.assign(this, { button, holdMs, mayHold, onHeld, onShort });
     this.timer = null;
-    const begin = ({ isPrimary = true, button = 0 }) => isPrimary && button === 0 && this.begin();
+    const begin = (event) => event.isPrimary !== false && !event.button && this.begin();
     listenToHold(button, ["Space", "Enter"], begin, () => this.end());
     document.addEventListener("visibilitychange", () => this.end());
   }

@@ -11,7 +11,7 @@ form.addEventListener("submit", async (event) => {
   try {
     const reply = await fetch("login", {
       method: "POST",
-      body: JSON.stringify({ token: document.getElementById("token").value.trim() }),
+      body: JSON.stringify({ token: /** @type {HTMLInputElement} */ (document.getElementById("token")).value.trim() }),
     });
     if (reply.ok) {
       location.reload();

@@ -176,10 +176,11 @@ element("layers").addEventListener("click", () => {
 });
 
 // Small screens show one panel at a time.
-for (const button of document.querySelectorAll("#tabs button")) {
+const tabs = /** @type {HTMLElement[]} */ ([...document.querySelectorAll("#tabs button")]);
+for (const button of tabs) {
   button.addEventListener("click", () => {
     document.body.dataset.panel = button.dataset.panel;
-    for (const other of document.querySelectorAll("#tabs button")) setPressed(other, other === button);
+    for (const other of tabs) setPressed(other, other === button);
   });
 }
 document.body.dataset.panel = "fleet";

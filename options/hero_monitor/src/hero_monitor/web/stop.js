@@ -12,6 +12,8 @@ const HOLD_MS = 1000;
 const INERT_MS = 2000;
 
 export class StopPanel {
+  connection; endDrive; notice;
+
   constructor({ connection, endDrive, notice }) {
     Object.assign(this, { connection, endDrive, notice });
     this.pressedMs = null; // when it was pressed; null once the monitor has acknowledged that

@@ -111,8 +111,8 @@ class BehaviorNode:
         is_known = np.isfinite(poses).all(axis=1)
         may_move = is_known & np.isfinite(self.control.wanted).all(axis=0)
         self._lateness.step(time.monotonic())
-        linear_m_s, angular_rad_s = np.array(speeds) * self._lateness.find_shares(ages_s)
-        self._commands.send(linear_m_s, angular_rad_s, may_move)
+        shares = np.array(self._lateness.find_shares(ages_s))
+        self._commands.send(speeds[0] * shares, speeds[1] * shares, may_move)
         late = self._lateness.take_warning()
         if late:
             rospy.logwarn(late)

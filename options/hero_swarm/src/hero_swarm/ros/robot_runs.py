@@ -104,7 +104,7 @@ def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source:
             swarm.report_missing(missing)
             poses, ages_s = source.read()
             poses[[missing[robot.name] is not None for robot in swarm]] = np.nan
-            speeds = drive.step(poses, [robot.fresh_proximity() for robot in swarm], swarm.now_s, ages_s)
+            speeds = drive.step(poses, [robot.fresh_proximity() for robot in swarm], swarm.now_s, ages_s.tolist())
             for robot, speed in zip(swarm, speeds.T.tolist()):
                 robot.check_not_stopped()
                 if missing[robot.name] is None:

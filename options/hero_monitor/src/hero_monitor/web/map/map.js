@@ -20,6 +20,8 @@ function listCorners([x, y, yaw], [left, low, right, high]) {
 }
 
 export class FleetMap {
+  state; choose; connection;
+
   constructor(state, { choose, connection }) {
     Object.assign(this, { state, choose, connection });
     this.canvas = element("canvas");
@@ -175,7 +177,7 @@ export class FleetMap {
   /** Robots inside the loop. */
   findInLasso() {
     const loop = new Path2D();
-    for (const place of this.lasso) loop.lineTo(...place);
+    for (const place of this.lasso) loop.lineTo(place[0], place[1]);
     const context = make("canvas").getContext("2d"); // without the map's transformation
     const isInside = (pose) => pose && context.isPointInPath(loop, pose[0], pose[1], "evenodd");
     return Object.keys(this.state.poses).filter((name) => isInside(this.state.poses[name]));

@@ -5,6 +5,8 @@ import { make } from "../dom.js";
 const STATES = ["unknown", "free", "occupied"]; // as the monitor numbers them
 
 export class Occupancy {
+  key;
+
   constructor() {
     this.grid = null; // as the monitor describes it
     this.image = null;

@@ -17,6 +17,8 @@ const UNKNOWN_ALPHA = 70;
 const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
 
 export class MapPainter {
+  view; state; width; height;
+
   constructor(map) {
     this.map = map;
     this.context = map.canvas.getContext("2d");
@@ -54,7 +56,7 @@ export class MapPainter {
     for (const robot of robots) this.paintRobot(robot);
     for (const [name, pose] of Object.entries(state.replay)) this.paintBody(pose, { ink: colorOf(Number(name.split("_")[1])) });
     if (map.aim) this.paintAim(map.aim);
-    else if (map.onPlace && map.canvas.matches(":focus-visible")) this.paintAim({ from: [view.x, view.y] }); // where Enter puts it
+    else if (map.onPlace && map.canvas.matches(":focus-visible")) this.paintAim({ from: [view.x, view.y], to: null }); // where Enter puts it
     if (map.lasso) this.paintLasso(map.lasso);
     context.restore();
     if (shows.names) this.paintNames(robots);
@@ -116,7 +118,7 @@ export class MapPainter {
     const fine = steps.find((step) => step * view.scale >= 14) || 100000;
     const [left, low] = this.map.toMap(0, this.height);
     const [right, high] = this.map.toMap(this.width, 0);
-    for (const [step, ink] of [[fine, "--grid"], [fine * 10, "--grid-bold"]]) {
+    for (const { step, ink } of [{ step: fine, ink: "--grid" }, { step: fine * 10, ink: "--grid-bold" }]) {
       this.pen(this.ink(ink), 1);
       context.beginPath();
       for (let x = Math.ceil(left / step) * step; x <= right; x += step) {

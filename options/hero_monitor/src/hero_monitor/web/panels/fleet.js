@@ -57,12 +57,14 @@ function compare(a, b) {
 }
 
 export class FleetTable {
+  choose; history; isAdding;
+
   /** isAdding(): whether clicks choose robots in addition, without Shift, too. */
   constructor({ choose, history, isAdding }) {
     Object.assign(this, { choose, history, isAdding });
     this.column = COLUMNS[0];
     this.down = false;
-    this.table = document.querySelector("#fleet table");
+    this.table = /** @type {HTMLTableElement} */ (document.querySelector("#fleet table"));
     this.rows = new Lines(this.table.tBodies[0], () => this.makeRow());
     this.heads = COLUMNS.map((column) => this.makeHead(column));
     this.table.tHead.rows[0].append(...this.heads);

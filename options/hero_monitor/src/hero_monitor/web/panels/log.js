@@ -14,6 +14,8 @@ const cell = (className, text) => make("span", { className }, text);
 const isLate = (seconds, entry) => entry && seconds < entry.seconds && seconds > entry.seconds - DELAY_MAX_S;
 
 export class LogView {
+  list; level; mine; words;
+
   constructor() {
     [this.list, this.level, this.mine, this.words] = ["lines", "level", "mine", "words"].map(element);
     this.chosen = new Set();

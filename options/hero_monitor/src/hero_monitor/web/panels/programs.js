@@ -17,6 +17,8 @@ const WORDS = {
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 
 export class ProgramPanel {
+  connection; map; notice;
+
   constructor({ connection, map, notice }) {
     Object.assign(this, { connection, map, notice });
     this.names = [];

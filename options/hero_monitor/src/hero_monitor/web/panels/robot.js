@@ -21,6 +21,8 @@ const KEYS = {
 };
 
 export class RobotPanel {
+  connection; map; notice;
+
   constructor({ connection, map, notice }) {
     Object.assign(this, { connection, map, notice });
     this.names = [];
@@ -155,7 +157,7 @@ export class RobotPanel {
       this.names = names;
       this.setGoing(false);
     }
-    const chip = document.querySelector("#robot .chip");
+    const chip = /** @type {HTMLElement} */ (document.querySelector("#robot .chip"));
     chip.hidden = robot === null;
     if (robot) chip.style.background = colorOf(robot.id);
     element("name").textContent = robot ? robot.name : robots.length ? `${robots.length} robots` : "All robots";

@@ -1,0 +1,2 @@
+// What the page's scripts find without an import.
+declare const uPlot: any;
