@@ -20,7 +20,7 @@ import numpy as np
 
 from hero_client.values import NO_OBJECTS, Binary, Neighborhood, Neighbors, Objects, ObjectsInSight, Sight, Things
 from hero_node import shorten
-from hero_node.number_checks import is_number
+from hero_node.parameters import is_number
 
 from .sensors import Surroundings, is_sensor, read_sensor
 from .sensors.own import Distance, NeighborColors, Odometry, Proximity
