@@ -59,11 +59,11 @@ class Monitor:
     def __init__(self, number):
         from hero_client import Drivers
         from hero_monitor.background import Background
-        from hero_monitor.control.commander import Commander
+        from hero_monitor.control.drive_requests import DriveRequests
 
         rospy.init_node("monitor", anonymous=True, disable_signals=True)
         self.robot = "hero_%d" % number
-        self.commander = Commander(Drivers(), Background())
+        self.commander = DriveRequests(Drivers(), Background())
 
     def drive(self):
         self.commander.drive(1, self.robot, SPEED_M_S, 0.0)

@@ -85,14 +85,14 @@ def test_public_methods_have_or_inherit_a_docstring():
 
 
 def test_docstrings_name_a_thing_or_an_action():
-    private = re.compile(r"^ *\"\"\"(See|What|How|Who|Where|Let)\b.*", re.MULTILINE)
+    private = re.compile(r"^ *\"\"\"(See|What|How|Who|Where|Let|Of|Between|Whether|From)\b.*", re.MULTILINE)
     for path in [path for path in PYTHON if "test" not in path.parts]:
         found = private.search(path.read_text(encoding="utf-8"))
         assert not found, f"{sources.name_of(path)}: {found.group()}"
 
 
 def test_names_of_bounds_begin_with_min_or_max():
-    private = re.compile(r"_?(LEAST|MOST|LARGEST|LONGEST|FARTHEST|SMALLEST|SHORTEST)_[A-Z]")
+    private = re.compile(r"_?(LEAST|MOST|MAX_FLOAT|LONGEST|FARTHEST|SMALLEST|SHORTEST)_[A-Z]")
     for path in PYTHON:
         for node in ast.walk(sources.parse(path)):
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):

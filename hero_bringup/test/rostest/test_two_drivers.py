@@ -13,7 +13,7 @@ from geometry_msgs.msg import Twist
 from hero_client.ros import Drivers
 from hero_client.swarm import Swarm
 from hero_monitor.background import Background
-from hero_monitor.control.commander import Commander
+from hero_monitor.control.drive_requests import DriveRequests
 from hero_test.processes import find_pid, suspended
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.swarm_watch import SwarmWatch
@@ -106,7 +106,7 @@ class TwoDriversTest(unittest.TestCase):
     def test_4_the_stop_of_the_page_reaches_both(self):
         background = Background()
         self.addCleanup(background.shutdown)
-        commander = Commander(self.drivers, background)
+        commander = DriveRequests(self.drivers, background)
         self.wait_until_all_move()
         commander.request_stop(True)
         self.assertFalse(commander.may_drive())

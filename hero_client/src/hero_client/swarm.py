@@ -17,7 +17,7 @@ from .values.background_motion import Sleep
 from .values.errors import RobotNotReadyError
 
 POLL_PERIOD_S = 0.02
-"""Between two looks whether robots have joined."""
+"""Time between two looks whether robots have joined."""
 
 
 class Swarm(BaseSwarm[Robot]):

@@ -11,8 +11,8 @@ from hero_client.values.object_sensing import (
     OBJECT,
     ROBOT,
     Objects,
+    PlacedObjects,
     Sight,
-    Things,
     sense_objects,
     sense_sight,
 )  # fmt: skip
@@ -20,7 +20,7 @@ from hero_client.values.robot_constants import BODY_RADIUS_M
 
 
 def sense(robots, objects, sensor=None, radius_m=0.05):
-    things = Things(np.array([objects], dtype=float).reshape(1, -1, 3), np.full(len(objects), radius_m))
+    things = PlacedObjects(np.array([objects], dtype=float).reshape(1, -1, 3), np.full(len(objects), radius_m))
     return sense_sight(np.array([robots], dtype=float), things, sensor or Sight()).tolist()
 
 
@@ -49,7 +49,7 @@ def test_robots_without_a_pose_see_nothing_and_are_not_seen():
 
 
 def test_objects_are_sensed_in_the_body_frame():
-    things = Things(np.array([[(1.0, 2.0, math.pi), (5.0, 1.0, 0.0)]]), np.array([0.1, 0.2]))
+    things = PlacedObjects(np.array([[(1.0, 2.0, math.pi), (5.0, 1.0, 0.0)]]), np.array([0.1, 0.2]))
     seen = sense_objects(np.array([[(1.0, 1.0, math.pi / 2.0)]]), things, Objects(range_m=2.0))
     assert seen.seen.tolist() == [[True, False]]
     np.testing.assert_allclose((seen.forward_m[0, 0], seen.left_m[0, 0]), (1.0, 0.0), atol=1e-12)

@@ -10,7 +10,7 @@ from .peer import Peer, PeerOwner
 from .rosserial.errors import RosserialError
 from .transport.event_loop import CallLater
 
-HEARD_S = 0.5
+SILENCE_LIMIT_S = 0.5
 """A robot that has been silent for this long gets no motion commands: it would take them late, all at once. Pauses of
 0.1 s are common on Wi-Fi; motion that waits is sent when the robot sends again."""
 
@@ -52,7 +52,7 @@ class CommandSender:
         if self._owner.stopped:
             # What a thread of rospy's offered just before the stop.
             bridge.commands.queue.discard_motion(now_s)
-        stops_only = peer.wheels.readings > 0 and now_s - peer.session.last_receive_s > HEARD_S
+        stops_only = peer.wheels.readings > 0 and now_s - peer.session.last_receive_s > SILENCE_LIMIT_S
         in_flight = link.read_unacknowledged_length()
         acknowledged = link.handed_length - in_flight >= peer.motion_mark
         for name, payload in bridge.commands.queue.take(in_flight, acknowledged, stops_only, now_s):

@@ -19,8 +19,8 @@ from hero_node.parameters import (
     is_whole_number,
     make_error,
     number,
+    string,
     whole_number,
-    words,
 )
 
 from .commands.command_settings import CommandSettings
@@ -53,7 +53,7 @@ def _read_robots(name: str, value: Any) -> Tuple[Address, ...]:
 class DriverConfig(CommandSettings, CorrectionSettings, SessionLimits, AdmissionLimits):
     """All parameters of the driver."""
 
-    host: str = declare(words("0.0.0.0", "address to listen on; empty: only connect to ~robots"))
+    host: str = declare(string("0.0.0.0", "address to listen on; empty: only connect to ~robots"))
     port: int = declare(whole_number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free port"))
     robots: Tuple[Address, ...] = declare(
         Parameter((), _read_robots, "robots that are TCP servers, to connect to: a list of {host, port}")

@@ -35,7 +35,7 @@ from hero_node.ros import (
 from .config import FORMER_STOP, DriverConfig, read_config
 from .gateway import NS_PER_S, STOP_LIMIT_S, Gateway
 from .reports.reporter import FleetStatus, Reporter
-from .ros.log_relay import LogRelay, tell_of_lost_log_lines
+from .ros.log_relay import LogRelay, report_dropped_log_lines
 from .ros.rospy_internals import (
     LATEST_S,
     call_before_shutdown,
@@ -62,10 +62,10 @@ robots while the driver logged a lot, or spoke with the ROS master."""
 REPORT_CHECK_S = 0.1
 
 MASTER_CHECK_S = 0.5
-"""Between two looks for the ROS master at the start."""
+"""Time between two looks for the ROS master at the start."""
 
 MASTER_WATCH_S = 2.0
-"""Between two looks whether the ROS master still knows this node."""
+"""Time between two looks whether the ROS master still knows this node."""
 
 LEAVE_WAIT_S = 3.0
 """Time limit for unregistering at the ROS master; 50 robots take 0.5 s."""
@@ -300,7 +300,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     limit_clock()
     init_ros_node(NODE_NAME, arguments=argv)
     leave_topics_out_of_rosout()
-    tell_of_lost_log_lines()
+    report_dropped_log_lines()
 
 
 def _wait_for_master(uri: str) -> None:

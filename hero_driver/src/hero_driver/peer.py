@@ -68,7 +68,7 @@ class PeerOwner(Protocol):
     """Interface of the gateway for stops and commands, on the thread of the sockets."""
 
     stopped: bool
-    """Whether all robots are stopped until they are released."""
+    """True if all robots are stopped until they are released."""
 
     def find_peer(self, namespace: str) -> Optional[Peer]:
         """Return the connection of a robot, None if it is away."""

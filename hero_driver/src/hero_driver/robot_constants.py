@@ -28,7 +28,7 @@ SCAN_TIME_S = 0.2
 
 MIN_DISTANCE_M = 0.04
 MAX_DISTANCE_M = 2.9
-"""Of HeRo+'s VL53L1X in its medium mode, in the dark (data sheet)."""
+"""Range of HeRo+'s VL53L1X in its medium mode, in the dark (data sheet)."""
 
 DISTANCE_CONE_RAD = 0.26
 """Its field of view with the 4 x 4 detectors that the firmware uses (15 degrees, ST UM2555)."""

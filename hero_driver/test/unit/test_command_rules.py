@@ -14,7 +14,7 @@ from hero_driver.corrections.tick_odometry import MAX_GAP_S, MIN_GAP_S, TickOdom
 from hero_driver.corrections.wheel_motion import REST_TICKS, SETTLED_TICKS, WheelMotion
 from hero_driver.robot_constants import MAX_WATCHDOG_S, MAX_WHEEL_SPEED_M_S
 from hero_driver.ros import robot_commands
-from hero_driver.ros.robot_commands import LIGHT_SUFFIX, TUNING_HEARD_S, TURNS_S, RobotCommands
+from hero_driver.ros.robot_commands import LIGHT_SUFFIX, SUPERSEDED_S, TUNING_SILENCE_S, RobotCommands
 from hero_node import Pose
 
 VELOCITY, POSITION = "/hero_1/velocity_controller/cmd_vel", "/hero_1/position_controller/cmd_vel"
@@ -117,7 +117,7 @@ def test_old_commands_and_those_to_stopped_robots_move_nothing(bench):
 
 
 def test_only_two_programs_that_take_turns_are_named(bench):
-    for sender, after_s in (("/a", 0.0), ("/b", 1.0), ("/b", 1.0), ("/a", TURNS_S + 0.1), ("", 0.1), ("/b", 0.1)):
+    for sender, after_s in (("/a", 0.0), ("/b", 1.0), ("/b", 1.0), ("/a", SUPERSEDED_S + 0.1), ("", 0.1), ("/b", 0.1)):
         bench.command(twist(0.1), sender, after_s=after_s)
     assert bench.lines == []
     for sender in ("/a", "/b"):
@@ -176,7 +176,7 @@ def test_self_tuning_is_known_by_calls_and_for_a_while_by_its_log(monkeypatch):
     bench.commands.note_tuning(False)
     assert not bench.commands.tunes(bench.now_s)
     bench.commands.note_tuning(True)
-    for after_s, tunes in ((TUNING_HEARD_S - 0.1, True), (0.2, False)):
+    for after_s, tunes in ((TUNING_SILENCE_S - 0.1, True), (0.2, False)):
         bench.now_s += after_s
         assert bench.commands.tunes(bench.now_s) == tunes
     assert bench.commands.offer_request("/hero_1/set_pid", "hero_msgs/SetPID", request) is None and bench.take() == [

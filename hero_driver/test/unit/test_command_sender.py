@@ -7,7 +7,7 @@ from commanded_robot import LIGHT, MOTORS, POSITION, VELOCITY, Clock, CommandedR
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.command_sender import HEARD_S
+from hero_driver.command_sender import SILENCE_LIMIT_S
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 
 GATE_S = 0.050
@@ -83,7 +83,7 @@ def test_a_robot_that_is_not_heard_gets_stops_and_no_motion():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock)
         robot.peer.wheels.read_ticks(0.0, 0.0)
-        clock.run(HEARD_S + 0.1)
+        clock.run(SILENCE_LIMIT_S + 0.1)
         robot.drive(0.1)
         clock.run(0.2)
         assert robot.taken == []

@@ -11,17 +11,17 @@ from hero_node.parameters.declared import (
     MAX_ROBOTS_IN_RANGE,
     check_parameters,
     choice,
+    explicit_ids_option,
     flag,
-    given_ids_option,
     number,
-    parse_given_ids,
+    parse_explicit_ids,
     parse_poses,
     parse_robot_ids,
     robot_ids,
     robot_ids_option,
+    string,
     whole_number,
     within,
-    words,
 )
 
 DECLARED = {
@@ -29,7 +29,7 @@ DECLARED = {
     "port": whole_number(8088, 0, 65535, text="TCP port"),
     "control": flag(False, "whether pages may drive"),
     "view": choice("orbit", ("orbit", "top"), "of the camera"),
-    "frame": words("map", "where poses are"),
+    "frame": string("map", "where poses are"),
     "robots": robot_ids("0-2", "their ids"),
 }
 
@@ -124,10 +124,10 @@ def test_what_are_no_ids_of_robots_is_named(value, reason):
 @pytest.mark.parametrize("value", ["all", "1 x", "", "3-1"])
 def test_robots_that_nothing_looks_for_must_be_given_by_their_ids(value):
     with pytest.raises(ProgramError, match="~robots"):
-        parse_given_ids("robots", value)
+        parse_explicit_ids("robots", value)
     with pytest.raises(argparse.ArgumentTypeError, match="^it "):
-        given_ids_option(value)
-    assert parse_given_ids("robots", "0 2-3") == given_ids_option("0 2-3") == [0, 2, 3]
+        explicit_ids_option(value)
+    assert parse_explicit_ids("robots", "0 2-3") == explicit_ids_option("0 2-3") == [0, 2, 3]
 
 
 def test_numbers_of_options_lie_within_their_limits():

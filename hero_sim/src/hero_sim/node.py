@@ -33,10 +33,10 @@ MASTER_WAIT_S = 0.7
 """An unreachable master must not delay the end for longer."""
 
 DRIVER_WAIT_S = 1.0
-"""Between two looks whether this node is to end."""
+"""Time between two looks whether this node is to end."""
 
 MASTER_WATCH_S = 2.0
-"""Between two looks at the master."""
+"""Time between two looks at the master."""
 
 LINGER_S = 2.5
 """roslaunch ends all of its nodes at once; the driver takes up to 2 s to stop its robots."""

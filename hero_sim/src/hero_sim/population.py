@@ -25,7 +25,7 @@ MAX_ROBOTS = 1000
 
 _DRAWN = "drawn"
 SERVO_TIMINGS = (CORE_2, CORE_3, _DRAWN)
-"""Of all robots, or one of the two for each: which core real robots carry is not known."""
+"""Servo timing of all robots, or one of the two for each: which core real robots carry is not known."""
 
 
 def draw_seeds(options: argparse.Namespace) -> Dict[str, Any]:

@@ -3,7 +3,7 @@
 import math
 
 MAX_ID = 2**31 - 1
-"""Of hero_msgs/Robot."""
+"""Largest id of hero_msgs/Robot."""
 
 WHEEL_DIAMETER_M = 0.0492
 WHEEL_SEPARATION_M = 0.063

@@ -87,7 +87,7 @@ class GoalOutcome(NamedTuple):
 
     reached: bool
     gave_up: bool
-    """Whether it was replaced or cancelled, or the program ended; no failure of the robot."""
+    """True if it was replaced or cancelled, or the program ended; no failure of the robot."""
     reason: str
     """Why it was not reached, for users."""
     distance_m: float
@@ -126,7 +126,7 @@ class GoalQueue(ABC):
 
     @property
     def busy(self) -> bool:
-        """Whether there is a goal to drive to."""
+        """Return whether there is a goal to drive to."""
         return self._requests.unfinished_tasks > 0
 
     def put(self, request: GoalRequest) -> None:

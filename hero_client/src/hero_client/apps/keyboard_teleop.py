@@ -22,7 +22,7 @@ from .keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard
 from .teleop_output import PauseDetector, TeleopOutput
 
 PERIOD_S = 0.1
-"""Between two commands; the robot takes one every 50 ms at most."""
+"""Time between two commands; the robot takes one every 50 ms at most."""
 
 FIRST_TIMEOUT_S = 0.75
 """A single press drives for this time: a little more than the longest usual wait for the first repeat."""
@@ -31,7 +31,7 @@ REPEAT_TIMEOUT_S = 0.3
 """A held key that is silent for this time was released: several repeats, so that a hiccup of ssh does not stop."""
 
 MIN_LINEAR_M_S, LINEAR_STEP_M_S = 0.02, 0.02
-MIN_ANGULAR_RAD_S, MAX_ANGULAR_RAD_S, ANGULAR_STEP_RAD_S = 0.25, 4.0, 0.25
+MIN_KEY_ANGULAR_RAD_S, MAX_KEY_ANGULAR_RAD_S, ANGULAR_STEP_RAD_S = 0.25, 4.0, 0.25
 
 MOTIONS: Dict[str, Tuple[int, int]] = {
     "w": (1, 0),
@@ -90,7 +90,7 @@ class KeyDrive:
             self.linear_m_s = min(MAX_LINEAR_M_S, max(MIN_LINEAR_M_S, self.linear_m_s + step_m_s))
         elif key in ">.<,":
             step_rad_s = ANGULAR_STEP_RAD_S if key in ">." else -ANGULAR_STEP_RAD_S
-            self.angular_rad_s = min(MAX_ANGULAR_RAD_S, max(MIN_ANGULAR_RAD_S, self.angular_rad_s + step_rad_s))
+            self.angular_rad_s = min(MAX_KEY_ANGULAR_RAD_S, max(MIN_KEY_ANGULAR_RAD_S, self.angular_rad_s + step_rad_s))
 
     def _move(self, key: str, now_s: float) -> None:
         """Set the parts of the motion that the key gives; the other part expires on its own."""

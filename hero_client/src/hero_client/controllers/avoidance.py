@@ -71,7 +71,7 @@ class WanderLaw(NamedTuple):
     free_m: float = 0.14
     """A turn on the spot continues until all front sectors see further than this."""
     slow_m: float = 0.20
-    """From here on the robot slows down and bends away."""
+    """Distance to an obstacle from which on the robot slows down and bends away."""
 
 
 WANDER = WanderLaw()

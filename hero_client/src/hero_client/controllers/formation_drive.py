@@ -11,9 +11,9 @@ from hero_node import Pose, Velocity, clamp
 
 AHEAD_M = 0.04
 GAIN_1_S = 1.5
-MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S = 0.15, 2.5
+MAX_FORMATION_LINEAR_M_S, MAX_FORMATION_ANGULAR_RAD_S = 0.15, 2.5
 PLACE_SPEED_M_S = 0.10
-"""Of the fastest place, so that its robot can catch up."""
+"""Speed of the fastest place, so that its robot can catch up."""
 
 WAIT_FROM_M, WAIT_FULLY_M = 0.03, 0.12
 """By how far the last robot lags when the body slows down, and when it stops."""
@@ -48,8 +48,8 @@ class FormationDrive:
         for pose, target, point in zip(poses, targets, points):
             wanted = velocity + 1j * angular_rad_s * (target - middle) + GAIN_1_S * (target - point)
             wanted *= cmath.rect(1.0, -pose.yaw_rad)  # as seen from the robot
-            robot_angular_rad_s = clamp(wanted.imag / AHEAD_M, MAX_ANGULAR_RAD_S)
-            commands.append(Velocity(clamp(wanted.real, MAX_LINEAR_M_S), robot_angular_rad_s))
+            robot_angular_rad_s = clamp(wanted.imag / AHEAD_M, MAX_FORMATION_ANGULAR_RAD_S)
+            commands.append(Velocity(clamp(wanted.real, MAX_FORMATION_LINEAR_M_S), robot_angular_rad_s))
         middle += velocity * period_s
         self.pose = Pose(middle.real, middle.imag, self.pose.yaw_rad + angular_rad_s * period_s)
         return commands

@@ -23,7 +23,7 @@ from ..values.robot_constants import BODY_RADIUS_M
 _TINY = 1e-9
 
 _SLACK_HALVINGS = 12
-"""Of at most a few m/s: leaves less than a millimeter a second."""
+"""Halvings of at most a few m/s: leaves less than a millimeter a second."""
 
 
 class AvoidanceLaw(NamedTuple):
@@ -51,7 +51,7 @@ class AvoidanceLaw(NamedTuple):
 
     @property
     def radius_m(self) -> float:
-        """Of the disc around the steered point."""
+        """Radius of the disc around the steered point."""
         return self.body_m + self.lookahead_m + self.margin_m
 
     @property

@@ -1,4 +1,4 @@
-"""Whether poses that are measured from outside, such as those in map, agree with what the robot's wheels do. Pure.
+"""Checks whether poses measured from outside, such as those in map, agree with what the robot's wheels do. Pure.
 
 A robot that is steered by a wrong pose drives anywhere: a tag that is glued on upside down turns its heading by 180
 degrees, and a tag that appears twice in the image moves it to and fro. Odometry shows both within centimeters.

@@ -129,7 +129,7 @@ class SwarmGoToController:
 
 
 class _Jam:
-    """Whether one robot makes progress towards its goal."""
+    """Checks whether one robot makes progress towards its goal."""
 
     angle_rad: float
     """To the goal, at which it goes aside."""
@@ -140,7 +140,7 @@ class _Jam:
 
     @property
     def aside(self) -> bool:
-        """Whether the robot is to go aside now."""
+        """Return whether the robot is to go aside now."""
         return self._waited_s > PATIENCE_S
 
     def look(self, distance_m: float, step_s: float) -> bool:

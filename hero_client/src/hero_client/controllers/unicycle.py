@@ -95,7 +95,7 @@ class FollowLaw(NamedTuple):
     """Gains and limits of following another robot."""
 
     gap_m: float = 0.15
-    """Between the centers; two bodies touch at 0.074 m."""
+    """Distance between the centers; two bodies touch at 0.074 m."""
     linear_gain: float = 1.0
     turn_gain: float = 2.0
     max_linear_m_s: float = 0.15

@@ -12,13 +12,13 @@ from ..values.background_motion import SEND_TIME_S, BackgroundMotion, FullWait, 
 from ..values.errors import RobotNotReadyError
 
 REPEAT_PERIOD_S = 0.1
-"""Between the commands of a motion: well within the robot's watchdog of about 2 s."""
+"""Time between the commands of a motion: well within the robot's watchdog of about 2 s."""
 
 READY_TIMEOUT_S = 2.0
 """Time that a motion waits for a robot that is not ready; it takes about 0.1 s after the start of a program."""
 
 POLL_PERIOD_S = 0.02
-"""Between two checks whether a robot is ready."""
+"""Time between two checks whether a robot is ready."""
 
 ROUNDING_S = 1e-6
 """Sums of seconds are this exact."""

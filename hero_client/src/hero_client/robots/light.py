@@ -8,7 +8,7 @@ from ..values.colors import COLORS, Color, parse_color
 from ..values.robot_link import RobotLink
 
 REPEAT_PERIOD_S = 5.0
-"""Between two messages of the same color: the robot's light goes dark 15 s after the last one."""
+"""Time between two messages of the same color: the robot's light goes dark 15 s after the last one."""
 
 MIN_BLINK_PERIOD_S = 0.2
 """The robot reads commands every 51 ms."""

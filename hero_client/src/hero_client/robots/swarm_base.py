@@ -24,7 +24,7 @@ from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .robot_base import BaseRobot
 
 REPORT_PERIOD_S = 5.0
-"""Between two lines on what is waited for."""
+"""Time between two lines on what is waited for."""
 
 FIRST_REPORT_S = 3.0
 """Most robots answer within a second or two even when all starts at once: no line about those."""

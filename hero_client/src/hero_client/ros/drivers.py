@@ -139,7 +139,7 @@ class _DriverLink:
 
     @property
     def is_connected(self) -> bool:
-        """Whether a driver that has reported is still connected; it may hang all the same."""
+        """Return whether a driver that has reported is still connected; it may hang all the same."""
         with self._lock:
             if self._is_closed or self.report is None:
                 return False
@@ -234,7 +234,7 @@ class Drivers:
 
     @property
     def is_settled(self) -> bool:
-        """Whether every driver that the master knows has reported, or had the time to."""
+        """Return whether every driver that the master knows has reported, or had the time to."""
         if self._looks >= SETTLE_LOOKS:
             return True
         return self._has_found and all(link.report is not None for link in self._find_known())

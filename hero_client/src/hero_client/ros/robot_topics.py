@@ -14,7 +14,7 @@ CONNECT_S = 3.0
 waits."""
 
 POLL_PERIOD_S = 0.02
-"""Between two looks whether the driver has connected."""
+"""Time between two looks whether the driver has connected."""
 
 
 class NewestMessages:
@@ -91,7 +91,7 @@ class CommandTopic(rospy.SubscribeListener):
 
     @property
     def connected(self) -> bool:
-        """Whether anything subscribes to the topic: the driver does while it knows the robot."""
+        """Return whether anything subscribes to the topic: the driver does while it knows the robot."""
         return bool(self._publisher.get_num_connections() > 0)
 
     def publish(self, message: Any) -> None:

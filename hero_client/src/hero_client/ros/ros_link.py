@@ -94,7 +94,7 @@ class RosLink(NewestMessages, RobotLink):
 
     @property
     def connected(self) -> bool:
-        """Whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
+        """Return whether the driver subscribes to the robot's commands, as it does while it knows the robot."""
         return self._cmd_vel.connected
 
     @property

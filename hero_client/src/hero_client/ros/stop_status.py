@@ -18,7 +18,7 @@ CROSSING_S = 0.15
 NAMES_SHOWN = 20
 
 COLORS = {"info": "", "warn": "\x1b[33m", "error": "\x1b[1;31m"}
-"""Of terminals (ECMA-48): as usual, yellow, bold red."""
+"""Colors of terminals (ECMA-48): as usual, yellow, bold red."""
 
 END_COLOR = "\x1b[0m"
 
@@ -30,7 +30,7 @@ class StopStatus(NamedTuple):
     """info, warn or error."""
     text: str
     is_final: bool
-    """Whether the outcome is known; until then the request is repeated."""
+    """True if the outcome is known; until then the request is repeated."""
 
 
 Replies = Mapping[str, Optional[RobotArray]]

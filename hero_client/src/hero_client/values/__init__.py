@@ -8,8 +8,8 @@ from .object_sensing import (
     ROBOT,
     Objects,
     ObjectsInSight,
+    PlacedObjects,
     Sight,
-    Things,
     sense_objects,
     sense_sight,
 )

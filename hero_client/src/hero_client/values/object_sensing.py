@@ -15,7 +15,7 @@ NOTHING, OBJECT, ROBOT = 0, 1, 2
 """Values of a Sight."""
 
 
-class Things(NamedTuple):
+class PlacedObjects(NamedTuple):
     """The objects of W worlds.
 
     Attributes:
@@ -27,7 +27,7 @@ class Things(NamedTuple):
     radii_m: np.ndarray
 
 
-NO_OBJECTS = Things(np.empty((1, 0, 3)), np.empty(0))
+NO_OBJECTS = PlacedObjects(np.empty((1, 0, 3)), np.empty(0))
 
 
 class Sight(NamedTuple):
@@ -40,7 +40,7 @@ class Objects(NamedTuple):
     """A sensor that tells where objects are, and how they are turned."""
 
     range_m: float = math.inf
-    """Between the centers."""
+    """Distance between the centers."""
 
 
 class ObjectsInSight(NamedTuple):
@@ -60,7 +60,7 @@ class ObjectsInSight(NamedTuple):
     radii_m: np.ndarray
 
 
-def sense_sight(poses: np.ndarray, things: Things, sensor: Sight) -> np.ndarray:
+def sense_sight(poses: np.ndarray, things: PlacedObjects, sensor: Sight) -> np.ndarray:
     """Return what the beam of each robot touches first (W * N,): NOTHING, OBJECT or ROBOT."""
     robots = poses.shape[1]
     to_robots_m = _measure_gaps(poses, poses, np.full(robots, BODY_RADIUS_M))
@@ -82,7 +82,7 @@ def _measure_gaps(poses: np.ndarray, others: np.ndarray, radii_m: np.ndarray) ->
         return np.where(touched, np.maximum(ahead_m - depth_m, 0.0), np.inf)
 
 
-def sense_objects(poses: np.ndarray, things: Things, sensor: Objects) -> ObjectsInSight:
+def sense_objects(poses: np.ndarray, things: PlacedObjects, sensor: Objects) -> ObjectsInSight:
     """Return what all W * N robots sense of objects."""
     shape = poses.shape[0] * poses.shape[1], things.poses.shape[1]
     forward_m, left_m = (values.reshape(shape) for values in look_at(poses, things.poses, 0.0))

@@ -27,7 +27,7 @@ class Obstacle(NamedTuple):
     """The nearest thing that a proximity sensor sees."""
 
     range_m: float
-    """From the robot's center."""
+    """Distance from the robot's center."""
     bearing_rad: float
     """Counter-clockwise from the robot's front, -pi..pi."""
 

@@ -20,7 +20,7 @@ class RobotLink(Protocol):
 
     @property
     def connected(self) -> bool:
-        """Whether something takes the robot's commands."""
+        """Return whether something takes the robot's commands."""
 
     @property
     def model(self) -> RobotModel:
@@ -82,7 +82,7 @@ class RobotLink(Protocol):
 
     @property
     def is_stopped(self) -> bool:
-        """Whether the robot takes no motion because all robots are stopped, as far as is known now."""
+        """Return whether the robot takes no motion because all robots are stopped, as far as is known now."""
 
     def describe_stop(self) -> str:
         """Return what has stopped all robots and how to release them, for users."""

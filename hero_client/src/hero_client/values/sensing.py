@@ -28,7 +28,7 @@ class Neighbors(NamedTuple):
     """A sensor that tells where other robots are, and how they are turned."""
 
     range_m: float = math.inf
-    """Between the centers."""
+    """Distance between the centers."""
     field_rad: float = 2.0 * math.pi
     """Width of the field of view, centered on the front."""
     range_noise_m: float = 0.0
@@ -37,7 +37,7 @@ class Neighbors(NamedTuple):
     dropout: float = 0.0
     """Probability that a neighbor is missed."""
     occlusion: bool = False
-    """Whether bodies hide those behind them."""
+    """True if bodies hide those behind them."""
 
 
 class Neighbor(NamedTuple):
@@ -45,7 +45,7 @@ class Neighbor(NamedTuple):
 
     robot_id: int
     range_m: float
-    """Between the centers."""
+    """Distance between the centers."""
     bearing_rad: float
     """Counter-clockwise from the front of the robot that senses, -pi..pi."""
     heading_rad: float

@@ -17,7 +17,7 @@ BURST_STOPS = 2
 """Number of stops that a burst counts for: the robot reads it in a reading cycle of its own, as it does two stops."""
 
 INTERVAL_S = 0.025
-"""Between two stops: there is one in each reading cycle of the robot (51 ms). Those that the firmware drops, because
+"""Time between two stops: each reading cycle of the robot (51 ms) has one. Those that the firmware drops, because
 they come within 50 ms of the last one that it took, do no harm."""
 
 STOPS_UNREAD = 6
@@ -39,7 +39,7 @@ TIRED_INTERVAL_S = 1.0
 
 
 READING_S = 0.034
-"""Between two readings, by the robot's time."""
+"""Time between two readings, by the robot's time."""
 
 
 class _Mark(NamedTuple):

@@ -74,17 +74,17 @@ class VelocityShaper:
 
     @property
     def has_stop(self) -> bool:
-        """Whether a stop, or its repeat, waits to be sent."""
+        """Return whether a stop, or its repeat, waits to be sent."""
         return self._stop_pending or self._repeats_left > 0
 
     @property
     def has_motion(self) -> bool:
-        """Whether a command that is no stop waits to be sent."""
+        """Return whether a command that is no stop waits to be sent."""
         return self._newest is not None
 
     @property
     def is_idle(self) -> bool:
-        """Whether nothing waits to be sent."""
+        """Return whether nothing waits to be sent."""
         return self._newest is None and not self._stop_pending and not self._repeats_left
 
     def offer(self, payload: bytes) -> None:

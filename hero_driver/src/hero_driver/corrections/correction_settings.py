@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any, Mapping, NamedTuple, Optional, Tuple
 
 from hero_node.files import HERO_PLUS, STOCK
-from hero_node.parameters import Parameter, choice, declare, is_number, make_error, number, parse_given_ids, words
+from hero_node.parameters import Parameter, choice, declare, is_number, make_error, number, parse_explicit_ids, string
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from .robot_models import PLUS_ENCODER_MD5, PLUS_WHEELS
@@ -19,7 +19,7 @@ def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
 
 def _read_names(name: str, value: Any) -> Tuple[str, ...]:
     """Return the names of the robots with the ids in value."""
-    ids = [] if value in ("", [], ()) else parse_given_ids(name, value)
+    ids = [] if value in ("", [], ()) else parse_explicit_ids(name, value)
     return tuple("hero_%d" % robot_id for robot_id in ids)
 
 
@@ -32,7 +32,7 @@ class OwnWheels(NamedTuple):
     ticks_per_turn: Optional[float] = None
     """None: as all of its model."""
     model: str = ""
-    """Of the robot that was calibrated; empty: not known."""
+    """Model of the robot that was calibrated; empty: not known."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class CorrectionSettings:
         number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel, except HeRo+'s")
     )
     calibration_folder: str = declare(
-        words(
+        string(
             "~/hero_calibration",
             "folder of calibrate's files hero_N.yaml, whose wheels replace those above; empty: none",
         )
@@ -89,7 +89,7 @@ class CorrectionSettings:
         number(5.0, 0.1, 3600.0, "s", "stamps further in the past are replaced by the time of arrival")
     )
     own_wheels: Mapping[str, OwnWheels] = field(default_factory=dict)
-    """Of robots whose wheels were calibrated, by name, such as hero_3; from ~calibration_folder."""
+    """Wheels of robots whose wheels were calibrated, by name, such as hero_3; from ~calibration_folder."""
     calibration_problems: Mapping[str, str] = field(default_factory=dict)
     """Reasons why calibration files are not used, for users, by the robot's name."""
 

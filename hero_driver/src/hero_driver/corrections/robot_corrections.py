@@ -41,14 +41,14 @@ class Sink(Protocol):
 
     @property
     def is_wanted(self) -> bool:
-        """Whether there are subscribers."""
+        """Return whether there are subscribers."""
 
     def publish(self, payload: bytes) -> None:
         """Send payload to all subscribers."""
 
 
 class _NoSink:
-    """Of odometry before it is declared."""
+    """Sink of odometry before it is declared."""
 
     is_wanted = False
 

@@ -15,7 +15,7 @@ PLUS_WHEELS = WheelGeometry(wheel_diameter_m=0.050, wheel_separation_m=0.065, ti
 """The firmware's config.h divides the circumference by 96."""
 
 PLUS_ENCODER_MD5 = "ec5c02e99365233af779a0f9f54cb0df"
-"""Of HeRo+'s Encoder message."""
+"""Checksum of HeRo+'s Encoder message."""
 
 IMU, DISTANCE = "/imu", "/distance"
 """Topics below a robot's namespace that only one of the models declares."""

@@ -14,7 +14,7 @@ FRAMES_MAX = 32
 """Pairs of frames that one robot may use; stock robots have five."""
 
 FRAME_NAME_LENGTH_MAX = 128
-"""Of a frame, in bytes; stock robots' have below 40."""
+"""Length limit of a frame's name, bytes; stock robots' have below 40."""
 
 FRAME_NAME_SHOWN = 60
 """Characters of a refused frame's name that reports show, of up to 4 kB."""

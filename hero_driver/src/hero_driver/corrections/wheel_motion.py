@@ -1,4 +1,4 @@
-"""Whether the wheels of one robot turn, from its encoder readings, or from odometry where it has no encoder. Pure.
+"""Tells whether the wheels of a robot turn, from its encoder readings, or from odometry where it has no encoder. Pure.
 
 Rest is counted in readings (29 per second of the robot's own time), not in time of arrival: readings that a
 network held back arrive all at once. Readings behind which more wait to be read are late, and no evidence: they may be
@@ -46,7 +46,7 @@ class WheelMotion:
 
     @property
     def go_on(self) -> bool:
-        """Whether wheels turn and did not slow down by half in the last MOVES_KEPT readings."""
+        """Return whether wheels turn and did not slow down by half in the last MOVES_KEPT readings."""
         moves = list(self._moves)
         half = len(moves) // 2
         return self.still_readings < REST_READINGS and 2.0 * sum(moves[half:]) >= sum(moves[:half])

@@ -13,7 +13,7 @@ from ..peer import Peer
 from ..ros.robot_bridge import RobotBridge
 
 DUPLICATES_SHOWN = 8
-"""Of one robot, in reports: one address could fill them with hundreds."""
+"""Duplicates of one robot in reports: one address could fill them with hundreds."""
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ class LogRelay:
         self._worker.close(drain=True)
 
 
-def tell_of_lost_log_lines() -> None:
+def report_dropped_log_lines() -> None:
     """After rospy has set its logging up: say once, on stderr, what keeps lines out of the log file."""
     told: List[BaseException] = []
 

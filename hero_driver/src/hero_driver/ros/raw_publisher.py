@@ -47,12 +47,12 @@ class RawPublisher:
 
     @property
     def is_open(self) -> bool:
-        """Whether the topic is registered."""
+        """Return whether the topic is registered."""
         return self._publisher is not None
 
     @property
     def is_wanted(self) -> bool:
-        """Whether there is a subscriber."""
+        """Return whether there is a subscriber."""
         return bool(self._impl.connections)
 
     def publish(self, payload: bytes) -> None:

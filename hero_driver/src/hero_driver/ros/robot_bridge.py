@@ -1,4 +1,4 @@
-"""From a robot's declaration to a publisher, subscriber or service. ROS begins here.
+"""Turns a robot's declaration into a publisher, subscriber or service. ROS begins here.
 
     declare() -> _choose_publishers(), _subscribe() or _declare_service_half() -> Endpoints
 

@@ -13,7 +13,7 @@ from typing import Callable, Dict, Optional, Protocol
 
 from ..commands.command_queue import CommandQueue
 from ..commands.command_settings import CommandSettings
-from ..commands.commander import Commanders
+from ..commands.command_sources import CommandSources
 from ..commands.service_requests import find_request_error
 from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_twist
 from ..corrections.wheel_motion import WheelMotion
@@ -29,10 +29,10 @@ CALIBRATION_SUFFIX = "/pid_calibration"
 LIGHT_SUFFIX = "/led"
 NO_LIGHT = bytes(16)
 
-TURNS_S = 1.0
+SUPERSEDED_S = 1.0
 """A program that commands again so soon after another one has not ended; robots stop 2 s after the last command."""
 
-TUNING_HEARD_S = 1.0
+TUNING_SILENCE_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
 
 
@@ -40,7 +40,7 @@ class CommandOwner(Protocol):
     """Interface of the gateway for commands."""
 
     stopped: bool
-    """Whether all robots are stopped."""
+    """True if all robots are stopped."""
 
     def send_commands(self, namespace: str) -> None:
         """Send the commands that wait for the robot, as soon as it can take them."""
@@ -74,7 +74,7 @@ class RobotCommands:
         self._log = log
         self._settings = settings
         self._connected = False
-        self._commanders = Commanders(WheelMotion())
+        self._commanders = CommandSources(WheelMotion())
         self._subscribers: Dict[str, RawSubscriber] = {}
         self._newest_sender: object = None  # connection of the newest motion command, and the name of its node
         self._newest_node = ""
@@ -85,7 +85,7 @@ class RobotCommands:
 
     def attach(self, wheels: WheelMotion) -> None:
         """The robot is connected; wheels shows whether it moves."""
-        self._commanders = Commanders(wheels)
+        self._commanders = CommandSources(wheels)
         self.note_tuning(False)
         self._connected = True
 
@@ -153,7 +153,7 @@ class RobotCommands:
             if sender is not self._newest_sender:
                 self._change_sender(sender, now_s)
             commander = self._commanders.note_command(name, source, sender, self._newest_node, moves, now_s)
-            if not moves and (self.tunes(now_s) or self._commanders.has_more_to_stop(commander, now_s)):
+            if not moves and (self.tunes(now_s) or self._commanders.needs_another_stop(commander, now_s)):
                 self._owner.stop_robot(self._namespace)
                 return
             self.queue.offer_motion(name, command, stop_payload, now_s)
@@ -165,7 +165,7 @@ class RobotCommands:
         self._newest_sender, self._newest_node = sender, after
         if not before or not after or before == after:
             return
-        if after == self._superseded[0] and now_s - self._superseded[1] < TURNS_S:
+        if after == self._superseded[0] and now_s - self._superseded[1] < SUPERSEDED_S:
             self._log.log_throttled(
                 "warn",
                 "two programs " + self._label,
@@ -225,7 +225,7 @@ class RobotCommands:
 
     @property
     def is_commanded(self) -> bool:
-        """Whether a program has asked for motion, and not for a stop, since the last stop()."""
+        """Return whether a program has asked for motion, and not for a stop, since the last stop()."""
         return self._commanders.are_moving
 
     def watch_commanders(self, now_s: float) -> None:
@@ -250,4 +250,4 @@ class RobotCommands:
 
     def tunes(self, now_s: float) -> bool:
         """Return whether the robot tunes itself, as far as its log and the calls to its services tell."""
-        return self.was_told_to_tune or now_s - self._tuning_heard_s < TUNING_HEARD_S
+        return self.was_told_to_tune or now_s - self._tuning_heard_s < TUNING_SILENCE_S

@@ -19,14 +19,14 @@ from .packets import Bytes, PacketReader, encode_packet
 from .payloads import Log, TopicInfo
 
 REQUEST_INTERVAL_S = 1.5
-"""Between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
+"""Time between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
 
 TIME_WITHOUT_TOPICS_S = 0.2
 """Time limit for topics after a time request while nothing is declared. In a whole handshake they
 follow in the same burst (node_handle.h:301); alone it is the zero-topic handshake, cured by a new request."""
 
 REPEAT_INTERVAL_S = 0.5
-"""Between two requests for topics when a peer proves that it runs but declared nothing."""
+"""Time between two requests for topics when a peer proves that it runs but declared nothing."""
 
 UNCONFIGURED_S = 3.0
 """A robot that logs but sent neither data nor a time request for this long has lost its configuration (no answer
@@ -38,7 +38,7 @@ UNDECLARED_REPEATS = 5
 BUFFER_LENGTH_MIN = 1
 
 NAME_LENGTH_MAX = 128
-"""Of topics and types."""
+"""Length limit of names of topics and types, bytes."""
 
 # \Z, because $ would let a line break at the end through.
 _MESSAGE_TYPE = re.compile(r"[a-zA-Z][a-zA-Z0-9_]*/[a-zA-Z][a-zA-Z0-9_]*\Z")
@@ -56,7 +56,7 @@ class TopicKind(enum.Enum):
 
     @property
     def is_from_robot(self) -> bool:
-        """Whether the robot sends this id (else it receives it)."""
+        """Return whether the robot sends this id (else it receives it)."""
         return self in _FROM_ROBOT
 
 

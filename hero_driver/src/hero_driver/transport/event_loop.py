@@ -38,7 +38,7 @@ silence and repeated requests. One timer for all, because each costs a turn of t
 PAUSE_S = 1.0
 """Time from one turn of the loop to the next, s, beyond which the driver or its PC was suspended, or too busy."""
 
-LATE_S = 0.1
+LATE_TURN_S = 0.1
 """Time from one turn of the loop to the next, s, beyond which it lacks CPU: it has a timer every POLL_INTERVAL_S."""
 
 LATE_KEPT_S = 5.0
@@ -170,7 +170,7 @@ class EventLoop(LinkOwner):
         """Tell the others of a pause in which this loop did not run, before anything is read that came meanwhile."""
         ran_s, self._ran_s = self._ran_s, time.clock_gettime(time.CLOCK_BOOTTIME)
         pause_s = self._ran_s - ran_s
-        if pause_s > LATE_S:
+        if pause_s > LATE_TURN_S:
             self._late_s = max(pause_s, self.find_lateness_s())
             self._late_seen_s = time.monotonic()
         if pause_s > PAUSE_S:

@@ -152,7 +152,7 @@ class Link:
 
     @property
     def is_full(self) -> bool:
-        """Whether packets wait until the socket takes them."""
+        """Return whether packets wait until the socket takes them."""
         return bool(self._unsent)
 
     def read(self) -> bytes:

@@ -14,7 +14,7 @@ from ..texts import make_printable, one_line, shorten
 from .yaml_text import MAX_CHARACTERS
 
 MAX_DEPTH = 20
-"""Of lists and mappings within each other; an experiment has four."""
+"""Levels of lists and mappings within each other; an experiment has four."""
 
 
 class EntryError(HeroError):

@@ -19,7 +19,7 @@ ALL_ROBOTS = "all"
 MAX_ROBOTS_IN_RANGE = 1000
 
 MAX_COORDINATE_M = 1e6
-"""Of goals; the driver accepts poses within the same limit. Beyond it, sums lose precision."""
+"""Largest coordinate of goals; the driver accepts poses within the same limit. Beyond it, sums lose precision."""
 
 
 class Parameter(NamedTuple):
@@ -62,7 +62,7 @@ def choice(default: str, choices: Sequence[str], text: str = "") -> Parameter:
     return Parameter(default, check, text, choices=tuple(choices))
 
 
-def words(default: str, text: str = "") -> Parameter:
+def string(default: str, text: str = "") -> Parameter:
     """Declare a text."""
     return Parameter(default, _make_check(lambda value: isinstance(value, str), str, "a text"), text)
 
@@ -154,7 +154,7 @@ def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
     return ids
 
 
-def parse_given_ids(name: str, value: Any) -> List[int]:
+def parse_explicit_ids(name: str, value: Any) -> List[int]:
     """As parse_robot_ids(), for what looks for no robots. Raises: ProgramError for "all", too."""
     ids = parse_robot_ids(name, value)
     if ids is None:
@@ -167,9 +167,9 @@ def robot_ids_option(text: str) -> Optional[List[int]]:
     return _read_option(parse_robot_ids, text)
 
 
-def given_ids_option(text: str) -> List[int]:
+def explicit_ids_option(text: str) -> List[int]:
     """As robot_ids_option(), but "all" is refused. Raises: argparse.ArgumentTypeError."""
-    return _read_option(parse_given_ids, text)
+    return _read_option(parse_explicit_ids, text)
 
 
 def _read_option(parse: Callable[[str, Any], T], text: str) -> T:

@@ -5,16 +5,16 @@ import sys
 from numbers import Real
 from typing import Any
 
-LARGEST = sys.float_info.max
+MAX_FLOAT = sys.float_info.max
 """Larger ints cannot become floats."""
 
 
-def is_number(value: Any, low: float = -LARGEST, high: float = LARGEST) -> bool:
+def is_number(value: Any, low: float = -MAX_FLOAT, high: float = MAX_FLOAT) -> bool:
     """Return whether value is a number in low..high, and finite where no limits are given."""
     return isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high
 
 
-def is_whole_number(value: Any, low: float = -LARGEST, high: float = LARGEST) -> bool:
+def is_whole_number(value: Any, low: float = -MAX_FLOAT, high: float = MAX_FLOAT) -> bool:
     """Return whether value is an int in low..high."""
     return isinstance(value, int) and is_number(value, low, high)
 

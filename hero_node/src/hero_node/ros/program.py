@@ -72,7 +72,7 @@ class Program(Clock):
 
     @property
     def running(self) -> bool:
-        """Whether the program is to continue."""
+        """Return whether the program is to continue."""
         return not self._ending
 
     @property

@@ -149,7 +149,7 @@ class Radio:
 
     @property
     def is_carrying(self) -> bool:
-        """Whether bytes are on their way."""
+        """Return whether bytes are on their way."""
         return bool(self.up.queue or self.down.queue)
 
     def is_congested(self, now_ms: int) -> bool:

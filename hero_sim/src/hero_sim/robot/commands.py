@@ -29,7 +29,7 @@ LIGHT_US = 1000
 _TWIST = "<d32xd"  # linear.x (m/s) and angular.z (rad/s); the firmware uses no other
 
 Answer = Tuple[bool, str]
-"""Of a service: success and message."""
+"""Answer of a service: success and message."""
 
 
 class CommandTable:

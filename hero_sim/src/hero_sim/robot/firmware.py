@@ -27,29 +27,29 @@ from .sensing import Sensing
 from .servo_pins import ServoPins
 
 BOOT_MS = 518
-"""From power-on to the attempt to connect (Wi-Fi that is there at once)."""
+"""Time from power-on to the attempt to connect (Wi-Fi that is there at once)."""
 
 IMU_LOG_MS = 57
-"""From the connection to the line about the IMU (IMUSensor.ino:99)."""
+"""Time from the connection to the line about the IMU (IMUSensor.ino:99)."""
 
 WELCOME_MS = 1120
-"""From the connection to the first pass of loop(): lights of welcome (LEDStatus.ino:93-108)."""
+"""Time from the connection to the first pass of loop(): lights of welcome (LEDStatus.ino:93-108)."""
 
 SPIN_MS = 51
-"""Between two spins, configured: SYNC_RATE 20 Hz (config.h:49), 1000/20 + 1."""
+"""Time between two spins, configured: SYNC_RATE 20 Hz (config.h:49), 1000/20 + 1."""
 
 UNCONFIGURED_SPIN_MS = 101
 """The same while unconfigured: loop() waits 50 ms, and the gate passes every second time."""
 
 LOG_MS = 1001
 UNCONFIGURED_LOG_MS = 1019
-"""Between two lines "Conected at time" (ROSHandle.ino:116)."""
+"""Time between two lines "Conected at time" (ROSHandle.ino:116)."""
 
 TIME_REQUEST_MS = 2500
-"""Between two time requests (SYNC_SECONDS 5 * 500, node_handle.h)."""
+"""Time between two time requests (SYNC_SECONDS 5 * 500, node_handle.h)."""
 
 ANSWER_MS = (42, 75)
-"""From the arrival of a service call to its answer (measured)."""
+"""Time from the arrival of a service call to its answer (measured)."""
 
 _TIME_REQUEST = packets.encode_packet(packets.ID_TIME, bytes(8))
 
@@ -150,7 +150,7 @@ class Firmware:
 
     @property
     def is_on(self) -> bool:
-        """Whether the robot has power."""
+        """Return whether the robot has power."""
         return self._phase is not None
 
     def freeze(self, now_ms: int, for_ms: int) -> None:

@@ -31,7 +31,7 @@ from .servo_pins import ServoPins
 from .wheel_odometry import WheelOdometry
 
 CONTROL_MS = 21
-"""Between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
+"""Time between two runs of a controller, 47.6 Hz (VelocityControl.ino:112)."""
 
 _WHEEL_SIGNS = (-1, 1)
 """The servos are mounted as mirror images: a pulse below the center drives the left wheel forward."""

@@ -14,7 +14,7 @@ SAMPLE_MS = 50
 
 
 class Gains(NamedTuple):
-    """Of one wheel: us per unit of the error, per unit and second, and per unit a second."""
+    """Gains of one wheel: us per unit of the error, per unit and second, and per unit a second."""
 
     proportional: float
     integral: float
@@ -22,10 +22,10 @@ class Gains(NamedTuple):
 
 
 VELOCITY_GAINS = Gains(1200.0, 2300.0, 0.1)
-"""Of an erased flash; the unit is m/s."""
+"""Gains of an erased flash; the unit is m/s."""
 
 POSITION_GAINS = Gains(5.0, 9.0, 0.1)
-"""Of an erased flash; the unit is an encoder tick."""
+"""Gains of an erased flash; the unit is an encoder tick."""
 
 
 class MotorPid:

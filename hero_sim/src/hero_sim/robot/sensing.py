@@ -23,7 +23,7 @@ from .ranges import convert_to_ranges
 from .wheel_odometry import WheelOdometry
 
 CYCLE_MS = 34
-"""Between two odoms: 1000/30 + 1."""
+"""Time between two odoms: 1000/30 + 1."""
 
 LASER_GATE_MS = 200
 """/laser comes with the first cycle after more than this."""
@@ -32,7 +32,7 @@ LASER_READ_MS = 1
 """Delay of the cycle by reading the infrared sensors; with it /laser comes every 205 ms, as measured."""
 
 DISTANCE_MS = 50
-"""Between two readings of the distance sensor (tof.ino of HeRo+: continuous, every 50 ms)."""
+"""Time between two readings of the distance sensor (tof.ino of HeRo+: continuous, every 50 ms)."""
 
 BLUE_MS = 2000
 """Time that the light is blue after startup."""

@@ -38,7 +38,7 @@ REACH_M = 0.65
 """Farther than this from a robot's center nothing is looked for: it adds less than the noise of one reading."""
 
 DISTANCE_REACH_M = 4.0
-"""Of HeRo+'s VL53L1X, which shows this where it sees nothing (assumption)."""
+"""Reach of HeRo+'s VL53L1X, which shows this where it sees nothing (assumption)."""
 
 DISTANCE_NOISE_M = 0.005
 """Standard deviation of one of its readings (assumption)."""

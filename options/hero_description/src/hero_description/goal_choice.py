@@ -16,7 +16,7 @@ from geometry_msgs.msg import PointStamped, PoseStamped
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_node.parameters import Parameter, parse_given_ids
+from hero_node.parameters import Parameter, parse_explicit_ids
 from hero_node.ros import Program, read_parameters
 
 from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
@@ -98,7 +98,7 @@ class GoalChoice:
 def main() -> None:
     """Run until the node is to end."""
     with Program("goal_choice") as program:
-        robots = read_parameters({"robots": Parameter("0", parse_given_ids)})["robots"]
+        robots = read_parameters({"robots": Parameter("0", parse_explicit_ids)})["robots"]
         GoalChoice(["hero_%d" % robot_id for robot_id in robots])
         while program.sleep(10.0):
             pass

@@ -13,7 +13,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_node.parameters import Parameter, parse_given_ids
+from hero_node.parameters import Parameter, parse_explicit_ids
 from hero_node.ros import Program, read_parameters
 
 from .rviz_config import LIGHTS_TOPIC, color_of
@@ -32,7 +32,7 @@ RING_RADIUS_M = 0.045
 RING_WIDTH_M = 0.006
 RING_POINTS = 25
 REPEAT_S = 2.0
-"""Between two messages of names and rings: RViz may start at any time."""
+"""Time between two messages of names and rings: RViz may start at any time."""
 
 
 def make_marker(robot_id: int, kind: int, namespace: str, frame: str, color: ColorRGBA) -> Marker:
@@ -69,7 +69,7 @@ def make_identity(robot_id: int) -> List[Marker]:
 def main() -> None:
     """Publish names and rings again and again, and a sphere for each color."""
     with Program("hero_lights") as program:
-        robots = read_parameters({"robots": Parameter("0", parse_given_ids)})["robots"]
+        robots = read_parameters({"robots": Parameter("0", parse_explicit_ids)})["robots"]
         publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(robots) + 10)
 
         def show(color: ColorRGBA, robot_id: int) -> None:

@@ -14,7 +14,7 @@ from typing import Any, Sequence
 import rospy
 
 from hero_node import ProgramError
-from hero_node.parameters import Parameter, choice, flag, parse_given_ids
+from hero_node.parameters import Parameter, choice, flag, parse_explicit_ids
 from hero_node.ros import Program, read_parameters
 
 from .hero_plus import make_hero_plus
@@ -22,7 +22,7 @@ from .rviz_config import FRAMES, PLUS_DESCRIPTION, make_config
 
 
 def _read_ids(name: str, value: Any) -> Sequence[int]:
-    return parse_given_ids(name, value) if value not in ("", ()) else ()
+    return parse_explicit_ids(name, value) if value not in ("", ()) else ()
 
 
 def main() -> None:
@@ -35,7 +35,7 @@ def main() -> None:
     with Program("rviz", anonymous=True):
         parameters = read_parameters(
             {
-                "robots": Parameter("0", parse_given_ids),
+                "robots": Parameter("0", parse_explicit_ids),
                 "fixed_frame": "",
                 "view": choice("orbit", sorted(FRAMES)),
                 "picture": flag(False),

@@ -16,7 +16,7 @@ CHOICE_TOPIC = "/hero_choice/chosen"
 POINT_TOPIC = "/hero_choice/point"
 GOAL_TOPIC = "/hero_choice/goal"
 ABOVE_PIXELS_PER_M = 300
-"""Of the views from above: an arena of 2.2 m fits into the window."""
+"""Scale of the views from above: an arena of 2.2 m fits into the window."""
 
 PLUS_DESCRIPTION = "hero_plus_description"
 """Parameter that holds the URDF of HeRo+."""

@@ -25,13 +25,13 @@ class CameraModel(NamedTuple):
     """Errors and timing of a simulated camera; it takes an image with each reading of odometry, 29 in a second."""
 
     delay_s: float = 0.1
-    """From the image to the measured pose."""
+    """Time from the image to the measured pose."""
     bias_sd_m: float = 0.001
     bias_sd_rad: float = 0.005
-    """Of one robot always the same: calibration, and how its tag sits. In x and y each."""
+    """Error that is always the same for one robot: calibration, and how its tag sits. In x and y each."""
     noise_sd_m: float = 0.0005
     noise_sd_rad: float = 0.005
-    """Of each image anew."""
+    """Error drawn anew for each image."""
 
 
 CAMERA = CameraModel()

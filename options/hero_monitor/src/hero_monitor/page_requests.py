@@ -12,9 +12,9 @@ from hero_node import Pose
 
 from .background import Background
 from .control.client_commands import find_press, read_command
-from .control.commander import Commander
+from .control.drive_requests import DriveRequests
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
-from .control.programs import PROGRAMS_MAX, Child, Programs
+from .control.programs import PROGRAMS_MAX, ChildProcess, Programs
 from .control.requests import AGE_MAX_S, RequestError, is_fresh, read_clock_ms, read_request
 from .fleet_feed.feed import FleetFeed
 from .parameters import Parameters
@@ -52,7 +52,7 @@ class PageRequests:
         self,
         parameters: Parameters,
         feed: FleetFeed,
-        commander: Commander,
+        commander: DriveRequests,
         background: Background,
         hand_over: Callable[..., Any],
         broadcast: Callable[[], None],
@@ -209,7 +209,7 @@ class PageRequests:
         if OFFERS[program].has_frame and unknown:
             text = "%s needs the robots' places, but that of %s is unknown: start localize"
             raise RefusedError(text % (program, unknown[0]))
-        child = Child(program, robots, place_robots(values, len(robots)))
+        child = ChildProcess(program, robots, place_robots(values, len(robots)))
         for robot in robots:
             # A stop at the end of the program then finds it open.
             self._commander.prepare(robot)
@@ -219,7 +219,7 @@ class PageRequests:
     def _do_end(self, page: "PageSocket", request: Request) -> None:
         self.programs.end(request["number"])
 
-    def _stop_robots_of(self, child: Child) -> None:
+    def _stop_robots_of(self, child: ChildProcess) -> None:
         for robot in child.driven:
             self._commander.dead_man.stop(robot)
 
@@ -231,4 +231,4 @@ class PageRequests:
             if "record" not in self.programs.paths:
                 raise RefusedError("hero_recording is not installed")
             folder = Path(self._parameters.record_folder).expanduser() / time.strftime("%Y-%m-%d_%H-%M-%S")
-            self.programs.start(Child("record", folder=folder), [f"--folder={folder}"])
+            self.programs.start(ChildProcess("record", folder=folder), [f"--folder={folder}"])

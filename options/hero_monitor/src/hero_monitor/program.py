@@ -14,7 +14,7 @@ from hero_node import ProgramError, import_optional, raise_file_limit
 from hero_node.ros import Program
 
 from .background import Background
-from .control.commander import STOP_PERIOD_S, Commander
+from .control.drive_requests import STOP_PERIOD_S, DriveRequests
 from .control.offers import describe_offers
 from .control.programs import find_programs
 from .control.requests import CLOCK_PERIOD_S, read_clock_ms
@@ -31,7 +31,7 @@ LINGER_S = 10.0
 END_CHECK_PERIOD_S = 0.2
 
 UNWATCHED_S = 2.0
-"""Between two looks at the ROS master while no page is open."""
+"""Time between two looks at the ROS master while no page is open."""
 
 
 class Monitor:
@@ -51,7 +51,7 @@ class Monitor:
         self._program = program
         self._background = Background()
         self._feed = FleetFeed(parameters.map_frame, self._background)
-        self._commander = Commander(self._feed.drivers, self._background)
+        self._commander = DriveRequests(self._feed.drivers, self._background)
         self._loop = MonotonicLoop()
         self._requests = PageRequests(
             parameters,

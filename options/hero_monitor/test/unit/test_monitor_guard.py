@@ -12,7 +12,7 @@ from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_monitor.control import guard as module
 from hero_monitor.control import programs as programs_module
 from hero_monitor.control.offers import OFFERS
-from hero_monitor.control.programs import Child, Programs
+from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import MAX_GOAL_M, MAX_TEXT_LENGTH, RequestError, read_request
 from hero_monitor.fleet_feed import master_link as master_link_module
 from hero_monitor.fleet_feed.camera_picture import MAX_DISTANCE_M, CameraPicture
@@ -113,9 +113,9 @@ def test_all_programs_are_waited_for_together_at_the_end(monkeypatch):
         clock.now_s += timeout_s
 
     children = [
-        Child("random_walk", ["hero_0"], [(1.2345, -0.5)]),
-        Child("follow", ["hero_1", "hero_2"]),
-        Child("record", folder=Path("/x")),
+        ChildProcess("random_walk", ["hero_0"], [(1.2345, -0.5)]),
+        ChildProcess("follow", ["hero_1", "hero_2"]),
+        ChildProcess("record", folder=Path("/x")),
     ]
     for number, child in enumerate(children, 1):
         programs._running[number] = child

@@ -13,7 +13,7 @@ import sources
 from hero_client.apps.formations import FormationError
 from hero_monitor.control import programs as programs_module
 from hero_monitor.control.offers import BEHAVIORS, OFFERS, check_values, make_arguments, place_robots
-from hero_monitor.control.programs import Child, Programs
+from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import RequestError
 from hero_swarm.behaviors import find_behavior, list_names
 from hero_test.waiting import wait_for
@@ -113,7 +113,7 @@ class Started:
         self._is_ended.set()
 
     def start(self, code, program="random_walk", robots=("hero_0", "hero_1"), folder=None):
-        child = Child(program, robots, folder=folder)
+        child = ChildProcess(program, robots, folder=folder)
         self.programs.start(child, ["-c", code])
         return child
 
@@ -183,7 +183,7 @@ def test_why_a_program_failed_is_shown_until_another_one_starts(started):
 def test_the_end_of_the_monitor_ends_the_program(monkeypatch):
     # As the kernel does with the pipe of a monitor that was killed.
     read = wait_for_output(monkeypatch)
-    child = Child("random_walk", ["hero_0"])
+    child = ChildProcess("random_walk", ["hero_0"])
     thread = threading.Thread(target=child.run, args=([sys.executable, "-c", OBEDIENT],))
     thread.start()
     assert read() == b"runs\n"
@@ -226,7 +226,7 @@ def test_the_length_of_a_recording_counts_from_its_file_on(started, monkeypatch,
 
 
 def test_the_length_of_a_recording_ends_when_it_is_told_to(started, tmp_path):
-    recording = started.programs._running[1] = Child("record", folder=tmp_path)
+    recording = started.programs._running[1] = ChildProcess("record", folder=tmp_path)
     recording.end()
     recording.start_s -= 100.0
     recording.end_s = recording.start_s + 7.5
@@ -235,6 +235,6 @@ def test_the_length_of_a_recording_ends_when_it_is_told_to(started, tmp_path):
 
 @pytest.mark.parametrize(("program", "driven"), [("follow", ["hero_1"]), ("led_show", [])])
 def test_robots_that_a_program_does_not_drive_are_left_alone(program, driven):
-    child = Child(program, ["hero_0", "hero_1"])
+    child = ChildProcess(program, ["hero_0", "hero_1"])
     child.end()
     assert child.driven == driven

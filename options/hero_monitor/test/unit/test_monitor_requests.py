@@ -11,10 +11,10 @@ import pytest
 from hero_client.apps.formations import FormationError
 from hero_client.ros import StopStatus
 from hero_monitor import page_requests
-from hero_monitor.control import commander as commander_module
+from hero_monitor.control import drive_requests as commander_module
 from hero_monitor.control.client_commands import PRESS_GAP_MS
-from hero_monitor.control.commander import LISTENER_TIMEOUT_S, Commander
 from hero_monitor.control.dead_man import HOLD_TIMEOUT_S
+from hero_monitor.control.drive_requests import LISTENER_TIMEOUT_S, DriveRequests
 from hero_monitor.control.programs import PROGRAMS_MAX
 from hero_monitor.control.requests import AGE_MAX_S
 from hero_monitor.fleet_feed.placement import Placement
@@ -367,7 +367,7 @@ class Ros:
         monkeypatch.setattr(commander_module, "read_clock_ms", lambda: round(1e3 * self.now_s))
         drivers = SimpleNamespace(request_stop=self.requests.append, stop_status=lambda: self.status)
         background = SimpleNamespace(submit=lambda function, *arguments: self.queued.append((function, arguments)))
-        self.commander = Commander(drivers, background)
+        self.commander = DriveRequests(drivers, background)
 
     def sleep(self, duration_s):
         self.now_s += duration_s

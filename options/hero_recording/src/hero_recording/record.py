@@ -31,7 +31,7 @@ from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError
 
 CHECK_PERIOD_S = 0.5
-"""Between two checks of the disk; fifty robots fill 3 MB in that time, uncompressed."""
+"""Time between two checks of the disk; fifty robots fill 3 MB in that time, uncompressed."""
 
 SILENCE_S = 15.0
 """An empty recording is reported this long after the start."""
@@ -40,7 +40,7 @@ CLOSING_S = 10.0
 """The recorder has to close its files within this; roslaunch waits 15 s before it sends SIGTERM."""
 
 PR_SET_PDEATHSIG = 1
-"""Of prctl(2)."""
+"""Option of prctl(2)."""
 
 EMPTY_BAG_BYTES = 10000
 """A bag without messages is a header of 4 kB and at most the names of topics."""

@@ -18,7 +18,16 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values import NO_OBJECTS, Binary, Neighborhood, Neighbors, Objects, ObjectsInSight, Sight, Things
+from hero_client.values import (
+    NO_OBJECTS,
+    Binary,
+    Neighborhood,
+    Neighbors,
+    Objects,
+    ObjectsInSight,
+    PlacedObjects,
+    Sight,
+)
 from hero_node import shorten
 from hero_node.parameters import is_number
 
@@ -154,7 +163,7 @@ class Behavior:
 
 
 def sense(
-    behavior: Behavior, time_s: float, poses: np.ndarray, random: Any, things: Things = NO_OBJECTS, **around: Any
+    behavior: Behavior, time_s: float, poses: np.ndarray, random: Any, things: PlacedObjects = NO_OBJECTS, **around: Any
 ) -> Sensed:
     """Return what the sensors of a behavior tell about things and poses (W, N, 3), NaN for unknown ones.
 

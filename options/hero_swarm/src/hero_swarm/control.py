@@ -8,7 +8,7 @@ from typing import Any, Optional, Tuple
 
 import numpy as np
 
-from hero_client.values import NO_OBJECTS, Things
+from hero_client.values import NO_OBJECTS, PlacedObjects
 
 from .behavior import Behavior, Random, Sensed, decide, sense
 from .safety import SafetyFilter
@@ -44,7 +44,7 @@ class Control:
         self._steps = 0
 
     def step(
-        self, time_s: float, poses: np.ndarray, things: Things = NO_OBJECTS, ages_s: Optional[np.ndarray] = None
+        self, time_s: float, poses: np.ndarray, things: PlacedObjects = NO_OBJECTS, ages_s: Optional[np.ndarray] = None
     ) -> Tuple[np.ndarray, np.ndarray]:
         """Return linear and angular speeds of all robots (R,) at poses (W, N, 3) that are ages_s old (W, N).
 

@@ -24,7 +24,7 @@ MAX_AGE_S = 0.5
 """A robot whose pose is older is stopped."""
 
 TOLERANCE_M_S = 1e-3
-"""Of closing speeds."""
+"""Tolerance of closing speeds."""
 
 
 class SafetyFilter:

@@ -11,7 +11,7 @@ from typing import Any, Deque, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values import BODY_RADIUS_M, Things
+from hero_client.values import BODY_RADIUS_M, PlacedObjects
 from hero_node import Pose
 from hero_sim.population import place_worlds
 from hero_sim.stepped import RobotRows
@@ -126,13 +126,13 @@ class Trial:
         return self._control.memory
 
     @property
-    def things(self) -> Things:
+    def things(self) -> PlacedObjects:
         """The objects of all worlds, where they are now."""
-        return Things(self.rows.world.object_poses, self._radii_m)
+        return PlacedObjects(self.rows.world.object_poses, self._radii_m)
 
     @property
     def state(self) -> State:
-        """What metrics measure now; the behavior decides before, unless it has."""
+        """Return what metrics measure now; the behavior decides before, unless it has."""
         self._decide()
         control, radii_m = self._control, self.rows.world.errors.radius_m[: self.poses.shape[1], 0]
         of_behavior = control.sensed, control.memory, control.colors

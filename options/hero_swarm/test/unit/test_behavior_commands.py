@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values import BODY_RADIUS_M, NO_OBJECTS, Neighbors, Things
+from hero_client.values import BODY_RADIUS_M, NO_OBJECTS, Neighbors, PlacedObjects
 from hero_swarm import metrics
 from hero_swarm.behavior import PULSES, Random, derive_seed, sense
 from hero_swarm.behaviors import find_behavior, list_names
@@ -178,7 +178,7 @@ def test_opinions_are_taken_over_now_and_then_from_those_in_sight():
 
 
 def make_things(x_m, y_m, radius_m=0.1):
-    return Things(np.array([[(x_m, y_m, 0.0)]]), np.array([radius_m]))
+    return PlacedObjects(np.array([[(x_m, y_m, 0.0)]]), np.array([radius_m]))
 
 
 def test_wheels_of_object_clustering_turn_by_what_is_touched():
@@ -236,7 +236,7 @@ def test_robots_behind_a_box_line_up_from_right_to_left():
     ahead_m_s, aside_m_s = 1.5 * 0.05, -1.5 * 0.015
     assert commands == close_to((ahead_m_s, aside_m_s / 0.06), (ahead_m_s, 0.0), (ahead_m_s, 0.0))
     worlds = np.array([[(-1.0 - row_m, y_m, 0.0) for y_m in (-0.0425, 0.0425 + off_m)] for off_m in (0.0, 0.05)])
-    both = Things(np.repeat(things.poses, 2, axis=0), things.radii_m)
+    both = PlacedObjects(np.repeat(things.poses, 2, axis=0), things.radii_m)
     behavior = find_behavior("box_pushing")()
     sensed = sense(behavior, 0.0, worlds, Fixed(), both)
     assert behavior.step(sensed, None, Fixed())[2].tolist() == [True, True, False, False], "each world by itself"
@@ -264,7 +264,7 @@ def test_a_behavior_is_the_same_wherever_and_however_its_world_lies(name, turn_r
         if goal:
             goal_x_m, goal_y_m, _ = move_all(np.array((0.2, -0.3, 0.0)), turn_rad, shift_m, mirror)
             goal = {"goal_x_m": goal_x_m, "goal_y_m": goal_y_m}
-        moved = Things(move_all(things.poses, turn_rad, shift_m, mirror), things.radii_m)
+        moved = PlacedObjects(move_all(things.poses, turn_rad, shift_m, mirror), things.radii_m)
         found, _ = act(name, *move_all(poses, turn_rad, shift_m, mirror), things=moved, **goal)
         assert np.allclose(found, np.array(commands) * (1.0, mirror), atol=1e-9)
 

@@ -10,7 +10,7 @@ from hero_sim.world.arena import build_rectangle
 from hero_swarm import metrics
 from hero_swarm.behavior import Behavior, Neighbors
 from hero_swarm.experiments.starts import _place_in_circle, _place_in_grid
-from hero_swarm.learning.episode import MAX_ANGULAR_RAD_S, Episode, count_observations
+from hero_swarm.learning.episode import MAX_LEARNED_ANGULAR_RAD_S, Episode, count_observations
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial, scatter
 
@@ -204,7 +204,7 @@ def test_an_episode_rewards_what_gets_better_and_observes_shares():
     observed = episode.observe()
     assert observed.shape == (3, count_observations(2)) == (3, 18)
     poses, rows = episode._poses[0], episode._rows
-    assert observed[:, 8:10] == pytest.approx(rows.velocities / (MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S), abs=1e-6)
+    assert observed[:, 8:10] == pytest.approx(rows.velocities / (MAX_LINEAR_M_S, MAX_LEARNED_ANGULAR_RAD_S), abs=1e-6)
     assert observed[:, 10:12] == pytest.approx(poses[:, :2] / (1.0, 0.5), abs=1e-6)
     assert observed[:, 12:14] == pytest.approx(np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2]))), abs=1e-6)
     for row, pose in enumerate(poses):

@@ -44,12 +44,12 @@ class RobotRow(NamedTuple):
 
     @property
     def is_heard(self) -> bool:
-        """Whether odometry and a scan have arrived."""
+        """Return whether odometry and a scan have arrived."""
         return self.track.pose is not None and self.track.proximity_seen
 
     @property
     def moved(self) -> bool:
-        """Whether the robot has driven or turned more than noise could explain."""
+        """Return whether the robot has driven or turned more than noise could explain."""
         return self.track.distance_m >= MOVED_M or self.track.turned_rad >= MOVED_RAD
 
 

@@ -75,7 +75,7 @@ def read_fields(*arguments: str) -> List[List[str]]:
 
 
 def exists() -> bool:
-    """Whether the connection exists, up or down."""
+    """Return whether the connection exists, up or down."""
     return [CONNECTION] in read_fields("NAME", "connection", "show")
 
 

@@ -1,6 +1,6 @@
 """Documents list what programs declare."""
 
-from hero_node.parameters import choice, flag, number, robot_ids, whole_number, words
+from hero_node.parameters import choice, flag, number, robot_ids, string, whole_number
 from hero_test.parameter_list import make_list
 
 DECLARED = {
@@ -8,7 +8,7 @@ DECLARED = {
     "port": whole_number(8088, 0, 65535, text="TCP port"),
     "control": flag(False, "whether pages may drive"),
     "view": choice("orbit", ("orbit", "top"), "of the camera"),
-    "frame": words("map", "where poses are"),
+    "frame": string("map", "where poses are"),
     "robots": robot_ids("0-2", "their ids"),
 }
 
@@ -22,4 +22,4 @@ def test_a_list_says_what_is_declared():
         "- `~frame` (`map`): where poses are",
         "- `~robots` (`0-2`): their ids",
     ]
-    assert make_list({"mean": words("x", "many words " * 20)})[0].splitlines()[1].startswith("  ")
+    assert make_list({"mean": string("x", "many words " * 20)})[0].splitlines()[1].startswith("  ")

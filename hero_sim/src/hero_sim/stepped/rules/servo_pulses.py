@@ -10,7 +10,7 @@ import numpy as np
 from ...robot.clock import NEVER_MS
 from ...robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
 from ...world.world import World
-from .which import Which, assign
+from .robot_mask import RobotMask, assign
 
 _FORWARD = np.array([[-1.0], [1.0]])
 """The servos are mounted as mirror images: a pulse below the center drives the left wheel forward."""
@@ -33,7 +33,7 @@ class ServoPulses:
         self._pulses_us = np.full((2, rows), np.nan)  # nan: no pulses go out
         self._stop_at_ms = np.full(rows, NEVER_MS)
 
-    def write(self, now_ms: int, pulses_us: np.ndarray, which: Which) -> None:
+    def write(self, now_ms: int, pulses_us: np.ndarray, which: RobotMask) -> None:
         """Write pulses (2, R), limited to 1000..2000 us, to the robots which."""
         stop_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
         assign(self._stop_at_ms, stop_at_ms, which)
@@ -47,7 +47,7 @@ class ServoPulses:
             least_us, most_us = PULSE_RANGE_US
             self._world.write_pulses(rows, np.minimum(np.maximum(written_us.T, least_us), most_us))
 
-    def drive(self, now_ms: int, outputs_us: np.ndarray, which: Which) -> None:
+    def drive(self, now_ms: int, outputs_us: np.ndarray, which: RobotMask) -> None:
         """Write outputs (2, R) of a controller beyond the centers, forward positive, to the robots which."""
         self.write(now_ms, self.centers_us + _FORWARD * outputs_us, which)
 

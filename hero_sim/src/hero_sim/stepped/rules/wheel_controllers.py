@@ -11,7 +11,7 @@ import numpy as np
 from ...robot.clock import LONG_AGO_MS
 from ...robot.motor_pid import SAMPLE_MS, Gains
 from ...robot_constants import COMMAND_GAP_MS
-from .which import Which, assign, simplify
+from .robot_mask import RobotMask, assign, simplify
 
 _SAMPLE_S = SAMPLE_MS / 1000.0
 
@@ -83,11 +83,11 @@ class WheelControllers:
         for values in (self.outputs_us, self._sums_us, self._last_inputs):
             values[wheels, rows] = 0.0
 
-    def find_active(self, now_ms: int) -> Which:
+    def find_active(self, now_ms: int) -> RobotMask:
         """Return which controllers run."""
         return now_ms < self._all_end_ms or self._watchdog_ms > now_ms - self._timeout_ms
 
-    def run(self, now_ms: int, measured: np.ndarray, active: Which) -> None:
+    def run(self, now_ms: int, measured: np.ndarray, active: RobotMask) -> None:
         """Compute new outputs from what was measured (2, R), for those active robots for whom it is time."""
         if now_ms < self._due_ms:
             return

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
 from ...world.world import World
-from .which import Which, choose
+from .robot_mask import RobotMask, choose
 
 
 class WheelEncoders:
@@ -41,7 +41,7 @@ class WheelEncoders:
         travels_m -= self._base_ticks
         return travels_m
 
-    def read(self, now_ms: int, which: Which) -> None:
+    def read(self, now_ms: int, which: RobotMask) -> None:
         """Read the counters and update the filtered speeds of the robots which."""
         ticks = self.count(now_ms)
         speeds_m_s = ticks - self.ticks

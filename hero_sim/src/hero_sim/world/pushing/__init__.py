@@ -1,1 +1,1 @@
-"""Things that robots can push: their shapes, where these touch, and how they move. Pure."""
+"""PlacedObjects that robots can push: their shapes, where these touch, and how they move. Pure."""

@@ -16,7 +16,7 @@ MAX_PUSH_N = 0.77
 """Traction of a robot: 0.156 kg at an assumed friction of 0.5 with the floor."""
 
 CONTACT_FRICTION = 0.3
-"""Between a robot or a wall and a body, and between bodies (plastic on cardboard)."""
+"""Coefficient of friction between a robot or a wall and a body, and between bodies (plastic on cardboard)."""
 
 MARGIN_M = 0.004
 """Bodies nearer than this may come to touch in the step: more than the fastest robot moves."""
@@ -28,7 +28,7 @@ SLIPS = 8
 """Halvings of the limit of a robot's pressure before all are taken to be too weak."""
 
 COMPLIANCE = 0.002
-"""Of a contact with a robot, as a share of the body's own: how robots that press side by side share the force."""
+"""Compliance of contacts with robots, as a share of the body's own: how robots side by side share the force."""
 
 Place = Sequence[float]
 """x m, y m."""

@@ -24,7 +24,7 @@ AIM_DEAD_ZONE_US = 25.0
 """Usual half of a dead zone, for the estimate of a center before the sweep."""
 
 MAX_AIM_US = 60.0
-"""Of an estimated center: a servo that is further off is refused."""
+"""Error of an estimated center: a servo that is further off is refused."""
 
 STEP_US = 6
 PULSE_S = 0.45
@@ -45,7 +45,7 @@ DROPPED_S = 0.1
 
 MIN_READINGS = 2
 MISSING_SHARE = 0.5
-"""Of the steps; with the simulated Wi-Fi of a PC that is the access point a third is missing."""
+"""Share of the steps; with the simulated Wi-Fi of a PC that is the access point a third is missing."""
 
 REST_M_S = 0.004
 """A slower wheel is at rest: two ticks (1.1 mm) in a step may be the servo that settles."""

@@ -21,7 +21,7 @@ FRONT = 4
 """Sensors are numbered counter-clockwise from the rear."""
 
 WALL_M = 0.10
-"""From the body to the wall."""
+"""Distance from the body to the wall."""
 
 NOMINAL_COUNTS_M2 = 0.42
 NEAR_COUNTS = 16.0

@@ -180,7 +180,7 @@ class GainSearch:
 
     @property
     def has_best(self) -> bool:
-        """Whether a response was received."""
+        """Return whether a response was received."""
         return bool(self._tried)
 
     def best(self) -> Tuple[Gains, Response]:

@@ -51,7 +51,7 @@ class Leg(NamedTuple):
     """Motion of a robot from one stop to the next."""
 
     ticks: np.ndarray
-    """Of the left and the right wheel, (K, 2)."""
+    """Ticks of the left and the right wheel, (K, 2)."""
     moved: Pose
     """Measured: from the first stop to the second, in the robot's frame at the first."""
     sd: Tuple[float, float, float] = CAMERA_SD

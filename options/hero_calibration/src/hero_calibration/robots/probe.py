@@ -151,7 +151,7 @@ class Probe(ABC):
 
     @abstractmethod
     def write(self, key: str, values: List[float]) -> None:
-        """Write one of SETTINGS of hero_node.calibration_file to the robot's flash; wait until it is there.
+        """Write one of SETTINGS of hero_node.files.calibration_file to the robot's flash; wait until it is there.
 
         Raises: CalibrationError with the reason if it fails.
         """

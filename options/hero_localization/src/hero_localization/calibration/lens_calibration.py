@@ -23,7 +23,7 @@ OUTLIER = 3.0
 """An image whose error is this many times the median is left out: blurred, or a bent board."""
 
 GOOD_FOCAL_ERROR = 0.003
-"""Of the focal length, standard deviation. The arena's calibration takes most of it up, by the camera's height."""
+"""Standard deviation of the focal length. The arena's calibration takes most of it up, by the camera's height."""
 
 TILTED_RAD = 0.25
 MIN_TILTED = 4

@@ -18,14 +18,14 @@ SAMPLES = 4
 """Along each side of a pixel."""
 CELL_TEXELS = 16
 MARGIN_CELLS = 2
-"""Of white around the print, of which SEEN_CELLS are compared."""
+"""Margin of white around the print, of which SEEN_CELLS are compared."""
 SEEN_CELLS = 0.7
 
 ROUNDS, MIN_GAIN = 20, 1e-4
 FIRST_BLUR_PX = 0.8
 STEPS = np.array((0.002, 0.02, 0.5, 0.5, 0.02))
 LOW, HIGH = np.array((0.9, 0.3, 1.0, 30.0, 0.4)), np.array((1.1, 4.0, 200.0, 255.0, 4.0))
-"""Of what is fitted: scale, blur (px), shades of black and white (of 255), gamma."""
+"""Limits of what is fitted: scale, blur (px), shades of black and white (of 255), gamma."""
 
 
 def refine_corners(gray: np.ndarray, tags: Sequence[TagCorners], family: str) -> List[TagCorners]:

@@ -30,7 +30,7 @@ MIN_POSES = 40
 MIN_TURN_RAD = 4.0
 MIN_DRIVE_M = 0.08
 DELAYS_S = (-0.1, 0.5)
-"""Of the stamps, that are looked for."""
+"""Delays of the stamps that are looked for."""
 
 GOOD_RMS_M = 0.002
 GOOD_DELAY_S = 0.005

@@ -14,7 +14,7 @@ from hero_node import shorten
 from ..errors import CalibrationError
 
 MAX_SIZE_PX = 20_000
-"""Of an image's width and height; cameras have up to 12,000."""
+"""Limit of an image's width and height; cameras have up to 12,000."""
 
 _MAX_ROUNDS = 50
 _ROUNDING = 1e-10

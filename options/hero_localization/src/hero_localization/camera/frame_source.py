@@ -39,7 +39,7 @@ MAX_FAILURES, HANG_S = 4, 1.0
 """Reads in a row without a whole image, or time of one read, that end a camera; a cable damages some images."""
 
 MIN_BACKOFF_S, MAX_BACKOFF_S = 0.5, 8.0
-"""Between two attempts to open a camera that ended."""
+"""Time between two attempts to open a camera that ended."""
 
 READ_BYTES = 2**20
 """At once: of an image in smaller parts, each costs a turn of the interpreter; a larger buffer costs page faults."""
@@ -53,7 +53,7 @@ class Frame(NamedTuple):
     gray: np.ndarray
     """(H, W), 8 bit."""
     number: int
-    """Of the source's images: gaps are those that did not get here."""
+    """Number among the source's images: gaps are those that did not get here."""
 
 
 class FrameSource:

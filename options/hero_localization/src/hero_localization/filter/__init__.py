@@ -1,1 +1,1 @@
-"""From odometry and measured poses to the poses of all robots in one frame."""
+"""Turns odometry and measured poses into the poses of all robots in one frame."""

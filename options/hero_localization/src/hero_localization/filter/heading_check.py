@@ -1,4 +1,4 @@
-"""Whether a tag's heading is its robot's: where it goes by the camera when it drives forward by its odometry. Pure."""
+"""Checks tags' headings: where a robot goes by the camera when it drives forward by its odometry. Pure."""
 
 import math
 from collections import deque

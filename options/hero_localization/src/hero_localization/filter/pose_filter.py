@@ -20,7 +20,7 @@ from .odometry_history import KEPT_S, OdometryHistory
 from .pose_hypothesis import Hypothesis, StampedPose
 
 SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
-"""Of measured poses (standard deviations in x, y, and of yaw), what stays however many are joined: calibration."""
+"""Errors of calibration in measured poses (standard deviations in x, y, and of yaw), however many are joined."""
 
 SYSTEMATIC = np.array((SYSTEMATIC_M**2, SYSTEMATIC_M**2, SYSTEMATIC_RAD**2))
 
@@ -40,7 +40,7 @@ class Outcome(enum.Enum):
     """Outcome of a measured pose."""
 
     FIRST = "first"
-    """Of the robot, or the first true one: the estimate had begun with a wrong pose."""
+    """First pose of the robot, or the first true one: the estimate had begun with a wrong pose."""
     USED = "used"
     WAITING = "waiting"
     """For odometry of its time."""

@@ -61,7 +61,7 @@ class StampedPose(NamedTuple):
     stamp_s: float
     pose: Pose
     covariance: np.ndarray
-    """Of x, y and yaw, (3, 3), m and rad."""
+    """Covariance of x, y and yaw, (3, 3), m and rad."""
     source: str = ""
     """Topic and node that a measured pose came from; empty if unknown."""
 
@@ -74,7 +74,7 @@ class _Step(NamedTuple):
     """At that time."""
     measurement: Optional[StampedPose]
     is_blocked: bool = False
-    """Whether the wheels slip in place, as at a wall: odometry then does not predict the motion."""
+    """True if the wheels slip in place, as at a wall: odometry then does not predict the motion."""
 
 
 class Hypothesis:

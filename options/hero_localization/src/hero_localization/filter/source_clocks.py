@@ -16,10 +16,10 @@ from .odometry_history import KEPT_S, OdometryHistory
 from .pose_hypothesis import StampedPose
 
 SPAN_S = 0.3
-"""Between two poses of a source that are compared."""
+"""Time between two poses of a source that are compared."""
 
 MAX_POSES = 8
-"""Of a robot and a source that wait for odometry."""
+"""Poses of a robot and a source that wait for odometry."""
 
 PAIRS_HZ = 50.0
 """Comparisons in a second, of all robots: each takes 0.2 ms."""

@@ -64,7 +64,7 @@ class LocalizedRobot(NamedTuple):
     state: RobotState
     estimate: Optional[StampedPose]
     odom_origin: Optional[Pose]
-    """Of the frame hero_N/odom in map."""
+    """Pose of the frame hero_N/odom in map."""
     problem: str
     """Problem as text; empty if there is none."""
 

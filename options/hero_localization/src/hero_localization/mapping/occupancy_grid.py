@@ -18,7 +18,7 @@ CONE_RAD = 0.21
 """Half of what a sensor sees (assumed, as in the simulator)."""
 
 REACH_M = 0.20
-"""Of a range, from the robot's center: weak echoes beyond are noise."""
+"""Reach of a range, from the robot's center: weak echoes beyond are noise."""
 
 FREE_REACH_M = 0.15
 """Up to here nothing in range means free; an obstacle at an angle may not be detected from further away."""

@@ -24,10 +24,10 @@ _POSE = struct.Struct("<7d")
 
 MAX_FIELD_M = 100.0
 QUATERNION_TOLERANCE = 0.01
-"""Of the square of a quaternion's length, 1: as tf has it."""
+"""Error of the square of a quaternion's length, 1: as tf has it."""
 
 MIN_UPRIGHT = 0.7
-"""Of the robot's axis, the part that points up: 45 degrees."""
+"""Part of the robot's axis that points up: 45 degrees."""
 
 RISE_M, STILL_M = 0.15, 0.02
 """A robot that comes this far up or down, but not even the second along y, drives where y points up."""

@@ -15,7 +15,7 @@ from hero_client.ros import share_drivers
 from hero_client.values import is_plausible
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
-from hero_node.parameters import flag, number, robot_ids, words
+from hero_node.parameters import flag, number, robot_ids, string
 
 from ..filter.pose_filter import make_covariance
 from ..filter.pose_hypothesis import StampedPose
@@ -28,7 +28,7 @@ UNKNOWN_S = 3.0
 """Time for which the tag of an unknown robot is named after it was seen."""
 
 MAX_SD = 1e3
-"""Of a position (m) or heading (rad); a larger one is invalid."""
+"""Largest standard deviation of a position (m) or heading (rad); a larger one is invalid."""
 
 
 class LocalizationNode:
@@ -131,13 +131,13 @@ SD_TEXT = "standard deviation, in x and y each, of poses that come without covar
 
 PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those of all drivers"),
-    "frame": words("map", "the common frame"),
-    "pose_topic": words(
+    "frame": string("map", "the common frame"),
+    "pose_topic": string(
         "/hero_{id}/measured_pose",
         "poses of one robot from elsewhere: geometry_msgs/PoseStamped, PoseWithCovarianceStamped, or nav_msgs/Odometry",
     ),
-    "pose_frame": words("", "name of `~frame` in these poses, such as world; empty: the same"),
-    "swarm_topic": words("/track/measured_poses", "hero_msgs/RobotPoses of `track`"),
+    "pose_frame": string("", "name of `~frame` in these poses, such as world; empty: the same"),
+    "swarm_topic": string("/track/measured_poses", "hero_msgs/RobotPoses of `track`"),
     "position_sd_m": number(0.002, 1e-5, 1.0, "m", SD_TEXT),
     "heading_sd_rad": number(0.01, 1e-5, 10.0, "rad", "the same of their yaw"),
     "correct_clocks": flag(True, "stamps of measured poses that are 10 ms off odometry's, or more, are corrected"),

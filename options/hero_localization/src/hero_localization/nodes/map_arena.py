@@ -24,7 +24,7 @@ from hero_client import Program, ProgramError, read_parameters
 from hero_client.values import front_first, is_plausible, read_ranges
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
-from hero_node.parameters import number, words
+from hero_node.parameters import number, string
 
 from ..mapping.map_files import save_map
 from ..mapping.occupancy_grid import BEAMS, OccupancyGrid
@@ -130,10 +130,10 @@ def _make_grid(bounds: Any, cell_m: float) -> OccupancyGrid:
 
 
 PARAMETERS = {
-    "bounds_m": words("-1.1 -1.1 1.1 1.1", "x min, y min, x max, y max"),
+    "bounds_m": string("-1.1 -1.1 1.1 1.1", "x min, y min, x max, y max"),
     "cell_m": number(0.01, 0.005, 0.1, "m", "side of a cell"),
-    "poses_topic": words("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
-    "file": words(
+    "poses_topic": string("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
+    "file": string(
         "~/hero_maps/arena.yaml",
         "written by the service `~save`, with an image: map_server reads it, and `hero_sim arena:=FILE`",
     ),

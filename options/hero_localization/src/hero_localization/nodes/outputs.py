@@ -17,7 +17,7 @@ from ..filter.source_clocks import Clock
 from ..filter.swarm_localizer import LocalizedRobot
 
 IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
-"""Of the entries of a covariance (x, y, z, and rotations about them), those of x, y and yaw."""
+"""Indices in a covariance (x, y, z, and rotations about them) of x, y and yaw."""
 
 
 class Outputs:

@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from hero_client import Program, read_parameters
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
 from hero_node import Pose
-from hero_node.parameters import number, words
+from hero_node.parameters import number, string
 
 from ..camera.frame_source import Frame, open_source
 from ..errors import DetectorError, LocalizationError
@@ -30,7 +30,7 @@ SILENT_S = 2.0
 DIAGNOSTICS_PERIOD_S = 1.0
 WAIT_S = 0.1
 LOG_PERIOD_S = 30.0
-"""Between two lines on one problem."""
+"""Time between two lines on one problem."""
 
 
 class TrackNode:
@@ -159,15 +159,15 @@ class TrackNode:
 
 
 PARAMETERS = {
-    "image": words(
+    "image": string(
         "camera/image_raw", "sensor_msgs/Image or CompressedImage (`.../compressed`), with its camera_info beside it"
     ),
-    "device": words("", "instead: a V4L2 device such as `/dev/video0`, the URL of a network camera, or a video file"),
-    "size_px": words("1920x1080", "of the images of a device"),
+    "device": string("", "instead: a V4L2 device such as `/dev/video0`, the URL of a network camera, or a video file"),
+    "size_px": string("1920x1080", "of the images of a device"),
     "rate_hz": number(30.0, 1.0, 240.0, "Hz", "of a device"),
-    "file": words(camera_file.DEFAULT_PATH, "[camera file](#camera-file)"),
-    "frame": words("map", "the common frame"),
-    "poses_topic": words("/localization/poses", "where robots are expected: windows of an image are searched first"),
+    "file": string(camera_file.DEFAULT_PATH, "[camera file](#camera-file)"),
+    "frame": string("map", "the common frame"),
+    "poses_topic": string("/localization/poses", "where robots are expected: windows of an image are searched first"),
 }
 
 

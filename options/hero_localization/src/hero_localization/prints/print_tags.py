@@ -12,7 +12,7 @@ import numpy as np
 
 from hero_node import import_optional
 from hero_node.files import replace_file
-from hero_node.parameters import given_ids_option
+from hero_node.parameters import explicit_ids_option
 
 from ..errors import LocalizationError
 from .tag_images import DEFAULT_SIZE_M, FAMILIES, REFERENCE_SIZE_M, draw_tag
@@ -53,9 +53,9 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="print_tags", description="Make a PDF with tags of true size.")
     text = "discs for robots, e.g. '0 1 2' or 0-9"
-    parser.add_argument("--robots", type=given_ids_option, default=(), metavar="IDS", help=text)
+    parser.add_argument("--robots", type=explicit_ids_option, default=(), metavar="IDS", help=text)
     text = "squares for the floor, e.g. 100-103"
-    parser.add_argument("--references", type=given_ids_option, default=(), metavar="IDS", help=text)
+    parser.add_argument("--references", type=explicit_ids_option, default=(), metavar="IDS", help=text)
     text = "family of the tags: 36h11 (default), or 16h5 as in the stock suite"
     parser.add_argument("--family", choices=sorted(FAMILIES), default="36h11", help=text)
     text = "side of the black square on robots, mm (%(default)g)"

@@ -27,7 +27,7 @@ class Family(NamedTuple):
     cells: int
     size: int
     begins_white: bool
-    """Whether the upper left cell within the border of tag 0 is white; its lower right one is the opposite."""
+    """True if the upper left cell within the border of tag 0 is white; its lower right one is the opposite."""
 
 
 FAMILIES: Dict[str, Family] = {

@@ -114,7 +114,7 @@ class RobotScene:
 
     @property
     def is_complete(self) -> bool:
-        """Whether the simulator has told where each robot is."""
+        """Return whether the simulator has told where each robot is."""
         return len(self._true.find(0.0)[0]) == len(self._ids)
 
     def render(self, taken_s: float) -> np.ndarray:

@@ -15,10 +15,10 @@ from .view import CameraOptions, PrintedTag, tag_corners
 
 REFERENCES = 4
 FIRST_REFERENCE_ID = 100
-"""Of families that have this many tags; otherwise the last ones are reference tags."""
+"""First reference tag of families that have this many tags; otherwise the last ones are reference tags."""
 
 REFERENCE_GAP_M = 0.12
-"""Between the arena's bounds and the centers of the reference tags beside it."""
+"""Distance between the arena's bounds and the centers of the reference tags beside it."""
 
 TAG_HEIGHT_M = PrintedTag(0).height_m
 

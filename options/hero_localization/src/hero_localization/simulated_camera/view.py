@@ -43,7 +43,7 @@ class CameraOptions(NamedTuple):
     exposure_s: float = 0.008
     rate_hz: float = 30.0
     delay_s: float = 0.07
-    """From the middle of the exposure to the image's arrival."""
+    """Time from the middle of the exposure to the image's arrival."""
     delay_jitter_s: float = 0.01
     """Images are late by up to this much more."""
     dropped_share: float = 0.02

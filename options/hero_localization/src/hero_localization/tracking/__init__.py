@@ -1,1 +1,1 @@
-"""From images to poses of robots, objects and reference tags in `map`."""
+"""Turns images into poses of robots, objects and reference tags in `map`."""

@@ -16,7 +16,7 @@ STEP_PX = 8
 """Pixels are found in such steps, with those between on a line: all of them would hold up the tracker."""
 
 MAX_REACH = 3.0
-"""Of the view to each side of the camera, in heights of the camera: a tilted camera sees to the horizon."""
+"""Reach of the view to each side of the camera, in heights of the camera: a tilted camera sees to the horizon."""
 
 _BORDER_POINTS = 17
 

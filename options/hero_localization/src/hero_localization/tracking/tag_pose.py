@@ -1,4 +1,4 @@
-"""From corners in an image to poses in `map`: of robots, objects and reference tags. Pure.
+"""Turns corners in an image into poses in `map`: of robots, objects and reference tags. Pure.
 
 The corners' rays are cut with the plane in which the tag lies, whose height is known. The pose of a single tag from its
 own perspective would need no height, but of a small tag seen from above it is ten times worse, and flips.

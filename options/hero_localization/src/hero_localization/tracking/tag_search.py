@@ -40,7 +40,7 @@ STEADY_S = 1.0
 RIM_SIDES = 1.5
 
 FINE_COST = 2.5
-"""Of the fine detector, by that of the other one, for as many pixels."""
+"""Cost of the fine detector, by that of the other one, for as many pixels."""
 
 MAX_STEP_S = 0.2
 """A longer gap between frames counts as this long, or all tiles would be searched at once."""
@@ -50,7 +50,7 @@ KEPT_S = 1.0
 
 TILE_PX = (480, 360)
 OVERLAP_PX = 96
-"""Of neighboring tiles: a tag on their border, with its white margin, lies wholly in one of them."""
+"""Overlap of neighboring tiles: a tag on their border, with its white margin, lies wholly in one of them."""
 
 WINDOW_SIDES = 0.9
 """Half a window's side, in sides of the tag: half its diagonal, and its white margin."""

@@ -1,4 +1,4 @@
-"""From the images of one camera to poses in `map`, and what is wrong with camera and tags. Pure."""
+"""Turns the images of one camera into poses in `map`, and what is wrong with camera and tags. Pure."""
 
 import math
 from collections import deque
@@ -34,10 +34,10 @@ MISSING_S = 5.0
 """A hand that covers a reference tag goes away sooner."""
 
 MIN_USED_SHARE = 0.8
-"""Of the images; tags that are searched less often move further between two searches."""
+"""Share of the images; tags that are searched less often move further between two searches."""
 
 MIN_SIDE_PX = 14.0
-"""Of a tag's side; one cell of 36h11 is an eighth of it."""
+"""Length of a tag's side; one cell of 36h11 is an eighth of it."""
 
 MARGIN_PX = 40.0
 """A tag that is expected nearer to the border than this need not be seen."""
@@ -53,7 +53,7 @@ class Problem(NamedTuple):
     """Its subject: camera, or "tag 17"."""
     text: str
     is_error: bool
-    """Whether poses are missing or wrong because of it."""
+    """True if poses are missing or wrong because of it."""
 
 
 class Tracker:

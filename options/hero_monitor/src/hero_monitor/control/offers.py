@@ -12,7 +12,7 @@ from hero_node.parameters import Parameter, choice, flag, number, whole_number
 from .requests import MAX_GOAL_M, RequestError
 
 
-class Offer(NamedTuple):
+class ProgramDescription(NamedTuple):
     """A program of a package."""
 
     package: str
@@ -69,13 +69,13 @@ BEHAVIORS: Dict[str, Dict[str, Parameter]] = {
 _SAFETY = choice("fence and robots", ("off", "fence and robots"))
 
 _PLACE = {"turn_deg": number(0.0, -360.0, 360.0, "deg"), "x_m": _COORDINATE, "y_m": _COORDINATE}
-"""Of a formation: a click on the map sets it."""
+"""Parameters of a formation: a click on the map sets it."""
 
 _BEHAVIOR_TITLES = {"formation": "formation by distances"}
 """Titles other than the name without underscores."""
 
 OFFERS = {
-    "swarm_go_to": Offer(
+    "swarm_go_to": ProgramDescription(
         "hero_examples",
         "swarm_go_to",
         "formation",
@@ -87,14 +87,14 @@ OFFERS = {
         },
         has_frame=True,
     ),
-    "go_to_goal": Offer("hero_examples", "go_to_goal", "take goals from the map", {"avoid": flag(False)}),
-    "random_walk": Offer(
+    "go_to_goal": ProgramDescription("hero_examples", "go_to_goal", "take goals from the map", {"avoid": flag(False)}),
+    "random_walk": ProgramDescription(
         "hero_examples",
         "random_walk",
         "random walk",
         {"linear_m_s": _SPEED._replace(default=0.1), "angular_rad_s": number(1.5, 0.1, 4.0, "rad/s")},
     ),
-    "follow": Offer(
+    "follow": ProgramDescription(
         "hero_examples",
         "follow",
         "follow the first one",
@@ -102,7 +102,7 @@ OFFERS = {
         has_frame=True,
         drives=slice(1, None),
     ),
-    "led_show": Offer(
+    "led_show": ProgramDescription(
         "hero_examples",
         "led_show",
         "light show",
@@ -114,7 +114,7 @@ OFFERS = {
         drives=slice(0, 0),
     ),
     **{
-        "behavior_" + name: Offer(
+        "behavior_" + name: ProgramDescription(
             "hero_swarm",
             "behavior",
             _BEHAVIOR_TITLES.get(name, name.replace("_", " ")),

@@ -34,10 +34,10 @@ USUAL_PATIENCE_S = 3.0
 """Stopping robots takes about 0.2 s."""
 
 SIZE_PERIOD_S = 1.0
-"""Between two looks at the size of a recording."""
+"""Time between two looks at the size of a recording."""
 
 LAST_BYTES = 2000
-"""Of what a program has printed: the end tells why it failed."""
+"""End of what a program has printed: the end tells why it failed."""
 
 
 def find_programs() -> Dict[str, str]:
@@ -51,7 +51,7 @@ def find_programs() -> Dict[str, str]:
     return {name: found[program] for name, program in wanted.items() if found.get(program)}
 
 
-class Child:
+class ChildProcess:
     """One program, from its start to its end."""
 
     def __init__(
@@ -124,14 +124,14 @@ def measure(folder: Path) -> int:
 class Programs:
     """All of them. To be used by one thread; its methods return at once, but for close()."""
 
-    def __init__(self, node_name: str, hand_over: Callable[..., Any], on_end: Callable[[Child], None]) -> None:
+    def __init__(self, node_name: str, hand_over: Callable[..., Any], on_end: Callable[[ChildProcess], None]) -> None:
         """node_name: of the monitor; theirs begin with it. hand_over: calls a function on the thread of this object."""
         self._node_name, self._hand_over, self._on_end = node_name.strip("/"), hand_over, on_end
         self._numbers = itertools.count(1)
-        self._running: Dict[int, Child] = {}
-        self._failed: Dict[int, Child] = {}
+        self._running: Dict[int, ChildProcess] = {}
+        self._failed: Dict[int, ChildProcess] = {}
         self.paths: Dict[str, str] = {}
-        """Of the programs that are installed."""
+        """Paths of the programs that are installed."""
 
     @property
     def count(self) -> int:
@@ -145,11 +145,11 @@ class Programs:
                 return f"{child.title} drives {robot}: end it first"
         return ""
 
-    def find_recording(self) -> Optional[Child]:
+    def find_recording(self) -> Optional[ChildProcess]:
         """Return the recording, None without one."""
         return next((child for child in self._running.values() if child.folder is not None), None)
 
-    def start(self, child: Child, arguments: Sequence[str]) -> None:
+    def start(self, child: ChildProcess, arguments: Sequence[str]) -> None:
         """Start a program."""
         number = next(self._numbers)
         self._running[number] = child
@@ -159,7 +159,7 @@ class Programs:
         child.thread = threading.Thread(target=self._run, args=(number, child, command), daemon=True)
         child.thread.start()
 
-    def _run(self, number: int, child: Child, command: Sequence[str]) -> None:
+    def _run(self, number: int, child: ChildProcess, command: Sequence[str]) -> None:
         try:
             child.run(command)
         except OSError as error:

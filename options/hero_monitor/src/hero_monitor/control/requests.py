@@ -22,10 +22,10 @@ MAX_TEXT_LENGTH = 16000
 MAX_GOAL_M = 1000.0
 
 CLOCK_PERIOD_S = 0.12
-"""Between two values of the clock."""
+"""Time between two values of the clock."""
 
 AGE_MAX_S = {"drive": HOLD_TIMEOUT_S, "goal": 1.0, "start": 1.0, "record": 1.0, "release": 1.0}
-"""Of the requests that make robots move. They need heard_ms: the clock, as the page last heard it."""
+"""Largest age of the requests that make robots move. They need heard_ms: the clock, as the page last heard it."""
 
 
 class RequestError(Exception):

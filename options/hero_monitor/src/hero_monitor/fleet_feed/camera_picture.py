@@ -14,10 +14,10 @@ from .page_state import MAX_DISTANCE_M, encode_pose
 
 JPEG_START = b"\xff\xd8"
 BYTES_MAX = 2000000
-"""Of a picture; the tracker's have some 100 kB."""
+"""Size of a picture; the tracker's have some 100 kB."""
 
 PERIOD_S = 0.2
-"""Between two pictures that pages fetch, however many are published."""
+"""Time between two pictures that pages fetch, however many are published."""
 
 JPEGS_KEPT = 5
 """A page on a busy computer asks for one when newer ones have come: the robots it was told of are on no other."""
@@ -26,7 +26,7 @@ SILENT_S = 3.0
 """The tracker publishes five pictures a second; an older one shows no robot where it is."""
 
 KEPT_S = 5.0
-"""Of each robot's poses."""
+"""Time for which each robot's poses are kept."""
 
 AHEAD_S = 0.1
 """A robot's newest pose shows where it was this long after it."""

@@ -16,7 +16,7 @@ SILENT_S = 2.0
 
 MARKERS_MAX = 20
 POINTS_MAX = 2000
-"""Of one marker. The lines between 100 robots that all sense each other would hide the robots."""
+"""Points of one marker. The lines between 100 robots that all sense each other would hide the robots."""
 
 
 class Drawings:

@@ -36,7 +36,7 @@ from .placement import Placement
 from .robot_feed import RobotFeed
 
 ROW_PERIOD_S = 0.5
-"""Between two updates of the table without a report: rates."""
+"""Time between two updates of the table without a report: rates."""
 
 LOG_LINES_PER_READ = 40
 """Decoding a line takes about 0.05 ms; a swarm that tunes its motors logs thousands a second."""
@@ -51,7 +51,7 @@ REPLAY_KEPT_S = 3.0
 """Robots of a replay disappear this long after its last message."""
 
 MARKERS_MAX = 2000
-"""Of the arena, or of ground truth."""
+"""Markers of the arena, or of ground truth."""
 
 LABEL = re.compile(r"(\S+?):? ")
 """Beginning of a driver's lines about one robot: "hero_0: voltage low", "hero_0 left (10.42.0.7:4242): ..."."""

@@ -10,7 +10,7 @@ SILENT_S = 1.8
 """The driver reports once a second, localization 25 times: what is silent for longer is shown as lost within 2 s."""
 
 FORGOTTEN_S = 10.0
-"""Of localization: then robots are placed by odometry, as without it, and the page says so."""
+"""Silence of localization: then robots are placed by odometry, as without it, and the page says so."""
 
 MASTER_SILENT_S = 1.3
 """A question to the ROS master that is open for longer; it is asked every MASTER_PERIOD_S."""
@@ -29,7 +29,7 @@ class Loss(NamedTuple):
 
 
 class LocalizationWatch:
-    """Whether localization reports, and whether it sees any robot."""
+    """Checks whether localization reports, and whether it sees any robot."""
 
     def __init__(self) -> None:
         self._heard_s = 0.0

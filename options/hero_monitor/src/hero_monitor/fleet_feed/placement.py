@@ -10,7 +10,7 @@ from typing import Dict, Iterable, List, Tuple
 from hero_node import Pose, find_frame, invert_pose, transform_pose
 
 APART_M = 1.0
-"""Between the origins of robots that are drawn side by side: farther than a short drive."""
+"""Distance between the origins of robots that are drawn side by side: farther than a short drive."""
 
 NOWHERE = Pose(0.0, 0.0, 0.0)
 
@@ -38,7 +38,7 @@ class Placement:
 
     @property
     def is_localized(self) -> bool:
-        """Whether the map has the frame of hero_localization."""
+        """Return whether the map has the frame of hero_localization."""
         return bool(self._localized)
 
     @property

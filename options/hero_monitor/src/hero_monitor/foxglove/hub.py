@@ -19,7 +19,7 @@ from .protocol import (
 )
 
 QUEUE_BYTES_MAX = 4_000_000
-"""Of one client: about a second of a large swarm with a camera's images."""
+"""Queue limit of one client: about a second of a large swarm with a camera's images."""
 
 SUBSCRIPTIONS_MAX = 10_000
 PUBLISHED_MAX = 1_000
@@ -101,7 +101,7 @@ class Hub:
 
     @property
     def takes_messages(self) -> bool:
-        """Whether clients may publish."""
+        """Return whether clients may publish."""
         return self._publisher is not None
 
     @property
@@ -125,7 +125,7 @@ class Hub:
         self.clients.discard(client)
 
     def update_topics(self, topics: Dict[str, TopicType]) -> None:
-        """Offer the topics that appeared, and withdraw those that vanished or changed their type."""
+        """ProgramDescription the topics that appeared, and withdraw those that vanished or changed their type."""
         gone = [known for known in self._channels.values() if topics.get(known.topic) != (known.type, known.definition)]
         for channel in gone:
             del self._channels[channel.topic]

@@ -23,7 +23,7 @@ class Access:
 
     @property
     def needs_token(self) -> bool:
-        """Whether a browser has to give a token."""
+        """Return whether a browser has to give a token."""
         return self._token is not None
 
     def admits_host(self, name: str) -> bool:

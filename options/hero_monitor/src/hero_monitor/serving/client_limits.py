@@ -25,7 +25,7 @@ class Connection(Protocol):
         """Close the connection."""
 
     def closed(self) -> bool:
-        """Whether either end has closed it."""
+        """Return whether either end has closed it."""
 
 
 def group_address(address: str) -> str:

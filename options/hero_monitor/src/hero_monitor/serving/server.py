@@ -119,12 +119,12 @@ class BaseHandler(tornado.web.RequestHandler):
 
     @property
     def is_logged_in(self) -> bool:
-        """Whether the browser has given the token, or needs none."""
+        """Return whether the browser has given the token, or needs none."""
         return not self.access.needs_token or self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS) is not None
 
     @property
     def is_own_page(self) -> bool:
-        """Whether a page of this server makes the request; every browser sends Origin."""
+        """Return whether a page of this server makes the request; every browser sends Origin."""
         return self.access.admits_origin(self.request.headers.get("Origin"), self.request.host)
 
     def check_token(self, token: Any) -> None:
@@ -239,12 +239,12 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 
     @property
     def ready(self) -> bool:
-        """Whether everything has been sent."""
+        """Return whether everything has been sent."""
         return self._sending is None or self._sending.done()  # type: ignore[attr-defined]
 
     @property
     def is_idle(self) -> bool:
-        """Whether no one can see this page: it is hidden, or takes nothing."""
+        """Return whether no one can see this page: it is hidden, or takes nothing."""
         return not self.visible or (not self.ready and time.monotonic() - self._sent_s > STUCK_S)
 
     def send(self, text: str) -> None:

@@ -14,7 +14,7 @@ except ImportError:  # a PC without ROS
     from .plain_reader import Reader  # type: ignore[assignment]
 
 ACTIVE_SUFFIX = ".active"
-"""Of a file that is being written, or was not closed."""
+"""Suffix of a file that is being written, or was not closed."""
 
 
 class BagSet:

@@ -18,7 +18,7 @@ Columns = Dict[str, Callable[[Any], Any]]
 """Name of each column after time_s, and the function that reads its value from a message."""
 
 BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "left", "rear_left")
-"""Of /hero_N/proximity by index: counter-clockwise from the rear."""
+"""Names of the beams of /hero_N/proximity by index: counter-clockwise from the rear."""
 
 
 def to_seconds(stamp: Any) -> float:

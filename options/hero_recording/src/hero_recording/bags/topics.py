@@ -63,7 +63,7 @@ class RawMessage(NamedTuple):
 
     topic: str
     header: Dict[str, str]
-    """Of the connection: type, md5sum, message_definition; callerid and latching, if the publisher sent them."""
+    """Header of the connection: type, md5sum, message_definition; callerid and latching, if the publisher sent them."""
     content: bytes
     time_ns: int
     """When the recorder received it, since 1970."""

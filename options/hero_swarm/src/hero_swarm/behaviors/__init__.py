@@ -14,7 +14,7 @@ from ..user_module import load_file
 __all__ = ["find_behavior", "list_names", "make_behavior"]
 
 MAX_NUMBER = 1e6
-"""Of the other parameters, whatever their unit."""
+"""Limit of the other parameters, whatever their unit."""
 
 _MODULES: Dict[str, str] = {
     "aggregation": "aggregation.Aggregation",

@@ -1,1 +1,1 @@
-"""From a file that describes an experiment to its runs, intervals and plots."""
+"""Turns a file that describes an experiment into its runs, intervals and plots."""

@@ -34,7 +34,7 @@ from .results_folder import Run
 from .starts import place_all, place_objects
 
 SAMPLE_S = 1.0
-"""Between two samples of the metrics."""
+"""Time between two samples of the metrics."""
 
 METRICS_ENDING, POSES_ENDING = ".metrics.npy", ".poses.npy"
 """Files of a batch: samples (T, W, metrics) of the metrics of list_sources(), and poses (T, W, N, 3); nan

@@ -8,7 +8,7 @@ from typing import Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values import NO_OBJECTS, Things
+from hero_client.values import NO_OBJECTS, PlacedObjects
 
 from ..behavior import Random, derive_seed
 from ..control import Control
@@ -57,7 +57,7 @@ class RobotTrial:
         return self._control.rate_hz
 
     def step(
-        self, time_s: float, poses: np.ndarray, ages_s: np.ndarray, things: Things = NO_OBJECTS
+        self, time_s: float, poses: np.ndarray, ages_s: np.ndarray, things: PlacedObjects = NO_OBJECTS
     ) -> Optional[Tuple[np.ndarray, np.ndarray]]:
         """Return the speeds of all robots, m/s and rad/s (N,), at poses (N, 3); None: the trial has ended.
 
@@ -77,7 +77,7 @@ class RobotTrial:
                 self._sample(time_s, poses, things)
         return None if self._reached or time_s >= self._experiment.time_s else speeds
 
-    def _sample(self, time_s: float, poses: np.ndarray, things: Things) -> None:
+    def _sample(self, time_s: float, poses: np.ndarray, things: PlacedObjects) -> None:
         if self._last is None:
             velocities = np.zeros_like(poses)
         else:

@@ -15,7 +15,7 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequ
 from tqdm import tqdm
 
 from hero_node.files import YamlError, read_text
-from hero_node.parameters import given_ids_option, within
+from hero_node.parameters import explicit_ids_option, within
 
 from . import engines
 from .batch import Inputs, compute_batch, load_checked
@@ -74,7 +74,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     )
     parser.add_argument("--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts")
     parser.add_argument(
-        "--robots", type=given_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9"
+        "--robots", type=explicit_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9"
     )
     parser.add_argument("--frame", default="map", help="of robots' poses: of localize (map), or world in the simulator")
     parser.add_argument(

@@ -20,7 +20,7 @@ from .experiment_file import Start
 _DIAMETER_M = 2.0 * BODY_RADIUS_M
 
 _MAX_OVERLAP_M = 0.002
-"""Of the bodies in a start file, which may hold where robots of a run ended: contacts leave 1.2 mm."""
+"""Overlap of the bodies in a start file, which may hold where robots of a run ended: contacts leave 1.2 mm."""
 
 
 def place_all(

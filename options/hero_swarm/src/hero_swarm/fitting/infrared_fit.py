@@ -21,11 +21,11 @@ from hero_sim.world import (
 from .recording import Recording, interpolate_poses
 
 _MIN_DISTANCE_M, _MAX_DISTANCE_M = 0.03, 0.20
-"""Of what is seen: nearer, errors of poses and saturation tell more than the sensor; farther, there is no signal."""
+"""Distances that are used: nearer, errors of poses and saturation prevail; farther, there is no signal."""
 
 _POSE_SD_M = 0.003
 _MAX_GAP_S = 0.5
-"""Between poses: where a robot is within a longer gap is not known."""
+"""Time between poses: where a robot is within a longer gap is not known."""
 
 _MIN_READINGS = 20
 _FAR_SDS = 1.5

@@ -34,7 +34,7 @@ _WINDOW = 4
 """Samples, over which wheel speeds are compared."""
 
 _PHASES_S = np.arange(0.0, SPIN_MS, 8.0) / 1000.0
-"""Of the cycle in which the firmware reads commands, that are tried: which one a robot has is not in its messages."""
+"""Phases tried for the cycle in which the firmware reads commands; messages do not tell it."""
 
 
 def fit_motors(recordings: List[Recording]) -> List[Motors]:

@@ -15,7 +15,7 @@ from ..metrics import FALLING
 from ..metrics.own import State, measure_metric
 from ..sources import Sources
 
-MAX_ANGULAR_RAD_S = 4.0
+MAX_LEARNED_ANGULAR_RAD_S = 4.0
 
 _OWN = 14
 """Eight infrared ranges, two velocities, x, y, cosine and sine of the yaw."""
@@ -67,7 +67,7 @@ class Episode:
     def step(self, actions: np.ndarray) -> np.ndarray:
         """Drive with actions (N, 2), shares of the largest linear and angular speed; return the rewards (N,)."""
         shares = np.clip(np.asarray(actions, dtype=float), -1.0, 1.0)
-        self._rows.send_velocity(self._all, MAX_LINEAR_M_S * shares[:, 0], MAX_ANGULAR_RAD_S * shares[:, 1])
+        self._rows.send_velocity(self._all, MAX_LINEAR_M_S * shares[:, 0], MAX_LEARNED_ANGULAR_RAD_S * shares[:, 1])
         self._rows.advance(self._rows.now_ms + self._period_ms)
         self.time_s = self._rows.now_ms / 1000.0
         value = self._measure(self._rows.world.poses[None].copy())
@@ -92,7 +92,7 @@ class Episode:
         """
         poses = self._poses[0]
         rim_m = np.nan_to_num(self._rows.proximity_m, posinf=1e3) - BODY_RADIUS_M
-        speeds = self._rows.velocities / (MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S)
+        speeds = self._rows.velocities / (MAX_LINEAR_M_S, MAX_LEARNED_ANGULAR_RAD_S)
         places = (poses[:, :2] - self._center_m) / self._half_m
         headings = np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])))
         seen = sense_neighbors(self._poses, self._sensor)

@@ -19,7 +19,7 @@ __all__ = [
 ]  # fmt: skip
 
 Metric = Callable[..., np.ndarray]
-"""Of poses and velocities (W, N, 3), both in the common frame, of the poses of objects (W, M, 3), and of the bodies'
+"""Function of poses and velocities (W, N, 3) in the common frame, of the poses of objects (W, M, 3), and of the bodies'
 radii (N,); the last two may be left out where they do not count. Returns one number for each world (W,)."""
 
 METRICS: Dict[str, Metric] = {
@@ -40,7 +40,7 @@ METRICS: Dict[str, Metric] = {
 """Those that need poses and velocities alone, by name."""
 
 UNITS = {"consensus_error": "m", "dispersion": "m", "hull_area": "m^2", "nearest_neighbor": "m", "object_distance": "m"}
-"""Of those that have one."""
+"""Units of those that have one."""
 
 FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area", "object_distance")
 """Metrics for which less is better: a bound without <= or >= is an upper one; it is a lower one for all others."""

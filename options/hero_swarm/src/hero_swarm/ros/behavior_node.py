@@ -14,8 +14,8 @@ from visualization_msgs.msg import MarkerArray
 from hero_client import Program, ProgramError, Swarm, read_parameters
 from hero_client.controllers import Lateness
 from hero_client.swarm import open_swarm
-from hero_client.values import BODY_RADIUS_M, Things
-from hero_node.parameters import choice, number, robot_ids, whole_number, words
+from hero_client.values import BODY_RADIUS_M, PlacedObjects
+from hero_node.parameters import choice, number, robot_ids, string, whole_number
 from hero_node.ros import read_duration_clock_s
 
 from ..behavior import Behavior, Objects, Random
@@ -102,7 +102,7 @@ class BehaviorNode:
         poses, ages_s = self._source.read()
         things = self._objects.read()
         if self._objects.are_needed and not len(things.radii_m):
-            poses, things = np.full_like(poses, np.nan), Things(np.full((1, 1, 3), np.nan), np.ones(1))
+            poses, things = np.full_like(poses, np.nan), PlacedObjects(np.full((1, 1, 3), np.nan), np.ones(1))
         now_s = read_duration_clock_s()
         self._filter.set_models([robot.model for robot in self._swarm])
         if self._others:
@@ -136,7 +136,7 @@ class BehaviorNode:
         text = "the behavior asks %s for %.3g m/s and %.3g rad/s, more than it can drive: it drives this curve slower"
         return text % (self._swarm.robots[row].name, *self.control.wanted[:, row])
 
-    def _show(self, now_s: float, poses: np.ndarray, things: Things) -> None:
+    def _show(self, now_s: float, poses: np.ndarray, things: PlacedObjects) -> None:
         """Publish the metric of the robots whose poses are known, and what RViz and the monitor draw."""
         last_s, last = self._last or (now_s - SHOW_PERIOD_S, poses)
         velocities = (poses - last) / max(now_s - last_s, 1e-3)
@@ -164,15 +164,15 @@ class BehaviorNode:
 
 
 PARAMETERS = {
-    "behavior": words("aggregation", "a built-in behavior, FILE.py, or FILE.py:Class"),
+    "behavior": string("aggregation", "a built-in behavior, FILE.py, or FILE.py:Class"),
     "parameters": {},
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
-    "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
-    "objects_topic": words("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
+    "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
+    "objects_topic": string("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
     "object_radius_m": number(0.05, 0.001, 5.0, "m", "of the circle around an object"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),
-    "fence": words("", "x min, y min, x max, y max of the fence, m"),
-    "calibration_folder": words("~/hero_calibration", "of `calibrate`; behaviors with drive = pulses need its files"),
+    "fence": string("", "x min, y min, x max, y max of the fence, m"),
+    "calibration_folder": string("~/hero_calibration", "of `calibrate`; behaviors with drive = pulses need its files"),
     "simulated": whole_number(0, 0, 1000, "", "robots of a simulator with seed 0, whose motors count as calibrated"),
     "seed": whole_number(0, 0, 2**31 - 1, "", "of the behavior's random numbers"),
     "time_s": number(0.0, 0.0, 1e6, "s", "stop after this time; 0 runs until Ctrl-C"),

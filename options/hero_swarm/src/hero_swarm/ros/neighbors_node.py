@@ -15,14 +15,14 @@ from hero_client.swarm import ready_ids
 from hero_client.values import Neighbors, list_neighbors, sense_neighbors
 from hero_msgs.msg import Neighbor as NeighborMessage
 from hero_msgs.msg import Neighbors as NeighborsMessage
-from hero_node.parameters import flag, number, robot_ids, whole_number, words
+from hero_node.parameters import flag, number, robot_ids, string, whole_number
 
 from ..behavior import Random
 from .pose_source import PoseSource
 
 PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
-    "frame": words("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
+    "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
     "range_m": number(1000.0, 0.0, 1000.0, "m", "between the centers, of neighbors that are sensed"),
     "field_rad": number(2.0 * math.pi, 0.0, 2.0 * math.pi, "rad", "width of the field of view, centered on the front"),
     "range_noise_m": number(0.0, 0.0, 1.0, "m", "standard deviation of ranges"),

@@ -13,7 +13,7 @@ from hero_node import list_names
 from .pose_source import SIMULATOR_FRAME, PoseSource
 
 LOOK_PERIOD_S = 1.0
-"""Between two looks for robots that have joined a driver or that localize has found."""
+"""Time between two looks for robots that have joined a driver or that localize has found."""
 
 
 class OtherRobots:

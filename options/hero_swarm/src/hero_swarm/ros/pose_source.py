@@ -9,7 +9,7 @@ import rospy
 from nav_msgs.msg import Odometry
 
 from hero_client.ros import share_poses
-from hero_client.values import NO_OBJECTS, FrameError, StaleDataError, Things
+from hero_client.values import NO_OBJECTS, FrameError, PlacedObjects, StaleDataError
 from hero_msgs.msg import ObjectPoses
 from hero_node import Pose, pose_of
 
@@ -105,12 +105,12 @@ class ObjectSource:
             # One that a picture does not show is where it was: it moves only while it is pushed.
             self._known = {**self._known, **{thing.name: (thing.x, thing.y, thing.yaw) for thing in report.objects}}
 
-    def read(self) -> Things:
+    def read(self) -> PlacedObjects:
         """Return the objects, in the order of their names."""
         known = self._known
         if not known:
             return NO_OBJECTS
-        return Things(np.array([[known[name] for name in sorted(known)]]), np.full(len(known), self._radius_m))
+        return PlacedObjects(np.array([[known[name] for name in sorted(known)]]), np.full(len(known), self._radius_m))
 
     def describe_missing(self) -> str:
         """Return that there are no objects that are needed, for users; empty if there are."""

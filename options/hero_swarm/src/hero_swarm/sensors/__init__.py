@@ -12,8 +12,8 @@ from hero_client.values import (
     Binary,
     Neighbors,
     Objects,
+    PlacedObjects,
     Sight,
-    Things,
     sense_binary,
     sense_neighbors,
     sense_objects,
@@ -39,7 +39,7 @@ class Surroundings(NamedTuple):
     time_s: float
     poses: np.ndarray
     random: Any
-    things: Things = NO_OBJECTS
+    things: PlacedObjects = NO_OBJECTS
     arena: Optional[Arena] = None
     robots: Any = None
     colors: Optional[np.ndarray] = None

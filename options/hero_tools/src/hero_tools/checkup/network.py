@@ -136,7 +136,7 @@ def resolve(name: str) -> Set[str]:
 
 
 def is_own(address: str, own: Sequence[Address]) -> bool:
-    """Whether an IPv4 address leads to this PC."""
+    """Return whether an IPv4 address leads to this PC."""
     return is_loopback(address) or address in {found.address for found in own}
 
 

@@ -1,1 +1,1 @@
-"""From the runs of an experiment to statistics, plots and a page."""
+"""Turns the runs of an experiment into statistics, plots and a page."""

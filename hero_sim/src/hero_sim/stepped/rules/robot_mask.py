@@ -4,11 +4,11 @@ from typing import Any, Union
 
 import numpy as np
 
-Which = Union[bool, np.ndarray]
+RobotMask = Union[bool, np.ndarray]
 """A mask (R,), or True for all robots, or False for none."""
 
 
-def assign(target: np.ndarray, values: Union[int, np.ndarray], which: Which) -> None:
+def assign(target: np.ndarray, values: Union[int, np.ndarray], which: RobotMask) -> None:
     """Copy values into target, arrays with robots last, for those that take part."""
     if which is True:
         target[...] = values
@@ -16,12 +16,12 @@ def assign(target: np.ndarray, values: Union[int, np.ndarray], which: Which) -> 
         np.copyto(target, values, where=which)
 
 
-def choose(values: Any, others: Any, which: Which) -> Any:
+def choose(values: Any, others: Any, which: RobotMask) -> Any:
     """Return values for those that take part, and others for the others: numbers or arrays with robots last."""
     return values if which is True else np.where(which, values, others)
 
 
-def simplify(which: np.ndarray) -> Which:
+def simplify(which: np.ndarray) -> RobotMask:
     """Return True or False instead of a mask of all robots or none."""
     count = np.count_nonzero(which)
     return which if 0 < count < len(which) else bool(count)

@@ -5,7 +5,7 @@ from commanded_robot import MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.commands.commander import Commander, Commanders
+from hero_driver.commands.command_sources import CommandSource, CommandSources
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
 from hero_driver.robot_constants import MAX_WATCHDOG_S
@@ -81,7 +81,7 @@ def test_a_program_that_hangs_twice_within_seconds_is_stopped_twice(pause_s):
 
 def find_silence_s(period_s, end_s, pauses, is_read_first=True, until_s=6.0):
     """Return when a program is found silent that commands until end_s; the driver does not run in pauses (s, s)."""
-    commanders, next_s, now_s = Commanders(WheelMotion()), 0.0, 0.0
+    commanders, next_s, now_s = CommandSources(WheelMotion()), 0.0, 0.0
     while now_s < until_s:
         now_s = next((after_s for before_s, after_s in pauses if before_s <= now_s < after_s), now_s)
         is_silent = not is_read_first and commanders.find_silent(STOP_S, now_s) is not None
@@ -104,7 +104,7 @@ def test_a_pause_of_the_driver_itself_is_no_silence_of_a_program(period_s, begin
     pauses = [(begin_s, begin_s + pause_s)]
     assert find_silence_s(period_s, 9.0, pauses, is_read_first) is None
     # The program is suspended as well.
-    commanders, commands = Commanders(WheelMotion()), int(begin_s / period_s)
+    commanders, commands = CommandSources(WheelMotion()), int(begin_s / period_s)
     for index in range(commands):
         commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", True, index * period_s)
         assert commanders.find_silent(STOP_S, index * period_s) is None
@@ -317,15 +317,15 @@ def test_a_robot_is_stopped_when_the_program_that_moves_it_ends(gone_s, other, s
 
 
 def test_motion_counts_until_the_firmware_has_ended_it():
-    commanders = Commanders(WheelMotion())
+    commanders = CommandSources(WheelMotion())
     commanders.note_command(POSITION, "a", "sender", "/other", True, 100.0)
     for now_s, is_moving in ((100.0 + MAX_WATCHDOG_S - 0.01, True), (100.0 + MAX_WATCHDOG_S + 0.01, False)):
         stopper = commanders.note_command(VELOCITY, "b", "sender", "/program", False, now_s)
-        assert commanders.has_more_to_stop(stopper, now_s) == is_moving
+        assert commanders.needs_another_stop(stopper, now_s) == is_moving
 
 
 def test_a_forgiven_pause_never_puts_the_last_command_into_the_future():
-    commander = Commander("sender", "/program", VELOCITY)
+    commander = CommandSource("sender", "/program", VELOCITY)
     for index in range(8):
         commander.note_command(True, 0.1 * index)
     commander.forgive_pause(0.9, 1.0)
@@ -337,7 +337,7 @@ def test_a_forgiven_pause_never_puts_the_last_command_into_the_future():
 
 def make_commander(intervals_s):
     """Return a commander of these intervals between its commands, and when its last one came."""
-    commander, now_s = Commander("sender", "/program", VELOCITY), 0.0
+    commander, now_s = CommandSource("sender", "/program", VELOCITY), 0.0
     for interval_s in (8.0, *intervals_s):
         now_s += interval_s
         commander.note_command(True, now_s)
@@ -379,7 +379,7 @@ def test_what_a_program_does_after_a_silence_tells_its_period_anew():
 
 def test_a_look_after_more_than_0_2_s_does_not_count_that_time_as_silence():
     for pause_s, is_forgiven in ((0.2, False), (0.203125, True)):
-        commanders = Commanders(WheelMotion())
+        commanders = CommandSources(WheelMotion())
         commander = commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", True, 0.0)
         commanders.find_silent(STOP_S, 0.0)
         commanders.find_silent(STOP_S, pause_s)
@@ -396,7 +396,7 @@ def test_a_zero_is_missed_unless_two_readings_after_it_show_rest():
     ):
         wheels = WheelMotion()
         wheels.read_ticks(0.0, 0.0)
-        commanders = Commanders(wheels)
+        commanders = CommandSources(wheels)
         for moves in (True, False):
             commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", moves, 0.0)
         for number in range(readings):
@@ -410,7 +410,7 @@ def test_a_zero_is_not_missed_without_readings_motion_or_if_motion_follows():
         wheels = WheelMotion()
         if has_readings:
             wheels.read_ticks(0.0, 0.0)
-        commanders = Commanders(wheels)
+        commanders = CommandSources(wheels)
         for moves in commands:
             commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", moves, 0.0)
         assert not commanders.is_zero_missed(9.0)
@@ -422,9 +422,9 @@ def test_a_rival_keeps_its_robot_for_half_a_second_of_silence():
         (0.5, "/other", True),
         (0.46875, "/program", True),
     ):
-        commanders = Commanders(WheelMotion())
+        commanders = CommandSources(WheelMotion())
         for number in range(8):
             commanders.note_command(POSITION, "a", "sender", node, True, 0.125 * number)
         now_s = 0.875 + silence_s
         stopper = commanders.note_command(VELOCITY, "b", "another", "/program", False, now_s)
-        assert commanders.has_more_to_stop(stopper, now_s) == has_more, (silence_s, node)
+        assert commanders.needs_another_stop(stopper, now_s) == has_more, (silence_s, node)

@@ -8,15 +8,15 @@ from ..corrections.wheel_motion import WheelMotion
 from ..robot_constants import MAX_WATCHDOG_S
 
 REGULAR_INTERVALS = 5
-"""Between six commands: from then on a program commands regularly. Fewer may be single commands, or a short burst."""
+"""Intervals from which on a program commands regularly; fewer may be single commands, or a short burst."""
 
 INTERVALS_KEPT = 8
 """Its period is the longest of these intervals: a program with jitter, or with pauses, is not taken for a hung one."""
 
 SILENT_PERIODS = 4
 
-LATE_S = 0.2
-"""Between two looks for silence, which is due more often: after more, the driver itself was suspended or too busy."""
+WATCH_PERIOD_S = 0.2
+"""Time between two looks for silence beyond which the driver itself was suspended or too busy."""
 
 RIVAL_SILENCE_S = 0.5
 """A program that commands regularly, and did so within this time or SILENT_PERIODS, drives the robot at this moment."""
@@ -34,7 +34,7 @@ class _Zero(NamedTuple):
     readings: int
 
 
-class Commander:
+class CommandSource:
     """A publisher that commands a robot on one motion topic, while no other one does.
 
     Attributes:
@@ -87,24 +87,26 @@ class Commander:
         return period_s is not None and now_s - self.commanded_s >= SILENT_PERIODS * period_s
 
 
-class Commanders:
+class CommandSources:
     """The programs that command one robot: on each motion topic the one of the newest command."""
 
     def __init__(self, wheels: WheelMotion) -> None:
         """Take the robot's wheels."""
         self._wheels = wheels
-        self._by_topic: Dict[str, Commander] = {}
+        self._by_topic: Dict[str, CommandSource] = {}
         self._zero: Optional[_Zero] = None  # until its effect shows
         self._looked_s = math.inf
         self._silent_from_s = -math.inf  # until then none can have been silent for long enough
 
-    def note_command(self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float) -> Commander:
+    def note_command(
+        self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float
+    ) -> CommandSource:
         """A command came on the motion topic called name; return its commander. The others are its attributes."""
         self._forgive_pause(now_s)
         commander = self._by_topic.get(name)
         ends_motion = not moves and self.are_moving
         if commander is None or commander.sender is not sender or commander.source != source:
-            commander = self._by_topic[name] = Commander(sender, node, source)
+            commander = self._by_topic[name] = CommandSource(sender, node, source)
         if moves and not commander.moves:
             self._silent_from_s = -math.inf
         commander.note_command(moves, now_s)
@@ -114,14 +116,14 @@ class Commanders:
             self._zero = _Zero(now_s, self._wheels.readings)
         return commander
 
-    def find(self, name: str) -> Optional[Commander]:
+    def find(self, name: str) -> Optional[CommandSource]:
         """Return what moves the robot on a motion topic, None where its newest command was a stop."""
         commander = self._by_topic.get(name)
         return commander if commander is not None and commander.moves else None
 
     @property
     def are_moving(self) -> bool:
-        """Whether a program has asked for motion, and not for a stop, since the last stop()."""
+        """Return whether a program has asked for motion, and not for a stop, since the last stop()."""
         for commander in self._by_topic.values():  # noqa: SIM110 - any() costs four times as much, per command
             if commander.moves:
                 return True
@@ -136,7 +138,7 @@ class Commanders:
     def _forgive_pause(self, now_s: float) -> None:
         """Notice a pause of the driver itself, before what was heard in it counts or what was not."""
         pause_s = now_s - self._looked_s
-        if pause_s > LATE_S:
+        if pause_s > WATCH_PERIOD_S:
             self._looked_s = now_s
             for commander in self._by_topic.values():
                 commander.forgive_pause(pause_s, now_s)
@@ -152,11 +154,11 @@ class Commanders:
         self._zero = None
         return wheels.readings > 0 and not (is_heard and wheels.still_readings >= STILL_READINGS)
 
-    def find_silent(self, silence_s: float, now_s: float) -> Optional[Commander]:
+    def find_silent(self, silence_s: float, now_s: float) -> Optional[CommandSource]:
         """Return a program that moves the robot and has fallen silent, None if there is none.
 
-        A call that comes LATE_S after the last one does not count that time: the driver heard nothing meanwhile, or has
-        not read it yet.
+        A call that comes WATCH_PERIOD_S after the last one does not count that time: the driver heard nothing
+        meanwhile, or has not read it yet.
         """
         self._forgive_pause(now_s)
         self._looked_s = now_s
@@ -171,7 +173,7 @@ class Commanders:
         self._silent_from_s = first_s + silence_s
         return None
 
-    def has_more_to_stop(self, commander: Commander, now_s: float) -> bool:
+    def needs_another_stop(self, commander: CommandSource, now_s: float) -> bool:
         """Return whether a stop of commander has to end motion of other topics than its own.
 
         Not where another program drives the robot there at this moment.

@@ -26,7 +26,7 @@ LISTENER_TIMEOUT_S = 2.0
 STOP_PERIOD_S = 0.06
 
 
-class Commander:
+class DriveRequests:
     """Commands of pages to robots. All methods return at once, except send_goal().
 
     Attributes:
