@@ -12,15 +12,17 @@ from hero_sim.world import compiled, contacts
 from hero_sim.world.arena import build_default, build_rectangle, place_robots
 from hero_sim.world.arena_file import SHIPPED, load_arena
 from hero_sim.world.kinematics import split_to_wheels
-from hero_sim.world.robot_errors import draw_errors
+from hero_sim.world.robot_errors import draw_errors, set_known
 from hero_sim.world.world import World
 
 MAX_OVERLAP_M = 5e-4
 WIDE = build_rectangle(20.0, 20.0, 1)
 
 
-def build_world(poses, arena=WIDE, errors=0.0, seed=0):
+def build_world(poses, arena=WIDE, errors=0.0, seed=0, known=()):
     drawn = draw_errors([np.random.RandomState([seed, index]) for index in range(len(poses))], errors)
+    for text in known:
+        set_known(drawn, 0, text)
     return World(arena, np.array(poses, dtype=float), [np.random.RandomState(seed)], drawn)
 
 
@@ -46,41 +48,6 @@ def test_a_robot_stops_at_a_wall_and_its_wheels_keep_turning():
     assert world.travels_m[0, 0] > 0.75
 
 
-def test_a_robot_slides_along_a_wall_that_it_meets_at_an_angle():
-    world = build_world([(0.0, 0.0, math.pi / 4)], build_rectangle(1.0, 3.0, 1))
-    set_speeds(world, [0.2])
-    for _ in range(600):
-        step(world)
-    assert world.poses[0, 0] == pytest.approx(0.5 - BODY_RADIUS_M, abs=1e-6)
-    assert world.poses[0, 1] == pytest.approx(0.2 * 6.0 * math.sin(math.pi / 4), abs=1e-3)
-
-
-def test_a_robot_in_the_way_is_pushed_at_half_the_speed():
-    world = build_world([(-BODY_RADIUS_M, 0.0, 0.0), (BODY_RADIUS_M, 0.0, 0.0)])
-    set_speeds(world, [0.1, 0.0])
-    for _ in range(300):
-        step(world)
-    assert world.poses[:, 0] == pytest.approx([0.15 - BODY_RADIUS_M, 0.15 + BODY_RADIUS_M], abs=1e-3)
-    assert world.poses[:, 1] == pytest.approx([0.0, 0.0], abs=1e-12)
-
-
-@pytest.mark.parametrize("robots", [2, 5, 12])
-def test_pushing_moves_the_center_of_all_as_their_wheels_do(robots):
-    rng = np.random.RandomState(robots)
-    poses = np.column_stack((np.arange(robots) * 2.0 * BODY_RADIUS_M, rng.uniform(0, 0.01, robots), np.zeros(robots)))
-    poses[:, 2] = np.where(np.arange(robots) < robots / 2, 0.0, math.pi) + rng.uniform(-0.5, 0.5, robots)
-    world = build_world(poses)
-    speeds_m_s = rng.uniform(0.1, 0.28, robots)
-    set_speeds(world, speeds_m_s)
-    moved_m = np.zeros(robots)
-    for number in range(1, 201):
-        step(world)
-        rolled_m = speeds_m_s * np.array((np.cos(poses[:, 2]), np.sin(poses[:, 2]))) * 0.01 * number
-        assert world.poses[:, :2].mean(axis=0) == pytest.approx(poses[:, :2].mean(axis=0) + rolled_m.mean(axis=1))
-        moved_m = np.hypot(*(world.poses[:, :2] - poses[:, :2] - rolled_m.T).T)
-    assert moved_m.max() > 0.02
-
-
 def test_a_robot_that_no_longer_pushes_lets_go_at_once():
     world = build_world([(-BODY_RADIUS_M, 0.0, 0.0), (BODY_RADIUS_M, 0.0, 0.0)])
     set_speeds(world, [0.2, 0.0])
@@ -95,7 +62,7 @@ def test_a_robot_that_no_longer_pushes_lets_go_at_once():
 
 def test_a_robot_pressed_from_behind_still_slides_off_sideways():
     poses = [(-0.2, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.0, 0.005, 0.0), (0.5, 0.0, 0.0)]
-    world = build_world(poses, build_rectangle(1.2, 1.2, 1))
+    world = build_world(poses, build_rectangle(1.2, 1.2, 1), known=["friction=0"])
     set_speeds(world, [0.2, 0.2, 0.2, 0.0])
     for _ in range(500):
         step(world)
@@ -178,7 +145,7 @@ def test_nothing_is_compiled_at_the_first_contact(monkeypatch):
     monkeypatch.setattr(compiled, "COMPILED_ROWS", 0)
     compiled._compile.cache_clear()
     build_world([(0.0, 0.0, 0.0)])
-    _, (loop,) = compiled.compile_loops(1, contacts._relax)
+    _, (loop,) = compiled.compile_loops(1, contacts.solve_contacts)
     known = list(loop.signatures)
     press(20, math.pi / 4, 30)
     assert known and loop.signatures == known
@@ -210,9 +177,7 @@ def test_it_is_known_from_how_far_away_robots_have_to_be_looked_at(monkeypatch):
     """Bodies are compared only when they could touch: rarely while they are far apart."""
     world, calls = build_world([(-0.9, 0.0, 0.0), (0.9, 0.0, math.pi)]), []
     separate = contacts.Contacts.separate
-    monkeypatch.setattr(
-        contacts.Contacts, "separate", lambda self, positions_m: (calls.append(0), separate(self, positions_m))
-    )
+    monkeypatch.setattr(contacts.Contacts, "separate", lambda *arguments: (calls.append(0), separate(*arguments)))
     set_speeds(world, [0.1, 0.1])
     for _ in range(800):
         step(world)

@@ -107,6 +107,7 @@ def test_one_swarm_holds_robots_of_several_models():
 def test_a_robot_with_a_bump_shield_keeps_others_and_walls_farther_away():
     errors = draw_errors([np.random.RandomState(index) for index in range(2)], 0.0)
     errors.radius_m[0] = 0.060
+    errors.wheel_friction[0] = 1.0  # it pushes the other one
     poses = np.array([(0.0, 0.0, 0.0), (0.2, 0.0, 0.0)])
     world = World(build_rectangle(1.0, 1.0, 1), poses, [np.random.RandomState(0)], errors)
     world.speeds_m_s[0] = world.commands_m_s[0] = 0.1

@@ -6,7 +6,7 @@ numpy's sine and cosine differ between versions and processors.
 """
 
 import math
-from typing import Any, Sequence, Tuple
+from typing import Any, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -53,22 +53,43 @@ def find_heading(theta_rad: Number) -> Tuple[np.ndarray, np.ndarray]:
     return sign * np.where(swapped, -sine, cosine), sign * np.where(swapped, cosine, sine)
 
 
-def follow_arcs(heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the displacements (K, 2, R), x and y in m, along K consecutive arcs, and the heading (2, R) after them.
+class Arcs(NamedTuple):
+    """Shapes of consecutive arcs (K, R): what depends on no other arc.
 
-    heading: cosine and sine (2, R) before them. It stays of length 1 whatever the number of arcs.
-    travels_m, rotations_rad: length and turn of each arc (K, R), turns of less than 0.5 rad. Several arcs at once are
-    faster: most of their shape depends on no other arc.
+    Attributes:
+        half_tangents, turns: tangent of half the rotation, and what it turns a heading by along the chord.
+        lengths_m: length of the chord, as a multiple of follow_arc()'s.
     """
+
+    half_tangents: np.ndarray
+    turns: np.ndarray
+    lengths_m: np.ndarray
+
+
+def shape_arcs(travels_m: np.ndarray, rotations_rad: np.ndarray) -> Arcs:
+    """Return the shapes of arcs by their lengths and turns (K, R) of less than 0.5 rad."""
     ratios = _sum_series(_HALF_TANGENT_TERMS, rotations_rad * rotations_rad)
     half_tangents = rotations_rad * ratios
     shorten = 2.0 / (1.0 + half_tangents * half_tangents)
+    return Arcs(half_tangents, half_tangents * shorten, travels_m * ratios * shorten)
+
+
+def follow_arc(
+    heading: np.ndarray, half_tangent: np.ndarray, turn: np.ndarray, length_m: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the displacement (2, R), x and y in m, along one arc, and the heading after it.
+
+    heading: cosine and sine (2, R) before it. It stays of length 1 whatever the number of arcs.
+    """
     cosine, sine = heading
+    # The direction of the chord, 1 / cos(rotation / 2) long.
+    chord = np.array((cosine - half_tangent * sine, sine + half_tangent * cosine))
+    return chord * length_m, np.array((cosine - turn * chord[1], sine + turn * chord[0]))
+
+
+def follow_arcs(heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the displacements (K, 2, R) along K consecutive arcs, and the heading (2, R) after them."""
     displacements_m = np.empty((len(travels_m), *heading.shape))
-    for displacement_m, half_tangent, turn in zip(displacements_m, half_tangents, half_tangents * shorten):
-        # The direction of the chord, 1 / cos(rotation / 2) long.
-        chord_x, chord_y = cosine - half_tangent * sine, sine + half_tangent * cosine
-        cosine, sine = cosine - turn * chord_y, sine + turn * chord_x
-        displacement_m[0], displacement_m[1] = chord_x, chord_y
-    displacements_m *= (travels_m * ratios * shorten)[:, None]
-    return displacements_m, np.array((cosine, sine))
+    for step, arc in enumerate(zip(*shape_arcs(travels_m, rotations_rad))):
+        displacements_m[step], heading = follow_arc(heading, *arc)
+    return displacements_m, heading

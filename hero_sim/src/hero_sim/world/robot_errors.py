@@ -31,6 +31,32 @@ SERVO_LAG_S = 0.08
 MAX_WHEEL_M_S = 0.28
 """Maximum speed of a servo without load (assumption)."""
 
+MASS_KG = 0.156
+"""As published."""
+
+CASTER_FRICTION = 0.2
+
+
+class Spread(NamedTuple):
+    """A usual value, and between what most robots are."""
+
+    usual: float
+    low: float
+    high: float
+
+    def draw(self, normal: np.ndarray) -> np.ndarray:
+        """Return values for standard normal numbers; none is beyond the ends."""
+        ends = np.where(normal < 0.0, self.usual - self.low, self.high - self.usual)
+        return np.minimum(np.maximum(self.usual + normal * ends / 2.0, self.low), self.high)
+
+
+ROBOT_FRICTION = Spread(0.3, 0.15, 0.45)
+WALL_FRICTION = Spread(0.3, 0.15, 0.5)
+WHEEL_FRICTION = Spread(0.5, 0.4, 0.9)
+WHEEL_LOAD = Spread(0.85, 0.8, 0.9)
+"""Coefficients of a body on another one (plastic on plastic) and on walls and things, of a wheel (rubber) on the floor,
+and the share of the weight that is on the wheels. Assumptions, from tables of materials; no robot was measured."""
+
 
 class Kind(NamedTuple):
     """One sort of difference.
@@ -62,6 +88,13 @@ KINDS: Dict[str, Kind] = {
     "radius_m": Kind("radius_m", _ALL, 0.03, 0.2),
     "slip": Kind("slip", _ALL, 0, 0.5),
     "ripple_m_s": Kind("ripple_m_s", _ALL, 0, 0.1),
+    "friction": Kind("friction", _ALL, 0, 2),
+    "robot_friction": Kind("friction", slice(0, 1), 0, 2),
+    "wall_friction": Kind("friction", slice(1, 2), 0, 2),
+    "caster_friction": Kind("friction", slice(2, 3), 0, 2),
+    "wheel_friction": Kind("wheel_friction", _ALL, 0.05, 5),
+    "wheel_load": Kind("wheel_load", _ALL, 0.1, 1),
+    "mass_kg": Kind("mass_kg", _ALL, 0.02, 5),
     "alpha_counts_m2": Kind("alpha_counts_m2", _ALL, 0.01, 10),
     "beta_counts": Kind("beta_counts", _ALL, -20, 20),
 }
@@ -70,7 +103,10 @@ for _index in range(BEAMS):
 
 
 class RobotErrors(NamedTuple):
-    """The differences of all robots (N), each an array (N, columns); wheels are left, right."""
+    """The differences of all robots (N), each an array (N, columns); wheels are left, right.
+
+    friction: of what slides: a robot's body on another robot's, on walls and things, and its caster on the floor.
+    """
 
     servo_center_us: np.ndarray
     dead_zone_us: np.ndarray
@@ -83,6 +119,10 @@ class RobotErrors(NamedTuple):
     ripple_m_s: np.ndarray
     alpha_counts_m2: np.ndarray
     beta_counts: np.ndarray
+    friction: np.ndarray
+    wheel_friction: np.ndarray
+    wheel_load: np.ndarray
+    mass_kg: np.ndarray
 
 
 def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> RobotErrors:
@@ -91,7 +131,8 @@ def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> Ro
     Sources: odometry off by 1.4 to 3.0 % of the path and alpha from 0.39 to 0.44 are published; that servos of
     one kind differ by some per cent and some microseconds is an assumption.
     """
-    drawn = np.array([draw_normal(rng, (6 + BEAMS,)) for rng in rngs]) * scale
+    drawn = np.array([draw_normal(rng, (6 + BEAMS + 4,)) for rng in rngs]) * scale
+    on_robots, on_walls, on_floor, load = drawn[:, 6 + BEAMS :].T
     same = np.ones((len(drawn), 1))
     return RobotErrors(
         servo_center_us=SERVO_CENTER_US + np.rint(6.0 * drawn[:, 0:2]),
@@ -103,8 +144,14 @@ def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> Ro
         radius_m=same * BODY_RADIUS_M,
         slip=same * 0.02 * scale,
         ripple_m_s=same * 0.003 * scale,
-        alpha_counts_m2=ALPHA_COUNTS_M2 * (1.0 + 0.02 * drawn[:, 6:]),
+        alpha_counts_m2=ALPHA_COUNTS_M2 * (1.0 + 0.02 * drawn[:, 6 : 6 + BEAMS]),
         beta_counts=same * BETA_COUNTS,
+        friction=np.column_stack(
+            (ROBOT_FRICTION.draw(on_robots), WALL_FRICTION.draw(on_walls), same * CASTER_FRICTION)
+        ),
+        wheel_friction=WHEEL_FRICTION.draw(on_floor)[:, None],
+        wheel_load=WHEEL_LOAD.draw(load)[:, None],
+        mass_kg=same * MASS_KG,
     )
 
 

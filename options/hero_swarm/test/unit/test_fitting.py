@@ -96,6 +96,7 @@ def record_scans(time_s):
     """Return signals of a robot that drives in a small arena with another one, and both robots' poses."""
     errors = draw_errors([np.random.RandomState(1), np.random.RandomState(5)])
     set_known(errors, 0, "robot=0," + INFRARED)
+    set_known(errors, 0, "friction=0")  # robots go on along walls, so that sensors see them from many places
     starts = np.array(((-0.1, 0.0, 0.0), (0.1, 0.05, 1.0)))
     rows = RobotRows(World(WALLS, starts, [np.random.RandomState(2)], errors))
     random, scans, poses = np.random.RandomState(3), [], ([], [])
@@ -118,7 +119,7 @@ def test_hidden_infrared_constants_come_back_from_a_known_arena():
     assert fit.values["beta_counts"] == pytest.approx(-3.0, abs=0.3)
     assert fit.after_counts < fit.before_counts / 3.0
     lines = describe_fit(Fit(fit.values, 0.0, 0.03, 0.01, fit), 4)
-    assert re.search(r"# hero_4: held-out infrared signals are \d\.\d counts off, before the fit \d\.\d$", lines[-2])
+    assert re.search(r"# hero_4: held-out infrared signals are \d\.\d counts off, before the fit \d+\.\d$", lines[-2])
     assert ",beta_counts=-" in lines[-1]
 
 

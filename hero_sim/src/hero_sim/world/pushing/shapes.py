@@ -122,7 +122,6 @@ class PushedBody:
         pose: of its center, frame world; x_m, y_m: its place.
         corners_m: frame world; none of a disc.
         friction_n: the force through its center that just moves it.
-        radius_m2: the square of c.
     """
 
     def __init__(self, shape: Shape, pose: Pose, mass_kg: float, friction: float) -> None:
@@ -135,7 +134,6 @@ class PushedBody:
                 raise ValueError(f"{name} must be more than 0, not {value:g}")
         self.friction_n = mass_kg * friction * GRAVITY_M_S2
         self.shape = shape
-        self.radius_m2 = shape.friction_radius_m * shape.friction_radius_m
         self._set(pose, math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
 
     def _set(self, pose: Pose, cosine: float, sine: float) -> None:
@@ -149,11 +147,6 @@ class PushedBody:
         body = copy.copy(self)
         body._set(pose, math.cos(pose.yaw_rad), math.sin(pose.yaw_rad))
         return body
-
-    def measure_work(self, motion: Motion) -> float:
-        """Return the work (J) against the floor's friction of a motion."""
-        x_m, y_m, rotation_rad = motion
-        return self.friction_n * math.sqrt(x_m * x_m + y_m * y_m + self.radius_m2 * rotation_rad * rotation_rad)
 
     def move(self, motion: Motion) -> None:
         """Move by less than half a radian."""
@@ -228,10 +221,61 @@ def find_contacts(first: PushedBody, second: PushedBody, margin_m: float) -> Lis
     elif isinstance(second.shape, Disc):
         contacts = [touch_circle(second.x_m, second.y_m, second.shape.radius_m, first).turned()]
     else:
-        # Normals of edges point out of their polygon: those of the first into the second.
-        contacts = [_find_edge(corner_m, first.corners_m) for corner_m in second.corners_m]
-        contacts += [_find_edge(corner_m, second.corners_m).turned() for corner_m in first.corners_m]
+        own, others = _find_facing(first, second), _find_facing(second, first)
+        # Of two that are alike the first body's edge: two boxes side by side touch along it, whichever rounds better.
+        if own[0] + _ALIKE_M >= others[0]:
+            contacts = _touch_edge(own[1], second)
+        else:
+            contacts = [contact.turned() for contact in _touch_edge(others[1], first)]
     return [contact for contact in contacts if contact.depth_m > -margin_m]
+
+
+_ALIKE_M = 1e-9
+
+
+def _find_facing(body: PushedBody, other: PushedBody) -> Tuple[float, Tuple[Point, Point]]:
+    """Return the edge of body that is farthest from other, and how far (negative: they overlap)."""
+    found = []
+    for start_m, end_m in _list_edges(body.corners_m):
+        _, (normal_x, normal_y), _ = _measure_edge(start_m, end_m)
+        found.append(min((x - start_m[0]) * normal_x + (y - start_m[1]) * normal_y for x, y in other.corners_m))
+    best = max(range(len(found)), key=found.__getitem__)
+    return found[best], _list_edges(body.corners_m)[best]
+
+
+def _measure_edge(start_m: Point, end_m: Point) -> Tuple[Point, Point, float]:
+    """Return the direction of an edge, its normal to the outside, and its length (m)."""
+    x_m, y_m = end_m[0] - start_m[0], end_m[1] - start_m[1]
+    length_m = math.sqrt(x_m * x_m + y_m * y_m)
+    return (x_m / length_m, y_m / length_m), (y_m / length_m, -x_m / length_m), length_m
+
+
+def _touch_edge(edge: Tuple[Point, Point], body: PushedBody) -> List[Contact]:
+    """Return where the edge of another body touches body: the ends of what of body's nearest edge is beside it."""
+    (start_x, start_y), _ = edge
+    (along_x, along_y), (normal_x, normal_y), length_m = _measure_edge(*edge)
+
+    def face(ends: Tuple[Point, Point]) -> float:
+        _, (x, y), _ = _measure_edge(*ends)
+        return x * normal_x + y * normal_y
+
+    ends = min(_list_edges(body.corners_m), key=face)
+    beside = [
+        ((x - start_x) * along_x + (y - start_y) * along_y, (x - start_x) * normal_x + (y - start_y) * normal_y)
+        for x, y in ends
+    ]
+    contacts = []
+    for (share_m, depth_m), (other_m, other_depth_m) in (beside, beside[::-1]):
+        kept_m = min(max(share_m, 0.0), length_m)
+        if abs(kept_m - share_m) < _ALIKE_M:
+            kept_m = share_m
+        elif (kept_m - share_m) * (other_m - kept_m) <= 0.0:
+            continue  # all of it is beyond this end
+        else:
+            depth_m += (other_depth_m - depth_m) * ((kept_m - share_m) / (other_m - share_m))
+        x_m, y_m = start_x + along_x * kept_m + normal_x * depth_m, start_y + along_y * kept_m + normal_y * depth_m
+        contacts.append(Contact(x_m, y_m, normal_x, normal_y, -depth_m))
+    return contacts
 
 
 def touch_walls(
