@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from hero_node.geometry import Pose
+from hero_node import Pose
 from hero_sim.world.pushing.shapes import (
     Disc,
     Polygon,

@@ -15,7 +15,7 @@ from hero_client.values import BODY_RADIUS_M, PlacedObjects
 from hero_node import Pose
 from hero_sim.population import place_worlds
 from hero_sim.stepped import RobotRows
-from hero_sim.world import Arena, PushedBody, measure_clearance
+from hero_sim.world import Arena, PushedBody, is_free, measure_clearance
 
 from .behavior import PULSES, Behavior, Random, derive_seed, lock
 from .control import Control
@@ -28,11 +28,16 @@ OPEN = Arena("open", np.empty((0, 4)), np.empty((0, 3)), (), np.array([-50.0, -5
 
 _MAX_TRIES = 20000
 
+_ROUNDED_M = 1e-9
+"""Robots may touch walls."""
 
-def scatter(robots: int, width_m: float, height_m: float, seed: int, gap_m: float = 0.0) -> np.ndarray:
+
+def scatter(
+    robots: int, width_m: float, height_m: float, seed: int, gap_m: float = 0.0, arena: Arena = OPEN
+) -> np.ndarray:
     """Return poses (robots, 3) drawn uniformly in a rectangle around the origin, with gap_m between bodies.
 
-    Raises: ValueError if they find no place.
+    Inside the arena's bounds and clear of all that it holds. Raises: ValueError if they find no place.
     """
     random = np.random.RandomState(derive_seed(seed, "places"))
     half_m = np.array((width_m, height_m)) / 2.0 - BODY_RADIUS_M
@@ -43,10 +48,18 @@ def scatter(robots: int, width_m: float, height_m: float, seed: int, gap_m: floa
             return poses
         x_share, y_share, turn = 2.0 * random.random_sample(3) - 1.0
         place_m = half_m * (x_share, y_share)
-        if ((poses[:placed, :2] - place_m) ** 2).sum(axis=1).min(initial=np.inf) > (2.0 * BODY_RADIUS_M + gap_m) ** 2:
+        apart_m2 = ((poses[:placed, :2] - place_m) ** 2).sum(axis=1).min(initial=np.inf)
+        if apart_m2 > (2.0 * BODY_RADIUS_M + gap_m) ** 2 and _is_clear(place_m, arena):
             poses[placed] = (*place_m, math.pi * turn)
             placed += 1
-    raise ValueError("%d robots find no place in %g m x %g m" % (robots, width_m, height_m))
+    raise ValueError("%d robots find no place in %g m x %g m of arena %s" % (robots, width_m, height_m, arena.name))
+
+
+def _is_clear(place_m: np.ndarray, arena: Arena) -> bool:
+    low_m, high_m = arena.bounds_m[:2] - _ROUNDED_M, arena.bounds_m[2:] + _ROUNDED_M
+    inside = (place_m >= low_m).all() and (place_m <= high_m).all()
+    pose = Pose(float(place_m[0]), float(place_m[1]), 0.0)
+    return bool(inside and is_free(pose, (), arena, BODY_RADIUS_M - _ROUNDED_M))
 
 
 def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedBody]:
@@ -106,7 +119,11 @@ class Trial:
         x_min, y_min, x_max, y_max = arena.bounds_m
         width_m, height_m = (x_max - x_min, y_max - y_min) if size_m is None else size_m
         if starts is None:
-            starts = np.array([scatter(robots, width_m, height_m, seed) for seed in seeds])
+            own = [arena.objects] * len(seeds) if objects is None else objects
+            rooms = [arena._replace(objects=tuple(things)) for things in own]
+            starts = np.array(
+                [scatter(robots, width_m, height_m, seed, arena=room) for seed, room in zip(seeds, rooms)]
+            )
         self.behavior = behavior
         self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects, known_errors))
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)

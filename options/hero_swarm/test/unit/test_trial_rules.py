@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from hero_client.values import BODY_RADIUS_M, MAX_LINEAR_M_S
-from hero_sim.world.arena import build_rectangle
+from hero_node import Pose
+from hero_sim.world.arena import build_rectangle, is_free
+from hero_sim.world.arena_file import load_arena
 from hero_swarm import metrics
 from hero_swarm.behavior import Behavior, Neighbors
-from hero_swarm.experiments.starts import _place_in_circle, _place_in_grid
+from hero_swarm.experiments.experiment_file import Start
+from hero_swarm.experiments.starts import _place_in_circle, _place_in_grid, place_all
 from hero_swarm.learning.episode import MAX_LEARNED_ANGULAR_RAD_S, Episode, count_observations
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial, scatter
@@ -170,6 +173,24 @@ def test_robots_are_scattered_inside_and_apart():
     assert np.abs(poses[:, 2]).max() > 2.0 and np.abs(poses[:, 1]).max() > 0.1
     with pytest.raises(ValueError, match=r"60 robots find no place in 0.5 m x 0.5 m"):
         scatter(60, 0.5, 0.5, 1)
+
+
+@pytest.mark.parametrize("name", ["obstacles", "maze", "box", "discs"])
+def test_robots_are_never_scattered_into_what_an_arena_holds(name):
+    arena = load_arena(name)
+    trial = Trial(Note(), arena, 10, range(20))
+    for poses in trial.poses.reshape(-1, 3):
+        assert is_free(Pose(*poses), (), arena, BODY_RADIUS_M - 1e-6)
+    uniform = place_all(Start("uniform", 0.03, 0.0, None), arena, 10, range(20))
+    assert all(is_free(Pose(*pose), (), arena, BODY_RADIUS_M - 1e-6) for pose in uniform.reshape(-1, 3))
+    low_m, high_m = arena.bounds_m.reshape(2, 2)
+    assert (uniform[..., :2] > low_m).all() and (uniform[..., :2] < high_m).all()
+
+
+def test_an_arena_without_room_for_the_robots_is_refused():
+    full = build_rectangle(1.0, 1.0, 1)._replace(circles_m=np.array([(0.0, 0.0, 0.7)]), name="full")
+    with pytest.raises(ValueError, match="3 robots find no place in 1 m x 1 m of arena full"):
+        Trial(Note(), full, 3, (1,))
 
 
 def test_starts_in_rows_and_circles_have_their_spacing():

@@ -59,7 +59,7 @@ def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:
         return place_robots(arena, robots, np.random.RandomState(derive_seed(seed, "places")))
     if start.kind == "uniform":
         side_m = math.sqrt(robots * math.pi * BODY_RADIUS_M * BODY_RADIUS_M / start.cover)
-        return scatter(robots, side_m, side_m, seed, start.gap_m)
+        return scatter(robots, side_m, side_m, seed, start.gap_m, arena)
     spacing_m = _DIAMETER_M + start.gap_m
     return _place_in_grid(robots, spacing_m, seed) if start.kind == "grid" else _place_in_circle(robots, spacing_m)
 

@@ -22,6 +22,7 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Start
 from hero_swarm.experiments.results_folder import Run
 from hero_swarm.experiments.starts import place_all
+from hero_swarm.trial import OPEN
 
 FILE = """\
 behavior: aggregation
@@ -92,9 +93,9 @@ def test_killed_anywhere_a_resumed_experiment_gives_the_same_bytes(finished, tmp
 def test_all_runs_differ_and_start_alike_for_the_same_seed_in_paired_cells(finished):
     rows = read_table(finished)
     assert len(rows) == 20 and len({row["dispersion"] for row in rows}) == 20
-    starts = place_all(Start("uniform", 0.05, 0.0, None), None, 5, [11, 12])
+    starts = place_all(Start("uniform", 0.05, 0.0, None), OPEN, 5, [11, 12])
     assert not np.array_equal(starts[0], starts[1])
-    assert np.array_equal(starts[1:], place_all(Start("uniform", 0.05, 0.0, None), None, 5, [12]))
+    assert np.array_equal(starts[1:], place_all(Start("uniform", 0.05, 0.0, None), OPEN, 5, [12]))
 
 
 def test_what_is_recorded_over_time_agrees_with_the_table(finished):
@@ -346,7 +347,7 @@ def test_a_name_with_a_nul_character_is_refused(tmp_path):
     ],
 )
 def test_starts_keep_their_gap_and_their_center(start, check):
-    (poses,) = place_all(start, None, 9, [3])
+    (poses,) = place_all(start, OPEN, 9, [3])
     apart_m = np.hypot(*(poses[:, None, :2] - poses[:, :2]).T)[~np.eye(9, dtype=bool)]
     assert check(apart_m - 2.0 * BODY_RADIUS_M)
     assert np.hypot(*poses[:, :2].mean(axis=0)) < 0.2
@@ -356,14 +357,14 @@ def test_starts_keep_their_gap_and_their_center(start, check):
 def test_starts_of_a_file_are_its_first_poses(tmp_path):
     path = tmp_path / "starts.csv"
     path.write_text("# x, y, yaw\n0, 0.5, 1\n\n-1,2,-3.0\n5,5,5\n")
-    poses = place_all(Start("file", 0.0, 0.0, str(path)), None, 2, [1, 2])
+    poses = place_all(Start("file", 0.0, 0.0, str(path)), OPEN, 2, [1, 2])
     assert poses.tolist() == [[[0.0, 0.5, 1.0], [-1.0, 2.0, -3.0]]] * 2
 
 
 def test_starts_of_a_file_may_touch_as_robots_at_the_end_of_a_run(tmp_path):
     path = tmp_path / "starts.csv"
     path.write_text("0,0,0\n%.4f,0,0\n" % (2.0 * BODY_RADIUS_M - 0.0012))
-    assert place_all(Start("file", 0.0, 0.0, str(path)), None, 2, [1]).shape == (1, 2, 3)
+    assert place_all(Start("file", 0.0, 0.0, str(path)), OPEN, 2, [1]).shape == (1, 2, 3)
 
 
 @pytest.mark.parametrize(
@@ -384,7 +385,7 @@ def test_a_wrong_file_of_starts_is_refused_with_its_line(content, words, tmp_pat
     path = Path(str(tmp_path)) / "starts.csv"
     path.write_text(content)
     with pytest.raises(ExperimentError) as caught:
-        place_all(Start("file", 0.0, 0.0, str(path)), None, 2, [1])
+        place_all(Start("file", 0.0, 0.0, str(path)), OPEN, 2, [1])
     assert words in str(caught.value) and "starts.csv" in str(caught.value)
 
 
