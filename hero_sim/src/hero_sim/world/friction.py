@@ -44,9 +44,11 @@ _SETTLED_M = 2e-5, 1e-7
 _PASSES = 100, 400
 _ROUNDS = 10, 60
 _SAME_SLIP = 2.0, 1.02
-"""Of a world where robots alone touch, and of one with things: a pass is the last one if it moves bodies by less than
-the first (few need more than five), a round if slips change by less than the last, a factor: the next step continues
-with them. Many contacts of things share a force, and a thing weighs anything: they need more."""
+"""Limits for a world where robots alone touch, and for one with things, whose many contacts share a force.
+
+A pass is the last one if it moves bodies by less than the first (few need more than five), a round if slips change by
+less than the last, a factor: the next step continues with them.
+"""
 
 
 def solve_contacts(
