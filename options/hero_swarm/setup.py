@@ -3,7 +3,7 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-ROOMS = ("behaviors", "experiments", "experiments.reporting", "fitting", "learning", "metrics", "ros")
+ROOMS = ("behaviors", "experiments", "experiments.reporting", "fitting", "learning", "metrics", "ros", "sensors")
 
 setup(
     **generate_distutils_setup(

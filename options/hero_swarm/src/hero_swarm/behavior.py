@@ -126,11 +126,15 @@ class Behavior:
     drive: str = VELOCITY
 
     def __init__(self, **parameters: Any) -> None:
-        """Set parameters by name.
+        """Set parameters by name, and fields of sensors by SENSOR.FIELD.
 
         Raises: TypeError for one that the behavior does not have; ValueError for rate_hz or drive.
         """
         for name, value in parameters.items():
+            sensor, dot, field = name.partition(".")
+            if dot and name in self.numbers():
+                setattr(self, sensor, getattr(self, sensor)._replace(**{field: value}))
+                continue
             if name.startswith("_") or not hasattr(self, name) or callable(getattr(self, name)):
                 raise TypeError(f"{type(self).__name__} has no parameter {name!r}; it has {self.parameters()}")
             setattr(self, name, value)
@@ -146,8 +150,11 @@ class Behavior:
         return {name: getattr(self, name) for name in names if not callable(getattr(self, name))}
 
     def numbers(self) -> Dict[str, float]:
-        """Return the parameters that are numbers, with their values."""
-        return {name: value for name, value in self.parameters().items() if isinstance(value, (int, float))}
+        """Return the parameters and the fields of sensors, as SENSOR.FIELD, that are numbers, with their values."""
+        own = {f"{name}.{field}": getattr(sensor, field) for name, sensor in self.sensors().items()
+               for field in sensor._fields}  # fmt: skip
+        given = {**self.parameters(), **own}
+        return {name: value for name, value in given.items() if isinstance(value, (int, float))}
 
     def sensors(self) -> Dict[str, Any]:
         """Return the sensors by name."""

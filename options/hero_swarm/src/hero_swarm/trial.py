@@ -13,6 +13,7 @@ import numpy as np
 
 from hero_client.values import BODY_RADIUS_M, PlacedObjects
 from hero_node import Pose
+from hero_sim.link import Radio, build_network, parse_wifi
 from hero_sim.population import place_worlds
 from hero_sim.stepped import RobotRows
 from hero_sim.world import Arena, PushedBody, is_free, measure_clearance
@@ -86,6 +87,14 @@ def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedB
     return placed
 
 
+def _build_radios(wifi: str, seeds: Sequence[int], robots: int) -> List[Radio]:
+    """Return the Wi-Fi of each robot; none where it is ideal."""
+    if wifi == "ideal":
+        return []
+    drawn = ([derive_seed(seed, f"radio {robot}") for robot in range(robots)] for seed in seeds)
+    return [radio for own in drawn for radio in build_network(*parse_wifi(wifi), own)]
+
+
 class Trial:
     """One behavior on W worlds with N robots each.
 
@@ -108,13 +117,14 @@ class Trial:
         starts: Optional[np.ndarray] = None,
         objects: Optional[Sequence[Sequence[PushedBody]]] = None,
         known_errors: Sequence[str] = (),
+        wifi: str = "ideal",
     ) -> None:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
         errors: 0 for nominal robots, 1 for usual ones. delay_s: age of the poses that robots sense each
         other by. filter_commands: keeps robots apart, or inside a fence, between the steps of the behavior as well.
         objects: of each world; None: those of the arena, where it has them. known_errors: of robots 0 to N - 1, as
-        hero_sim --error takes them.
+        hero_sim --error takes them. wifi: quality of the network, as hero_sim --wifi.
         """
         x_min, y_min, x_max, y_max = arena.bounds_m
         width_m, height_m = (x_max - x_min, y_max - y_min) if size_m is None else size_m
@@ -125,7 +135,9 @@ class Trial:
                 [scatter(robots, width_m, height_m, seed, arena=room) for seed, room in zip(seeds, rooms)]
             )
         self.behavior = behavior
-        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects, known_errors))
+        self.rows = RobotRows(
+            place_worlds(arena, starts, seeds, errors, objects, known_errors), _build_radios(wifi, seeds, robots)
+        )
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
         self.poses, self.velocities = lock(np.array(starts)), lock(np.zeros_like(starts))
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
@@ -149,7 +161,7 @@ class Trial:
 
     @property
     def state(self) -> State:
-        """Return what metrics measure now; the behavior decides before, unless it has."""
+        """The state for metrics now; the behavior decides before, unless it has."""
         self._decide()
         control, radii_m = self._control, self.rows.world.errors.radius_m[: self.poses.shape[1], 0]
         of_behavior = control.sensed, control.memory, control.colors

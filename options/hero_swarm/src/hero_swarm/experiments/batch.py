@@ -29,7 +29,7 @@ from ..sources import Sources
 from ..trial import OPEN, Trial
 from .code_version import check_suite
 from .errors import ExperimentError, report_place
-from .experiment_file import ERRORS, Cell, Experiment, Metric, parse_experiment
+from .experiment_file import ERROR_KEYS, ERRORS, Cell, Experiment, Metric, parse_experiment
 from .results_folder import Run
 from .starts import place_all, place_objects
 
@@ -49,7 +49,8 @@ def load_checked(experiment: Experiment) -> None:
     built = set()
     for cell in tqdm(experiment.cells, "checking", unit=" cells", leave=False, disable=None, file=sys.stderr):
         make_behavior(experiment, cell)
-        settings = json.dumps({**cell.settings, "delay_s": None}, sort_keys=True)
+        needed = [{**cell.settings, "delay_s": None}, cell.behavior, cell.start, cell.own]
+        settings = json.dumps(needed, sort_keys=True)
         if settings not in built:
             # Two worlds, as an own metric may give one number for all.
             trial = build_trial(experiment, cell, [experiment.seeds[0]] * 2)
@@ -73,20 +74,26 @@ def build_trial(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> Tri
         arena = load_cell_arena(experiment, cell)
         pushes = any(isinstance(sensor, Objects) for sensor in behavior.sensors().values())
         if pushes and not arena.objects:
-            raise ExperimentError(f"{experiment.behavior} pushes objects: arena must have them, as box does")
+            raise ExperimentError(f"{cell.behavior} pushes objects: arena must have them, as box does")
     with _at(experiment, "start"):
         starts = place_robots(experiment, cell, seeds)
     with _at(experiment, "objects"):
         objects = place_objects(settings.get("objects", "arena"), arena, starts, seeds)
     with _at(experiment, "errors"):
-        scale = ERRORS.get(settings.get("errors", "default"), ERRORS["default"])
+        scale = _find_scale(settings.get("errors", "default"))
         ids, read = range(settings["robots"]), experiment.sources.read
         known = read_known(files["errors"], ids, read) if "errors" in files else []
-        delay_s = settings.get("delay_s", 0.0)
+        known += ["%s=%r" % (name.partition(".")[2], settings[name]) for name in ERROR_KEYS if name in settings]
+        delay_s, wifi = settings.get("delay_s", 0.0), settings.get("wifi", "ideal")
         return Trial(
             behavior, arena, settings["robots"], seeds,
-            starts=starts, objects=objects, errors=scale, known_errors=known, delay_s=delay_s,
+            starts=starts, objects=objects, errors=scale, known_errors=known, delay_s=delay_s, wifi=wifi,
         )  # fmt: skip
+
+
+def _find_scale(errors: Any) -> float:
+    """Return by how much robots differ: a number, or a name; a file is put over usual differences."""
+    return ERRORS.get(errors, ERRORS["default"]) if isinstance(errors, str) else float(errors)
 
 
 @contextmanager
@@ -102,14 +109,18 @@ def _at(experiment: Experiment, name: str) -> Iterator[None]:
 def make_behavior(experiment: Experiment, cell: Cell) -> Behavior:
     """Return the behavior of a cell. Raises: ExperimentError."""
     with _at(experiment, "behavior"):
-        kind = find_behavior(experiment.locate(experiment.behavior), experiment.sources)
+        kind = find_behavior(experiment.locate(cell.behavior), experiment.sources)
         allowed = kind().numbers()
-    for name in cell.parameters:
-        if name not in allowed:
+    known = set(allowed)
+    for name in cell.parameters.keys() - known:
+        with _at(experiment, "behavior"):
+            others = [find_behavior(experiment.locate(one), experiment.sources) for one in experiment.list_behaviors()]
+        # Where behaviors vary, a baseline need not have what the others have.
+        if name in cell.own or not any(name in other().numbers() for other in others):
             text = "%s: %s has no parameter %r; it has %s"
-            raise ExperimentError(text % (experiment.places[name], experiment.behavior, name, ", ".join(allowed)))
+            raise ExperimentError(text % (experiment.places[name], cell.behavior, name, ", ".join(allowed)))
     with _at(experiment, "rate_hz"):
-        return kind(**cell.parameters)
+        return kind(**{name: value for name, value in cell.parameters.items() if name in known})
 
 
 def load_cell_arena(experiment: Experiment, cell: Cell) -> Arena:
@@ -123,7 +134,7 @@ def load_cell_arena(experiment: Experiment, cell: Cell) -> Arena:
 
 def place_robots(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> np.ndarray:
     """Return where the robots of runs begin (W, N, 3). Raises: ExperimentError."""
-    start = experiment.start._replace(file=experiment.list_files(cell).get("file"))
+    start = cell.start._replace(file=experiment.list_files(cell).get("file"))
     arena, robots = load_cell_arena(experiment, cell), cell.settings["robots"]
     return place_all(start, arena, robots, seeds, experiment.sources.read)
 

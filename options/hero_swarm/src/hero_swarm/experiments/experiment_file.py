@@ -8,17 +8,19 @@
     metrics: [cluster_fraction, {time_until: {dispersion_ratio: 1.15}}]
 
 Each combination of the values that vary is a cell; each cell runs with every seed. Paths of files (of a behavior, an
-arena, errors, start places) are relative to the file's folder.
+arena, errors, start places, metrics) are relative to the file's folder.
 """
 
 import itertools
 import json
 import math
 import os
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from hero_node.files import Entry, EntryError, read_entries
-from hero_sim.world import SHIPPED
+from hero_sim.errors import OptionError
+from hero_sim.link import parse_wifi
+from hero_sim.world import KINDS, SHIPPED
 
 from ..metrics import FALLING
 from ..metrics.own import MetricNames, is_own
@@ -38,14 +40,17 @@ START_KEYS: Dict[str, Tuple[Tuple[str, ...], Tuple[str, ...]]] = {
     "file": (("file",), ()),
     "arena": ((), ()),
 }
-SETTINGS = ("robots", "errors", "delay_s", "arena", "objects")
+SETTINGS = ("robots", "errors", "delay_s", "arena", "objects", "wifi")
 ERRORS = {"perfect": 0.0, "default": 1.0}
-"""Differences between robots, as an option of the simulator."""
+"""Differences between robots, as an option of the simulator: shares of the usual ones."""
+MAX_ERRORS = 10.0
+ERROR_KEYS = tuple("errors." + key for key in KINDS)
+"""Differences that are the same for all robots, as hero_sim --error takes them."""
 OBJECTS = ("arena", "scattered")
 """Places of the objects at the start: as in the arena, or drawn from each seed."""
 TESTS = ("wilcoxon",)
 METRIC_NAMES = MetricNames()
-_REQUIRED = ("behavior", "time_s", "seeds", "metrics")
+_REQUIRED = ("time_s", "seeds", "metrics")
 _KEYS = (
     "behavior", "vary", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record", "compare"
 )  # fmt: skip
@@ -95,23 +100,38 @@ class Start(NamedTuple):
     file: Optional[str]
 
 
+NO_START = Start("arena", 0.0, 0.0, None)
+
+
 class Cell(NamedTuple):
     """One combination of the values that vary.
 
     Attributes:
         varied: name -> value, in the order of the file: the columns of the results.
-        settings: robots, errors, delay_s (age of the poses that robots sense each other by), arena, objects.
-        parameters: name -> value, of the behavior.
+        settings: robots, errors, delay_s (age of the poses that robots sense each other by), arena, objects, wifi, and
+            differences of all robots by ERROR_KEYS.
+        parameters: name -> value, of the behavior; of a sensor, SENSOR.FIELD.
+        own: names of parameters that are given with the behavior, which must have them.
     """
 
     varied: Dict[str, Any]
     settings: Dict[str, Any]
     parameters: Dict[str, float]
+    behavior: str
+    start: Start
+    own: Tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
         """The values that vary, for users."""
         return ", ".join("%s %s" % item for item in self.varied.items()) or "all"
+
+
+class _Value(NamedTuple):
+    """A value of the file: its text or number in tables, and the fields of a cell that it sets."""
+
+    label: Any
+    fields: Dict[str, Any]
 
 
 class Comparing(NamedTuple):
@@ -135,9 +155,7 @@ class Experiment(NamedTuple):
         sources: contents of the files that runs read.
     """
 
-    behavior: str
     cells: Tuple[Cell, ...]
-    start: Start
     time_s: float
     until: Optional[Bound]
     seeds: range
@@ -147,6 +165,15 @@ class Experiment(NamedTuple):
     places: Mapping[str, str]
     folder: str
     sources: Sources
+
+    @property
+    def behavior(self) -> str:
+        """All behaviors, for users."""
+        return ", ".join(self.list_behaviors())
+
+    def list_behaviors(self) -> List[str]:
+        """Return the behaviors of all cells."""
+        return list(dict.fromkeys(cell.behavior for cell in self.cells))
 
     def locate(self, name: str) -> str:
         """Return a built-in name, or FILE.py with what follows, as it is found from any folder."""
@@ -162,16 +189,18 @@ class Experiment(NamedTuple):
 
     def list_files(self, cell: Cell) -> Dict[str, str]:
         """Return the files that a run of cell reads, without that of the behavior: name in places -> path."""
-        named = {"file": self.start.file, **{name: cell.settings.get(name) for name in ("arena", "errors")}}
+        named = {"file": cell.start.file, **{name: cell.settings.get(name) for name in ("arena", "errors")}}
         built_in = (*SHIPPED, *ERRORS)
-        return {name: os.path.join(self.folder, path) for name, path in named.items() if path and path not in built_in}
+        return {
+            name: os.path.join(self.folder, path)
+            for name, path in named.items()
+            if isinstance(path, str) and path not in built_in
+        }
 
     def describe_cell(self, cell: Cell) -> str:
         """Return all that a run of cell depends on besides its seed and the code, as JSON."""
         description = {
-            "behavior": self.behavior,
             "cell": cell._asdict(),
-            "start": self.start._asdict(),
             "time_s": self.time_s,
             "until": self.until,
             "metrics": self.metrics,
@@ -196,10 +225,10 @@ def parse_experiment(
 
 
 def _parse(text: str, file: str, folder: str, sources: Sources) -> Experiment:
-    root = read_entries(text, file, "behavior: aggregation.Aggregation").mapping(_KEYS, _REQUIRED)
-    start = _parse_start(root.get("start"))
+    entry = read_entries(text, file, "behavior: aggregation.Aggregation")
+    root = entry.mapping((*_KEYS, *(name for name in entry.mapping() if name in ERROR_KEYS)), _REQUIRED)
     seeds = _parse_seeds(root["seeds"])
-    cells = _parse_cells(root, len(seeds))
+    cells = _parse_cells(root, entry.place, len(seeds))
     metrics = tuple(_parse_metric(entry) for entry in root["metrics"].entries())
     names = [metric.name for metric in metrics]
     _check_different(root["metrics"], names)
@@ -209,17 +238,21 @@ def _parse(text: str, file: str, folder: str, sources: Sources) -> Experiment:
     if "record" in root:
         record_hz = root["record"].mapping(("hz",), ("hz",))["hz"].number(0.01, 20.0, "Hz")
     compare = _parse_comparing(root["compare"], names, cells) if "compare" in root else None
-    behavior = root["behavior"].text()
-    inner = [root[name].mapping() for name in ("start", "vary", "parameters") if name in root]
-    places = {name: entry.place for entries in (*inner, root) for name, entry in entries.items()}
-    return Experiment(
-        behavior, cells, start, time_s, until, seeds, metrics, record_hz, compare, places, folder, sources
-    )
+    places = dict(_list_places(entry))
+    places["behavior"] = places.get("behavior", entry.place)
+    return Experiment(cells, time_s, until, seeds, metrics, record_hz, compare, places, folder, sources)
 
 
-def _parse_start(entry: Optional[Entry]) -> Start:
-    if entry is None:
-        return Start("arena", 0.0, 0.0, None)
+def _list_places(entry: Entry) -> Iterator[Tuple[str, str]]:
+    """Yield the names of all mappings and where they stand, inner ones first."""
+    named: Dict[str, Entry] = entry.value if isinstance(entry.value, dict) else {}
+    for value in named.values() or (entry.value if isinstance(entry.value, list) else ()):
+        yield from _list_places(value)
+    for name, value in named.items():
+        yield name, value.place
+
+
+def _parse_start(entry: Entry) -> Start:
     given = entry.mapping(("kind", "cover", "gap_m", "file"), ("kind",))
     kind = given["kind"].choice(START_KEYS)
     required, optional = START_KEYS[kind]
@@ -232,7 +265,45 @@ def _parse_start(entry: Optional[Entry]) -> Start:
     return Start(kind, cover, gap_m, given["file"].text() if "file" in given else None)
 
 
+def _parse_value(name: str, entry: Entry) -> _Value:
+    """Return what the value of a setting, or of a parameter of the behavior, sets."""
+    if name == "behavior":
+        return _parse_behavior(entry)
+    if name == "start":
+        start = _parse_start(entry)
+        given = {key: value.value for key, value in entry.mapping().items() if key != "kind"}
+        return _Value(_label(start.kind, given), {"start": start})
+    if name in SETTINGS or name in ERROR_KEYS:
+        value = _parse_setting(name, entry)
+        return _Value(value, {"settings": {name: value}})
+    value = entry.number(-1e6, 1e6, "")
+    return _Value(value, {"parameters": {name: value}})
+
+
+def _parse_behavior(entry: Entry) -> _Value:
+    """Return a behavior by its name, or by {NAME: {parameter: number}}."""
+    if not isinstance(entry.value, dict):
+        return _Value(entry.text(), {"behavior": entry.text()})
+    name, inner = entry.single((*entry.value,))
+    given = {key: value.number(-1e6, 1e6, "") for key, value in inner.mapping().items()}
+    return _Value(_label(name, given), {"behavior": name, "parameters": given, "own": tuple(given)})
+
+
+def _label(name: str, given: Mapping[str, Any]) -> str:
+    return " ".join([name, *("%s %s" % item for item in given.items())])
+
+
 def _parse_setting(name: str, entry: Entry) -> Any:
+    if name in ERROR_KEYS:
+        kind = KINDS[name.partition(".")[2]]
+        return entry.number(kind.least, kind.most, "")
+    if name == "errors" and not isinstance(entry.value, str):
+        return entry.number(0.0, MAX_ERRORS, "times the usual differences, or perfect, default or a file")
+    if name == "wifi":
+        try:
+            parse_wifi(entry.text())
+        except OptionError as error:
+            raise ExperimentError(f"{entry.place}: {error}") from None
     if name == "robots":
         return entry.whole(1, MAX_ROBOTS)
     if name == "delay_s":
@@ -240,10 +311,6 @@ def _parse_setting(name: str, entry: Entry) -> Any:
     if name == "objects":
         return entry.choice(OBJECTS)
     return entry.text()
-
-
-def _parse_parameter(entry: Entry) -> float:
-    return entry.number(-1e6, 1e6, "")
 
 
 def _check_different(entry: Entry, values: Sequence[Any]) -> None:
@@ -255,32 +322,37 @@ def _check_different(entry: Entry, values: Sequence[Any]) -> None:
         seen.add(value)
 
 
-def _parse_cells(root: Dict[str, Entry], seeds: int) -> Tuple[Cell, ...]:
-    settings = {name: _parse_setting(name, root[name]) for name in SETTINGS if name in root}
+def _parse_cells(root: Dict[str, Entry], place: str, seeds: int) -> Tuple[Cell, ...]:
     given = root["parameters"].mapping() if "parameters" in root else {}
-    parameters = {name: _parse_parameter(entry) for name, entry in given.items()}
-    varied: List[Tuple[str, List[Any]]] = []
+    settings = {name: entry for name, entry in root.items() if name in (*SETTINGS, *ERROR_KEYS, "behavior", "start")}
+    fixed = {name: _parse_value(name, entry) for name, entry in {**settings, **given}.items()}
+    varied: List[Tuple[str, List[_Value]]] = []
     for name, entry in (root["vary"].mapping() if "vary" in root else {}).items():
-        if name in settings or name in parameters:
+        if name in fixed:
             raise ExperimentError(f"{entry.place}: {name} is given twice: once as what varies")
-        values = [
-            _parse_setting(name, item) if name in SETTINGS else _parse_parameter(item) for item in entry.entries()
-        ]
-        _check_different(entry, values)
+        values = [_parse_value(name, item) for item in entry.entries()]
+        _check_different(entry, [value.label for value in values])
         varied.append((name, values))
-    if "robots" not in settings and "robots" not in dict(varied):
-        raise ExperimentError(f"{root['behavior'].place}: robots is missing: give robots: 20, or vary it")
+    names = [name for name, _ in varied]
+    for name, example in (("behavior", "behavior: milling"), ("robots", "robots: 20")):
+        if name not in fixed and name not in names:
+            where = root["behavior"].place if "behavior" in root else place
+            raise ExperimentError(f"{where}: {name} is missing: give {example}, or vary it")
     runs = math.prod(len(values) for _, values in varied) * seeds
     if runs > MAX_RUNS:
         root["seeds"].refuse("such that there are at most %d runs, not %d" % (MAX_RUNS, runs))
-    names = [name for name, _ in varied]
-    cells = []
-    for combination in itertools.product(*(values for _, values in varied)):
-        chosen = dict(zip(names, combination))
-        own = {name: value for name, value in chosen.items() if name in SETTINGS}
-        others = {name: value for name, value in chosen.items() if name not in SETTINGS}
-        cells.append(Cell(chosen, {**settings, **own}, {**parameters, **others}))
-    return tuple(cells)
+    combinations = itertools.product(*(values for _, values in varied))
+    return tuple(_make_cell(list(fixed.values()), dict(zip(names, chosen))) for chosen in combinations)
+
+
+def _make_cell(fixed: List[_Value], chosen: Dict[str, _Value]) -> Cell:
+    """Return the cell that all these values set."""
+    varied = {name: value.label for name, value in chosen.items()}
+    fields: Dict[str, Any] = {"settings": {}, "parameters": {}, "start": NO_START}
+    for value in [*fixed, *chosen.values()]:
+        for name, new in value.fields.items():
+            fields[name] = {**fields[name], **new} if isinstance(new, dict) else new
+    return Cell(varied, **fields)
 
 
 def _parse_seeds(entry: Entry) -> range:

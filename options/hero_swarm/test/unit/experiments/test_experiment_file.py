@@ -32,7 +32,7 @@ def test_every_combination_of_what_varies_is_a_cell():
 
 def test_all_parts_of_the_file_are_read():
     experiment = parse(FILE)
-    assert experiment.start == Start("uniform", 0.02, 0.0, None)
+    assert experiment.cells[0].start == Start("uniform", 0.02, 0.0, None)
     assert list(experiment.seeds) == list(range(1, 31))
     assert experiment.time_s == 300.0 and experiment.record_hz == 1.0
     assert [metric.name for metric in experiment.metrics] == [
@@ -85,6 +85,17 @@ def test_a_cell_is_described_by_everything_that_its_runs_depend_on():
         ("time_s: 300", "time_s: true", 4, "time_s is True"),
         ("time_s: 300", "time_s: .inf", 4, "time_s is inf"),
         ("time_s: 300\n", "", 1, "time_s is missing"),
+        ("behavior: aggregation.Aggregation\n", "", 1, "behavior is missing: give behavior: milling, or vary it"),
+        ("perfect, default", "perfect, 11", 2, "vary.errors is 11, but must be a number from 0 to 10 times"),
+        (
+            "errors: [perfect, default]",
+            "errors.lag_s: [0.1, 9]",
+            2,
+            "errors.lag_s is 9, but must be a number",
+        ),
+        ("errors: [perfect, default]", "wifi: [ideal, slow]", 2, "slow"),
+        ("errors: [perfect, default]", "behavior: [a]", 2, "behavior is given twice"),
+        ("errors: [perfect, default]", "start: [{kind: grid}]", 2, "start is given twice"),
         ("10, 25", "10, 2.5", 2, "vary.robots is 2.5, but must be a whole number"),
         ("10, 25", "10, 10", 2, "holds 10 more than once"),
         ("[10, 25]", "10", 2, "vary.robots is 10, but must be a list"),
@@ -183,7 +194,7 @@ def test_numbers_are_taken_up_to_their_limits(pattern, low, below, high, above):
 
 def test_without_a_start_robots_begin_as_in_the_arena_and_seeds_at_1():
     experiment = parse("behavior: a.B\nrobots: 5\ntime_s: 1\nseeds: {count: 2}\nmetrics: [dispersion]\n")
-    assert experiment.start == Start("arena", 0.0, 0.0, None) and list(experiment.seeds) == [1, 2]
+    assert experiment.cells[0].start == Start("arena", 0.0, 0.0, None) and list(experiment.seeds) == [1, 2]
     assert (experiment.record_hz, experiment.until, experiment.compare) == (0.0, None, None)
     whole = parse("behavior: a.B\nrobots: 5\ntime_s: 1\nseeds: {count: 1000000}\nmetrics: [dispersion]\n")
     assert len(whole.seeds) == 1_000_000
@@ -207,3 +218,36 @@ def test_too_many_cells_are_refused_before_any_is_made(monkeypatch):
     vary = ", ".join("p%d: [%s]" % (number, values) for number in range(8))
     with pytest.raises(ExperimentError, match="at most 1000000 runs, not 300000000000000000"):
         parse(FILE.replace("robots: [10, 25], errors: [perfect, default]", "robots: [10], " + vary))
+
+
+VARYING = """\
+vary:
+  behavior: [milling, {gather.py: {gain: 2}}, {gather.py: {gain: 3}}]
+  near.range_m: [0.5, 1]
+  errors.slip: [0, 0.02]
+  start: [{kind: grid}, {kind: uniform, cover: 0.02}]
+  wifi: [ideal, bad]
+  errors: [perfect, 0.5]
+robots: 4
+errors.lag_s: 0.1
+parameters: {gain: 1}
+time_s: 3
+seeds: {count: 2}
+metrics: [dispersion]
+compare: {metric: dispersion, between: behavior}
+"""
+
+
+def test_behaviors_sensors_errors_starts_and_wifi_vary():
+    experiment = parse(VARYING)
+    assert len(experiment.cells) == 3 * 2**5
+    first, last = experiment.cells[0], experiment.cells[-1]
+    assert first.label == "behavior milling, near.range_m 0.5, errors.slip 0.0, start grid, wifi ideal, errors perfect"
+    assert (first.behavior, first.parameters, first.own) == ("milling", {"gain": 1.0, "near.range_m": 0.5}, ())
+    assert last.varied["behavior"] == "gather.py gain 3.0" and last.varied["start"] == "uniform cover 0.02"
+    assert (last.behavior, last.parameters, last.own) == ("gather.py", {"gain": 3.0, "near.range_m": 1.0}, ("gain",))
+    assert last.start == Start("uniform", 0.02, 0.0, None)
+    assert last.settings == {"robots": 4, "errors.lag_s": 0.1, "errors.slip": 0.02, "wifi": "bad", "errors": 0.5}
+    assert len({experiment.describe_cell(cell) for cell in experiment.cells}) == len(experiment.cells)
+    assert experiment.behavior == "milling, gather.py"
+    assert experiment.places["gain"] == "e.yaml, line 10" and experiment.places["near.range_m"] == "e.yaml, line 3"
