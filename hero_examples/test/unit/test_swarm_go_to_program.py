@@ -46,7 +46,7 @@ def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count, hz", [(8, 6.8), (6, 3.0), (8, 3.0), (8, 1.6)])
+@pytest.mark.parametrize("count, hz", [(8, 6.8), (6, 3.0), (8, 3.0), (6, 1.6), (8, 1.6)])
 def test_robots_whose_program_is_late_are_slow_and_do_not_touch(count, hz, monkeypatch):
     warnings = []
     monkeypatch.setattr("rospy.logwarn", warnings.append)

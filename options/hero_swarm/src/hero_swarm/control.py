@@ -4,14 +4,16 @@ All that drives robots by a behavior steps this loop: trials on simulated robots
 """
 
 import math
-from typing import Any, Optional, Tuple
+from collections import deque
+from typing import Any, Deque, Optional, Tuple
 
 import numpy as np
 
+from hero_client.controllers import Lateness
 from hero_client.values import NO_OBJECTS, PlacedObjects
 
 from .behavior import Behavior, Random, Sensed, decide, sense
-from .safety import SafetyFilter
+from .safety import MAX_AGE_S, SafetyFilter
 
 
 class Control:
@@ -24,9 +26,12 @@ class Control:
         sensed: what the behavior sensed then.
         memory, colors: what it remembers and shows.
         wanted: linear m/s and angular rad/s of all robots (2, R), as it decided last.
+        lateness: of its steps and of the poses that it is given; robots are slow meanwhile.
+        share: of its speed at which each robot drives therefore, 0 to 1 (R,).
     """
 
     sensed: Sensed
+    share: np.ndarray
 
     def __init__(
         self, behavior: Behavior, random: Random, safety: Optional[SafetyFilter] = None, **surroundings: Any
@@ -41,12 +46,16 @@ class Control:
         self.memory: Any = None
         self.colors: Optional[np.ndarray] = None
         self.wanted = np.empty((2, 0))
+        self.lateness = Lateness(1.0 / self.rate_hz)
+        self._sent: Deque[Tuple[float, np.ndarray]] = deque()  # when, and which speeds (2, R)
         self._steps = 0
 
     def step(
         self, time_s: float, poses: np.ndarray, things: PlacedObjects = NO_OBJECTS, ages_s: Optional[np.ndarray] = None
     ) -> Tuple[np.ndarray, np.ndarray]:
         """Return linear and angular speeds of all robots (R,) at poses (W, N, 3) that are ages_s old (W, N).
+
+        time_s: by any clock that never steps back. Without ages and a filter, commands are those of the behavior.
 
         Raises: ValueError, or whatever the behavior raises.
         """
@@ -58,8 +67,30 @@ class Control:
             *wanted, self.memory = decide(self._behavior, self.sensed, self.memory, self._random)
             self.wanted = np.array(wanted)
             self.colors = self._behavior.colors(self.memory)
-        linear_m_s, angular_rad_s = self.wanted
-        if self._safety is None:
-            return linear_m_s, angular_rad_s
-        linear_m_s, angular_rad_s = self._safety(poses, linear_m_s, angular_rad_s, ages_s)
-        return linear_m_s.ravel(), angular_rad_s.ravel()
+        speeds = self.wanted
+        if self._safety is None and ages_s is None:
+            return speeds[0], speeds[1]
+        ages_s = np.zeros(poses.shape[:2]) if ages_s is None else ages_s
+        if self._safety is not None:
+            poses = self._predict(poses, ages_s, time_s)
+            speeds = np.array(self._safety(poses, speeds[0], speeds[1], ages_s)).reshape(2, -1)
+        self.lateness.step(time_s)
+        self.share = np.array(self.lateness.find_shares(ages_s.ravel().tolist()))
+        speeds = speeds * self.share
+        self._sent.append((time_s, speeds))
+        return speeds[0], speeds[1]
+
+    def _predict(self, poses: np.ndarray, ages_s: np.ndarray, time_s: float) -> np.ndarray:
+        """Return where robots are now, by the commands that were sent since their poses were true."""
+        if self._sent and self._sent[-1][0] > time_s:
+            self._sent.clear()  # a simulation that begins again
+        while len(self._sent) > 1 and self._sent[1][0] <= time_s - MAX_AGE_S:
+            self._sent.popleft()
+        poses, since_s = poses.copy(), time_s - np.clip(ages_s, 0.0, MAX_AGE_S)
+        ends_s = [sent_s for sent_s, _ in self._sent][1:] + [time_s]
+        for (sent_s, speeds), end_s in zip(self._sent, ends_s):
+            driven_s = np.maximum(end_s - np.maximum(since_s, sent_s), 0.0)
+            linear_m, turn_rad = driven_s * speeds.reshape(2, *driven_s.shape)
+            heading_rad = poses[..., 2] + 0.5 * turn_rad
+            poses += np.stack((linear_m * np.cos(heading_rad), linear_m * np.sin(heading_rad), turn_rad), axis=-1)
+        return poses

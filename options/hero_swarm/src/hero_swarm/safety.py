@@ -71,7 +71,6 @@ class SafetyFilter:
         self._fence_m = fence_m
         self.is_limited = np.zeros((1, 1), dtype=bool)
         self.calls = self.limited_calls = 0
-        self._last: Optional[np.ndarray] = None
 
     @property
     def rate_hz(self) -> float:
@@ -86,11 +85,12 @@ class SafetyFilter:
     def __call__(
         self, poses: np.ndarray, linear_m_s: np.ndarray, angular_rad_s: np.ndarray, ages_s: Optional[np.ndarray] = None
     ) -> Tuple[np.ndarray, np.ndarray]:
-        """Return safe linear and angular speeds (W, N) for those wanted, at poses (W, N, 3) that are ages_s old (W, N).
+        """Return safe linear and angular speeds (W, N) for those wanted, at poses (W, N, 3) of now.
 
-        Wanted ones are those of all robots of all worlds (W * N,), or one for all, as a behavior gives them. Robots
-        drove on as they were told meanwhile. One whose pose is NaN or too old is stopped, and others ignore it. Speeds
-        that are no finite numbers stop their robot; those beyond the limits count as the fastest of the same curve.
+        Wanted ones are those of all robots of all worlds (W * N,), or one for all, as a behavior gives them. ages_s:
+        of what poses were predicted from (W, N); see Control. A robot whose pose is NaN or too old is stopped, and
+        others ignore it. Speeds that are no finite numbers stop their robot; those beyond the limits count as the
+        fastest of the same curve.
         """
         linear_m_s, angular_rad_s = (
             np.broadcast_to(np.ravel(values), poses[..., 0].size).reshape(poses.shape[:2])
@@ -110,11 +110,6 @@ class SafetyFilter:
         known = np.isfinite(poses).all(axis=2) & (ages_s <= MAX_AGE_S)
         yaw_rad = np.where(known, poses[..., 2], 0.0)
         places_m = np.where(known[..., None], poses[..., :2], 1e6)
-        if self._last is not None:
-            drift_s = np.where(known, ages_s, 0.0)
-            yaw_rad = yaw_rad + drift_s * self._last[1]
-            headings = np.stack((np.cos(yaw_rad), np.sin(yaw_rad)), axis=-1)
-            places_m = places_m + (drift_s * self._last[0])[..., None] * headings
         cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
         points_m = places_m + self.lookahead_m * np.stack((cosine, sine), axis=-1)
         aside_m_s = angular_rad_s * self.lookahead_m
@@ -137,9 +132,7 @@ class SafetyFilter:
         linear_m_s = (found[..., 0] * cosine + found[..., 1] * sine) * known
         angular_rad_s = (found[..., 1] * cosine - found[..., 0] * sine) / self.lookahead_m * known
         share = self._find_share(linear_m_s, angular_rad_s)
-        linear_m_s, angular_rad_s = linear_m_s * share, angular_rad_s * share
-        self._last = np.array((linear_m_s, angular_rad_s))
-        return linear_m_s, angular_rad_s
+        return linear_m_s * share, angular_rad_s * share
 
     def _find_share(self, linear_m_s: np.ndarray, angular_rad_s: np.ndarray) -> np.ndarray:
         """Return the share of these speeds (W, N) that robots and their wheels can drive, at most 1."""

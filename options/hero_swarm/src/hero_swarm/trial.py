@@ -122,7 +122,8 @@ class Trial:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
         errors: 0 for nominal robots, 1 for usual ones. delay_s: age of the poses that robots sense each
-        other by. filter_commands: keeps robots apart, or inside a fence, between the steps of the behavior as well.
+        other by. filter_commands: keeps robots apart, or inside a fence, between the steps of the behavior as well;
+        with it robots are slow where delay_s is more than 0.1 s, and do not move beyond 0.5 s.
         objects: of each world; None: those of the arena, where it has them. known_errors: of robots 0 to N - 1, as
         hero_sim --error takes them. wifi: quality of the network, as hero_sim --wifi.
         """
@@ -143,8 +144,8 @@ class Trial:
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
         self._control = Control(behavior, random, filter_commands, arena=arena, robots=self.rows)
         self._arena, self._decided_ms = arena, -1
-        self._delay_s = delay_s
-        self._seen: Deque[Tuple[float, np.ndarray]] = deque([(-math.inf, self.poses)])
+        self._delay_s, self._is_filtered = delay_s, filter_commands is not None
+        self._seen: Deque[Tuple[float, np.ndarray]] = deque([(0.0, self.poses)])
         objects = [arena.objects] if objects is None else objects
         self._radii_m = np.array([thing.shape.reach_m for thing in objects[0]])
         self._all = np.arange(starts.shape[0] * robots)
@@ -190,7 +191,9 @@ class Trial:
         self._seen.append((now_s, self.poses))
         while len(self._seen) > 1 and self._seen[1][0] <= now_s - self._delay_s + 1e-9:
             self._seen.popleft()
-        linear_m_s, angular_rad_s = self._control.step(now_s, self._seen[0][1], self.things)
+        seen_s, poses = self._seen[0]
+        ages_s = np.full(poses.shape[:2], now_s - seen_s) if self._is_filtered else None
+        linear_m_s, angular_rad_s = self._control.step(now_s, poses, self.things, ages_s)
         if self.behavior.drive == PULSES:
             rows.send_pulses(self._all, *find_pulses(linear_m_s, angular_rad_s, self._dead_zones_us))
         else:

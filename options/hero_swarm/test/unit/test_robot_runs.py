@@ -24,6 +24,7 @@ class Stage(Clock):
 
     def __init__(self, monkeypatch):
         self.times_s, self.stops, self.name, self.safety = [], 0, "hero_3", SimpleNamespace()
+        self.lateness = SimpleNamespace(take_warning=lambda: "")
         for module in (ros_clock, robot_runs):
             monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
         monkeypatch.setattr(rospy, "get_time", lambda: self.now_s + self.ahead_s)

@@ -65,19 +65,6 @@ def test_a_robot_without_a_fresh_pose_is_stopped_and_ignored():
     assert not linear_m_s[0, 1:].any() and not angular_rad_s[0, 1:].any()
 
 
-def test_robots_of_old_poses_are_kept_apart_where_they_have_driven_to():
-    age_s, far_m = 0.4, np.array([[(0.0, 0.0, 0.0), (3.0, 0.0, 0.0)]])
-    linear_m_s, angular_rad_s = np.array([[0.1, 0.1]]), np.array([[1.0, -1.0]])
-    old = np.array([[(0.0, 0.0, 0.0), (0.22, 0.02, math.pi)]])
-    arcs_rad = old[..., 2] + 0.5 * age_s * angular_rad_s
-    moved = age_s * np.stack((linear_m_s * np.cos(arcs_rad), linear_m_s * np.sin(arcs_rad), angular_rad_s), axis=-1)
-    keep_apart = SafetyFilter(ROBOTS)
-    keep_apart(far_m, linear_m_s, angular_rad_s)
-    found = keep_apart(old, linear_m_s, angular_rad_s, np.full((1, 2), age_s))
-    assert found[0] == pytest.approx(SafetyFilter(ROBOTS)(old + moved, linear_m_s, angular_rad_s)[0], abs=0.005)
-    assert np.abs(found[0] - linear_m_s).max() > 0.1, "or they would not have met"
-
-
 def test_a_speed_that_was_no_number_once_disturbs_nobody_later():
     poses = np.array([[(0.0, 0.0, 0.0), (0.4, 0.0, 0.0)]])
     speeds, ages_s = np.full((1, 2), 0.1), np.full((1, 2), 0.1)
@@ -142,10 +129,10 @@ class LeaveTogether(Behavior):
         return 0.2, 6.0 * (bearing_rad - 2.0 * np.pi * np.rint(bearing_rad / (2.0 * np.pi))), memory
 
 
-@pytest.mark.parametrize("rate_hz", [1.0, 3.0, 20.0])
-def test_behaviors_that_decide_seldom_are_filtered_as_often_as_others(rate_hz):
-    behavior = LeaveTogether(rate_hz=rate_hz)
-    trial = Trial(behavior, OPEN, 8, (1, 2, 3), (1.2, 1.2), filter_commands=SafetyFilter(ROBOTS, FENCE_M))
+def leave_together(rate_hz, delay_s):
+    """Return the least distance between two robots, and how far the farthest was outside of the fence, m."""
+    behavior, safe = LeaveTogether(rate_hz=rate_hz), SafetyFilter(ROBOTS, FENCE_M)
+    trial = Trial(behavior, OPEN, 8, (1, 2, 3), (1.2, 1.2), delay_s=delay_s, filter_commands=safe)
     nearest_m, farthest_m = [], []
 
     def watch(_):
@@ -154,10 +141,23 @@ def test_behaviors_that_decide_seldom_are_filtered_as_often_as_others(rate_hz):
         farthest_m.append(np.abs(poses[..., :2]).max())
 
     trial.rows.on_cycle.append(watch)
-    for _ in trial.run(12.0):
-        pass
+    assert np.abs(list(trial.run(12.0))[-1][1][..., :2]).max() > 0.55, "or they did not drive"
     assert len(nearest_m) > 300
-    assert min(nearest_m) > 2.0 * BODY_RADIUS_M and max(farthest_m) < 0.7 - BODY_RADIUS_M
+    return min(nearest_m) - 2.0 * BODY_RADIUS_M, max(farthest_m) + BODY_RADIUS_M - 0.7
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 3.0, 20.0])
+def test_behaviors_that_decide_seldom_are_filtered_as_often_as_others(rate_hz):
+    gap_m, outside_m = leave_together(rate_hz, 0.0)
+    assert gap_m > 0.0 and outside_m < 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay_s", [0.1, 0.2, 0.3, 0.5])
+def test_robots_whose_poses_are_old_neither_touch_nor_leave_the_fence(delay_s):
+    for rate_hz in (1.0, 20.0):
+        gap_m, outside_m = leave_together(rate_hz, delay_s)
+        assert gap_m > 0.0 and outside_m < 0.0
 
 
 RING_M = 0.6

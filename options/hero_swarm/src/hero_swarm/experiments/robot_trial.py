@@ -25,6 +25,7 @@ class RobotTrial:
     Attributes:
         behavior: with the parameters of the cell.
         safety: the filter of its commands.
+        lateness: of its steps and poses.
         remark: why the trial does not count; empty while it does.
     """
 
@@ -47,6 +48,7 @@ class RobotTrial:
         self.safety = safety
         random = Random([derive_seed(seed, "behavior")], len(names))
         self._control = Control(self.behavior, random, safety, arena=self._arena, robots=readings)
+        self.lateness = self._control.lateness
         self._samples: List[np.ndarray] = []
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._reached = False
@@ -75,6 +77,9 @@ class RobotTrial:
             speeds = self._control.step(time_s, poses[None], things, ages_s[None])
             if time_s >= len(self._samples) * SAMPLE_S:
                 self._sample(time_s, poses, things)
+        if not self._control.share.all():
+            self.remark = f"commands or poses came too late at {time_s:.1f} s"
+            return None
         return None if self._reached or time_s >= self._experiment.time_s else speeds
 
     def _sample(self, time_s: float, poses: np.ndarray, things: PlacedObjects) -> None:

@@ -12,7 +12,6 @@ from std_msgs.msg import Float32
 from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program, ProgramError, Swarm, read_parameters
-from hero_client.controllers import Lateness
 from hero_client.swarm import open_swarm
 from hero_client.values import BODY_RADIUS_M, PlacedObjects
 from hero_node.parameters import choice, number, robot_ids, string, whole_number
@@ -87,7 +86,6 @@ class BehaviorNode:
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         random, readings = Random([parameters["seed"]], len(ids)), OwnReadings(swarm, self.behavior.sensors())
         self.control = Control(self.behavior, random, self._filter, robots=readings)
-        self._lateness = Lateness(1.0 / self.control.rate_hz)
         self._start_s = read_duration_clock_s()
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._sources = Sources()
@@ -110,10 +108,8 @@ class BehaviorNode:
         speeds = self.control.step(now_s - self._start_s, poses[None], things, ages_s[None])
         is_known = np.isfinite(poses).all(axis=1)
         may_move = is_known & np.isfinite(self.control.wanted).all(axis=0)
-        self._lateness.step(time.monotonic())
-        shares = np.array(self._lateness.find_shares(ages_s))
-        self._commands.send(speeds[0] * shares, speeds[1] * shares, may_move)
-        late = self._lateness.take_warning()
+        self._commands.send(speeds[0], speeds[1], may_move)
+        late = self.control.lateness.take_warning()
         if late:
             rospy.logwarn(late)
         if not may_move.all():

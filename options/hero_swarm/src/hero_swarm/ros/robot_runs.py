@@ -14,7 +14,6 @@ import numpy as np
 import rospy
 
 from hero_client import Program, StoppedError, Swarm
-from hero_client.controllers import Lateness
 from hero_node import end_process
 from hero_node.ros import read_duration_clock_s
 
@@ -190,7 +189,7 @@ def _drive(
     others: OtherRobots,
 ) -> bool:
     """Run one trial; return whether it has ended by itself, by a stop or a loss."""
-    start_s, lateness = read_duration_clock_s(), Lateness(1.0 / trial.rate_hz)
+    start_s = read_duration_clock_s()
     all_may_move = np.ones(len(swarm), dtype=bool)
     try:
         for _ in program.rate(trial.rate_hz):
@@ -205,18 +204,12 @@ def _drive(
             if others.describe_missing():
                 source.warn(others.describe_missing())
             speeds = trial.step(read_duration_clock_s() - start_s, poses, ages_s, objects.read())
-            if speeds is None:
-                return True
-            lateness.step(time.monotonic())
-            shares = lateness.find_shares(ages_s)
-            late = lateness.take_warning()
+            late = trial.lateness.take_warning()
             if late:
                 rospy.logwarn(late)
-            if min(shares) == 0.0:
-                trial.remark = f"commands or poses came too late at {read_duration_clock_s() - start_s:.1f} s"
+            if speeds is None:
                 return True
-            linear_m_s, angular_rad_s = np.array(speeds) * shares
-            commands.send(linear_m_s, angular_rad_s, all_may_move)
+            commands.send(speeds[0], speeds[1], all_may_move)
     except StoppedError:
         trial.remark = f"stopped at {read_duration_clock_s() - start_s:.1f} s"
         return True
