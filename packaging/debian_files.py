@@ -1,6 +1,7 @@
 """Writes debian/ for the packages of the suite from their package.xml; source package ros-hero, one .deb per package.
 
-Usage: debian_files.py SOURCES DEBIAN_DIR, with the packages below SOURCES. Source: Debian policy 4 and 5, debhelper(7).
+Usage: debian_files.py SOURCES DEBIAN_DIR [BUILD], with the packages below SOURCES; BUILD, such as 20261126.412, is
+added to their version. Source: Debian policy 4 and 5, debhelper(7), systemd.service(5).
 """
 
 import sys
@@ -26,7 +27,6 @@ Priority: optional
 Maintainer: {maintainer}
 Build-Depends: debhelper-compat (= 13), dh-python, {build_depends}
 Standards-Version: 4.5.1
-Homepage: {homepage}
 Rules-Requires-Root: no
 """
 
@@ -54,6 +54,53 @@ CMAKE_OPTIONS = (
     "-DPYTHON_EXECUTABLE=/usr/bin/python3",
     "-DPython_EXECUTABLE=/usr/bin/python3",  # Debian 13's catkin takes this name only
 )
+SERVICES = {
+    # name: what it is, what it starts
+    "hero-master": ("ROS master of the robots", "roscore"),
+    "hero-driver": ("driver of the robots", "roslaunch --wait hero_bringup hero_bringup.launch $HERO_DRIVER"),
+    "hero-monitor": ("monitor of the robots", "roslaunch --wait hero_bringup monitor.launch $HERO_MONITOR"),
+    "hero-camera": ("overhead camera", "roslaunch --wait hero_bringup overhead_camera.launch $HERO_CAMERA"),
+    "hero-recorder": ("recorder of the robots", "roslaunch --wait hero_bringup record.launch $HERO_RECORDER"),
+}
+"""Each for a user: systemctl enable --now hero-driver@USER; none is enabled by the packages."""
+
+SERVICE = """\
+[Unit]
+Description=HeRo: {description} (of %i)
+After=network-online.target {after}
+Wants=network-online.target {after}
+
+[Service]
+User=%i
+EnvironmentFile=-/etc/default/hero
+ExecStart=/usr/bin/{command}
+# roslaunch passes Ctrl-C on, at which the driver stops the robots.
+KillMode=mixed
+KillSignal=SIGINT
+TimeoutStopSec=20
+Restart=on-failure
+RestartSec=2
+
+[Install]
+WantedBy=multi-user.target
+"""
+
+ENVIRONMENT = """\
+# Read by the services hero-*@USER (docs/lab.md), as systemd reads it: NAME=VALUE, no $(...).
+PYTHONUNBUFFERED=1
+#ROS_MASTER_URI=http://192.168.1.10:11311
+#ROS_IP=192.168.1.10
+# Arguments of their launch files:
+HERO_DRIVER=
+HERO_MONITOR=
+HERO_CAMERA=
+HERO_RECORDER=
+"""
+SERVICES_PACKAGE = "ros-hero-bringup"
+
+INSTALL_SERVICES = "".join(
+    f"\tdh_installsystemd -p{SERVICES_PACKAGE} --name={name}@ --no-enable --no-start\n" for name in SERVICES
+)
 RULES = f"""\
 #!/usr/bin/make -f
 %:
@@ -61,7 +108,10 @@ RULES = f"""\
 override_dh_auto_configure:
 \tdh_auto_configure -- {" ".join(CMAKE_OPTIONS)}
 override_dh_auto_test:
+override_dh_installsystemd:
+{INSTALL_SERVICES}\
 override_dh_auto_install:
+\tinstall -D -m 644 debian/hero.default debian/{SERVICES_PACKAGE}/etc/default/hero
 """
 
 INSTALL = "\tDESTDIR=$(CURDIR)/debian/{name} cmake -P obj-$(DEB_HOST_GNU_TYPE)/{ros_name}/cmake_install.cmake\n"
@@ -104,9 +154,21 @@ def find_relationships(package, own):
     return depends, recommends
 
 
-def write_debian_dir(sources, directory):
-    """Write control, changelog and rules."""
+def write_services(directory):
+    """Write the systemd units and their environment file, for debhelper to install."""
+    for name, (description, command) in SERVICES.items():
+        after = "" if name == "hero-master" else "hero-master@%i.service"
+        text = SERVICE.format(description=description, command=command, after=after)
+        (directory / f"{SERVICES_PACKAGE}.{name}@.service").write_text(text)
+    (directory / "hero.default").write_text(ENVIRONMENT)
+
+
+def write_debian_dir(sources, directory, build=""):
+    """Write control, changelog, rules and services."""
     packages = [package for _, package in topological_order(str(sources))]
+    for package in packages:
+        # Newer than the release itself, older than the next one: every build is an upgrade.
+        package.version += f"+git{build}" if build else ""
     own = {package.name for package in packages}
     first = packages[0]
     maintainer = f"{first.maintainers[0].name} <{first.maintainers[0].email}>"
@@ -117,7 +179,7 @@ def write_debian_dir(sources, directory):
         if dependency.name not in own
     }
     build_depends = [name for key in sorted(keys) for name in find_packages(key, "lib*-dev", "python3-*", "ros-*", "*")]
-    control = CONTROL.format(maintainer=maintainer, build_depends=", ".join(build_depends), homepage=first.urls[0].url)
+    control = CONTROL.format(maintainer=maintainer, build_depends=", ".join(build_depends))
     rules = RULES
     for package in packages:
         name = make_name(package.name)
@@ -130,6 +192,7 @@ def write_debian_dir(sources, directory):
             description=package.description.rstrip("."),
         )
         rules += INSTALL.format(name=name, ros_name=package.name)
+    write_services(directory)
     (directory / "control").write_text(control)
     (directory / "rules").write_text(rules)
     (directory / "rules").chmod(0o755)
@@ -139,4 +202,4 @@ def write_debian_dir(sources, directory):
 
 
 if __name__ == "__main__":
-    write_debian_dir(*map(Path, sys.argv[1:]))
+    write_debian_dir(*map(Path, sys.argv[1:3]), *sys.argv[3:])

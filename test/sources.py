@@ -24,6 +24,7 @@ ROS_MODULES = (
 OTHER_PACKAGES = {
     # module that is imported: package to declare
     **{name: name for name in ROS_MODULES},
+    "catkin_pkg": "python3-catkin-pkg",
     "cv2": "python3-opencv",
     "PIL": "python3-pil",
     **{name: f"python3-{name}" for name in "matplotlib numpy pexpect rospkg scipy selenium tornado tqdm yaml".split()},

@@ -24,6 +24,7 @@ ORDER = (
     "hero_driver",
     "hero_client",
     "hero_sim",
+    "hero_common",
     "hero_description",
     "hero_tools",
     "hero_monitor",
@@ -41,7 +42,7 @@ METAPACKAGES = ("hero", "hero_options")
 FOR_LEARNING = {"hero_examples", "hero_tutorial"}
 KNOW_NEITHER_DRIVER_NOR_SIMULATOR = {"hero_client", "hero_examples", "hero_tutorial", "hero_description"}
 
-CONDA_NAMES = {"matplotlib": "matplotlib-base", "pil": "pillow", "yaml": "pyyaml"}
+CONDA_NAMES = {"catkin-pkg": "catkin_pkg", "matplotlib": "matplotlib-base", "pil": "pillow", "yaml": "pyyaml"}
 
 
 def name_in_conda(key):

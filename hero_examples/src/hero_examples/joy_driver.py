@@ -1,18 +1,35 @@
-"""Runs joy/joy_node with the same parameters where it is installed, and else says how to get it, in one line."""
+"""Publishes a joystick on /joy: by joy_node of the package joy where that is installed, else by Linux's own device."""
 
+import contextlib
 import os
 import sys
 
 import rospkg
+import rospy
+from sensor_msgs.msg import Joy
+
+from hero_client import Program, read_parameters
+from hero_node.parameters import number, string
+
+from .joystick_device import JoystickDevice
 
 
 def main() -> None:
-    try:
+    with contextlib.suppress(rospkg.ResourceNotFound):
         rospkg.RosPack().get_path("joy")
-    except rospkg.ResourceNotFound:
-        sys.exit(
-            "no joystick driver: the ROS package joy is not installed. ROS Noetic: sudo apt install"
-            " ros-noetic-joy; elsewhere build it from ros-drivers/joystick_drivers, or start another node that"
-            " publishes sensor_msgs/Joy on /joy and give joy_driver:=false"
+        os.execvp("rosrun", ["rosrun", "joy", "joy_node", *sys.argv[1:]])
+    with Program("joy_driver", anonymous=True) as program:
+        parameters = read_parameters(
+            {
+                "dev": string("/dev/input/js0"),
+                "deadzone": number(0.05, 0.0, 0.9),
+                "autorepeat_rate": number(20.0, 1.0, 100.0, "Hz"),
+            }
         )
-    os.execvp("rosrun", ["rosrun", "joy", "joy_node", *sys.argv[1:]])
+        publisher = rospy.Publisher("joy", Joy, queue_size=1)
+        with contextlib.closing(JoystickDevice(parameters["dev"], parameters["deadzone"])) as device:
+            while program.running:
+                device.read(1.0 / parameters["autorepeat_rate"])
+                message = Joy(axes=device.axes, buttons=device.buttons)
+                message.header.stamp = rospy.Time.now()
+                publisher.publish(message)

@@ -7,6 +7,7 @@ What they do is tested in virtual time: see test/unit.
 import math
 import os
 import re
+import struct
 import sys
 import tempfile
 import unittest
@@ -158,13 +159,24 @@ class ExampleNodesTest(unittest.TestCase):
         self.assertEqual(1, program.wait_end())
         self.assertRegex(program.text(), r"teleop_joy: the joystick has 1 axes and 1 buttons: set ~linear_axis")
 
-    def test_joy_driver_runs_the_joystick_driver_or_says_how_to_get_it(self):
+    def test_joy_driver_runs_joy_node_or_reads_the_device_itself(self):
         with tempfile.TemporaryDirectory() as folder:
             environment = dict(os.environ, ROS_PACKAGE_PATH=folder, CMAKE_PREFIX_PATH=folder)
-            absent = ExampleProgram("joy_driver", environment=environment)
+            absent = ExampleProgram("joy_driver", "_dev:=" + folder + "/js9", environment=environment)
             self.addCleanup(absent.close)
             self.assertEqual(1, absent.wait_end())
-            self.assertRegex(absent.text(), r"\Ajoy_driver: no joystick driver: .*joy_driver:=false\n\Z")
+            self.assertRegex(absent.text(), r"joy_driver: no joystick .*/js9: plug it in")
+            device = folder + "/js0"
+            os.mkfifo(device)
+            kernel = os.open(device, os.O_RDWR)
+            self.addCleanup(os.close, kernel)
+            sticks = []
+            rospy.Subscriber("joy", Joy, sticks.append)
+            plugged = ExampleProgram("joy_driver", "_dev:=" + device, environment=environment)
+            self.addCleanup(plugged.close)
+            os.write(kernel, struct.pack("=IhBB", 1, -32767, 2, 1))
+            wait_for(lambda: sticks and list(sticks[-1].axes) == [0.0, 1.0], "the stick")
+            plugged.close()
             package = Path(folder) / "joy"
             package.mkdir()
             (package / "package.xml").write_text("<package><name>joy</name></package>")

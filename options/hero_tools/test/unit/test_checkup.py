@@ -2,6 +2,7 @@
 
 import socket
 import threading
+from types import SimpleNamespace
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -69,13 +70,108 @@ def test_a_port_held_on_ipv6_is_seen_too():
 
 
 def test_the_socket_of_another_users_program_leads_to_how_to_find_it(monkeypatch):
-    line = "LISTEN 0      128    0.0.0.0%lo:11411 0.0.0.0:*\n"  # without root, ss names no process of others
-    monkeypatch.setattr(network, "ask_system", lambda command: line)
-    listeners = network.find_listeners(11411)
-    assert listeners == {"0.0.0.0": None}
-    finding = network.check_port(11411, listeners)
+    with socket.socket() as holder:
+        holder.bind(("127.0.0.1", 0))
+        holder.listen()
+        port = holder.getsockname()[1]
+
+        def refuse(path):  # what other users may not read
+            raise PermissionError(path)
+
+        monkeypatch.setattr(network.os, "readlink", refuse)
+        listeners = network.find_listeners(port)
+    assert listeners == {"127.0.0.1": None}
+    finding = network.check_port(port, listeners)
     assert finding.state == WARN
-    assert "ss -ltnp" in finding.remedy[0]
+    assert "sudo lsof -i tcp:%d" % port in finding.remedy[0]
+
+
+def test_a_connection_on_the_port_is_no_listener():
+    with socket.socket() as holder:
+        holder.bind(("127.0.0.1", 0))
+        holder.listen()
+        port = holder.getsockname()[1]
+        with socket.create_connection(("127.0.0.1", port)):
+            holder.close()
+            assert network.find_listeners(port) == {}
+
+
+def make_package(folder, name):
+    folder.mkdir(parents=True)
+    manifest = "<package><name>{}</name><version>1.0.0</version><description>x</description>"
+    (folder / "package.xml").write_text(
+        manifest.format(name) + '<maintainer email="a@b.org">m</maintainer><license>BSD</license></package>'
+    )
+
+
+def test_two_packages_of_one_name_in_a_workspace_are_named(tmp_path, monkeypatch):
+    for place in ("hero/hero_tutorial", "mine"):
+        make_package(tmp_path / "src" / place, "hero_tutorial")
+    make_package(tmp_path / "src" / "hero" / "hero_msgs", "hero_msgs")
+    (tmp_path / "build").mkdir()
+    monkeypatch.chdir(str(tmp_path / "src" / "mine"))
+    finding = computer.check_workspace()
+    assert finding.state == FAIL and "two packages are called hero_tutorial" in finding.text
+    assert str(tmp_path / "src" / "mine") in finding.text and "CATKIN_IGNORE" in finding.remedy[0]
+    (tmp_path / "src" / "hero" / "hero_tutorial" / "CATKIN_IGNORE").write_text("")
+    assert computer.check_workspace() == ok(f"2 packages in {tmp_path}, each of another name")
+    monkeypatch.chdir("/")
+    assert computer.check_workspace().state == OK
+
+
+def test_a_package_that_hides_one_of_the_suite_is_named(monkeypatch):
+    foreign = SimpleNamespace(version="0.0.0", author="me", rosdeps=[])
+    own = SimpleNamespace(version="0.3.0", author=computer.AUTHOR, rosdeps=[])
+    finder = SimpleNamespace(
+        get_path=lambda name: "/ws/src/" + name,
+        get_manifest=lambda name: foreign if name == "hero_tutorial" else own,
+    )
+    monkeypatch.setattr(computer.rospkg, "RosPack", lambda: finder)
+    finding = computer.check_packages()
+    assert finding.state == FAIL
+    assert "/ws/src/hero_tutorial is another package of the name hero_tutorial" in finding.text
+
+
+def test_a_module_that_a_package_declares_and_is_missing_is_named(monkeypatch):
+    keys = [SimpleNamespace(name=name) for name in ("rospy", "python3-no-such", "python3-yaml")]
+    manifests = {"hero_swarm": SimpleNamespace(rosdeps=keys)}
+
+    def get_manifest(name):
+        if name not in manifests:
+            raise computer.rospkg.ResourceNotFound(name)
+        return manifests[name]
+
+    monkeypatch.setattr(computer.rospkg, "RosPack", lambda: SimpleNamespace(get_manifest=get_manifest))
+    assert computer.find_lacking_modules() == {"no-such": ["hero_swarm"]}
+    finding = computer.check_python()
+    assert finding.state == WARN and "lacks no-such (for hero_swarm)" in finding.text
+
+
+@pytest.mark.parametrize("free_gb, state", [(0.1, FAIL), (1.0, WARN), (50.0, OK)])
+def test_a_disk_that_fills_is_told(monkeypatch, tmp_path, free_gb, state):
+    monkeypatch.setenv("ROS_HOME", str(tmp_path / "not" / "there"))
+    monkeypatch.setattr(computer.shutil, "disk_usage", lambda path: SimpleNamespace(free=free_gb * 1e9, path=path))
+    finding = computer.check_disk()
+    assert finding.state == state and f"{free_gb:.1f} GB free" in finding.text
+
+
+@pytest.mark.parametrize("answer, state", [("yes\n", OK), ("no\n", WARN), (None, OK)])
+def test_a_clock_that_is_not_synchronized_is_told(monkeypatch, answer, state):
+    monkeypatch.setattr(computer, "ask_system", lambda command: answer)
+    finding = computer.check_clock()
+    assert finding.state == state and ("unknown" in finding.text) == (answer is None)
+
+
+@pytest.mark.parametrize(
+    "status, percent, state", [("Discharging", 20, WARN), ("Discharging", 80, OK), ("Charging", 5, OK)]
+)
+def test_a_battery_that_runs_out_is_told(tmp_path, status, percent, state):
+    supply = tmp_path / "BAT0"
+    supply.mkdir()
+    (supply / "status").write_text(status + "\n")
+    (supply / "capacity").write_text(f"{percent}\n")
+    assert computer.check_battery(tmp_path).state == state
+    assert computer.check_battery(tmp_path / "none").state == OK
 
 
 WIFI, LAN, DOCKER = (

@@ -171,7 +171,7 @@ def test_points_that_need_one_that_failed_are_skipped(monkeypatch, capsys):
     report = json.loads(capsys.readouterr().out)
     assert (
         report["ok"]
-        and len(report["points"]) == 15
+        and len(report["points"]) == 19
         and ran[1:] == [["node"], ["localization", "return_path", "robots"]]
     )
     states["node"] = FAIL
@@ -183,7 +183,7 @@ def test_points_that_need_one_that_failed_are_skipped(monkeypatch, capsys):
     assert len(ran) == 1 and findings["node"].text == "skipped: needs the point master"
     assert findings["robots"].text == "skipped: needs the point node"
     assert check.run(check.parse_options([])) == 1
-    assert capsys.readouterr().out.splitlines()[-1] == "10 OK, 4 WARN, 1 FAIL"
+    assert capsys.readouterr().out.splitlines()[-1] == "14 OK, 4 WARN, 1 FAIL"
 
 
 def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
@@ -203,7 +203,8 @@ def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
     monkeypatch.setattr(computer, "OLDEST_PYTHON", (9, 0))
     assert "3.8 or newer is needed" in computer.check_python().text
     finder = SimpleNamespace(
-        get_path=lambda name: "/ws/" + name, get_manifest=lambda name: SimpleNamespace(version=name.rpartition("_")[2])
+        get_path=lambda name: "/ws/" + name,
+        get_manifest=lambda name: SimpleNamespace(version=name.rpartition("_")[2], author=computer.AUTHOR),
     )
     monkeypatch.setattr(computer.rospkg, "RosPack", lambda: finder)
     monkeypatch.setattr(computer, "CORE", ("a_1",))

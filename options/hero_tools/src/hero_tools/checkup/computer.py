@@ -1,12 +1,16 @@
-"""Python, packages and messages of this PC."""
+"""Python, packages, messages, disk, clock and battery of this PC."""
 
-import importlib
+import importlib.util
 import os
 import platform
 import shutil
 import sys
+from pathlib import Path
+from typing import Dict, List
 
 import rospkg
+from catkin_pkg.package import parse_package
+from catkin_pkg.packages import find_package_paths
 
 from .points import Finding, ask_system, fail, ok, warn
 
@@ -22,6 +26,7 @@ CORE = (
 )
 OPTIONS = (
     "hero_calibration",
+    "hero_common",
     "hero_description",
     "hero_localization",
     "hero_monitor",
@@ -40,6 +45,12 @@ FIRMWARE_MD5 = {
     "hero_msgs.srv.SetPID": "69c16eccc66fd6b477afb5e5500b4b47",
 }
 OLDEST_PYTHON = (3, 8)
+MODULES = {"python3-opencv": "cv2", "python3-pil": "PIL"}
+"""Modules of rosdep keys that are not called python3- and the module's name."""
+
+AUTHOR = "HeRo suite maintainers"
+LOW_DISK_GB, FULL_DISK_GB = 2.0, 0.2
+LOW_BATTERY_PERCENT = 30
 SOURCE = "source the workspace in this terminal: source devel/setup.bash"
 
 
@@ -59,6 +70,13 @@ def check_python() -> Finding:
             f"Python {version} ({sys.executable}) lacks {', '.join(missing)}",
             "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
         )
+    lacking = find_lacking_modules()
+    if lacking:
+        return warn(
+            f"Python {version} ({sys.executable}) lacks "
+            + ", ".join(f"{module} (for {', '.join(packages)})" for module, packages in lacking.items()),
+            "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
+        )
     text = f"Python {version} ({sys.executable}) has all modules"
     other = shutil.which("python3")
     if other and os.path.realpath(other) != os.path.realpath(sys.executable):
@@ -72,14 +90,35 @@ def check_python() -> Finding:
     return ok(text)
 
 
+def find_lacking_modules() -> Dict[str, List[str]]:
+    """Return the Python modules that cannot be imported, with the packages of the suite that declare them."""
+    finder, lacking = rospkg.RosPack(), {}  # type: rospkg.RosPack, Dict[str, List[str]]
+    for name in CORE + OPTIONS:
+        try:
+            keys = [key.name for key in finder.get_manifest(name).rosdeps]
+        except rospkg.ResourceNotFound:
+            continue
+        for key in keys:
+            module = MODULES.get(key, key[len("python3-") :])
+            if key.startswith("python3-") and not importlib.util.find_spec(module):
+                lacking.setdefault(module, []).append(name)
+    return lacking
+
+
 def check_packages() -> Finding:
     """Check that the core is on ROS_PACKAGE_PATH, and all that is there of the suite in one version."""
     finder = rospkg.RosPack()
     paths, versions, missing = [], set(), []
     for name in CORE + OPTIONS:
         try:
+            manifest = finder.get_manifest(name)
+            if AUTHOR not in manifest.author:
+                return fail(
+                    f"{finder.get_path(name)} is another package of the name {name}, which hides the suite's",
+                    f"rename it; or, to leave out the suite's: touch HERO/{name}/CATKIN_IGNORE, and build again",
+                )
             paths.append(finder.get_path(name))
-            versions.add(finder.get_manifest(name).version)
+            versions.add(manifest.version)
         except rospkg.ResourceNotFound:
             missing.append(name)
     missing_core = [name for name in missing if name in CORE]
@@ -110,3 +149,55 @@ def check_messages() -> Finding:
             "; ".join(wrong), "rebuild hero_msgs; another package of that name may hide it: rospack find hero_msgs"
         )
     return ok(f"{len(FIRMWARE_MD5)} types match those of firmware v3.8")
+
+
+def check_workspace() -> Finding:
+    """Look for packages of one name in the workspace of this folder: catkin then builds none of it."""
+    for folder in (Path.cwd(), *Path.cwd().parents):
+        if not (folder / "src").is_dir() or not ((folder / "build").is_dir() or (folder / ".catkin_tools").is_dir()):
+            continue
+        found: Dict[str, List[str]] = {}
+        for path in find_package_paths(str(folder / "src")):
+            name = parse_package(str(folder / "src" / path)).name
+            found.setdefault(name, []).append(str(folder / "src" / path))
+        for name, paths in found.items():
+            if len(paths) > 1:
+                return fail(
+                    f"two packages are called {name}, so that catkin builds none: {', '.join(sorted(paths))}",
+                    "rename one, or leave one out: touch ITS_FOLDER/CATKIN_IGNORE",
+                )
+        return ok(f"{len(found)} packages in {folder}, each of another name")
+    return ok("this folder is in no catkin workspace")
+
+
+def check_disk() -> Finding:
+    """Check the space for logs, recordings and what the driver keeps."""
+    home = os.environ.get("ROS_HOME") or os.path.expanduser("~/.ros")
+    folder = next(path for path in (Path(home), *Path(home).parents) if path.is_dir())
+    free_gb = shutil.disk_usage(str(folder)).free / 1e9
+    text = f"{free_gb:.1f} GB free for {home}"
+    remedy = "rosclean check shows what logs take, rosclean purge removes them; recordings are in ~/hero_recordings"
+    if free_gb < FULL_DISK_GB:
+        return fail(text, remedy)
+    return warn(text, remedy) if free_gb < LOW_DISK_GB else ok(text)
+
+
+def check_clock() -> Finding:
+    """Check that the clock is synchronized, which several PCs and cameras need."""
+    answer = ask_system(["timedatectl", "show", "-p", "NTPSynchronized", "--value"])
+    if answer is None:
+        return ok("unknown whether the clock is synchronized: the command timedatectl gives no answer")
+    if answer.strip() == "yes":
+        return ok("the clock is synchronized")
+    return warn("the clock is not synchronized: several PCs disagree", "sudo timedatectl set-ntp true; or chrony")
+
+
+def check_battery(power: Path = Path("/sys/class/power_supply")) -> Finding:
+    """Check that this PC is not about to run out of power."""
+    for supply in sorted(power.glob("*/capacity")):
+        status = (supply.parent / "status").read_text().strip()
+        percent = int(supply.read_text())
+        if status == "Discharging":
+            text = f"this PC runs on its battery, {percent} %"
+            return warn(text, "plug it in") if percent < LOW_BATTERY_PERCENT else ok(text)
+    return ok("this PC has no battery that discharges")

@@ -1,11 +1,12 @@
 """Addresses that robots can connect to, the firewall, the program on the driver's port, names that resolve.
 
-Read by ip(8) and ss(8) of iproute2: nothing is bound or connected.
+Read by ip(8) of iproute2 and from /proc: nothing is bound or connected.
 """
 
 import json
-import re
+import os
 import socket
+import struct
 from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional, Sequence, Set
 
@@ -16,7 +17,7 @@ from .points import Finding, ask_system, fail, ok, warn
 HOTSPOT_ADDRESS = "10.42.0.1"
 """The address that robots connect to by default, and that NetworkManager gives a PC that shares a hotspot."""
 
-HOST_REMEDY = "roslaunch hero_bringup hero_bringup.launch without host:=, or with host:=0.0.0.0, admits robots"
+HOST_REMEDY = "host:=0.0.0.0 admits robots; without host:= the driver does, too, unless count:= is given"
 
 EVERYWHERE = {"0.0.0.0", "::", "*"}
 DRIVER = "hero_driver"
@@ -95,12 +96,38 @@ def advise_firewall(interface: Optional[str], port: int) -> Finding:
 
 def find_listeners(port: int) -> Dict[str, Optional[int]]:
     """Return the address of each listener on a TCP port, and its process; None: it belongs to another user."""
-    found = {}
-    for line in (ask_system(["ss", "-Hltnp", "sport = :%d" % port]) or "").splitlines():
-        local = line.split()[3]
-        process = re.search(r"pid=([0-9]+)", line)
-        found[local.rpartition(":")[0].partition("%")[0].strip("[]")] = int(process.group(1)) if process else None
-    return found
+    sockets = {}
+    for table in ("tcp", "tcp6"):
+        for line in Path("/proc/net", table).read_text().splitlines()[1:]:
+            fields = line.split()
+            words, _, own_port = fields[1].partition(":")
+            if fields[3] == _LISTENING and int(own_port, 16) == port:
+                sockets[f"socket:[{fields[9]}]"] = _decode_address(words)
+    owners = _find_owners(set(sockets))
+    return {address: owners.get(name) for name, address in sockets.items()}
+
+
+_LISTENING = "0A"
+"""TCP_LISTEN in the tables of proc(5)."""
+
+
+def _decode_address(words: str) -> str:
+    """Return an address that stands in hexadecimal words of this machine's byte order."""
+    raw = b"".join(struct.pack("=I", int(words[start : start + 8], 16)) for start in range(0, len(words), 8))
+    return socket.inet_ntop(socket.AF_INET if len(raw) == 4 else socket.AF_INET6, raw)
+
+
+def _find_owners(sockets: Set[str]) -> Dict[str, int]:
+    """Return the process that holds each of these sockets, of those that this user may look into."""
+    owners = {}
+    for link in Path("/proc").glob("[0-9]*/fd/*"):
+        try:
+            target = os.readlink(str(link))
+        except OSError:  # it has ended meanwhile, or belongs to another user
+            continue
+        if target in sockets:
+            owners[target] = int(link.parts[2])
+    return owners
 
 
 def check_port(port: int, listeners: Dict[str, Optional[int]]) -> Finding:
@@ -111,7 +138,7 @@ def check_port(port: int, listeners: Dict[str, Optional[int]]) -> Finding:
     if process is None:
         return warn(
             "TCP port %d on %s is held by a program of another user" % (port, address),
-            "to see which: sudo ss -ltnp 'sport = :%d'" % port,
+            "to see which: sudo lsof -i tcp:%d -s tcp:listen" % port,
         )
     try:
         words = Path("/proc/%d/cmdline" % process).read_bytes().decode(errors="replace").split("\0")

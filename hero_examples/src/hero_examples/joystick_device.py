@@ -1,0 +1,81 @@
+"""Reads a joystick by Linux's joystick interface (joystick-api.rst of the kernel's documentation).
+
+The kernel sends the state of each axis and button when the device is opened, then each change, as records of 8 bytes.
+"""
+
+import errno
+import os
+import select
+import struct
+from typing import List
+
+from hero_client import ProgramError
+
+_RECORD = struct.Struct("=IhBB")  # time, ms; value; kind; number
+_BUTTON, _AXIS, _INITIAL = 0x01, 0x02, 0x80
+_FULL = 32767.0
+_READ_LENGTH = 64 * _RECORD.size
+
+
+class JoystickDevice:
+    """An open joystick.
+
+    Attributes:
+        axes: -1..1 each, left and up positive, as joy_node publishes them.
+        buttons: 1 where pressed.
+    """
+
+    def __init__(self, path: str, deadzone: float = 0.05) -> None:
+        """Open a device such as /dev/input/js0; values up to deadzone count as 0.
+
+        Raises: ProgramError if it cannot be opened.
+        """
+        self._path = path
+        self._deadzone = deadzone
+        self.axes: List[float] = []
+        self.buttons: List[int] = []
+        try:
+            self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        except FileNotFoundError:
+            raise ProgramError(
+                f"no joystick {path}: plug it in; ls /dev/input/js* lists those that are there"
+            ) from None
+        except PermissionError:
+            raise ProgramError(f"{path}: may not be read: sudo usermod -a -G input $USER, then log in again") from None
+        except OSError as error:
+            raise ProgramError(f"{path}: cannot be read: {error.strerror}") from None
+
+    def read(self, timeout_s: float) -> None:
+        """Wait at most timeout_s for a change, and take it over. Raises: ProgramError when the joystick has gone."""
+        if not select.select([self._file], [], [], timeout_s)[0]:
+            return
+        try:
+            data = os.read(self._file, _READ_LENGTH)
+        except OSError as error:
+            if error.errno != errno.ENODEV:
+                raise ProgramError(f"{self._path}: cannot be read: {error.strerror}") from None
+            data = b""
+        if not data:
+            raise ProgramError(f"the joystick {self._path} has gone: plug it in and start again")
+        # The kernel gives whole records only.
+        for _, value, kind, number in _RECORD.iter_unpack(data[: len(data) // _RECORD.size * _RECORD.size]):
+            if kind & ~_INITIAL == _AXIS:
+                self._set(self.axes, number, self._scale(-value / _FULL))
+            elif kind & ~_INITIAL == _BUTTON:
+                self._set(self.buttons, number, value)
+
+    def _scale(self, value: float) -> float:
+        """Return a value with the deadzone taken out, so that it starts at 0 beyond it."""
+        beyond = max(0.0, min(1.0, abs(value)) - self._deadzone) / (1.0 - self._deadzone)
+        return beyond if value > 0.0 else -beyond
+
+    @staticmethod
+    def _set(values: List, number: int, value: float) -> None:
+        values.extend([type(value)(0)] * (number + 1 - len(values)))
+        values[number] = value
+
+    def close(self) -> None:
+        """Close the device; safe to call twice."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1

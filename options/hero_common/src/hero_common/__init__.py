@@ -1,0 +1,1 @@
+"""The stock package's name for the messages of HeRo."""
