@@ -3,4 +3,5 @@
 from hero_node import run_named
 
 if __name__ == "__main__":
-    run_named("hero_swarm", {"fit": "fit", "run": "run", "report": "experiments.report", "show": "show"})
+    experiments = {name: f"experiments.{name}" for name in ("pack", "report", "verify")}
+    run_named("hero_swarm", {"fit": "fit", "run": "run", "show": "show", **experiments})

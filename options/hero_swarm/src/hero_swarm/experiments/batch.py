@@ -30,15 +30,11 @@ from ..trial import OPEN, Trial
 from .code_version import check_suite
 from .errors import ExperimentError, report_place
 from .experiment_file import ERROR_KEYS, ERRORS, Cell, Experiment, Metric, parse_experiment
-from .results_folder import Run
+from .results_folder import METRICS_ENDING, POSES_ENDING, Run
 from .starts import place_all, place_objects
 
 SAMPLE_S = 1.0
 """Time between two samples of the metrics."""
-
-METRICS_ENDING, POSES_ENDING = ".metrics.npy", ".poses.npy"
-"""Files of a batch: samples (T, W, metrics) of the metrics of list_sources(), and poses (T, W, N, 3); nan
-after a run's end."""
 
 
 def load_checked(experiment: Experiment) -> None:

@@ -37,13 +37,21 @@ def hash_suite() -> str:
 
 def _hash_packages() -> str:
     digest = hashlib.sha256()
+    for name, content in list_suite().items():
+        _add_file(digest, name, content)
+    return digest.hexdigest()[:16]
+
+
+def list_suite() -> Dict[str, bytes]:
+    """Return the suite's sources on the disk that a run may use, by package and path, in a fixed order."""
+    contents: Dict[str, bytes] = {}
     for package in PACKAGES:
         folders = map(Path, import_module(package).__path__)
         # In a devel space of catkin, the first folder holds but an __init__.py that leads to the second one.
         folder = next(folder for folder in folders if {path.name for path in folder.glob("*.py")} > {"__init__.py"})
         for path in sorted(filter(_is_source, folder.rglob("*"))):
-            _add_file(digest, f"{package}/{path.relative_to(folder)}", path.read_bytes())
-    return digest.hexdigest()[:16]
+            contents[f"{package}/{path.relative_to(folder)}"] = path.read_bytes()
+    return contents
 
 
 def _is_source(path: Path) -> bool:

@@ -1,17 +1,18 @@
 """Program report: medians with intervals, comparisons and plots of an experiment's runs, as text, CSV, and a page."""
 
 import argparse
+import io
 import os
-from typing import Dict, Optional, Sequence
+from typing import Mapping, Optional, Sequence
 
-import numpy as np
+from matplotlib.figure import Figure
 
 from hero_node.files import write_file
 
-from .batch import METRICS_ENDING, SAMPLE_S, list_sources
-from .experiment_file import Experiment
-from .reporting.report_page import OverTime, draw_page
-from .reporting.summary import build_report, describe, format_summaries
+from .reporting.figures import draw_all, to_svg
+from .reporting.report_page import draw_page
+from .reporting.summary import build_report, describe, describe_method, format_summaries
+from .results import load
 from .results_folder import REAL, SIMULATED, ResultsFolder
 from .runner import read_results
 
@@ -20,6 +21,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="report", description="Medians, intervals and plots of an experiment.")
     parser.add_argument("folder", metavar="FOLDER", help="folder with the results of run")
+    parser.add_argument("--series", metavar="FILE", help="write the metrics over time to a .csv or .parquet, too")
     return parser.parse_args(arguments)
 
 
@@ -34,27 +36,31 @@ def write_report(path: str) -> None:
         # Robots and the simulator are never mixed in one median.
         report = build_report(experiment, [run for run in runs if run.kind == kind])
         suffix = "" if kind == SIMULATED else "_robots"
-        over_time = _read_over_time(folder, experiment) if kind == SIMULATED else {}
-        page = draw_page(report, over_time, text, about)
+        figures = draw_all(report, load(path, kind))
+        page = draw_page(report, figures, text, about)
         write_file(os.path.join(path, f"summary{suffix}.csv"), format_summaries(report).encode())
         write_file(os.path.join(path, f"report{suffix}.html"), page.encode())
+        _write_figures(os.path.join(path, "figures" + suffix), figures)
         print(describe(report))
+        print(describe_method(report, about))
         print(os.path.join(path, f"report{suffix}.html"))
 
 
-def _read_over_time(folder: ResultsFolder, experiment: Experiment) -> Dict[str, OverTime]:
-    """Return the course of each metric that was sampled, for the cells that have runs."""
-    cells = {cell: folder.read_series(cell, METRICS_ENDING) for cell in range(len(experiment.cells))}
-    recorded = {cell: np.stack(list(runs.values()), axis=1) for cell, runs in cells.items() if runs}
-    if not recorded:
-        return {}
-    times_s = SAMPLE_S * np.arange(len(next(iter(recorded.values()))))
-    return {
-        name: (times_s, {cell: samples[..., index] for cell, samples in recorded.items()})
-        for index, name in enumerate(list_sources(experiment))
-    }
+def _write_figures(folder: str, figures: Mapping[str, Figure]) -> None:
+    """Write each figure as PDF and SVG, the same bytes for the same runs."""
+    os.makedirs(folder, exist_ok=True)
+    for name, figure in figures.items():
+        stem = os.path.join(folder, name.replace(os.sep, "_"))
+        content = io.BytesIO()
+        figure.savefig(content, format="pdf", metadata={"CreationDate": None})
+        write_file(stem + ".pdf", content.getvalue())
+        write_file(stem + ".svg", to_svg(figure).encode())
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    write_report(parse_options(arguments).folder)
+    options = parse_options(arguments)
+    write_report(options.folder)
+    if options.series:
+        load(options.folder).write_table(options.series)
+        print(options.series)

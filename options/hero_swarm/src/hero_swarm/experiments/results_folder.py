@@ -8,6 +8,7 @@
     *.lock             held while a program adds runs of this kind
     times.csv          wall time of each batch: the only file that depends on the machine
     runs.csv           all runs, sorted; the same bytes however they were computed
+    series.csv         where the series of each run are: files, and the place of the run in them
 
 A batch is written to a temporary file, which is renamed when the disk has it; no two writers' files have one name.
 A folder is ours by its about.json; of others nothing is written, and in ours no file of another name is touched.
@@ -41,6 +42,10 @@ REAL = "real"
 
 OTHER_CELL = -1
 """Cell of a run of another experiment."""
+
+METRICS_ENDING, POSES_ENDING = ".metrics.npy", ".poses.npy"
+"""Files of a batch: samples (T, W, metrics) of the metrics of list_sources(), and poses (T, W, N, 3); nan
+after a run's end."""
 
 ABOUT, EXPERIMENT, LOCK_ENDING = "about.json", "experiment.yaml", ".lock"
 
@@ -149,7 +154,7 @@ class ResultsFolder:
                 aside.append(name)
         if kind == SIMULATED:
             self._remove_series(lambda name: True)
-        for name in ("runs.csv", "times.csv"):
+        for name in ("runs.csv", "series.csv", "times.csv"):
             with suppress(FileNotFoundError):
                 os.remove(os.path.join(self.path, name))
         return self._set_aside(aside)
@@ -264,7 +269,20 @@ class ResultsFolder:
         """Write runs.csv and return its path."""
         path = os.path.join(self.path, "runs.csv")
         write_file(path, format_table(self._experiment, runs).encode())
+        write_file(os.path.join(self.path, "series.csv"), format_csv(self._index_series()).encode())
         return path
+
+    def _index_series(self) -> List[List[Any]]:
+        """Return the rows of series.csv, sorted; cells are numbered from 1."""
+        rows: List[List[Any]] = []
+        for name in self._list_batches():
+            files = [os.path.join("series", name[: -len(".jsonl")] + end) for end in (METRICS_ENDING, POSES_ENDING)]
+            present = [file if os.path.isfile(os.path.join(self.path, file)) else "" for file in files]
+            if any(present):
+                own = ((place, run, self._experiment.cells[run.cell]) for place, run in self._list_runs(name))
+                rows += [[run.cell + 1, *cell.varied.values(), run.seed, place, *present] for place, run, cell in own]
+        varied = self._experiment.cells[0].varied
+        return [["cell", *varied, "seed", "run", "metrics", "poses"], *sorted(rows, key=lambda row: (row[0], row[-4]))]
 
 
 def _list_names(folder: str) -> List[str]:

@@ -268,10 +268,11 @@ def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, 
         first = (path / name).read_text().splitlines()[1].split(",")
         assert first[:2] == ["2", "dispersion"] and float(first[3]) == pytest.approx(median)
     assert {"report.html", "report_robots.html", "runs.csv"} <= set(os.listdir(str(path)))
-    (_, over_time, text, about), (_, no_time, _, _) = pages
-    times_s, values = over_time["dispersion"]
-    assert times_s.tolist() == [0.0, 1.0, 2.0] and values[0][:, 1].tolist() == [1.0, 5.0, 9.0]
-    assert text == FILE and about["code"] == "c0de" and no_time == {}
+    (_, simulated, text, about), (_, of_robots, _, _) = pages
+    line = simulated["dispersion_over_time"].axes[0].lines[0]
+    assert line.get_xdata().tolist() == [0.0, 1.0, 2.0] and line.get_ydata().tolist() == [1.5, 5.5, 9.5]
+    assert text == FILE and about["code"] == "c0de"
+    assert "dispersion" in of_robots and "dispersion_over_time" not in of_robots
     assert "report_robots.html" in capsys.readouterr().out
     only = tmp_path / "robots"
     open_folder(only)[0].write_batch([Run(0, 5, (7.0, 1.0), REAL)])

@@ -1,12 +1,19 @@
 """Draws the metrics of an experiment: every run as a point beside its cell's interval, and medians over time."""
 
 import io
-from typing import Any, Sequence, Tuple
+from typing import Any, Dict, Sequence, Tuple
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from ...metrics import UNITS
+from ..results import Results
 from .statistics import Interval
+from .summary import Report, Summary
+
+OVER_TIME, MAP = "_over_time", "_map"
+"""Ends of the names of figures."""
 
 _WIDTH_IN = 8.0
 _POINT_SPREAD = 0.12
@@ -14,6 +21,67 @@ _POINT_SPREAD = 0.12
 
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+
+
+_DASHES = (1.0, 1.5, 3.0, 5.0)
+
+
+def _choose_style(index: int) -> Dict[str, Any]:
+    """Return a color and a line style that no other index has."""
+    dashes = index // len(_COLORS)
+    lengths = [length for dash in range(dashes) for length in (_DASHES[dash % len(_DASHES)], 1.5)]
+    return {"color": _COLORS[index % len(_COLORS)], "linestyle": (0, lengths) if lengths else "-"}
+
+
+def draw_all(report: Report, results: Results) -> Dict[str, Figure]:
+    """Return all figures by their names: each metric, its map over two numbers that vary, and those over time."""
+    figures: Dict[str, Figure] = {}
+    for metric in report.experiment.metrics:
+        summaries = report.summaries[metric.name]
+        unit = UNITS.get(metric.source, "") if metric.bound is None else "s"
+        cells, values, intervals = zip(*summaries)
+        figures[metric.name] = draw_runs(unit, [cell.label for cell in cells], values, intervals)
+        if _spans_a_map(summaries):
+            figures[metric.name + MAP] = draw_map(metric.name, unit, summaries)
+    for name, series in results.series.items():
+        own = {label: runs.T for label, runs in zip(results.labels, series) if not np.isnan(runs).all()}
+        if own:
+            unit = UNITS.get(name, "")
+            figures[name + OVER_TIME] = draw_over_time(name, unit, list(own), results.times_s, list(own.values()))
+    return figures
+
+
+def _spans_a_map(summaries: Sequence[Summary]) -> bool:
+    """Return whether two numbers vary, and nothing else, and all their combinations have runs."""
+    columns = list(zip(*(summary.cell.varied.values() for summary in summaries)))
+    if len(columns) != 2 or not all(isinstance(value, (int, float)) for column in columns for value in column):
+        return False
+    counts = [len(set(column)) for column in columns]
+    return min(counts) > 1 and len(summaries) == counts[0] * counts[1]
+
+
+def draw_map(metric: str, unit: str, summaries: Sequence[Summary]) -> Figure:
+    """Draw the medians of all combinations of two numbers as colors with their values."""
+    figure, axes = _begin(4.5)
+    (first, rows), (second, columns) = (
+        (name, sorted({summary.cell.varied[name] for summary in summaries})) for name in summaries[0].cell.varied
+    )
+    medians = np.full((len(rows), len(columns)), np.nan)
+    for summary in summaries:
+        row, column = rows.index(summary.cell.varied[first]), columns.index(summary.cell.varied[second])
+        medians[row, column] = summary.interval.median
+    finite = np.where(np.isfinite(medians), medians, np.nan)
+    image = axes.imshow(finite, cmap="cividis", origin="lower", aspect="auto")
+    middle = np.nanmean([np.nanmin(finite), np.nanmax(finite)]) if np.isfinite(finite).any() else 0.0
+    for (row, column), median in np.ndenumerate(medians):
+        color = "white" if median < middle else "black"
+        axes.text(column, row, "%.3g" % median, ha="center", va="center", color=color, fontsize=8)
+    for name, values, axis in ((second, columns, axes.xaxis), (first, rows, axes.yaxis)):
+        axis.set_ticks(range(len(values)))
+        axis.set_ticklabels(["%g" % value for value in values])
+        axis.set_label_text(name)
+    figure.colorbar(image, label="median %s%s" % (metric, " (%s)" % unit if unit else ""))
+    return figure
 
 
 def _begin(height_in: float) -> Tuple[Figure, Any]:
@@ -63,11 +131,11 @@ def draw_over_time(
     """
     figure, axes = _begin(3.6)
     for index, (label, runs) in enumerate(zip(labels, values)):
-        color = _COLORS[index % len(_COLORS)]
+        style = _choose_style(index)
         has_runs = ~np.isnan(runs).all(axis=1)
         low, middle, high = np.nanpercentile(runs[has_runs], (25.0, 50.0, 75.0), axis=1)
-        axes.plot(times_s[has_runs], middle, color=color, label=label)
-        axes.fill_between(times_s[has_runs], low, high, color=color, alpha=0.2, linewidth=0.0)
+        axes.plot(times_s[has_runs], middle, label=label, **style)
+        axes.fill_between(times_s[has_runs], low, high, color=style["color"], alpha=0.2, linewidth=0.0)
     axes.set_xlabel("time (s)", fontsize=9)
     axes.set_ylabel("%s%s" % (metric, " (%s)" % unit if unit else ""), fontsize=9)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
@@ -78,6 +146,7 @@ def draw_over_time(
 def to_svg(figure: Figure) -> str:
     """Return a figure as an SVG element for a page."""
     output = io.StringIO()
-    figure.savefig(output, format="svg", metadata={"Date": None})
+    with rc_context({"svg.hashsalt": "hero_swarm"}):  # ids are else drawn anew each time
+        figure.savefig(output, format="svg", metadata={"Date": None})
     text = output.getvalue()
     return text[text.index("<svg") :]

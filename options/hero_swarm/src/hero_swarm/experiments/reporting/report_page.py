@@ -1,16 +1,12 @@
 """The report as a self-contained page: no other file, no network."""
 
 import html
-from typing import List, Mapping, Sequence, Tuple
+from typing import List, Mapping, Sequence
 
-import numpy as np
+from matplotlib.figure import Figure
 
-from ...metrics import UNITS
-from .figures import draw_over_time, draw_runs, to_svg
-from .summary import Report, Summary, format_comparison, format_interval
-
-OverTime = Tuple[np.ndarray, Mapping[int, np.ndarray]]
-"""Times (T,) in s, and cell -> a metric of its runs (T, runs)."""
+from .figures import MAP, OVER_TIME, to_svg
+from .summary import Report, Summary, describe_method, format_comparison, format_interval
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222 }
@@ -22,24 +18,21 @@ overflow: auto }
 """
 
 
-def draw_page(report: Report, over_time: Mapping[str, OverTime], text: str, about: Mapping[str, str]) -> str:
-    """Return the page as HTML.
-
-    over_time: metric -> its course, of those that were recorded; text: the experiment's file; about: of the folder.
-    """
+def draw_page(report: Report, figures: Mapping[str, Figure], text: str, about: Mapping[str, str]) -> str:
+    """Return the page as HTML; figures: of draw_all(); text: the experiment's file; about: of the folder."""
     experiment = report.experiment
     parts = [f"<h1>{html.escape(experiment.behavior)}</h1>"]
     parts += [f'<p class="note">{html.escape(remark)}</p>' for remark in report.remarks]
     parts.append("<p>Each point is a run; large points are medians, with 95 % intervals.</p>")
-    for metric in experiment.metrics:
-        unit = UNITS.get(metric.source, "") if metric.bound is None else "s"
-        parts += _draw_metric(metric.name, unit, report.summaries[metric.name])
+    for name, summaries in report.summaries.items():
+        own = [figures[key] for key in (name, name + MAP) if key in figures]
+        parts += [f"<h2>{html.escape(name)}</h2>", *map(to_svg, own), _list_summaries(summaries)]
+    over_time = [figure for name, figure in figures.items() if name.endswith(OVER_TIME)]
     if over_time:
         parts.append("<h2>Over time</h2><p>Median of each cell, and the middle half of its runs.</p>")
-    for source, (times_s, values) in over_time.items():
-        labels = [experiment.cells[cell].label for cell in values]
-        parts.append(to_svg(draw_over_time(source, UNITS.get(source, ""), labels, times_s, list(values.values()))))
+    parts += map(to_svg, over_time)
     parts += _list_comparisons(report)
+    parts.append(f"<h2>Method</h2><p>{html.escape(describe_method(report, about))}</p>")
     parts.append(f"<h2>Experiment</h2><pre>{html.escape(text)}</pre>")
     parts.append(_table(("", ""), list(about.items())))
     title = html.escape(experiment.behavior)
@@ -47,12 +40,9 @@ def draw_page(report: Report, over_time: Mapping[str, OverTime], text: str, abou
     return head % (title, _STYLE) + "\n".join(parts) + "</body></html>\n"
 
 
-def _draw_metric(metric: str, unit: str, summaries: Sequence[Summary]) -> List[str]:
-    cells, values, intervals = zip(*summaries)
-    labels = [cell.label for cell in cells]
+def _list_summaries(summaries: Sequence[Summary]) -> str:
     rows = [(cell.label, str(len(runs)), format_interval(interval)) for cell, runs, interval in summaries]
-    heading, figure = f"<h2>{html.escape(metric)}</h2>", to_svg(draw_runs(unit, labels, values, intervals))
-    return [heading, figure, _table(("cell", "runs", "median (95 % interval)"), rows)]
+    return _table(("cell", "runs", "median (95 % interval)"), rows)
 
 
 def _list_comparisons(report: Report) -> List[str]:

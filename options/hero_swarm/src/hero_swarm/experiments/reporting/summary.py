@@ -1,13 +1,22 @@
 """Summary of runs: medians with intervals, comparisons, and remarks on both. Pure."""
 
-from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
 from ..errors import ExperimentError
 from ..experiment_file import Cell, Comparing, Experiment
 from ..results_folder import Run, format_csv
-from .statistics import FEW_SEEDS, Comparison, Interval, bootstrap_median, compare_pairs, correct_by_holm
+from .statistics import (
+    CONFIDENCE,
+    FEW_SEEDS,
+    RESAMPLES,
+    Comparison,
+    Interval,
+    bootstrap_median,
+    compare_pairs,
+    correct_by_holm,
+)
 
 
 class Summary(NamedTuple):
@@ -104,6 +113,23 @@ def describe(report: Report) -> str:
         text = "%s: %s, %s pairs: difference %s, corrected p %s, Cliff's delta %s"
         lines.append(text % (report.experiment.compare.metric, *format_comparison(*comparison)))
     return "\n".join(lines + ["note: " + remark for remark in report.remarks])
+
+
+def describe_method(report: Report, about: Mapping[str, str]) -> str:
+    """Return how the numbers were found, as a sentence for a paper."""
+    experiment = report.experiment
+    seeds, names = experiment.seeds, list(experiment.cells[0].varied)
+    text = (
+        "Each of %d combinations%s was run with the seeds %d to %d, which start alike in all combinations%s; medians"
+        " have %.0f %% percentile bootstrap intervals (%d resamples)%s. Computed with HeRo's ROS suite, commit %s, code"
+        " %s, Python %s, numpy %s."
+    )
+    test = "; pairs of the same seed are compared by Wilcoxon's test with Holm's correction and Cliff's delta"
+    of_names = f" of {' and '.join(names)}" if names else ""
+    same = " with as many robots" if "robots" in names else ""
+    values = len(experiment.cells), of_names, seeds[0], seeds[-1], same, 100.0 * CONFIDENCE, RESAMPLES
+    versions = (about.get(name, "unknown") for name in ("commit", "code", "python", "numpy"))
+    return text % (*values, test if experiment.compare else "", *versions)
 
 
 def format_interval(interval: Interval) -> str:
