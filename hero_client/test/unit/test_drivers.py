@@ -1,11 +1,12 @@
 """Reports of several drivers become one: each robot once, stopped only if all are; only drivers are believed."""
 
 import math
+import time
 
 import pytest
 
 from hero_client.ros.drivers import clean, find_drivers, merge
-from hero_client.values.robot_states import STATES, STOP_STATES
+from hero_client.values.robot_states import STATES, STOP_STATES, describe_stop_origin
 from hero_msgs.msg import Robot, RobotArray
 
 
@@ -53,6 +54,40 @@ def test_refused_and_unidentified_peers_are_no_other_robot():
         make_report(2, [(3, Robot.REFUSED), (None, Robot.JOINING)]),
     ]
     assert len(merge(reports).robots) == 4
+
+
+def test_robots_that_are_gone_from_one_driver_are_not_if_another_has_them():
+    first, second = make_report(1, [(3, Robot.READY)]), make_report(2, [])
+    second.gone = [Robot(id=number, namespace="/hero_%d" % number) for number in (9, 3)]
+    first.gone = second.gone[:1]
+    assert [robot.id for robot in merge([first, second]).gone] == [9]
+
+
+def test_a_merged_report_names_all_who_stopped_robots():
+    reports = [make_report(number, [], stopped=True) for number in range(3)]
+    for report, node in zip(reports, ("/teleop", "", "/hero_monitor")):
+        report.stopped_by = node
+    assert merge(reports).stopped_by == "/hero_monitor, /teleop"
+
+
+@pytest.mark.parametrize(
+    ("by", "age_s", "text"),
+    [
+        ("/lab/teleop", 600, "by lab teleop since 09:03"),
+        ("", 93600, "since 2023-11-13 07:13, before the driver's start"),
+        ("", None, "before the driver's start"),
+    ],
+)
+def test_a_stop_is_told_with_who_requested_it_and_since_when(monkeypatch, by, age_s, text):
+    monkeypatch.setenv("TZ", "UTC+13")
+    time.tzset()
+    report = make_report(1, [], stopped=True, stamp_s=100000)  # a clock of its own (/clock)
+    report.stopped_by, report.stopped_since.secs = by, 0 if age_s is None else 100000 - age_s
+    assert describe_stop_origin(report, 1.7e9) == text
+    report.stopped = False
+    assert describe_stop_origin(report, 1.7e9) == ""
+    monkeypatch.undo()
+    time.tzset()
 
 
 def test_the_fleet_is_stopped_only_if_every_driver_is():

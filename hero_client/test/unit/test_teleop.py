@@ -16,6 +16,7 @@ from hero_client.apps.robot_choice import ChoiceButtons, RobotChoice
 from hero_client.apps.teleop_output import HOLD_ENDED, PAUSE_S, TeleopOutput
 from hero_client.controllers.formation_drive import FormationDrive
 from hero_client.ros.stop_status import StopStatus
+from hero_msgs.msg import RobotArray
 from hero_node import Pose, ProgramError, Velocity
 
 MAPPING = JoystickMapping(0.1, 2.0, 1, 0, 4, 1)
@@ -32,6 +33,9 @@ class FakeDrivers:
 
     def stop_status(self):
         return self.status
+
+    def read(self):
+        return RobotArray(stopped=True, stopped_by="/hero_monitor")
 
 
 def make_swarm(*numbers):
@@ -130,7 +134,7 @@ def test_keys_stop_and_release_all_robots(shown):
         teleop.step(now_s)
         teleop.step(now_s + 0.8)
     assert velocities(swarm.links[0]) == [] and shown == [
-        "all robots are stopped, so hero_0 cannot move: r releases them\n"
+        "all robots are stopped by hero_monitor, so hero_0 cannot move: r releases them\n"
     ]
     swarm.links[0].is_stopped = False
     teleop.step(2.9)
@@ -193,7 +197,7 @@ def test_the_live_line_tells_the_robot_or_what_keeps_it_from_driving():
         (StopStatus("info", "released", True), False, ("info", "waiting: nothing subscribes")),
         (StopStatus("error", "NOT RELEASED", True), False, ("error", "NOT RELEASED")),
         (StopStatus("error", "NOT STOPPED", False), True, ("error", "NOT STOPPED")),
-        (None, True, ("warn", "all robots are stopped, so hero_1 cannot move")),
+        (None, True, ("warn", "all robots are stopped by hero_monitor, so hero_1 cannot move")),
     ):
         swarm.drivers.status, swarm.links[1].is_stopped = status, stopped
         level, text = teleop.describe()

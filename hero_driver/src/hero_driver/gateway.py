@@ -345,6 +345,18 @@ class Gateway(LinkHandler):
             statuses.append(describe_robot(record, bridge, peer, stop_state, duplicate_stops, now_s))
         return sorted(statuses, key=lambda status: (status.message.id, status.message.namespace))
 
+    def list_gone(self, now_s: float) -> List[RobotStatus]:
+        """Return the last state of each robot that has not returned, sorted by id."""
+        records = sorted(self.fleet.gone.values(), key=lambda record: record.identity.number)
+        return [describe_robot(record, None, None, StopState.NOT_STOPPED, {}, now_s) for record in records]
+
+    def dismiss_gone(self, answer: Callable[[List[str]], None]) -> None:
+        """Report robots that are gone no longer; call answer() with their names."""
+        names = [record.identity.namespace.lstrip("/") for record in self.fleet.gone.values()]
+        self.fleet.gone.clear()
+        self.note_change()
+        answer(names)
+
     def list_stops(self) -> List[Tuple[str, Optional[StopState]]]:
         """Return name and stop of every connection that can move a robot, and None for robots that are away."""
         records = sorted(self.fleet.robots.values(), key=lambda record: record.identity.number)

@@ -20,6 +20,7 @@ from typing import Any, Callable, List, Optional
 
 import rosgraph
 import rospy
+from std_srvs.srv import Trigger, TriggerResponse
 
 from hero_node import NodeError, ProgramError, print_error
 from hero_node.ros import (
@@ -113,9 +114,10 @@ class DriverNode:
         except OSError as error:
             raise ProgramError(_explain_bind_error(self._config, error)) from error
         self._gateway.open()
-        since = self._stop_store.read_since() if self._config.start_stopped == "as_before" else ""
-        self._stop_interface.open(bool(since) or self._config.start_stopped == "always", since)
+        since_s = self._stop_store.read_since() if self._config.start_stopped == "as_before" else None
+        self._stop_interface.open(since_s is not None or self._config.start_stopped == "always", since_s)
         self._thread.start()
+        rospy.Service("~dismiss_gone", Trigger, self._serve_dismissal)
         threading.Thread(target=self._watch_master, name="master watch", daemon=True).start()
         self._log.log("info", self._describe_start())
         for problem in self._config.calibration_problems.values():
@@ -196,6 +198,14 @@ class DriverNode:
                     self._log.log("error", text % error)
             was_lost = watch.is_lost
 
+    def _serve_dismissal(self, request: Any) -> TriggerResponse:
+        del request
+        try:
+            names = self._loop.ask(self._gateway.dismiss_gone, 1.0)
+        except NoAnswerError:
+            return TriggerResponse(False, "the driver hangs")
+        return TriggerResponse(True, f"no longer listed as gone: {', '.join(names) or 'no robot'}")
+
     def _describe_start(self) -> str:
         parts = []
         if self._loop.listening is not None:
@@ -231,10 +241,13 @@ class DriverNode:
             now_s,
             "" if listening is None else str(listening),
             self._gateway.stopped,
+            self._stop_interface.stopped_by,
+            self._stop_interface.stopped_s,
             len(self._gateway.peers),
             self._gateway.refused_connections,
             self._gateway.last_refusal,
             self._gateway.list_robots(now_s),
+            self._gateway.list_gone(now_s),
         )
         answer(status)
 

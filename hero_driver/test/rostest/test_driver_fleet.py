@@ -6,6 +6,7 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Twist
 from std_msgs.msg import ColorRGBA
+from std_srvs.srv import Trigger
 
 from hero_msgs.msg import Encoder, Robot
 from hero_msgs.srv import SetOdom
@@ -114,6 +115,7 @@ class TestDriverFleet(DriverCase):
         robot.close()
         self.fleet.wait("/hero_4", Robot.AWAY)
         self.fleet.wait_gone("/hero_4")
+        wait_for(lambda: "/hero_4" in [robot.namespace for robot in self.fleet.newest.gone], "its entry as gone")
         wait_for(lambda: not list_driver_topics("/hero_4"), "topics to be taken down")
         wait_for(lambda: self.find_status("hero_4") is None, "its diagnostics to go")
         again = self.join(4)
@@ -121,6 +123,12 @@ class TestDriverFleet(DriverCase):
         self.send_encoder(again, 3.0)
         self.assertEqual(encoders.wait_count(1)[0].left_ticks, 3.0)
         self.assertEqual(self.fleet.find("/hero_4").reconnects, 0)
+        self.assertNotIn("/hero_4", [robot.namespace for robot in self.fleet.newest.gone])
+        again.close()
+        wait_for(lambda: "/hero_4" in [robot.namespace for robot in self.fleet.newest.gone], "its entry as gone")
+        dismissed = rospy.ServiceProxy(NODE + "/dismiss_gone", Trigger)()
+        self.assertIn("hero_4", dismissed.message)
+        wait_for(lambda: not self.fleet.newest.gone, "an empty list")
 
     def test_a_connection_that_is_reset_is_a_departure_like_any_other(self):
         robot = self.join(5)

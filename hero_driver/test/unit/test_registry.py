@@ -7,6 +7,7 @@ from hero_driver.fleet.namespaces import Identity
 from hero_driver.fleet.registry import (
     ALIVE_S,
     FLAP_S,
+    GONE_MAX,
     RIVALS_MAX,
     FleetRegistry,
     RobotState,
@@ -86,6 +87,29 @@ def test_a_robot_stays_known_for_exactly_the_grace_period():
     assert record.identity == HERO
     assert sorted(fleet.robots) == ["/hero_1"]
     assert identify(fleet, 3, T0 + 16.0).verdict is Verdict.ARRIVED
+
+
+def test_a_robot_that_was_ready_stays_listed_as_gone_until_it_returns():
+    fleet = make_fleet()
+    for link, identity, is_ready in ((1, HERO, True), (2, OTHER, False)):
+        record = identify(fleet, link, T0, identity=identity).record
+        if is_ready:
+            record.enter(RobotState.READY, T0)
+        fleet.leave(link, "closed", T0 + 1.0)
+    assert fleet.gone == {}
+    fleet.collect_expired(T0 + 100.0)
+    assert [(record.identity, record.since_s) for record in fleet.gone.values()] == [(HERO, T0 + 1.0)]
+    identify(fleet, 3, T0 + 200.0)
+    assert fleet.gone == {}
+
+
+def test_of_very_many_robots_that_are_gone_the_last_ones_stay_listed():
+    fleet = make_fleet()
+    for number in range(GONE_MAX + 3):
+        identify(fleet, number, T0, identity=Identity("/hero_%d" % number, number)).record.enter(RobotState.READY, T0)
+        fleet.leave(number, "closed", T0 + number)
+        fleet.collect_expired(T0 + 1000.0)
+    assert [record.identity.number for record in fleet.gone.values()] == list(range(3, GONE_MAX + 3))
 
 
 def test_a_robot_that_returned_is_not_forgotten():

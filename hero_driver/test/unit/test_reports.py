@@ -81,7 +81,7 @@ def publish(reporter, *records):
     """Return the rows of a report about robots."""
     stops = {"10.0.0.2:1": StopState.MOVING}
     robots = [describe_robot(record, None, None, StopState.NOT_STOPPED, stops, NOW_S) for record in records]
-    reporter.publish(FleetStatus(NOW_S, "", False, 0, 0, "", robots))
+    reporter.publish(FleetStatus(NOW_S, "", False, "", None, 0, 0, "", robots, []))
     return reporter._publisher.published[-1].robots
 
 
@@ -128,7 +128,7 @@ def test_a_robot_of_which_nothing_came_has_zeros_in_its_report(reporter):
 def test_rates_are_what_came_since_the_last_report_by_the_time_between(reporter):
     def measure(now_s, *records):
         robots = [describe_robot(record, None, None, StopState.NOT_STOPPED, {}, now_s) for record in records]
-        status = FleetStatus(now_s, "", False, 0, 0, "", robots)
+        status = FleetStatus(now_s, "", False, "", None, 0, 0, "", robots, [])
         reporter.measure_rates(status)
         reporter.publish(status)
         return [(row.packets_per_s, row.bytes_per_s) for row in reporter._publisher.published[-1].robots]
@@ -143,6 +143,16 @@ def test_rates_are_what_came_since_the_last_report_by_the_time_between(reporter)
 def test_a_report_says_since_when_each_robot_is_in_its_state(reporter):
     assert publish(reporter, make_record(since_s=NOW_S - 12.0))[0].since.to_sec() == 1795240942 - 12
     assert publish(reporter, make_record(since_s=NOW_S - 2e9))[0].since.to_sec() == 0
+
+
+def test_a_report_says_who_stopped_the_robots_and_which_have_not_returned(reporter):
+    gone = [describe_robot(make_record(since_s=NOW_S - 60.0), None, None, StopState.NOT_STOPPED, {}, NOW_S)]
+    reporter.publish(FleetStatus(NOW_S, "", True, "/teleop", NOW_S - 9.0, 0, 0, "", [], gone))
+    report = reporter._publisher.published[-1]
+    assert (report.stopped_by, report.stopped_since.to_sec()) == ("/teleop", 1795240942 - 9)
+    assert [(robot.id, robot.since.to_sec()) for robot in report.gone] == [(7, 1795240942 - 60)]
+    reporter.publish(FleetStatus(NOW_S, "", False, "", None, 0, 0, "", [], []))
+    assert reporter._publisher.published[-1].stopped_since.to_sec() == 0.0
 
 
 def test_a_damaged_calibration_is_reported_beside_all_else(reporter):
@@ -175,4 +185,4 @@ def test_diagnostics_have_a_part_for_each_robot_that_is_known(reporter):
     values = {pair.key: pair.value for pair in stat.values}
     assert (values["address"], values["state"], values["stop"]) == ("10.0.0.1:4711", "READY", "NOT_STOPPED")
     stat = updater.tasks["driver"](DiagnosticStatusWrapper())
-    assert (stat.level, stat.message) == (stat.OK, "1 of 1 robots ready")
+    assert (stat.level, stat.message) == (stat.OK, "1 of 1 robots connected")

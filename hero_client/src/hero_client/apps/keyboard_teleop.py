@@ -8,6 +8,7 @@ before they repeat, and short once the key repeats (every 30..50 ms).
 import math
 import os
 import sys
+import time
 from typing import Dict, List, Optional, Tuple
 
 from hero_node import STOP, Velocity
@@ -18,6 +19,7 @@ from ..ros.stop_status import paint
 from ..swarm import Swarm
 from ..values.errors import NotCalibratedError, StaleDataError
 from ..values.robot_constants import MAX_LINEAR_M_S
+from ..values.robot_states import describe_stop_origin
 from .keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard
 from .teleop_output import PauseDetector, TeleopOutput
 
@@ -209,7 +211,11 @@ class KeyboardTeleop:
     def _find_stopped(self) -> str:
         """Return a line with the chosen robots that cannot move because all robots are stopped; empty if none."""
         stopped = [robot.name for robot in self._chosen if robot.is_stopped]
-        return f"all robots are stopped, so {', '.join(stopped)} cannot move: r releases them" if stopped else ""
+        report = self._swarm.drivers.read() if stopped else None
+        if report is None:
+            return ""
+        origin = describe_stop_origin(report, time.time())
+        return f"all robots are stopped {origin}".strip() + f", so {', '.join(stopped)} cannot move: r releases them"
 
     def _describe_stop(self) -> Tuple[str, str]:
         """Return level and text about a stop of all robots; no text if there is nothing to say."""

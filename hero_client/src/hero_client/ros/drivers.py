@@ -7,6 +7,7 @@ Threads: only the finder waits for the ROS master; only the sender sends request
 hangs delays a stop, because the topics to drivers are open before it is needed.
 """
 
+import contextlib
 import math
 import threading
 import time
@@ -15,6 +16,7 @@ from typing import Any, Dict, FrozenSet, Iterable, List, Optional, Sequence, Set
 
 import rospy
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import NodeError, ProgramError, list_names
@@ -94,6 +96,10 @@ def merge(reports: Sequence[RobotArray]) -> RobotArray:
         known = by_name.get(key)
         if known is None or own is None or PREFERENCE.index(robot.state) < PREFERENCE.index(known.state):
             by_name[key] = robot
+    merged.stopped_by = ", ".join(sorted({report.stopped_by for report in reports if report.stopped_by}))
+    merged.stopped_since = max((report.stopped_since for report in reports), default=merged.stopped_since)
+    gone = {robot.namespace: robot for report in reports for robot in report.gone if robot.namespace not in by_name}
+    merged.gone = sorted(gone.values(), key=lambda robot: robot.id)
     merged.robots = sorted(by_name.values(), key=lambda robot: (robot.namespace, robot.address))
     return merged
 
@@ -268,6 +274,12 @@ class Drivers:
         merged = merge(list(reports.values()))
         merged.stopped = merged.stopped and not self.find_silent()
         return merged
+
+    def dismiss_gone(self) -> None:
+        """Ask all drivers to list robots that are gone no longer; waits for the ROS master and the drivers."""
+        for driver in self.names():
+            with contextlib.suppress(rospy.ServiceException):
+                rospy.ServiceProxy(driver + "/dismiss_gone", Trigger)()
 
     def count(self) -> int:
         """Return how many reports came so far, to see whether there are new ones."""

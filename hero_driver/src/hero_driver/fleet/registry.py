@@ -20,6 +20,9 @@ FLAP_S = 5.0
 """Two take-overs within this time, where the loser still speaks while the winner does, are two robots behind
 one address: a robot that boots or reconnects is silent on its old connection."""
 
+GONE_MAX = 100
+"""Robots that are remembered after their grace period; of more, those that left first are forgotten."""
+
 RIVALS_MAX = 16
 """Addresses that are remembered because a second robot with the id of the known one came from them."""
 
@@ -67,12 +70,14 @@ class RobotRecord:
     received_length: int = 0
     refused: Dict[str, str] = field(default_factory=dict)  # address -> reason, of duplicates that are connected
     rivals: Dict[str, float] = field(default_factory=dict)  # host -> when a duplicate from there was first refused
+    was_ready: bool = False
 
     def enter(self, state: RobotState, now_s: float) -> bool:
         """Enter a state; return whether it is another one."""
         if self.state is state:
             return False
         self.state, self.since_s = state, now_s
+        self.was_ready = self.was_ready or state is RobotState.READY
         return True
 
 
@@ -91,6 +96,8 @@ class FleetRegistry:
 
     def __init__(self, grace_s: float) -> None:
         self.robots: Dict[str, RobotRecord] = {}
+        self.gone: Dict[str, RobotRecord] = {}
+        """Robots that were ready once and have not returned since their grace period, in the order of its end."""
         self._grace_s = grace_s
 
     def claim_identity(
@@ -103,6 +110,7 @@ class FleetRegistry:
                 identity, host, address, link, RobotState.JOINING, now_s, last_heard_s=now_s, joined_s=now_s
             )
             self.robots[identity.namespace] = record
+            self.gone.pop(identity.namespace, None)
             return Decision(Verdict.ARRIVED, record)
         if self._is_duplicate(record, host, opened_s, now_s):
             reason = (
@@ -152,7 +160,7 @@ class FleetRegistry:
         return None
 
     def collect_expired(self, now_s: float) -> List[RobotRecord]:
-        """Forget the robots that were away for longer than the grace period, and return them."""
+        """Move the robots that were away for longer than the grace period to those that are gone; return them."""
         expired = [
             record
             for record in self.robots.values()
@@ -160,4 +168,8 @@ class FleetRegistry:
         ]
         for record in expired:
             del self.robots[record.identity.namespace]
+            if record.was_ready:
+                self.gone[record.identity.namespace] = record
+        for namespace in list(self.gone)[:-GONE_MAX]:
+            del self.gone[namespace]
         return expired

@@ -4,7 +4,7 @@ Runs on the main thread of the node; gets the states as values from the thread o
 """
 
 import functools
-from typing import Any, Dict, List, NamedTuple, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 import diagnostic_updater
 import rospy
@@ -26,10 +26,13 @@ class FleetStatus(NamedTuple):
     now_s: float  # monotonic, when it was put together
     listening: str
     stopped: bool
+    stopped_by: str
+    stopped_s: Optional[float]  # monotonic, since when; None: not stopped, or unknown
     connections: int
     refused_connections: int
     last_refusal: str
     robots: List[RobotStatus]
+    gone: List[RobotStatus]
 
 
 class Reporter:
@@ -43,18 +46,27 @@ class Reporter:
         self._known: Dict[str, RobotStatus] = {}
         self._rates: Dict[str, Tuple[float, float]] = {}
         self._last_counts: Dict[str, Tuple[float, int, int]] = {}
-        self._status = FleetStatus(0.0, "", False, 0, 0, "", [])
+        self._status = FleetStatus(0.0, "", False, "", None, 0, 0, "", [], [])
 
     def publish(self, status: FleetStatus) -> None:
         """Publish ~robots."""
         self._status = status
         ros_now = rospy.Time.now()
-        message = RobotArray(listening=status.listening, stopped=status.stopped)
+        message = RobotArray(listening=status.listening, stopped=status.stopped, stopped_by=status.stopped_by)
         message.header.stamp = ros_now
+
+        def stamp_of(time_s: float) -> rospy.Time:
+            age = rospy.Duration.from_sec(max(0.0, status.now_s - time_s))
+            return ros_now - age if ros_now.to_sec() > age.to_sec() else rospy.Time(0)
+
+        if status.stopped_s is not None:
+            message.stopped_since = stamp_of(status.stopped_s)
+        for robot in status.gone:
+            robot.message.since = stamp_of(robot.since_s)
+            message.gone.append(robot.message)
         for robot in status.robots:
             row = robot.message
-            age = rospy.Duration.from_sec(status.now_s - robot.since_s)
-            row.since = ros_now - age if ros_now.to_sec() > age.to_sec() else rospy.Time(0)
+            row.since = stamp_of(robot.since_s)
             row.packets_per_s, row.bytes_per_s = self._rates.get(row.namespace, (0.0, 0.0))
             message.robots.append(row)
             message.robots += [
@@ -100,7 +112,9 @@ class Reporter:
     def _diagnose_driver(self, stat: Any) -> Any:
         status = self._status
         ready = sum(robot.message.state == Robot.READY for robot in status.robots)
-        text = "%d of %d robots ready" % (ready, len(status.robots))
+        text = "%d of %d robots connected" % (ready, len(status.robots) + len(status.gone))
+        if status.gone:
+            text += "; gone: " + ", ".join(robot.name for robot in status.gone)
         moving = [robot.name for robot in status.robots if robot.message.stop_state == Robot.MOVING]
         if moving:
             stat.summary(DiagnosticStatus.ERROR, f"{text}; moving though stopped: {', '.join(moving)}")

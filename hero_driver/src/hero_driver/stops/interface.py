@@ -4,7 +4,9 @@ Programs connect to ~stop_request at their start, so that it works while the ROS
 until ~robots says that the robots are stopped. Whether they are is kept on disk (store).
 """
 
+import contextlib
 import queue
+import time
 import weakref
 from typing import Any, Callable, FrozenSet, List, Optional, Protocol, Tuple
 
@@ -17,7 +19,7 @@ from ..ros.log_relay import LogRelay
 from ..ros.rospy_internals import find_connection, is_latched_before, list_publishers
 from ..ros.worker import Worker
 from ..transport.event_loop import EventLoop, NoAnswerError
-from .store import StopStore
+from .store import UNKNOWN_TIME_S, StopStore
 
 ANSWER_WAIT_S = 0.5
 """The thread of the sockets answers within milliseconds; a service call must not hang where it does not."""
@@ -55,15 +57,20 @@ class StopInterface:
         self._heard: weakref.WeakSet[Any] = weakref.WeakSet()  # connections that have brought a request
         self._publisher = rospy.Publisher("~stopped", Bool, queue_size=1, latch=True)
         self._stopped = False
+        self.stopped_by = ""
+        """Node that stopped the robots; empty if they are not, or were stopped before the driver's start."""
+        self.stopped_s: Optional[float] = None  # monotonic; None: not stopped, or unknown
         self._keeper = Worker("stop keeper", 100, self._report_bug)
 
-    def open(self, stopped: bool, since: str) -> None:
-        """Serve; begin as stopped says. The loop does not run yet. since: since when they are, if that was kept."""
+    def open(self, stopped: bool, since_s: Optional[float]) -> None:
+        """Serve; begin as stopped says. The loop does not run yet. since_s: as StopStore.read_since() returns it."""
         self._fleet.set_stopped(stopped)
         self._stopped = stopped
         self._keeper.submit(self._keep)
         if stopped:
-            begin = "since " + since if since else "from the start (~start_stopped)"
+            begin = "from the start (~start_stopped)" if since_s is None else "since " + describe_time(since_s)
+            if since_s != UNKNOWN_TIME_S:
+                self.stopped_s = time.monotonic() - (0.0 if since_s is None else max(0.0, time.time() - since_s))
             text = "all robots are stopped %s; this releases them: rosservice call %s false"
             self._log.log("warn", text % (begin, rospy.resolve_name("~stop")))
         self._publisher.publish(Bool(stopped))
@@ -101,9 +108,10 @@ class StopInterface:
 
     def _serve(self, request: Any) -> SetBoolResponse:
         stopped = bool(request.data)
+        caller = str(request._connection_header.get("callerid", ""))
 
         def set_and_answer(answer: Callable[[Stops], None]) -> None:
-            self._set(stopped)
+            self._set(stopped, caller)
             answer(self._fleet.list_stops())
 
         try:
@@ -123,9 +131,10 @@ class StopInterface:
                 text = "a release on ~stop_request was refused, because it is from before the driver was there"
                 self._log.log("warn", text)
                 return
-        self._loop.call_soon(lambda: self._set(stopped))
+        caller = str(message._connection_header.get("callerid", ""))
+        self._loop.call_soon(lambda: self._set(stopped, caller))
 
-    def _set(self, stopped: bool) -> None:
+    def _set(self, stopped: bool, caller: str) -> None:
         """Runs on the thread of the sockets."""
         changed = stopped is not self._fleet.stopped
         if not changed and not stopped:
@@ -133,13 +142,22 @@ class StopInterface:
         self._fleet.set_stopped(stopped)
         if changed:
             self._stopped = stopped
+            self.stopped_by, self.stopped_s = (caller, time.monotonic()) if stopped else ("", None)
             # Published and written elsewhere: both may block.
             self._keeper.submit(self._keep)
             self._keeper.submit(lambda: self._publisher.publish(Bool(stopped)))
-            self._log.log("warn", "stopping all robots" if stopped else "robots may move")
+            self._log.log("warn", f"{'stopping all robots' if stopped else 'robots may move'}, by {caller or '?'}")
 
     def _report_bug(self, error: BaseException) -> None:
         self._log.log("error", f"~stopped was not published: {type(error).__name__}: {error}")
+
+
+def describe_time(since_s: float) -> str:
+    """Return a time (s since 1970) for users."""
+    with contextlib.suppress(OverflowError, ValueError, OSError):
+        if since_s != UNKNOWN_TIME_S:
+            return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(since_s))
+    return "an unknown time"
 
 
 def describe_stop(stops: Stops) -> str:

@@ -6,14 +6,13 @@ a disk that has filled up since the driver's start loses no stop. When they were
 
 import os
 import platform
-import time
 import urllib.parse
+from typing import Optional
 
 import rospkg
 
 FOLDER = "hero_driver"  # in ROS_HOME
-TIME_FORMAT = "%Y-%m-%d %H:%M:%S"
-UNKNOWN_TIME = "an unknown time"
+UNKNOWN_TIME_S = 0.0
 
 
 class StopStore:
@@ -26,16 +25,15 @@ class StopStore:
         self._released_path = os.path.join(self._folder, name + ".released")
         self.path = os.path.join(self._folder, name + ".stopped")
 
-    def read_since(self) -> str:
-        """Return since when robots are stopped, empty if they are not."""
+    def read_since(self) -> Optional[float]:
+        """Return since when robots are stopped, s since 1970 or UNKNOWN_TIME_S; None if they are not."""
         try:
-            stopped_s = os.stat(self.path).st_mtime
-            return time.strftime(TIME_FORMAT, time.localtime(stopped_s))
+            return os.stat(self.path).st_mtime
         except (FileNotFoundError, NotADirectoryError):
-            return ""
-        except (OSError, OverflowError, ValueError):
+            return None
+        except OSError:
             # It cannot be ruled out that they are.
-            return UNKNOWN_TIME
+            return UNKNOWN_TIME_S
 
     def write(self, stopped: bool) -> None:
         """Keep stopped, and return when it is on the disk; the time of a stop that is kept already stays.

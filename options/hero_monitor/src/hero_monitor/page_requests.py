@@ -168,6 +168,9 @@ class PageRequests:
             text = "stopped: %s; another page drove, and needs a new press to drive again"
             page.tell("info", text % ", ".join(driven))
 
+    def _do_dismiss(self, page: "PageSocket", request: Request) -> None:
+        self._background.submit(self._feed.drivers.dismiss_gone)
+
     # ---------------------------------------------------------------- motion
 
     def _do_drive(self, page: "PageSocket", request: Request) -> None:

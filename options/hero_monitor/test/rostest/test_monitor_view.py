@@ -113,17 +113,31 @@ class ViewTest(unittest.TestCase):
         wait_for(is_true, "the page to show it")
 
     def counts(self):
-        return {name: int(self.page.text("#count_" + name)) for name in ("ready", "driving", "stopped", "lost")}
+        return {name: int(self.page.text("#count_" + name)) for name in ("ready", "stopped", "lost", "unknown")}
 
     def test_the_summary_counts_each_robot_once(self):
         others = [{"state": state} for state in ("AWAY", "REFUSED", "JOINING")]
-        states = [{}, {"stop": "at rest"}, {"known": False}, *others]
-        self.show([make_robot(number, **changes) for number, changes in enumerate(states)])
-        wait_for(lambda: self.counts() == {"ready": 1, "driving": 0, "stopped": 1, "lost": 2}, self.counts)
+        robots = [make_robot(number, **more) for number, more in enumerate([{}, {}, {"known": False}, *others])]
+        self.show(robots, gone=[[7, "hero_7"], [9, "hero_9"]])
+        wait_for(lambda: self.counts() == {"ready": 2, "stopped": 0, "lost": 3, "unknown": 1}, self.counts)
+        self.page.wait_for_text("#ready", "1 of 7 unknown")
+        self.show(robots[:2] + robots[3:], stopped=True, gone=[[7, "hero_7"]])
+        wait_for(lambda: self.counts() == {"ready": 0, "stopped": 2, "lost": 2, "unknown": 0}, self.counts)
+        self.page.wait_for_text("#ready", "0 of 5 ready, 2 stopped, 1 joining, 2 lost")
+        self.assertEqual([row["State"] for row in self.page.rows()][:2], ["STOPPED", "STOPPED"])
+
+    def test_robots_that_are_gone_are_named_until_a_user_dismisses_them(self):
+        self.show([make_robot(0)], gone=[[7, "hero_7"]])
+        loss = {"source": "robots", "cause": "7 gone since 18:43", "remedy": "Switch them on, or dismiss this"}
+        self.monitor.show(losses=[loss])
+        self.page.wait_for_text("#losses", "7 gone since 18:43. Switch them on")
+        self.assertEqual(self.page.text("#link"), "robots lost")
+        self.page.click("#losses button")
+        self.monitor.wait_for_request("dismiss")
 
     def test_robots_that_move_count_as_driving_at_their_mean_speed(self):
         robots = [make_robot(number) for number in range(4)]
-        self.drive(robots, lambda: self.counts()["driving"] == 4)
+        self.drive(robots, lambda: "4 driving" in self.page.text("#mean_speed"))
         self.assertIn(" m/s", self.page.text("#mean_speed"))
         self.assertGreater(float(self.page.rows()[0]["Speed"].split()[0]), 0.0)
 

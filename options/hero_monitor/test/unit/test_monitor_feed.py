@@ -74,7 +74,8 @@ class Fleet:
         monkeypatch.setattr(feed_module, "RobotFeed", self.make_robot_feed)
         monkeypatch.setattr(feed_module, "MasterLink", lambda background: SimpleNamespace(check=lambda: ""))
         monkeypatch.setattr(feed_module.rospy, "Subscriber", lambda *arguments, **options: None)
-        monkeypatch.setattr(feed_module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
+        monkeypatch.setattr(feed_module, "time", SimpleNamespace(monotonic=lambda: self.now_s, time=lambda: 1.7e9))
+        monkeypatch.setattr(feed_module.rospy, "get_name", lambda: "/hero_monitor")
         self.feed = FleetFeed("world", SimpleNamespace(submit=self.submit, warn=lambda *said: None))
         self.page = {}
 
@@ -291,9 +292,9 @@ def test_the_outcome_of_a_stop_is_that_of_a_page_or_a_program(fleet):
     fleet.receive(moving, make_row(1), stopped=True)
     fleet.read()
     assert fleet.read()["stop"]["text"] == "NOT STOPPED: hero_0 moves"
-    assert describe_stop_of_others(True, ["hero_0", "hero_1"]) == ("error", "NOT STOPPED: hero_0, hero_1 move", False)
-    assert describe_stop_of_others(True, []) == ("info", "stopped by another program", True)
-    assert describe_stop_of_others(False, []) is None
+    assert describe_stop_of_others("by x", ["hero_0", "hero_1"]) == ("error", "NOT STOPPED: hero_0, hero_1 move", False)
+    assert describe_stop_of_others("by teleop since 18:43", []) == ("info", "stopped by teleop since 18:43", True)
+    assert describe_stop_of_others(None, []) is None
 
 
 def test_lines_of_the_log_are_counted_and_known_by_their_robot(fleet):

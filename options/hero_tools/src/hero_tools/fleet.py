@@ -20,7 +20,7 @@ import rospy
 
 from hero_client.apps.keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard, NoTerminalError
 from hero_client.ros import Drivers, RobotListener, RobotTrack, StopStatus, follow, paint
-from hero_msgs.msg import Robot
+from hero_msgs.msg import Robot, RobotArray
 from hero_node.parameters import within
 from hero_node.ros import Program
 
@@ -49,9 +49,7 @@ class FleetListener:
     """The drivers' lists of robots, and a listener for each robot."""
 
     def __init__(self) -> None:
-        self.heard = False
-        self.listening = ""
-        self.stopped = False
+        self.report: Optional[RobotArray] = None
         self.drivers = Drivers()
         self._listeners: Dict[str, RobotListener] = {}
         self._asked: Set[str] = set()
@@ -70,20 +68,24 @@ class FleetListener:
         report = self.drivers.read()
         if report is None:
             return []
-        self.heard, self.listening, self.stopped = True, report.listening, report.stopped
+        self.report = report
         present = {robot.namespace for robot in report.robots if robot.namespace and robot.state != Robot.REFUSED}
         if present != self._asked:
             self._asked = present
             self._worker.submit(follow, self._listeners, present, RobotListener)
-        return [self._make_row(robot, now_s) for robot in report.robots]
+        return [self._make_row(robot, report.stopped, now_s) for robot in report.robots]
 
-    def _make_row(self, robot: Robot, now_s: float) -> RobotRow:
+    def dismiss_gone(self) -> None:
+        """Have the drivers list robots that are gone no longer; returns at once."""
+        self._worker.submit(self.drivers.dismiss_gone)
+
+    def _make_row(self, robot: Robot, stopped: bool, now_s: float) -> RobotRow:
         # Topics under the name of a robot that was refused are those of another robot.
         listener = None if robot.state == Robot.REFUSED else self._listeners.get(robot.namespace)
         if listener is not None:
             listener.read_newest()
         track = listener.track if listener is not None else RobotTrack()
-        return RobotRow(robot, track, track.odometry.rate_hz(now_s))
+        return RobotRow(robot, track, track.odometry.rate_hz(now_s), stopped)
 
 
 @contextlib.contextmanager
@@ -127,12 +129,12 @@ class FleetProgram:
         self._rows = sort_rows(self._fleet.read_rows(time.monotonic()), self._order)
 
     def _make_lines(self, width: int, height: int) -> List[str]:
-        if not self._fleet.heard:
+        if self._fleet.report is None:
             text = "no driver yet: nothing on /hero_driver/robots (roslaunch hero_bringup hero_bringup.launch)"
             return [text[:width]]
         silent = self._fleet.drivers.find_silent()
-        title = format_title(self._rows, self._fleet.listening, self._fleet.stopped, silent)
-        return [title[:width], *format_table(self._rows, width, max(2, height - 1))]
+        title = format_title(self._fleet.report, time.time(), silent)
+        return [*(line[:width] for line in title), *format_table(self._rows, width, max(2, height - len(title)))]
 
     def _press(self, key: str) -> None:
         """Execute the command of a key."""
@@ -140,11 +142,13 @@ class FleetProgram:
             self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
         elif key in STOP_KEYS or key == RELEASE_KEY:
             self._fleet.drivers.request_stop(key in STOP_KEYS)
+        elif key == "d":
+            self._fleet.dismiss_gone()
 
     def print_fleet(self) -> None:
         """Print the fleet once, as lines or as JSON."""
         if self._options.json:
-            print(format_json(self._rows, self._fleet.listening, self._fleet.stopped), flush=True)
+            print(format_json(self._rows, self._fleet.report or RobotArray()), flush=True)
         else:
             print("\n".join(self._make_lines(200, 10000)), flush=True)
 

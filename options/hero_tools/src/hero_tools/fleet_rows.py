@@ -4,7 +4,7 @@ import math
 from typing import Dict, List, NamedTuple, Sequence
 
 from hero_client.ros import RobotTrack
-from hero_client.values import STATES, STOP_STATES
+from hero_client.values import STOP_STATES, name_state
 from hero_msgs.msg import Robot
 
 ORDERS = ("id", "state", "nearest")
@@ -21,6 +21,7 @@ class RobotRow(NamedTuple):
     robot: Robot
     track: RobotTrack
     odom_hz: float
+    stopped: bool = False  # whether all robots are
 
     @property
     def name(self) -> str:
@@ -29,8 +30,8 @@ class RobotRow(NamedTuple):
 
     @property
     def state(self) -> str:
-        """The state of the connection."""
-        return STATES.get(self.robot.state, str(self.robot.state))
+        """The state, in the words of all programs."""
+        return name_state(self.robot, self.stopped)
 
     @property
     def stop_state(self) -> str:

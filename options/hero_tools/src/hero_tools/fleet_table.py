@@ -7,8 +7,8 @@ import json
 import math
 from typing import Any, Dict, List, Optional, Sequence
 
-from hero_client.values import Obstacle, finite
-from hero_msgs.msg import Robot
+from hero_client.values import Obstacle, describe_counts, describe_gone, describe_stop_origin, finite
+from hero_msgs.msg import Robot, RobotArray
 from hero_node import Pose, make_printable
 
 from .fleet_rows import RobotRow
@@ -39,15 +39,16 @@ def format_cells(row: RobotRow) -> List[str]:
     """Return one robot's cells, in the order of HEADINGS."""
     robot, track = row.robot, row.track
     notes = [robot.last_error, "reconnected %dx" % robot.reconnects if robot.reconnects else ""]
+    is_connected = robot.state in (Robot.READY, Robot.JOINING)
     return [
         make_printable(row.name),
         make_printable(robot.address),
         ", ".join(filter(None, (row.state, row.stop_state))),
-        f"{row.odom_hz:.1f} Hz",
-        f"{robot.bytes_per_s / 1000.0:.1f} kB/s",
+        f"{row.odom_hz:.1f} Hz" if is_connected else "-",
+        f"{robot.bytes_per_s / 1000.0:.1f} kB/s" if is_connected else "-",
         format_pose(track.pose),
         f"{track.distance_m:.2f} m",
-        format_nearest(track.proximity_seen, track.is_free, track.nearest),
+        format_nearest(is_connected and track.proximity_seen, track.is_free, track.nearest),
         make_printable("; ".join(filter(None, notes))),
     ]
 
@@ -69,17 +70,17 @@ def format_table(rows: Sequence[RobotRow], width: int, height: int) -> List[str]
     return lines
 
 
-def format_title(rows: Sequence[RobotRow], listening: str, stopped: bool, silent: Sequence[str] = ()) -> str:
-    """Return the line above the table; silent: names of drivers that do not answer."""
-    ready = sum(row.robot.state == Robot.READY for row in rows)
-    title = "%d of %d robots ready" % (ready, len(rows))
-    if stopped:
-        title += ", ALL STOPPED"  # not last: a narrow terminal cuts the end off
+def format_title(report: RobotArray, now_s: float, silent: Sequence[str] = ()) -> List[str]:
+    """Return the lines above the table; silent: names of drivers that do not answer, now_s: s since 1970."""
+    title = describe_counts(report)
+    if report.stopped:
+        title += f", ALL STOPPED {describe_stop_origin(report, now_s)}".rstrip()  # not last: narrow terminals cut
     for driver in silent:
         title += f", driver {driver.strip('/')} does not answer"
-    if listening:
-        title += f", driver listens on {make_printable(listening)}"
-    return title
+    if report.listening:
+        title += f", driver listens on {report.listening}"
+    gone = describe_gone(report, now_s)
+    return [make_printable(title), *([make_printable(gone) + " (d: list them no longer)"] if gone else [])]
 
 
 def make_row_dict(row: RobotRow) -> Dict[str, Any]:
@@ -109,9 +110,17 @@ def make_row_dict(row: RobotRow) -> Dict[str, Any]:
     }
 
 
-def format_json(rows: Sequence[RobotRow], listening: str, stopped: bool) -> str:
-    """Return the fleet as one line of JSON."""
-    return json.dumps(
-        {"listening": listening, "stopped": stopped, "robots": [make_row_dict(row) for row in rows]},
-        allow_nan=False,
-    )
+def format_json(rows: Sequence[RobotRow], report: RobotArray) -> str:
+    """Return the fleet as one line of JSON; times in s since 1970, null where there is none."""
+    fleet = {
+        "listening": report.listening,
+        "stopped": report.stopped,
+        "stopped_by": report.stopped_by,
+        "stopped_since": report.stopped_since.to_sec() or None,
+        "gone": [
+            {"id": robot.id, "namespace": robot.namespace, "since": robot.since.to_sec() or None}
+            for robot in report.gone
+        ],
+        "robots": [make_row_dict(row) for row in rows],
+    }
+    return json.dumps(fleet, allow_nan=False)

@@ -92,8 +92,16 @@ def make_report(*states, stopped=False, listening="10.42.0.1:11411"):
 
 def test_robots_that_cannot_be_driven_are_told_with_their_remedy():
     text, lines = describe_report("/lab", make_report(Robot.READY, Robot.AWAY, stopped=True))
-    assert text == "/lab: 1 of 2 robots ready, the driver listens on 10.42.0.1:11411, firmware v3.8"
-    assert lines == ["all robots are stopped; release them: rosservice call /lab/stop false", "/hero_1 at a is AWAY"]
+    assert text == "/lab: 0 of 2 robots ready, 1 stopped, 1 lost, the driver listens on 10.42.0.1:11411, firmware v3.8"
+    assert lines == [
+        "all robots are stopped before the driver's start; to release them: rosservice call /lab/stop false",
+        "/hero_1 at a is AWAY",
+    ]
+    report = make_report(Robot.READY)
+    report.gone = [Robot(id=number) for number in (7, 3)]
+    text, lines = describe_report("/lab", report)
+    assert text.startswith("/lab: 1 of 3 robots ready, 2 lost")
+    assert lines == ["3, 7 gone: switch them on, or list them no longer: rosservice call /lab/dismiss_gone"]
     assert describe_report("/d", make_report(Robot.READY))[1] == []
     for listening, remedy in (
         ("127.0.0.1:11411", "host:=0.0.0.0"),

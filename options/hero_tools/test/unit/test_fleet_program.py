@@ -21,7 +21,7 @@ from hero_tools.fleet import (
     RobotRow,
 )
 from hero_tools.fleet_rows import MOVED_M, MOVED_RAD, find_missing
-from hero_tools.fleet_table import format_cells, format_nearest, format_title, make_row_dict
+from hero_tools.fleet_table import format_cells, format_nearest, make_row_dict
 
 
 class World:
@@ -37,7 +37,7 @@ class World:
         monkeypatch.setattr(
             module, "ThreadPoolExecutor", lambda *given: SimpleNamespace(submit=lambda call, *given: call(*given))
         )
-        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s, time=lambda: 1.7e9))
         monkeypatch.setattr(module.shutil, "get_terminal_size", lambda: SimpleNamespace(columns=100, lines=8))
 
     @property
@@ -164,7 +164,7 @@ def test_a_stop_is_drawn_at_once_and_a_time_limit_counted_down(world, monkeypatc
     world.status, world.stopped = StopStatus("error", "NOT STOPPED: hero_0 moves", False), True
     _, text = run_screen(world, monkeypatch, [["x"], ["q"]], seconds=30.0)
     assert world.now_s == pytest.approx(100.2) and "NOT STOPPED: hero_0 moves" in text
-    assert "ALL STOPPED, driver lab/driver does not answer" in text
+    assert "ALL STOPPED before the driver's start, driver lab/driver does not answer" in text
     _, text = run_screen(world, monkeypatch, [], seconds=1.2)
     assert "ends in 1 s" in text and world.now_s == pytest.approx(101.4, abs=0.01)
     world.checked.clear()
@@ -205,7 +205,10 @@ def test_cells_have_units_and_the_table_its_words():
     ):
         nearest = SimpleNamespace(range_m=0.1, bearing_rad=eighth * 0.7854 + 0.3)
         assert format_nearest(True, False, nearest) == "0.10 m " + words
-    assert format_title([], "", True) == "0 of 0 robots ready, ALL STOPPED"
+    stopped = format_cells(row._replace(stopped=True))
+    assert stopped[2] == "STOPPED, at rest"
+    away = format_cells(make_row(0, state=Robot.AWAY))
+    assert (away[2], away[3], away[4], away[7]) == ("AWAY", "-", "-", "-"), "what it said is not what it is"
     shown = make_row_dict(RobotRow(row.robot, row.track, 29.3456))
     assert (shown["odom_hz"], shown["bytes_per_s"], shown["distance_m"], shown["nearest"]) == (
         29.35,

@@ -1,7 +1,8 @@
 """A driver without connections: takes stop requests, and reports of its robots what a test tells it to.
 
-~ids lists the robots, as JSON; ~twin_of is an id that a second robot wants. ~behave (std_msgs/String) takes JSON: which
-robots move though stopped, and whether the others come to rest at all. ~rate is that of each robot, a word for a float.
+~ids lists the robots, ~gone those that have not returned, as JSON; ~twin_of is an id that a second robot wants. ~behave
+(std_msgs/String) takes JSON: which robots move though stopped, and whether the others come to rest at all. ~rate is
+that of each robot, a word for a float.
 The port on which it says that it listens is the number of stop requests so far.
 """
 
@@ -11,7 +12,7 @@ from functools import partial
 
 import rospy
 from std_msgs.msg import Bool, String
-from std_srvs.srv import SetBool, SetBoolResponse
+from std_srvs.srv import SetBool, SetBoolResponse, Trigger, TriggerResponse
 
 from hero_msgs.msg import Robot, RobotArray
 
@@ -25,11 +26,13 @@ class ScriptedDriver:
         self.twin_of = rospy.get_param("~twin_of", None)
         self.rate = float(rospy.get_param("~rate", "88"))
         self.requests = 0
+        self.gone = json.loads(rospy.get_param("~gone", "[]"))
         self.lock = threading.Lock()
         self.behavior = {"moving": [], "rest": True}
-        self.stop_time_s = None
+        self.stop_time_s, self.stopped_by = None, ""
         self.publisher = rospy.Publisher("~robots", RobotArray, queue_size=5, latch=True)
         rospy.Service("~stop", SetBool, self.serve_stop)
+        rospy.Service("~dismiss_gone", Trigger, self.dismiss_gone)
         rospy.Subscriber("~stop_request", Bool, self.receive_stop, queue_size=10, tcp_nodelay=True)
         rospy.Subscriber("~behave", String, self.receive_behavior, queue_size=10)
         rospy.Timer(rospy.Duration(REPORT_PERIOD_S), lambda event: self.report())
@@ -40,8 +43,14 @@ class ScriptedDriver:
             self.requests += 1
             if message.data != (self.stop_time_s is not None):
                 self.stop_time_s = rospy.get_time() if message.data else None
+                self.stopped_by = message._connection_header["callerid"] if message.data else ""
         self.report()
         rospy.Timer(rospy.Duration(REST_AFTER_S), lambda event: self.report(), oneshot=True)
+
+    def dismiss_gone(self, request):
+        self.gone = []
+        self.report()
+        return TriggerResponse(True, "")
 
     def serve_stop(self, request):
         self.receive_stop(request)
@@ -64,6 +73,9 @@ class ScriptedDriver:
             make = partial(Robot, since=rospy.Time.now(), firmware="v3.8", **rates)
             report = RobotArray(listening="127.0.0.1:%d" % self.requests, stopped=self.stop_time_s is not None)
             report.header.stamp = rospy.Time.now()
+            report.stopped_by = self.stopped_by
+            report.stopped_since = rospy.Time.from_sec(self.stop_time_s or 0.0)
+            report.gone = [Robot(id=number, since=report.header.stamp) for number in self.gone]
             for robot_id in self.ids:
                 row = make(id=robot_id, namespace="/hero_%d" % robot_id, state=Robot.READY)
                 row.address, row.stop_state = "127.0.1.%d:40000" % robot_id, self.find_stop_state(robot_id)

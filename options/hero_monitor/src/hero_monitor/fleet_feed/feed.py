@@ -21,14 +21,22 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_client.ros import Drivers, NewestMessage, StopStatus, follow
-from hero_client.values import STATES, STOP_STATES, finite, is_plausible, read_pose
-from hero_msgs.msg import Robot, RobotPose, RobotPoses
+from hero_client.values import (
+    STATES,
+    STOP_STATES,
+    describe_gone,
+    describe_stop_origin,
+    finite,
+    is_plausible,
+    read_pose,
+)
+from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
 from hero_node import Pose, make_printable, pose_of
 
 from ..background import Background
 from .camera_picture import CameraPicture
 from .drawings import Drawings
-from .losses import SILENT_S, LocalizationWatch, list_losses
+from .losses import SILENT_S, LocalizationWatch, Loss, list_losses
 from .master_link import MasterLink
 from .occupancy import encode_grid
 from .page_state import LOG_LINES_KEPT, PageState, encode_pose, encode_range, shorten
@@ -95,7 +103,9 @@ class FleetFeed:
         self._tracked: Set[str] = set()
         self.master = MasterLink(background)
         self._pending_reads = 0
-        self._listening = ""
+        self._report = RobotArray()
+        self.stopper = ""
+        """User who stopped the robots on a page."""
         self._rows: Sequence[Robot] = ()
         self._health: Dict[str, List[Any]] = {}
         self._change: Optional[Future[None]] = None
@@ -152,7 +162,7 @@ class FleetFeed:
         message = self.drivers.read() if reports != self._reports else None
         self._reports = reports
         if message is not None:
-            self._listening, self.stopped = message.listening, message.stopped
+            self._report, self.stopped = message, message.stopped
             self._fleet_stamp_s = message.header.stamp.to_sec()
             self._rows = sorted(message.robots, key=lambda row: row.id)[:ROBOTS_MAX]
             self.robots = {row.namespace.strip("/"): row for row in self._rows if row.state != Robot.REFUSED}
@@ -163,8 +173,9 @@ class FleetFeed:
         self.stopped = self.stopped and all(answering.values())
         fleet = {
             "driver": has_driver,
-            "listening": make_printable(self._listening),
+            "listening": make_printable(self._report.listening),
             "stopped": self.stopped,
+            "gone": [[robot.id, shorten(robot.namespace.strip("/"))] for robot in self._report.gone],
             "frame": shorten(self.placement.frame),
             "localized": self.placement.is_localized,
             "robots": [self._make_row(row) for row in self._rows],
@@ -173,6 +184,9 @@ class FleetFeed:
 
     def _list_losses(self) -> None:
         losses = list_losses(self._answering, self.master.check(), self._localization, time.monotonic())
+        gone = describe_gone(self._report, time.time()) if any(self._answering.values()) else ""
+        if gone:
+            losses.append(Loss("robots", shorten(gone), "Switch them on, or dismiss this"))
         self.page_state.put("losses", [loss._asdict() for loss in losses])
 
     def _make_row(self, row: Robot) -> Dict[str, Any]:
@@ -232,12 +246,20 @@ class FleetFeed:
         if status is None:
             # No page has asked; another program may have.
             moving = [name for name, row in self.robots.items() if row.stop_state == Robot.MOVING]
-            status = describe_stop_of_others(self.stopped, moving)
+            status = describe_stop_of_others(self._describe_origin() if self.stopped else None, moving)
+        elif status is not None and status.is_final and status.level != "error" and self.stopped:
+            status = status._replace(text=f"{status.text} ({self._describe_origin()})")
         pending = status is not None and not status.is_final and status.level != "error"
         # Different each time while it is pending, which shows pages that the monitor is alive.
         self._pending_reads = self._pending_reads + 1 if pending else 0
         value = None if status is None else {**status._asdict(), "reads": self._pending_reads}
         return self.page_state.put("stop", value)
+
+    def _describe_origin(self) -> str:
+        """Return who stopped all robots, and since when."""
+        origin = describe_stop_origin(self._report, time.time())
+        own = "by " + rospy.get_name().strip("/")
+        return shorten(f"by {self.stopper}" + origin[len(own) :] if self.stopper and origin.startswith(own) else origin)
 
     def _read_scene(self) -> None:
         now_s, put = time.monotonic(), self.page_state.put
@@ -327,12 +349,15 @@ class FleetFeed:
             log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
 
 
-def describe_stop_of_others(stopped: bool, moving: Sequence[str]) -> Optional[StopStatus]:
-    """Return the status of a stop that another program requested; None if there is none."""
+def describe_stop_of_others(origin: Optional[str], moving: Sequence[str]) -> Optional[StopStatus]:
+    """Return the status of a stop that another program requested; None if there is none.
+
+    origin: who requested it, None: robots are not stopped.
+    """
     if moving:
         verb = "moves" if len(moving) == 1 else "move"
         return StopStatus("error", f"NOT STOPPED: {', '.join(moving)} {verb}", is_final=False)
-    return StopStatus("info", "stopped by another program", is_final=True) if stopped else None
+    return None if origin is None else StopStatus("info", f"stopped {origin}".strip(), is_final=True)
 
 
 def describe_arena(message: MarkerArray) -> Dict[str, List[List[int]]]:

@@ -7,6 +7,21 @@ export function stateOf(robot, state) {
   return state.isFresh && robot.known ? robot.state : "UNKNOWN";
 }
 
+/** A robot's state in the words of all programs: as stateOf(), or STOPPED while all robots are. */
+export function wordOf(robot, state) {
+  const shown = stateOf(robot, state);
+  return shown === "READY" && state.fleet.stopped ? "STOPPED" : shown;
+}
+
+const COUNTED_AS = { READY: "ready", STOPPED: "stopped", JOINING: "joining", AWAY: "lost", UNKNOWN: "unknown" };
+
+/** How many robots are ready, stopped, joining, lost and unknown: each counts once; those that are gone are lost. */
+export function countRobots(robots, state, gone = 0) {
+  const counts = { ready: 0, stopped: 0, joining: 0, lost: gone, unknown: 0 };
+  for (const robot of robots) if (robot.state !== "REFUSED") counts[COUNTED_AS[wordOf(robot, state)]] += 1;
+  return counts;
+}
+
 /** What a robot's place on the map is known by. */
 export function sourceOf(robot, state) {
   return stateOf(robot, state) === "UNKNOWN" ? "unknown" : robot.source;
@@ -29,11 +44,18 @@ function listLosses(state, connection) {
   return state.losses;
 }
 
-export function showLosses(state, connection) {
+/** Show what is lost; dismiss() is called for the robots that have not returned. */
+export function showLosses(state, connection, dismiss) {
   const losses = listLosses(state, connection);
   const banner = element("losses");
   banner.hidden = losses.length === 0;
-  const lines = losses.map(({ cause, remedy }) => make("span", {}, make("b", {}, `${cause}. `), `${remedy}\n`));
+  const lines = losses.map(({ source, cause, remedy }) => {
+    const line = make("span", {}, make("b", {}, `${cause}. `), `${remedy}\n`);
+    if (source !== "robots") return line;
+    const button = make("button", { type: "button" }, "Dismiss");
+    button.addEventListener("click", dismiss);
+    return make("span", {}, line, button);
+  });
   const text = lines.map((line) => line.textContent).join("");
   if (banner.textContent !== text) banner.replaceChildren(...lines);
 }

@@ -8,7 +8,7 @@ import { isDark, onTheme, showTheme } from "./theme.js";
 import { FleetTable } from "./panels/fleet.js";
 import { GamepadInput } from "./gamepad.js";
 import { History } from "./history.js";
-import { showLosses, stateOf } from "./losses.js";
+import { countRobots, showLosses } from "./losses.js";
 import { FleetMap } from "./map/map.js";
 import { LogView } from "./panels/log.js";
 import { RobotPanel } from "./panels/robot.js";
@@ -23,7 +23,7 @@ const NOTICE_MS = 6000;
 /** As received, whether it is up to date, and the names of the chosen robots. */
 const state = {
   hello: { control: false },
-  fleet: { driver: false, listening: "", stopped: false, frame: "", localized: false, robots: [] },
+  fleet: { driver: false, listening: "", stopped: false, frame: "", localized: false, robots: [], gone: [] },
   losses: [],
   poses: {},
   ranges: {},
@@ -116,7 +116,7 @@ function showPanel() {
   panel.show(state, chosen);
   programs.show(state, [...state.chosen]);
   element("summary").hidden = chosen.length === 1;
-  showSummary({ ...state, fleet: { ...state.fleet, robots } }, history);
+  showSummary(robots, state, history, chosen.length ? 0 : state.fleet.gone.length);
   chart.show(robots);
 }
 
@@ -126,15 +126,16 @@ function showHead() {
   const link = element("link");
   link.textContent = isLive && state.losses.length === 0 ? "live" : isLive ? state.losses[0].source + " lost" : "unknown";
   link.className = "pill " + (isLive && state.losses.length === 0 ? "good" : "quiet");
-  const count = (wanted) => robots.filter((robot) => stateOf(robot, state) === wanted).length;
-  const unknown = count("UNKNOWN");
-  element("ready").textContent = unknown ? `${unknown} of ${robots.length} unknown` : `${count("READY")} of ${robots.length} ready`;
+  const counts = countRobots(robots, state, state.fleet.gone.length);
+  const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
+  const others = Object.entries(counts).filter(([name, count]) => count && name !== "ready");
+  element("ready").textContent = [`${counts.ready} of ${total} ready`, ...others.map(([name, count]) => `${count} ${name}`)].join(", ");
   element("listening").textContent = isLive && listening ? `driver on ${listening}` : "";
   const source = localized ? "localized" : "odometry drifts";
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
   document.body.classList.toggle("stale", !state.isFresh);
   element("empty").hidden = robots.length > 0 || !isLive || Object.keys(state.replay).length > 0;
-  showLosses(state, connection);
+  showLosses(state, connection, () => connection.send({ do: "dismiss" }));
 }
 
 /** Show the state in all panels. */

@@ -5,6 +5,7 @@ The return path is tried: the node rosout runs beside the master and must connec
 
 import contextlib
 import os
+import time
 import urllib.parse
 from typing import List, Optional, Sequence, Tuple
 
@@ -14,7 +15,7 @@ import rospy
 from rosgraph_msgs.msg import Log
 
 from hero_client.ros import Drivers
-from hero_client.values import STATES
+from hero_client.values import STATES, describe_counts, describe_gone, describe_stop_origin
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import NodeError, is_loopback
 from hero_node.ros import ask_master, read_master_uri
@@ -148,14 +149,20 @@ class OwnNode:
 def describe_report(driver: str, report: RobotArray) -> Tuple[str, List[str]]:
     """Return one line on a driver's robots, and a line for each that cannot be driven."""
     ready = [robot for robot in report.robots if robot.state == Robot.READY]
-    text = f"{driver}: {len(ready)} of {len(report.robots)} robots ready"
+    text = f"{driver}: {describe_counts(report)}"
     text += ", the driver listens on %s" % (report.listening or "no port")
     versions = sorted({robot.firmware for robot in ready if robot.firmware})
     if versions:
         text += ", firmware " + ", ".join(versions)
     lines = []
     if report.stopped:
-        lines.append(f"all robots are stopped; release them: rosservice call {driver}/stop false")
+        origin = describe_stop_origin(report, time.time())
+        lines.append(
+            f"all robots are stopped {origin}".strip() + f"; to release them: rosservice call {driver}/stop false"
+        )
+    if report.gone:
+        dismiss = f"rosservice call {driver}/dismiss_gone"
+        lines.append(f"{describe_gone(report, time.time())}: switch them on, or list them no longer: {dismiss}")
     for robot in report.robots:
         if robot.state != Robot.READY:
             error = ": " + robot.last_error if robot.last_error else ""

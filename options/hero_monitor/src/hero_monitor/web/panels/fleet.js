@@ -3,7 +3,7 @@
 import { Lines, element, isPressed, make, setPressed } from "../dom.js";
 import { colorOf } from "../map/colors.js";
 import { nearestOf, nearestText } from "../history.js";
-import { sourceOf, stateOf } from "../losses.js";
+import { sourceOf, stateOf, wordOf } from "../losses.js";
 
 export function spanOf(seconds) {
   if (seconds === null || seconds === undefined) return "-";
@@ -22,7 +22,7 @@ const number = (value, digits, unit) => (value === null ? "-" : `${value.toFixed
 export const healthOf = (robot) => robot.error || (robot.health[0] > 0 ? robot.health[1] : "");
 
 function stateText(robot, state) {
-  const shown = stateOf(robot, state);
+  const shown = wordOf(robot, state);
   return shown === "READY" && robot.odom === 0 ? "READY, no data" : shown;
 }
 

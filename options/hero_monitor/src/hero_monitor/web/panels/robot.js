@@ -11,7 +11,7 @@ import { isLate } from "../connection.js";
 import { listenToHold } from "../hold.js";
 import { healthOf, spanOf } from "./fleet.js";
 import { nearestOf, nearestText } from "../history.js";
-import { stateOf } from "../losses.js";
+import { stateOf, wordOf } from "../losses.js";
 
 const HOLD_MS = 100;
 const GAP_MS = 400; // after such a pause of this page, a button that was held may have been let go
@@ -161,7 +161,7 @@ export class RobotPanel {
     chip.hidden = robot === null;
     if (robot) chip.style.background = colorOf(robot.id);
     element("name").textContent = robot ? robot.name : robots.length ? `${robots.length} robots` : "All robots";
-    const shown = robot ? stateOf(robot, state) : "";
+    const shown = robot ? wordOf(robot, state) : "";
     element("state").textContent = shown;
     element("state").dataset.state = shown;
     const isKnown = robots.some((one) => stateOf(one, state) !== "UNKNOWN");
