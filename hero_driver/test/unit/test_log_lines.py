@@ -16,6 +16,12 @@ def test_the_boot_line_tells_the_versions():
     assert line.text == "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 127.0.0.1"
 
 
+def test_the_boot_line_of_a_simulated_robot_names_its_world():
+    line = read_log_line(BOOT.replace(" \x1b[0m", " | World: 1a2b \x1b[0m"))
+    assert (line.boot, line.world) == (BootLine("v3.8", "v2.5", "v2.3"), "1a2b")
+    assert read_log_line(BOOT).world == read_log_line("no boot | World: 1a2b").world == ""
+
+
 def test_the_boot_line_of_an_older_firmware_has_no_config():
     line = read_log_line("\x1b[94m[/hero_0] Firmware: v3.0 | Hardware: v2.5 | IP: 10.42.0.17 \x1b[0m")
     assert line.boot == BootLine("v3.0", "v2.5", "")
@@ -58,7 +64,7 @@ def test_what_only_resembles_a_heartbeat_is_none(text):
     ],
 )
 def test_the_firmwares_texts_lose_colors_and_the_name_and_nothing_else(text, clean):
-    assert read_log_line(text) == (clean, None, None, None, False)
+    assert read_log_line(text) == (clean, None, "", None, None, False)
 
 
 @pytest.mark.parametrize(

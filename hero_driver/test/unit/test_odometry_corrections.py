@@ -223,6 +223,15 @@ def test_pending_messages_are_not_sent_on_the_next_connection():
     assert len(list_odometry(outputs)) == 1
 
 
+def test_odometry_of_another_world_begins_at_zero_at_any_count():
+    robot = CorrectedRobot()
+    robot.corrections.set_pose(Pose(1.0, 2.0, 1.0))
+    robot.corrections.restart_odometry()
+    odometry = robot.corrections.odometry
+    odometry.integrate(7000.0, 7000.0, 100.0)
+    assert (odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.resets) == (0.0, 0.0, 0.0, 0)
+
+
 def test_a_set_pose_is_where_the_odometry_goes_on_from():
     robot = CorrectedRobot()
     robot.receive_burst(NOW_NS, (100.0, 100.0))

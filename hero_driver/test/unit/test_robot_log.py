@@ -24,7 +24,7 @@ def make_peer():
         label="hero_1",
         link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
         bridge=SimpleNamespace(corrections=SimpleNamespace(note_reboot=lambda: None), commands=SimpleNamespace()),
-        record=SimpleNamespace(booted_s=None, heard_uptime_s=0.0, dropped_messages=0),
+        record=SimpleNamespace(booted_s=None, heard_uptime_s=0.0, dropped_messages=0, world=""),
         wheels=SimpleNamespace(is_late=False),
         refused=False,
         boot=None,
@@ -117,6 +117,16 @@ def test_a_boot_line_tells_of_a_reboot_after_which_the_uptime_is_longer(lines, b
             say_uptime(robot_log, peer, 1000 * uptime_s, NOW_S + first_s + uptime_s)
     assert len([text for _, text in lines if "rebooted" in text]) == min(boots - 1, 1), "the same line is throttled"
     assert peer.record.booted_s == NOW_S + 100 * (boots - 1)
+
+
+def test_odometry_begins_anew_only_where_a_robot_boots_in_another_world(lines):
+    robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
+    restarts = []
+    peer.bridge.corrections.restart_odometry = lambda: restarts.append(peer.record.world)
+    for world in ("", " | World: a1", " | World: a1", "", " | World: b2"):
+        text = "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 1%s " % world
+        robot_log.receive(peer, Log(LOG_INFO, text), NOW_S)
+    assert restarts == ["a1", "b2"]
 
 
 def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):

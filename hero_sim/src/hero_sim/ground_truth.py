@@ -42,6 +42,7 @@ class GroundTruth:
         ]
         self._odom_origins: List[Tuple[str, str, Pose]] = []
         self._arena.publish(make_markers(draw_arena(self._swarm.world.arena)))
+        self._object_markers.publish(make_markers([]))  # those of an earlier simulator are gone
         self._swarm.after_step = self.publish
         self.publish(self._swarm.world.time_ms)
 

@@ -8,6 +8,7 @@ import queue
 import signal
 import sys
 import threading
+import uuid
 import xmlrpc.client
 from contextlib import suppress
 from typing import Tuple
@@ -118,6 +119,9 @@ def _run() -> None:
         return
     with command_line.simulate(options, rospy.loginfo) as (simulator, injector):
         rospy.on_shutdown(lambda: setattr(simulator, "stopping", True))
+        world = f" | World: {uuid.uuid4().hex[:8]}"
+        for robot in simulator.swarm.robots:
+            robot.world = world
         GroundTruth(simulator, options.clock, not options.no_tf)
         FaultService(simulator, injector)
         has_ended = threading.Event()

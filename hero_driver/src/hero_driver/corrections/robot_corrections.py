@@ -130,6 +130,11 @@ class RobotCorrections:
         self.odometry.expect_reset()
         self.wheels.forget_ticks()
 
+    def restart_odometry(self) -> None:
+        """The robot boots in another world: its odometry begins at zero."""
+        self.set_pose(Pose(0.0, 0.0, 0.0))
+        self.note_reboot()
+
     def set_pose(self, pose: Pose) -> None:
         """The robot's odometry was set, which zeroes its counters."""
         self.odometry.set_pose(pose)

@@ -17,6 +17,7 @@ _BOOT = re.compile(
     r"Firmware:\s*(?P<firmware>\S+)\s*\|\s*Hardware:\s*(?P<hardware>\S+)\s*\|"
     r"(?:\s*Config:\s*(?P<config>\S+)\s*\|)?"
 )
+_WORLD = re.compile(r"\| World: (\w{1,16})")  # simulated robots only
 _PID_RESET = "Reseting PID..."  # VelocityControl.ino, with each zero velocity: ten times a second while one is sent
 _TUNES = re.compile(r"^(Starting Motors Auto Tuning|Tunning Motor Set)")  # VelocityControl.ino:230, 118
 _TUNING_ENDED = re.compile(r"Tuning Failure|Best PID params")  # VelocityControl.ino:261-276
@@ -37,6 +38,7 @@ class LogLine(NamedTuple):
 
     text: str  # without name, colors and control characters, of bounded length
     boot: Optional[BootLine]
+    world: str  # in which a simulated robot boots; empty: a real robot, or no boot line
     uptime_s: Optional[float]  # in the status that a robot logs once a second
     tunes: Optional[bool]  # True: a controller tunes itself; False: it has ended that; None: nothing of that
     is_routine: bool  # said so often, and so independently of what happens, that it is no news
@@ -52,9 +54,12 @@ def read_log_line(text: str) -> LogLine:
     """Return what a log text of a robot says."""
     body = _NAME.sub("", clean_text(text))
     boot = uptime_s = None
+    world = ""
     match = _BOOT.search(body)
     if match is not None:
         boot = BootLine(*(part[:32] for part in (match["firmware"], match["hardware"], match["config"] or "")))
+        named = _WORLD.search(body, match.end())
+        world = "" if named is None else named[1]
     else:
         match = _HEARTBEAT.match(body)
         if match is not None:
@@ -66,4 +71,4 @@ def read_log_line(text: str) -> LogLine:
         tunes = False
     if body.startswith(_NO_IMU):
         body = "no IMU hat, so nothing on imu"
-    return LogLine(body, boot, uptime_s, tunes, uptime_s is not None or body == _PID_RESET)
+    return LogLine(body, boot, world, uptime_s, tunes, uptime_s is not None or body == _PID_RESET)

@@ -61,6 +61,7 @@ class RobotRecord:
     firmware: str = ""
     hardware: str = ""
     config: str = ""
+    world: str = ""  # of a simulated robot, as it said at its last boot
     booted_s: Optional[float] = None
     heard_uptime_s: float = 0.0  # as the robot said it last; infinite from its boot line to the next
     last_error: str = ""

@@ -41,6 +41,9 @@ class RobotLog:
             record.firmware, record.hardware, record.config = line.boot
             if record.heard_uptime_s > 0.0:
                 record.heard_uptime_s = math.inf
+        if line.world and line.world != record.world:
+            record.world = line.world
+            peer.bridge.corrections.restart_odometry()
         if line.tunes is not None:
             peer.bridge.commands.note_tuning(line.tunes)
             if line.tunes and not peer.bridge.commands.was_told_to_tune and peer.stop is None:

@@ -86,6 +86,8 @@ class Firmware:
         self.model = model
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
+        self.world = ""
+        """Addition to the boot line that tells the driver in which of several worlds the robot boots."""
         self.flash = flash
         self.rng = rng
         self.body = body
@@ -248,7 +250,7 @@ class Firmware:
     def _begin_setup(self, now_ms: int) -> None:
         """Go on with setup() after the attempt to connect (ROSHandle.ino:92-94, firmware.ino:114-140)."""
         self._phase = self._run_setup
-        self.log(f"\x1b[94m[/{self.name}] {self.model.versions} | IP: {self._address} \x1b[0m")
+        self.log(f"\x1b[94m[/{self.name}] {self.model.versions} | IP: {self._address}{self.world} \x1b[0m")
         # The first spin comes before anything is advertised; a request that is in by then meets no topics.
         first_spin_ms = now_ms + int(self.rng.randint(0, 3))
         self._setup = [

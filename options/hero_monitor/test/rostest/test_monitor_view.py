@@ -397,7 +397,7 @@ class ViewTest(unittest.TestCase):
                 ({"fleet": make_fleet(*robots)}, "3 of 3 ready", []),
                 (
                     {"fleet": make_fleet(*robots, stopped=True), "stop": {**status, "level": "info"}},
-                    "3 of 3 ready",
+                    "0 of 3 ready, 3 stopped",
                     ["#release_bar", "#stopping"],
                 ),
                 (

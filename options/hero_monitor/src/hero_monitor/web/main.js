@@ -129,7 +129,8 @@ function showHead() {
   const counts = countRobots(robots, state, state.fleet.gone.length);
   const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
   const others = Object.entries(counts).filter(([name, count]) => count && name !== "ready");
-  element("ready").textContent = [`${counts.ready} of ${total} ready`, ...others.map(([name, count]) => `${count} ${name}`)].join(", ");
+  const texts = [`${counts.ready} of ${total} ready`, ...others.map(([name, count]) => `${count} ${name}`)];
+  element("ready").textContent = counts.unknown ? `${counts.unknown} of ${total} unknown` : texts.join(", ");
   element("listening").textContent = isLive && listening ? `driver on ${listening}` : "";
   const source = localized ? "localized" : "odometry drifts";
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
