@@ -1,7 +1,7 @@
 """Runs what may block, on the ROS master or a paused terminal (Ctrl-S), on threads other than that of the pages."""
 
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Optional
+from typing import Any, Callable, Optional
 
 import rospy
 
@@ -18,5 +18,12 @@ class Background(ThreadPoolExecutor):
 
     def warn(self, text: str, period_s: float = 0.0) -> None:
         """Log a warning, at most one per period_s; dropped while the terminal still blocks the one before."""
+        self._log(rospy.logwarn_throttle, period_s, text)
+
+    def inform(self, text: str) -> None:
+        """Log a line; dropped as a warning is."""
+        self._log(rospy.loginfo, text)
+
+    def _log(self, log: Callable[..., None], *arguments: Any) -> None:
         if self._line is None or self._line.done():
-            self._line = self.submit(rospy.logwarn_throttle, period_s, text)
+            self._line = self.submit(log, *arguments)

@@ -3,7 +3,7 @@
 import time
 from concurrent.futures import Future
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Callable, Dict, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, Optional, Sequence, Tuple, Union
 
 import rospy
 
@@ -11,6 +11,7 @@ from hero_client.apps.formations import FormationError
 from hero_node import Pose
 
 from .background import Background
+from .control.activity import Activity
 from .control.client_commands import find_press, read_command
 from .control.drive_requests import DriveRequests
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
@@ -18,6 +19,7 @@ from .control.programs import PROGRAMS_MAX, ChildProcess, Programs
 from .control.requests import AGE_MAX_S, RequestError, is_fresh, read_clock_ms, read_request
 from .fleet_feed.feed import FleetFeed
 from .parameters import Parameters
+from .serving.lesson import Lesson
 
 if TYPE_CHECKING:
     from .foxglove.hub import Client
@@ -29,6 +31,9 @@ GOALS_AT_ONCE = 100
 
 MOVING = ("drive", "goal", "start")
 """Requests that make robots move: with control:=true, of robots that are connected and not stopped."""
+
+NOTED = ("stop", "release", "stop_some", "goal", "start", "end", "record", "code", "withdraw")
+"""Requests that are noted with their user, beside drive."""
 
 INERT_S = 2.0
 """After a stop no release counts: the finger that stopped all robots may tap again."""
@@ -56,8 +61,11 @@ class PageRequests:
         background: Background,
         hand_over: Callable[..., Any],
         broadcast: Callable[[], None],
+        lesson: Optional[Lesson] = None,
     ) -> None:
         """hand_over: calls a function later, on this thread. broadcast: sends to pages what is new to them."""
+        self._lesson = lesson
+        self.activity = Activity(background)
         self._parameters, self._feed, self._commander = parameters, feed, commander
         self._background, self._hand_over, self._broadcast = background, hand_over, broadcast
         self.programs = Programs(rospy.get_name(), hand_over, self._stop_robots_of)
@@ -109,11 +117,21 @@ class PageRequests:
         """Carry out a request, if it may be made now. Raises: RefusedError or FormationError."""
         if not is_fresh(request, read_clock_ms()):
             raise LateError("the request was delayed: nothing was done")
-        self._check(request["do"], request.get("robots", ()))
-        getattr(self, "_do_" + request["do"])(page, request)
+        do, robots = request["do"], request.get("robots", ())
+        refusal = page.user.role.find_refusal(
+            do, self.programs.find_robots(request["number"]) if do == "end" else robots
+        )
+        if refusal:
+            raise RefusedError(refusal)
+        self._check(do, robots)
+        getattr(self, "_do_" + do)(page, request)
+        if do == "drive":
+            self.activity.note_drive(page.who, robots)
+        elif do in NOTED:
+            self.activity.note(page.who, f"{do} {request.get('program', '')}".strip(), robots)
 
     def _check(self, do: str, robots: Sequence[str]) -> None:
-        """Check whether a page may request this. Raises: RefusedError."""
+        """Check whether anybody may request this now. Raises: RefusedError."""
         if do not in (*MOVING, "record"):
             return
         if not self._parameters.control:
@@ -140,12 +158,12 @@ class PageRequests:
         verb, stopped_ms = request["do"], self._commander.stopped_ms
         if verb == "release" and stopped_ms is not None and read_clock_ms() - stopped_ms < 1e3 * INERT_S:
             raise RefusedError(f"NOT RELEASED: robots were stopped less than {INERT_S:g} s ago; hold Release again")
+        self._feed.stopper = page.user.name or page.who
         self._commander.request_stop(verb == "stop")
         self.end_motions_of_stopped_robots()
         self._feed.read_stop()
         # After the acknowledgement has left.
         self._hand_over(self._broadcast)
-        self._background.warn(f"a page or Foxglove client requests to {verb} all robots")
 
     _do_release = _do_stop
 
@@ -170,6 +188,17 @@ class PageRequests:
 
     def _do_dismiss(self, page: "PageSocket", request: Request) -> None:
         self._background.submit(self._feed.drivers.dismiss_gone)
+
+    def _do_code(self, page: "PageSocket", request: Request) -> None:
+        self._find_lesson().add(request["robots"])
+
+    def _do_withdraw(self, page: "PageSocket", request: Request) -> None:
+        self._find_lesson().withdraw(request["code"])
+
+    def _find_lesson(self) -> Lesson:
+        if self._lesson is None:
+            raise RefusedError("this monitor has no codes: start it with classroom:=true")
+        return self._lesson
 
     # ---------------------------------------------------------------- motion
 

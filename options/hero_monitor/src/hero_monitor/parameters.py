@@ -47,11 +47,15 @@ class Parameters:
     record_folder: str = declare(Parameter("~/hero_recordings", _read_text))
     foxglove_origins: Sequence[str] = declare(Parameter("", _read_words))
     foxglove_publish: bool = declare(flag(False))
+    classroom: bool = declare(flag(False))
 
 
 def load_parameters() -> Parameters:
     """Return the node's private parameters. Raises: ProgramError."""
-    return Parameters(**read_parameters(find_declared(Parameters)))
+    parameters = Parameters(**read_parameters(find_declared(Parameters)))
+    if parameters.classroom and not parameters.token_file:
+        raise ProgramError(f"~classroom admits phones by codes, teachers by a token: {TOKEN_REMEDY}; and host:=0.0.0.0")
+    return parameters
 
 
 def list_host_names(parameters: Parameters) -> List[str]:

@@ -24,11 +24,16 @@ from .page_requests import PageRequests
 from .parameters import Parameters, list_host_names, load_parameters, read_token
 from .serving.access import Access
 from .serving.client_limits import CONNECTIONS_MAX, ClientLimits
+from .serving.invitation import Invitation
+from .serving.lesson import TEACHER, Lesson
 
 LINGER_S = 10.0
 """Time that subscriptions outlive the last page, which may only reload."""
 
 END_CHECK_PERIOD_S = 0.2
+
+LESSON = "lesson"
+"""Part of the page state."""
 
 UNWATCHED_S = 2.0
 """Time between two looks at the ROS master while no page is open."""
@@ -52,6 +57,7 @@ class Monitor:
         self._background = Background()
         self._feed = FleetFeed(parameters.map_frame, self._background)
         self._commander = DriveRequests(self._feed.drivers, self._background)
+        self._lesson = Lesson() if parameters.classroom else None
         self._loop = MonotonicLoop()
         self._requests = PageRequests(
             parameters,
@@ -60,6 +66,7 @@ class Monitor:
             self._background,
             self._loop.add_callback,
             self._broadcast_updates,
+            self._lesson,
         )
         self._programs = self._requests.programs
         self._feed.page_state.put("hello", {"control": parameters.control})
@@ -78,7 +85,7 @@ class Monitor:
             source, parameters.foxglove_origins, publisher if parameters.foxglove_publish else None
         )
         token = read_token(parameters.host, parameters.token_file)
-        access = Access(token, list_host_names(parameters))
+        access = Access(token, list_host_names(parameters), self._lesson)
         self._server = Server(access, limits, actions, self._foxglove.route)
         self._repeated = [
             tornado.ioloop.PeriodicCallback(call, 1000.0 * period_s)
@@ -102,6 +109,9 @@ class Monitor:
                 "cannot listen on %s port %d: %s; choose others with host:=ADDRESS port:=PORT"
                 % (wanted.host, wanted.port, getattr(error, "strerror", None) or error)
             ) from None
+        if self._lesson is not None:
+            self._invitation = Invitation(wanted.host, port, self._lesson.class_code)
+            rospy.loginfo("class code %s, or %s", self._lesson.class_code, self._invitation.link)
         host = f"[{wanted.host}]" if ":" in wanted.host else wanted.host
         if wanted.host in ("0.0.0.0", "::"):
             host = platform.node()
@@ -164,6 +174,10 @@ class Monitor:
         self._feed.update_subscriptions(True, ground_truth, picture)
         self._feed.read()
         self._feed.page_state.put("programs", self._programs.describe())
+        if self._lesson is not None:
+            users = sorted((page.user.name, page.user.role.title, sorted(page.user.role.robots)) for page in pages)
+            drivers = self._lesson.list_drivers()
+            self._feed.page_state.put(LESSON, {**self._invitation.describe(), "drivers": drivers, "users": users})
         self._broadcast_updates()
 
     def _step(self) -> None:
@@ -179,7 +193,12 @@ class Monitor:
         for page in self._server.pages:
             page.is_served = page in served
             if page.ready:
-                page.send(encode({"clock_ms": read_clock_ms(), "served": page.is_served}))
+                message = {"clock_ms": read_clock_ms(), "served": page.is_served}
+                user = page.user
+                if user != page.shown_user:
+                    page.shown_user = user
+                    message["user"] = {"name": user.name, "title": user.role.title, "robots": sorted(user.role.robots)}
+                page.send(encode(message))
         self._foxglove.send_clock(read_clock_ms())
 
     def _broadcast_updates(self) -> None:
@@ -188,7 +207,9 @@ class Monitor:
         for page in self._server.pages:
             page.send_waiting()
             if page.ready:
-                updates = state.take_updates(page.seen, None if page in served else ["stop"])
+                # Codes are for teachers.
+                names = None if page.user.role == TEACHER else state.list_names(LESSON)
+                updates = state.take_updates(page.seen, names if page in served else ["stop"])
                 if updates is not None:
                     page.send(updates)
 

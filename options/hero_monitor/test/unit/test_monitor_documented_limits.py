@@ -62,7 +62,7 @@ class Handler(BaseHandler):
     def __init__(self, monkeypatch, age_s):
         application = tornado.web.Application(cookie_secret="secret")
         monkeypatch.setattr(tornado.web, "time", SimpleNamespace(time=lambda: NOW_S))
-        value = tornado.web.create_signed_value("secret", COOKIE, "in", clock=lambda: NOW_S - age_s)
+        value = tornado.web.create_signed_value("secret", COOKIE, "token", clock=lambda: NOW_S - age_s)
         headers = tornado.httputil.HTTPHeaders({"Cookie": f"{COOKIE}={value.decode()}"})
         request = tornado.httputil.HTTPServerRequest(method="GET", uri="/", headers=headers, connection=mock.Mock())
         super().__init__(application, request, access=Access(TOKEN, []))

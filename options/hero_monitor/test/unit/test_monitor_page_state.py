@@ -337,3 +337,11 @@ def test_drawings_that_no_page_can_show_are_left_out():
     found.receive(wrong, 0.0)
     assert [drawn["color"] for drawn in found.describe("map", 0.0)] == ["#0000ff"]
     found.receive(MarkerArray(), 0.0)
+
+
+def test_codes_for_drivers_reach_teachers_only():
+    state, teacher, pupil = PageState(), {}, {}
+    state.put("lesson", {"drivers": [["120934", ["hero_3"]]]})
+    state.put("fleet", {})
+    assert set(json.loads(state.take_updates(pupil, state.list_names("lesson")))) == {"fleet"}
+    assert set(json.loads(state.take_updates(teacher))) == {"fleet", "lesson"}

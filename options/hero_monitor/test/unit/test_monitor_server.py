@@ -11,6 +11,7 @@ import tornado.web
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
+from hero_monitor.serving.lesson import Lesson
 from hero_monitor.serving.server import (
     SOCKETS_MAX,
     FileHandler,
@@ -156,3 +157,18 @@ def test_an_address_that_waited_long_has_no_more_tries_than_a_new_one(clock):
     assert log_in("wrong")[0] == 403
     clock.return_value = 2000.0
     assert [log_in("wrong")[0] for _ in range(6)] == [403] * 5 + [429]
+
+
+def test_a_code_of_the_lesson_lets_a_phone_in_under_its_name(monkeypatch, clock):
+    lesson = Lesson()
+    access = Access(TOKEN, [], lesson)
+    monkeypatch.setattr("test_monitor_server.Access", lambda *given: access)
+    log_in = make_login()
+    status, headers, _ = log_in(json.dumps({"token": lesson.class_code, "name": "Ada\n" + "x" * 99}))
+    assert status == 204
+    value = headers["Set-Cookie"].partition("=")[2].partition(";")[0].strip('"')
+    cookie = tornado.web.decode_signed_value("secret", server_module.COOKIE, value).decode()
+    key, _, name = cookie.partition(" ")
+    assert key == lesson.class_code and name.isprintable() and len(name) <= server_module.NAME_LENGTH_MAX
+    assert [log_in('{"token": "000"}')[0] for _ in range(6)] == [403] * 5 + [429]
+    assert log_in(json.dumps({"token": lesson.class_code}))[0] == 429, "guessing is rate-limited as with tokens"

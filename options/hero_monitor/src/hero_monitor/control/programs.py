@@ -145,6 +145,11 @@ class Programs:
                 return f"{child.title} drives {robot}: end it first"
         return ""
 
+    def find_robots(self, number: int) -> List[str]:
+        """Return the robots of a program."""
+        child = self._running.get(number) or self._failed.get(number)
+        return [] if child is None else child.robots
+
     def find_recording(self) -> Optional[ChildProcess]:
         """Return the recording, None without one."""
         return next((child for child in self._running.values() if child.folder is not None), None)

@@ -97,6 +97,10 @@ class PageState:
         self._texts[name] = text
         return True
 
+    def list_names(self, hidden: str) -> List[str]:
+        """Return the names of all parts but one."""
+        return [name for name in (*self._texts, "log") if name != hidden]
+
     def take_updates(self, seen: Dict[str, Any], names: Optional[Sequence[str]] = None) -> Optional[str]:
         """Return what is new to a page as one JSON object, None without any; marks it as seen.
 

@@ -8,6 +8,7 @@ import tornado.iostream
 import tornado.web
 import tornado.websocket
 
+from ..serving.lesson import VIEWER, User
 from ..serving.server import BaseHandler, PageSocket, Route
 from .hub import Client, Hub, Publisher, TopicMessage, TopicType
 from .protocol import SUBPROTOCOLS
@@ -35,14 +36,13 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 
     def prepare(self) -> Optional[Awaitable[None]]:
         """Refuse foreign pages, clients without the token (cookie, or ?token=), and those beyond CLIENTS_MAX."""
-        self._gave_token = False
+        self._key = ""
         origin = self.request.headers.get("Origin")
         # Programs send none. Browsers always do, whatever page they show.
         if origin and not self.check_origin(origin):
             raise tornado.web.HTTPError(403)
         if not self.is_logged_in:
-            self.check_token(self.get_query_argument("token", ""))
-            self._gave_token = True
+            self._key = self.check_token(self.get_query_argument("token", ""))
         BaseHandler.prepare(self)
         offered = self.request.headers.get("Sec-WebSocket-Protocol", "").split(",")
         if not {name.strip() for name in offered} & set(SUBPROTOCOLS):
@@ -51,9 +51,8 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
             raise tornado.web.HTTPError(503)
         return None
 
-    @property
-    def is_logged_in(self) -> bool:
-        return self._gave_token or super().is_logged_in
+    def find_user(self) -> Optional[User]:
+        return self.access.find_user(self._key) if self._key else super().find_user()
 
     def check_origin(self, origin: str) -> bool:
         """Return whether a page may connect: this server's, and those that a parameter names."""
@@ -73,6 +72,8 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         self._sending: Any = None
         self.set_nodelay(True)
         self.client = Client(self._write, next(PageSocket.numbers))
+        self.client.user = self.find_user() or User("", VIEWER)
+        self.client.who = self.client.user.describe(f"Foxglove client at {self.request.remote_ip}")
         self.endpoint.add(self)
 
     def on_message(self, message: Union[str, bytes]) -> None:

@@ -7,6 +7,7 @@ from typing import Any, Callable, DefaultDict, Deque, Dict, Iterable, List, Name
 from hero_node import shorten
 from hero_node.parameters import is_whole_number
 
+from ..serving.lesson import TEACHER, User
 from .protocol import (
     WARNING,
     Channel,
@@ -53,6 +54,7 @@ class Client:
         self.number = number
         self.published: Dict[int, Channel] = {}
         self.refusal = ""  # why the last message was refused; said once
+        self.user, self.who = User("", TEACHER), "a Foxglove client"
         self.heard_ms = 0  # the monitor's clock, as the client had heard it when it sent what came last
         self.presses: Dict[str, Tuple[int, int]] = {}  # of robots that it drives (client_commands)
         self.subscriptions: Dict[int, Channel] = {}

@@ -9,6 +9,9 @@ import hmac
 import ipaddress
 from typing import FrozenSet, Iterable, Optional
 
+from .lesson import TEACHER, Lesson, User
+
+TOKEN_KEY = "token"
 TOKEN_LENGTH_MIN = 16
 """A shorter token could be guessed."""
 
@@ -16,9 +19,10 @@ TOKEN_LENGTH_MIN = 16
 class Access:
     """The rules of one server."""
 
-    def __init__(self, token: Optional[str], host_names: Iterable[str]) -> None:
-        """token: None if none is needed; host_names: names of this PC."""
+    def __init__(self, token: Optional[str], host_names: Iterable[str], lesson: Optional[Lesson] = None) -> None:
+        """token: None if none is needed; host_names: names of this PC; lesson: its codes are valid, too."""
         self._token = token
+        self.lesson = lesson
         self._host_names: FrozenSet[str] = frozenset(name.lower().rstrip(".") for name in host_names)
 
     @property
@@ -44,6 +48,21 @@ class Access:
             return False
         scheme, _, netloc = origin.partition("://")
         return scheme in ("http", "https") and netloc.lower() == host_header.lower()
+
+    def find_key(self, secret: str) -> str:
+        """Return what the cookie of a user holds who gives this secret; empty if it is wrong."""
+        if self.admits_token(secret):
+            return TOKEN_KEY
+        is_code = self.lesson is not None and self.lesson.find(secret) is not None
+        return secret.replace(" ", "") if is_code else ""
+
+    def find_user(self, cookie: Optional[str]) -> Optional[User]:
+        """Return whose cookie this is: a key and a name; None for none of this server, or a code that was withdrawn."""
+        if self._token is None:
+            return User("", TEACHER)
+        key, _, name = (cookie or "").partition(" ")
+        role = TEACHER if key == TOKEN_KEY else self.lesson.find(key) if self.lesson else None
+        return None if role is None else User(name, role)
 
     def admits_token(self, token: str) -> bool:
         """Return whether this is the token."""

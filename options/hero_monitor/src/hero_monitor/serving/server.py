@@ -21,12 +21,13 @@ import tornado.netutil
 import tornado.web
 import tornado.websocket
 
-from hero_node import TokenBuckets
+from hero_node import TokenBuckets, make_printable
 
 from ..fleet_feed.page_state import encode
 from .access import Access
 from .client_limits import ClientLimits, group_address
 from .fair_stream import FairStream
+from .lesson import VIEWER, User
 
 WEB = Path(__file__).resolve().parents[1] / "web"
 FILES = {path.relative_to(WEB).as_posix(): path for path in WEB.glob("**/*") if path.is_file()}
@@ -65,6 +66,9 @@ WAITING_MAX = 5
 PING_INTERVAL_S = 3.0
 PING_TIMEOUT_S = 9.0
 MAX_REQUEST_LENGTH = 16384
+NAME_LENGTH_MAX = 30
+"""Of a user."""
+
 LISTEN_BACKLOG = 4096
 """As many as the kernel keeps by default (net.core.somaxconn): a connection that finds the queue full may be reset."""
 
@@ -117,24 +121,31 @@ class BaseHandler(tornado.web.RequestHandler):
             self.limits.trust(stream)
         return None
 
+    def find_user(self) -> Optional[User]:
+        """Return who makes the request; None for a browser that is not logged in."""
+        cookie = self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS) if self.access.needs_token else None
+        return self.access.find_user(None if cookie is None else cookie.decode())
+
     @property
     def is_logged_in(self) -> bool:
-        """Return whether the browser has given the token, or needs none."""
-        return not self.access.needs_token or self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS) is not None
+        """Whether the browser has given the token or a code, or needs none."""
+        return self.find_user() is not None
 
     @property
     def is_own_page(self) -> bool:
         """Return whether a page of this server makes the request; every browser sends Origin."""
         return self.access.admits_origin(self.request.headers.get("Origin"), self.request.host)
 
-    def check_token(self, token: Any) -> None:
-        """Refuse a request whose token is wrong, rate-limited per address. Raises: HTTPError."""
+    def check_token(self, token: Any) -> str:
+        """Return the key for the cookie; refuse a wrong token or code, rate-limited per address. Raises: HTTPError."""
         address, now_s = group_address(self.request.remote_ip or ""), time.monotonic()
         if self.wrong_tokens.count(address, now_s) < 1.0:
             raise tornado.web.HTTPError(429)
-        if not (isinstance(token, str) and self.access.admits_token(token)):
+        key = self.access.find_key(token) if isinstance(token, str) else ""
+        if not key:
             self.wrong_tokens.take(address, 1.0, now_s)
             raise tornado.web.HTTPError(403)
+        return key
 
     def write_error(self, status_code: int, **others: Any) -> None:
         """Send one line that says what is wrong."""
@@ -178,18 +189,19 @@ class PictureHandler(BaseHandler):
 
 
 class LoginHandler(BaseHandler):
-    """Exchanges the token for a signed cookie."""
+    """Exchanges the token or a code for a signed cookie."""
 
     def post(self) -> None:
-        """Check the token."""
+        """Check the token or code; keep the user's name."""
         if not self.is_own_page:
             raise tornado.web.HTTPError(403)
         try:
-            token = json.loads(self.request.body)["token"]
+            fields = json.loads(self.request.body)
+            token, name = fields["token"], str(fields.get("name", ""))
         except (ValueError, TypeError, KeyError, RecursionError):
-            token = None
-        self.check_token(token)
-        self.set_secure_cookie(COOKIE, "in", expires_days=None, httponly=True, samesite="Strict", path="/")
+            token = name = ""
+        cookie = f"{self.check_token(token)} {make_printable(name)[:NAME_LENGTH_MAX].strip()}"
+        self.set_secure_cookie(COOKIE, cookie, expires_days=None, httponly=True, samesite="Strict", path="/")
         self.set_status(204)
 
 
@@ -217,6 +229,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         self.seen: Dict[str, Any] = {}
         self.ground_truth = self.picture = False
         self.visible, self.is_served = True, False
+        self.shown_user: Optional[User] = None
         self._sent_s = time.monotonic()
         self._sending: Optional[Awaitable[None]] = None
         self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
@@ -236,6 +249,16 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         if self in self.pages:
             self.pages.remove(self)
             self.actions.close_page(self.number)
+
+    @property
+    def user(self) -> User:
+        """Who uses the page; whose code was withdrawn may watch and stop."""
+        return self.find_user() or User("", VIEWER)
+
+    @property
+    def who(self) -> str:
+        """The user, for the log."""
+        return self.user.describe(str(self.request.remote_ip))
 
     @property
     def ready(self) -> bool:

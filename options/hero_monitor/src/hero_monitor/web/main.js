@@ -15,6 +15,7 @@ import { RobotPanel } from "./panels/robot.js";
 import { ProgramPanel } from "./panels/programs.js";
 import { Chart } from "./panels/chart.js";
 import { showSummary } from "./panels/summary.js";
+import { LessonPanel } from "./panels/lesson.js";
 import { Projector } from "./projector.js";
 import { StopPanel } from "./stop.js";
 
@@ -40,8 +41,10 @@ const state = {
   offers: { programs: [], record: false },
   programs: [],
   chosen: new Set(),
+  user: { name: "", title: "teacher", robots: [] },
+  lesson: null,
 };
-const SHOWN_BY_ALL = ["fleet", "hello", "losses", "offers", "programs"];
+const SHOWN_BY_ALL = ["fleet", "hello", "losses", "offers", "programs", "user", "lesson"];
 const RECEIVED = Object.keys(state).filter((name) => name !== "isFresh" && name !== "chosen");
 
 const connection = new Connection({
@@ -94,6 +97,7 @@ const chart = new Chart(history);
 new Projector(() => map.draw());
 const panel = new RobotPanel({ connection, map, notice });
 const programs = new ProgramPanel({ connection, map, notice });
+const lesson = new LessonPanel({ connection });
 const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notice });
 
 const listPresent = () => state.fleet.robots.filter((robot) => robot.state !== "REFUSED");
@@ -115,6 +119,7 @@ function showPanel() {
   const robots = chosen.length ? chosen : present;
   panel.show(state, chosen);
   programs.show(state, [...state.chosen]);
+  lesson.show(state, [...state.chosen]);
   element("summary").hidden = chosen.length === 1;
   showSummary(robots, state, history, chosen.length ? 0 : state.fleet.gone.length);
   chart.show(robots);
@@ -154,6 +159,7 @@ function receive(updates) {
   for (const name of RECEIVED) {
     if (name in updates) state[name] = updates[name];
   }
+  if ("user" in updates) stop.mayRelease = updates.user.title === "teacher";
   stop.receive(updates);
   history.update(state);
   if ("notice" in updates) notice(updates.notice.level, updates.notice.text);
@@ -161,6 +167,7 @@ function receive(updates) {
   if ("log" in updates) log.append(updates.log);
   if (SHOWN_BY_ALL.some((name) => name in updates)) showAll();
   else if ("poses" in updates) panel.show(state, listPresent().filter((robot) => state.chosen.has(robot.name)));
+  if ("user" in updates && !state.chosen.size) choose(state.user.robots); // a driver's own
   if (RECEIVED.some((name) => name in updates)) map.update(updates); // most carry the clock alone
 }
 

@@ -20,6 +20,7 @@ export class StopPanel {
     this.status = null; // the monitor's status of the last request
     this.stopped = false; // whether all drivers report that they have stopped
     this.heardMs = 0; // while robots are being stopped the monitor sends updates all the time
+    this.mayRelease = true; // pupils stop, teachers release
     this.inertMs = 0; // until then Release does nothing
     const stop = element("stop");
     stop.addEventListener("pointerdown", () => this.press());
@@ -102,6 +103,8 @@ export class StopPanel {
     element("stop").classList.toggle("done", atRest);
     setText(element("stop"), atRest ? "STOPPED" : "STOP ALL");
     element("release_bar").hidden = !this.stopped;
+    element("release").hidden = !this.mayRelease;
+    setText(element("release_note"), this.mayRelease ? "Robots may move then." : "The teacher releases the robots.");
     element("release").classList.toggle("inert", Date.now() < this.inertMs);
   }
 }

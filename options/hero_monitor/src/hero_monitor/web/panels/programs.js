@@ -1,5 +1,6 @@
 // Programs on the chosen robots, those that run, and the recording. They belong to the monitor: every page shows them.
 
+import { mayDrive } from "./lesson.js";
 import { Lines, element, make, setPressed, setText } from "../dom.js";
 
 const UNIT = /_(m_s|rad_s|1_s|m|s|deg|hz)$/;
@@ -85,13 +86,14 @@ export class ProgramPanel {
       if (programs.some(({ program }) => program === chosen)) element("program").value = chosen;
       this.showFields();
     }
-    element("launcher").hidden = names.length === 0 || programs.length === 0 || !state.isFresh;
+    const isTeacher = state.user.title === "teacher";
+    element("launcher").hidden = names.length === 0 || programs.length === 0 || !state.isFresh || !mayDrive(state, names);
     element("stop_some").textContent = `Stop ${names.length === 1 ? names[0] : `these ${names.length}`}`;
     const isRecording = ({ program, failure }) => program === "record" && !failure;
     const shown = state.programs.filter((one) => !isRecording(one) && (one.program !== "record" || state.isFresh));
-    this.rows.show(shown, ({ number }) => number, (row, program) => this.fill(row, program));
+    this.rows.show(shown, ({ number }) => number, (row, program) => this.fill(row, program, state));
     this.recording = state.programs.find(isRecording);
-    element("recorder").hidden = !record || !state.hello.control;
+    element("recorder").hidden = !record || !state.hello.control || !isTeacher;
     setPressed(element("record"), Boolean(this.recording));
     const { seconds = 0, bytes = 0, folder = "" } = this.recording || {};
     const length = bytes ? clock(seconds) : "starting";
@@ -101,11 +103,12 @@ export class ProgramPanel {
     element("rec").textContent = `rec ${length}`;
   }
 
-  fill({ line, text, button }, { title, robots, seconds, ending, failure }) {
+  fill({ line, text, button }, { title, robots, seconds, ending, failure }, state) {
     const what = robots.length === 1 ? robots[0] : `${robots.length} robots`;
     setText(text, failure ? `${title} failed: ${failure}` : `${title}, ${what}, ${clock(seconds)}${ending ? ", ending" : ""}`);
     line.classList.toggle("problem", Boolean(failure));
     setText(button, failure ? "Dismiss" : "End");
+    button.hidden = !mayDrive(state, robots);
     button.setAttribute("aria-label", `${button.textContent} ${title}`);
   }
 

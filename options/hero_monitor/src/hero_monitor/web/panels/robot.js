@@ -11,8 +11,10 @@ import { isLate } from "../connection.js";
 import { listenToHold } from "../hold.js";
 import { healthOf, spanOf } from "./fleet.js";
 import { nearestOf, nearestText } from "../history.js";
+import { mayDrive, roleOf } from "./lesson.js";
 import { stateOf, wordOf } from "../losses.js";
 
+const VIEW_ONLY = "View only. control:=true lets the monitor drive robots.";
 const HOLD_MS = 100;
 const GAP_MS = 400; // after such a pause of this page, a button that was held may have been let go
 const KEYS = {
@@ -165,8 +167,10 @@ export class RobotPanel {
     element("state").textContent = shown;
     element("state").dataset.state = shown;
     const isKnown = robots.some((one) => stateOf(one, state) !== "UNKNOWN");
-    element("control").hidden = !isKnown || !state.hello.control;
-    element("advice").hidden = robots.length === 0 || state.hello.control;
+    const isAllowed = mayDrive(state, names);
+    element("control").hidden = !isKnown || !state.hello.control || !isAllowed;
+    element("advice").hidden = robots.length === 0 || (state.hello.control && isAllowed);
+    setText(element("advice"), !state.hello.control ? VIEW_ONLY : `You are ${roleOf(state.user)}: others drive these robots.`);
     const problem = robot ? healthOf(robot) : "";
     element("problem").hidden = !problem;
     element("problem").textContent = problem;

@@ -1,0 +1,48 @@
+"""How phones find the page of a lesson: its link, the class code, and both as a QR code (python3-qrcode, optional)."""
+
+import platform
+import socket
+from typing import Any, Dict, List
+
+HOTSPOT_ADDRESS = "10.42.0.1"
+"""Of a PC that shares its network with robots and phones; every PC has a route to it."""
+
+
+class Invitation:
+    """Link and QR code of one lesson.
+
+    Attributes:
+        link: address of the page, with the code that its login fills in.
+    """
+
+    def __init__(self, host: str, port: int, code: str) -> None:
+        self._code = code
+        self._page = f"http://{find_address() if host in ('0.0.0.0', '::') else host}:{port}/"
+        self.link = f"{self._page}#{code}"
+        self._rows = make_qr_rows(self.link)
+
+    def describe(self) -> Dict[str, Any]:
+        """Return what pages of teachers show."""
+        return {"code": self._code, "link": self._page, "qr": self._rows}
+
+
+def find_address() -> str:
+    """Return this PC's address in the robots' network, else in that of its default route, else its name."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:  # sends nothing
+        try:
+            probe.connect((HOTSPOT_ADDRESS, 9))
+            return str(probe.getsockname()[0])
+        except OSError:
+            return platform.node()
+
+
+def make_qr_rows(text: str) -> List[str]:
+    """Return the rows of a QR code, 1 for dark; none without the library, where users read the link."""
+    try:
+        import qrcode  # type: ignore[import-not-found]
+    except ImportError:
+        return []
+    code = qrcode.QRCode(border=0)
+    code.add_data(text)
+    code.make()
+    return ["".join("01"[cell] for cell in row) for row in code.get_matrix()]
