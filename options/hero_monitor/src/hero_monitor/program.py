@@ -193,7 +193,7 @@ class Monitor:
         for page in self._server.pages:
             page.is_served = page in served
             if page.ready:
-                message = {"clock_ms": read_clock_ms(), "served": page.is_served}
+                message: Dict[str, Any] = {"clock_ms": read_clock_ms(), "served": page.is_served}
                 user = page.user
                 if user != page.shown_user:
                     page.shown_user = user
