@@ -3,7 +3,7 @@
 import os
 import sys
 
-from hero_node.errors import ProgramError
+from hero_node import ProgramError
 
 NEW_NAMES = {
     "blink.py": "rosrun hero_examples led_show",
