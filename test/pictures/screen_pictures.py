@@ -56,7 +56,7 @@ def photograph_rviz(picture, robots, arena, *options, part=VIEW):
         with RunningSuite(robots, "arena:=" + arena) as stage:
             stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
             launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch"]
-            launch += ["robots:=0-%d" % (robots - 1), *options]
+            launch += [f"{group}:=0-{robots - 1}" for group in ("robots", "simulated")] + list(options)
             stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             wait_until_drawn(screen, stage)
             wait_while_they_walk(stage)

@@ -16,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from hero_node.parameters import Parameter, parse_explicit_ids
 from hero_node.ros import Program, read_parameters
 
-from .rviz_config import LIGHTS_TOPIC, color_of
+from .rviz_config import LIGHTS_TOPIC, TRUE, color_of, read_ids
 
 LIGHT_S = 15.0
 """The firmware switches the light off this long after the last command (LEDStatus.ino:76)."""
@@ -36,16 +36,18 @@ REPEAT_S = 2.0
 
 
 def make_marker(robot_id: int, kind: int, namespace: str, frame: str, color: ColorRGBA) -> Marker:
-    """Return a marker that follows a frame of the robot."""
+    """Return a marker that follows a frame of the robot; of a simulated one, true/base_link and so on."""
     marker = Marker(type=kind, ns=namespace, id=robot_id, frame_locked=True, color=color)
     marker.header.frame_id = "hero_%d/%s" % (robot_id, frame)
     marker.pose.orientation.w = 1.0
     return marker
 
 
-def make_light(robot_id: int, color: ColorRGBA) -> Marker:
+def make_light(robot_id: int, color: ColorRGBA, place: str = "") -> Marker:
     """Return the sphere of one robot, which disappears when the light goes out."""
-    marker = make_marker(robot_id, Marker.SPHERE, "lights", "hat_link", ColorRGBA(color.r, color.g, color.b, 1.0))
+    marker = make_marker(
+        robot_id, Marker.SPHERE, "lights", place + "hat_link", ColorRGBA(color.r, color.g, color.b, 1.0)
+    )
     marker.action = Marker.ADD if max(color.r, color.g, color.b) > 0.0 else Marker.DELETE
     marker.pose.position.z = LIGHT_Z_M
     marker.scale.x = marker.scale.y = marker.scale.z = LIT_DIAMETER_M
@@ -53,13 +55,13 @@ def make_light(robot_id: int, color: ColorRGBA) -> Marker:
     return marker
 
 
-def make_identity(robot_id: int) -> List[Marker]:
+def make_identity(robot_id: int, place: str = "") -> List[Marker]:
     """Return the name above one robot, and the ring around it."""
-    name = make_marker(robot_id, Marker.TEXT_VIEW_FACING, "names", "base_link", ColorRGBA(0.1, 0.1, 0.1, 1.0))
+    name = make_marker(robot_id, Marker.TEXT_VIEW_FACING, "names", place + "base_link", ColorRGBA(0.1, 0.1, 0.1, 1.0))
     name.text = "hero_%d" % robot_id
     name.pose.position.z = NAME_Z_M
     name.scale.z = NAME_SIZE_M
-    ring = make_marker(robot_id, Marker.LINE_STRIP, "rings", "base_link", ColorRGBA(*color_of(robot_id), 1.0))
+    ring = make_marker(robot_id, Marker.LINE_STRIP, "rings", place + "base_link", ColorRGBA(*color_of(robot_id), 1.0))
     angles_rad = [math.tau * index / (RING_POINTS - 1) for index in range(RING_POINTS)]
     ring.points = [Point(RING_RADIUS_M * math.cos(angle), RING_RADIUS_M * math.sin(angle), 0.0) for angle in angles_rad]
     ring.scale.x = RING_WIDTH_M
@@ -69,14 +71,20 @@ def make_identity(robot_id: int) -> List[Marker]:
 def main() -> None:
     """Publish names and rings again and again, and a sphere for each color."""
     with Program("hero_lights") as program:
-        robots = read_parameters({"robots": Parameter("0", parse_explicit_ids)})["robots"]
+        parameters = read_parameters(
+            {"robots": Parameter("0", parse_explicit_ids), "simulated": Parameter((), read_ids)}
+        )
+        robots = parameters["robots"]
+        places = {robot_id: TRUE + "/" for robot_id in parameters["simulated"]}
         publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(robots) + 10)
 
         def show(color: ColorRGBA, robot_id: int) -> None:
-            publisher.publish(MarkerArray([make_light(robot_id, color)]))
+            publisher.publish(MarkerArray([make_light(robot_id, color, places.get(robot_id, ""))]))
 
         for robot_id in robots:
             rospy.Subscriber("/hero_%d/led" % robot_id, ColorRGBA, show, robot_id, queue_size=5)
-        identities = MarkerArray([marker for robot_id in robots for marker in make_identity(robot_id)])
+        identities = MarkerArray(
+            [marker for robot_id in robots for marker in make_identity(robot_id, places.get(robot_id, ""))]
+        )
         for _ in program.rate(1.0 / REPEAT_S):
             publisher.publish(identities)

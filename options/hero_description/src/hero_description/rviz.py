@@ -9,7 +9,6 @@ import os
 import shutil
 import sys
 import tempfile
-from typing import Any, Sequence
 
 import rospy
 
@@ -18,11 +17,7 @@ from hero_node.parameters import Parameter, choice, flag, parse_explicit_ids
 from hero_node.ros import Program, read_parameters
 
 from .hero_plus import make_hero_plus
-from .rviz_config import FRAMES, PLUS_DESCRIPTION, make_config
-
-
-def _read_ids(name: str, value: Any) -> Sequence[int]:
-    return parse_explicit_ids(name, value) if value not in ("", ()) else ()
+from .rviz_config import FRAMES, PLUS_DESCRIPTION, make_config, read_ids
 
 
 def main() -> None:
@@ -39,13 +34,15 @@ def main() -> None:
                 "fixed_frame": "",
                 "view": choice("orbit", sorted(FRAMES)),
                 "picture": flag(False),
-                "hero_plus": Parameter((), _read_ids),
+                "hero_plus": Parameter((), read_ids),
+                "simulated": Parameter((), read_ids),
             }
         )
         if parameters["hero_plus"]:
             rospy.set_param(PLUS_DESCRIPTION, make_hero_plus(str(rospy.get_param("robot_description"))))
-    names, plus_names = (["hero_%d" % robot_id for robot_id in parameters[name]] for name in ("robots", "hero_plus"))
+    groups = ("robots", "hero_plus", "simulated")
+    names, plus_names, simulated = (["hero_%d" % robot_id for robot_id in parameters[group]] for group in groups)
     with tempfile.NamedTemporaryFile("w", prefix="hero_", suffix=".rviz", delete=False) as file:
         settings = str(parameters["fixed_frame"]), parameters["view"], parameters["picture"]
-        file.write(make_config(names, *settings, hero_plus=plus_names))
+        file.write(make_config(names, *settings, hero_plus=plus_names, simulated=simulated))
     os.execv(rviz, [rviz, "-d", file.name, *sys.argv[1:]])

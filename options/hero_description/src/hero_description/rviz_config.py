@@ -1,6 +1,6 @@
 """The configuration of RViz for a number of robots, as text. Pure.
 
-Displays of what only simulated or localized robots have (arena, ground truth; poses, occupancy grid) are always
+Displays of what only simulated or localized robots have (arena; poses, occupancy grid) are always
 included: with other robots nothing is published on their topics. Source of the format: files that RViz 1.14 writes,
 reduced to what differs from its defaults.
 """
@@ -10,6 +10,8 @@ from typing import Any, Collection, Dict, List, Mapping, Sequence, Tuple
 
 import yaml
 
+from hero_node.parameters import parse_explicit_ids
+
 LIGHTS_TOPIC = "/hero_lights"
 # Between RViz and the node goal_choice.
 CHOICE_TOPIC = "/hero_choice/chosen"
@@ -17,6 +19,9 @@ POINT_TOPIC = "/hero_choice/point"
 GOAL_TOPIC = "/hero_choice/goal"
 ABOVE_PIXELS_PER_M = 300
 """Scale of the views from above: an arena of 2.2 m fits into the window."""
+
+TRUE = "true"
+"""Part of the names of frames and topics of simulated robots where they truly are: see true_poses."""
 
 PLUS_DESCRIPTION = "hero_plus_description"
 """Parameter that holds the URDF of HeRo+."""
@@ -31,6 +36,11 @@ FRAMES = {"orbit": "world", "close": "world", "above": "world", "map": "map"}
 """Fixed frame of each view, unless another is given."""
 
 
+def read_ids(name: str, value: Any) -> Sequence[int]:
+    """Return the ids of a parameter that may name no robot. Raises: ProgramError."""
+    return parse_explicit_ids(name, value) if value not in ("", ()) else ()
+
+
 def color_of(robot_id: int) -> Tuple[float, float, float]:
     """Return a robot's own color, red, green, blue, each 0..1; hues are a golden angle apart, as in hero_monitor."""
     return hls_to_rgb((robot_id * 137.508 + 24.0) / 360.0, 0.42, 0.7)
@@ -41,14 +51,23 @@ def make_display(kind: str, name: str, settings: Mapping[str, Any], enabled: boo
     return {"Class": "rviz/" + kind, "Name": name, "Enabled": enabled, **settings}
 
 
-def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
-    """Return the displays of one robot: model, path by odometry, proximity, and of a HeRo+ the distance ahead."""
-    color = "; ".join("%d" % (255 * part) for part in color_of(int(name.rpartition("_")[2])))
-    model = {
+def make_model(name: str, title: str, prefix: str, is_plus: bool, alpha: float = 1.0) -> Dict[str, Any]:
+    """Return the display of a robot's body, at the frames with this prefix."""
+    settings = {
         "Robot Description": PLUS_DESCRIPTION if is_plus else "robot_description",
-        "TF Prefix": name,
+        "TF Prefix": prefix,
         "Update Interval": 0,
+        "Alpha": alpha,
     }
+    return make_display("RobotModel", title, settings)
+
+
+def make_robot_displays(name: str, is_plus: bool, place: str) -> List[Dict[str, Any]]:
+    """Return the displays of one robot: model, path by odometry, proximity, and of a HeRo+ the distance ahead.
+
+    place: name, or of a simulated robot name/true, where its frames and what it sees are drawn.
+    """
+    color = "; ".join("%d" % (255 * part) for part in color_of(int(name.rpartition("_")[2])))
     path = {
         "Topic": f"/{name}/odom",
         "Unreliable": False,
@@ -61,7 +80,7 @@ def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
         "Shape": make_arrow(color, (0.025, 0.0025), (0.0001, 0.0001)),
     }
     proximity = {
-        "Topic": f"/{name}/proximity",
+        "Topic": f"/{place}/proximity",
         "Style": "Spheres",
         "Size (m)": 0.012,
         "Color Transformer": "FlatColor",
@@ -71,7 +90,7 @@ def make_robot_displays(name: str, is_plus: bool) -> List[Dict[str, Any]]:
     distance = {"Topic": f"/{name}/range", "Color": color, "Alpha": 0.3}
     return [
         *([make_display("Range", name + " distance", distance)] if is_plus else []),
-        make_display("RobotModel", name, model),
+        make_model(name, name, place, is_plus),
         make_display("Odometry", name + " path", path),
         make_display("LaserScan", name + " proximity", proximity),
     ]
@@ -85,19 +104,6 @@ def make_arrow(color: str, shaft_m: Tuple[float, float], head_m: Tuple[float, fl
         "Alpha": 0.8,
         **dict(zip(("Shaft Length", "Shaft Radius", "Head Length", "Head Radius"), shaft_m + head_m)),
     }
-
-
-def make_ground_truth_display(name: str) -> Dict[str, Any]:
-    """Return the display of a simulated robot's ground truth: an arrow above the model."""
-    settings = {
-        "Topic": f"/{name}/ground_truth",
-        "Keep": 1,
-        "Position Tolerance": 0,
-        "Angle Tolerance": 0,
-        "Covariance": {"Value": False},
-        "Shape": make_arrow("60; 60; 60", (0.045, 0.002), (0.015, 0.007)),
-    }
-    return make_display("Odometry", name + " ground truth", settings)
 
 
 def make_pose_display(name: str) -> Dict[str, Any]:
@@ -140,8 +146,11 @@ def make_config(
     view: str = "orbit",
     picture: bool = False,
     hero_plus: Collection[str] = (),
+    simulated: Collection[str] = (),
 ) -> str:
     """Return the configuration for robots with these names (hero_0, ...), of which hero_plus are HeRo+.
+
+    Those that are simulated are drawn where they are; a group shows where odometry believes them.
 
     view: one of FRAMES, which holds the fixed frame if none is given; picture: with that of the overhead camera.
     """
@@ -157,9 +166,9 @@ def make_config(
     ):
         displays.append(make_display("MarkerArray", name, {"Marker Topic": topic, "Queue Size": MARKERS}))
     for name in names:
-        displays += make_robot_displays(name, name in hero_plus)
-    ground_truths = [make_ground_truth_display(name) for name in names]
-    displays.append(make_display("Group", "ground truth (simulated)", {"Displays": ground_truths}))
+        displays += make_robot_displays(name, name in hero_plus, f"{name}/{TRUE}" if name in simulated else name)
+    ghosts = [make_model(name, name + " odometry", name, name in hero_plus, 0.3) for name in names if name in simulated]
+    displays.append(make_display("Group", "odometry (simulated)", {"Displays": ghosts}, enabled=False))
     localization = [make_display("Map", "occupancy grid", {"Topic": "/map", "Alpha": 0.6})]
     localization += [make_pose_display(name) for name in names]
     displays.append(make_display("Group", "localization", {"Displays": localization}, enabled=view == "map"))

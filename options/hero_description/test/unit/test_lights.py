@@ -31,6 +31,12 @@ def test_a_ring_is_closed_and_lies_around_the_body():
     assert (ring.color.a, ring.pose.orientation.w, ring.frame_locked) == (1.0, 1.0, True)
 
 
+def test_lights_names_and_rings_of_a_simulated_robot_are_where_it_is():
+    markers = [lights.make_light(7, ColorRGBA(1.0, 0.0, 0.0, 1.0), "true/"), *lights.make_identity(7, "true/")]
+    frames = [marker.header.frame_id for marker in markers]
+    assert frames == ["hero_7/true/hat_link", "hero_7/true/base_link", "hero_7/true/base_link"]
+
+
 def test_a_name_stands_above_the_hat_in_dark_letters():
     name, _ = lights.make_identity(7)
     assert HAT_Z_M + name.scale.z / 2 < name.pose.position.z < 0.2

@@ -31,7 +31,6 @@ def test_rviz_displays_robots_arena_and_lights():
     for name in ("hero_0", "hero_7"):
         assert ("rviz/RobotModel", name) in shown
         assert ("rviz/Odometry", "/%s/odom" % name) in shown
-        assert ("rviz/Odometry", "/%s/ground_truth" % name) in shown
         assert ("rviz/LaserScan", "/%s/proximity" % name) in shown
     for topic in ("/hero_sim/arena", "/hero_sim/object_markers", "/hero_sim/replay"):
         assert ("rviz/MarkerArray", topic) in shown
@@ -58,14 +57,26 @@ def list_switches(displays):
 
 @pytest.mark.parametrize("view", ["orbit", "above", "map"])
 def test_displays_are_enabled_and_named_after_what_they_show(view):
-    config = yaml.safe_load(make_config(["hero_3"], view=view, hero_plus=["hero_3"]))
+    config = yaml.safe_load(make_config(["hero_3"], view=view, hero_plus=["hero_3"], simulated=["hero_3"]))
     switches = list_switches(config["Visualization Manager"]["Displays"])
-    robots_own = {"hero_3", *("hero_3 " + what for what in ("distance", "path", "proximity", "ground truth", "pose"))}
+    robots_own = {"hero_3", *("hero_3 " + what for what in ("distance", "path", "proximity", "pose", "odometry"))}
     assert robots_own == {name for name in switches if "hero" in name}
-    simulated = {"arena (simulated)", "objects (simulated)", "robots of a replay", "ground truth (simulated)"}
+    simulated = {"arena (simulated)", "objects (simulated)", "robots of a replay", "odometry (simulated)"}
     assert {"Grid", *simulated} < set(switches)
     switched_off = {name for name, is_on in switches.items() if not is_on}
-    assert switched_off == ({"localization"} if view != "map" else set())
+    assert switched_off == ({"localization"} if view != "map" else set()) | {"odometry (simulated)"}
+
+
+def test_simulated_robots_are_drawn_where_they_are_and_odometry_as_a_ghost():
+    config = yaml.safe_load(make_config(["hero_0", "hero_7"], simulated=["hero_7"]))
+    displays = config["Visualization Manager"]["Displays"]
+    models = {display["Name"]: display["TF Prefix"] for display in displays if "TF Prefix" in display}
+    assert models == {"hero_0": "hero_0", "hero_7": "hero_7/true"}
+    scans = {display["Topic"] for display in displays if display["Class"] == "rviz/LaserScan"}
+    assert scans == {"/hero_0/proximity", "/hero_7/true/proximity"}
+    (ghost,) = next(display for display in displays if display["Name"] == "odometry (simulated)")["Displays"]
+    assert (ghost["TF Prefix"], ghost["Name"]) == ("hero_7", "hero_7 odometry")
+    assert 0.0 < ghost["Alpha"] < 1.0 == displays[-2].get("Alpha", 1.0)
 
 
 def test_robots_have_the_hues_of_the_monitor():
@@ -83,7 +94,7 @@ def test_robots_have_their_names_and_rings_in_the_color_of_their_paths():
     name, ring = lights.make_identity(7)
     assert name.text == "hero_7" and name.header.frame_id == ring.header.frame_id == "hero_7/base_link"
     assert len(ring.points) == lights.RING_POINTS
-    path = make_robot_displays("hero_7", False)[1]["Shape"]["Color"]
+    path = make_robot_displays("hero_7", False, "hero_7")[1]["Shape"]["Color"]
     assert path == "; ".join("%d" % (255 * part) for part in (ring.color.r, ring.color.g, ring.color.b))
     assert len({color_of(robot_id) for robot_id in range(100)}) == 100
 
@@ -174,7 +185,6 @@ def test_only_errors_of_localized_places_are_drawn_around_robots():
     position = {"Value": True, "Scale": 3}
     assert covariances == {
         "hero_0 path": {"Value": False},
-        "hero_0 ground truth": {"Value": False},
         "hero_0 pose": {"Value": True, "Orientation": {"Value": False}, "Position": position},
     }
     (path,) = [display for display in manager["Displays"] if display["Name"] == "hero_0 path"]
