@@ -21,6 +21,7 @@ MAX_RADIUS, RADIUS_STEP = 1.6, 1e-4
 BOARD_CELLS_PX, BOARD_MARGIN = 60, 1
 """Of a square of the board; white squares around it."""
 BODY_RADIUS_M, PLATE_RADIUS_M = 0.0375, 0.0365
+PENUMBRA_M = 0.003
 FLOOR, BODY, BLACK, WHITE = 0.45, 0.05, 0.06, 0.85
 """Reflected shares of the light."""
 
@@ -49,6 +50,10 @@ class LabTag(NamedTuple):
     height_m: float = 0.076
     speed_m_s: float = 0.0
     turn_rad_s: float = 0.0
+    shade: float = 1.0
+    """Share of the light that a shadow leaves; its edge lies edge_m from the center, across edge_rad."""
+    edge_rad: float = 0.0
+    edge_m: float = 0.0
 
 
 class LabCamera(NamedTuple):
@@ -177,6 +182,8 @@ class LabCamera(NamedTuple):
             moved_m = tag.speed_m_s * time_s
             place_m = (tag.x_m + moved_m * math.cos(yaw_rad), tag.y_m + moved_m * math.sin(yaw_rad))
             patch += _shade(points_m - place_m, yaw_rad, tag.size_m, cells, is_robot, under) / moments
+        across_m = (points_m - (tag.x_m, tag.y_m)) @ (math.cos(tag.edge_rad), math.sin(tag.edge_rad)) - tag.edge_m
+        patch *= 1.0 - (1.0 - tag.shade) * np.clip(0.5 + across_m / PENUMBRA_M, 0.0, 1.0)
         light[low[1] : high[1], low[0] : high[0]] = _average(patch, low, high)
 
 

@@ -62,12 +62,12 @@ def find_camera(lab: LabCamera) -> Camera:
     return Camera(model, lab.rotation, np.array(lab.position_m))
 
 
-def place_tags(lab: LabCamera, random: np.random.RandomState) -> List[LabTag]:
+def place_tags(lab: LabCamera, random: np.random.RandomState, count: int = TAGS) -> List[LabTag]:
     """Return robots' tags wholly within the image, by chance."""
     size_px, tags = np.array(lab.lens.size_px), []  # type: np.ndarray, List[LabTag]
     angles = np.linspace(0.0, math.tau, 16)
     rim_m = 0.0375 * np.column_stack((np.cos(angles), np.sin(angles)))
-    while len(tags) < TAGS:
+    while len(tags) < count:
         place = lab.find_points(random.uniform((0.0, 0.0), size_px)[None], 0.076)[0]
         rim = place + rim_m
         pixels = lab.project(np.column_stack((rim, np.full(len(rim), 0.076))))
@@ -125,6 +125,37 @@ def measure_tags(seeds: int) -> None:
         share, cpu_ms = np.mean(results, axis=0)
         smallest_px = find_smallest_side(find_camera(lab), DEFAULT_SIZE_M, DEFAULT_HEIGHT_M)
         print(f"  {name:32} {100.0 * share:6.2f} % {cpu_ms:6.1f} ms {smallest_px:5.0f} px", flush=True)
+
+
+def measure_shadows(seeds: int) -> None:
+    """Print the share of tags that are found where the edge of a shadow crosses each, and in bad light."""
+    lens = LENS_A._replace(size_px=(960, 540))
+    small = LENS_B._replace(size_px=(640, 360))
+    cameras = {
+        "f 1391": LabCamera(lens),
+        "f 1391, gamma 2.2": LabCamera(lens, gamma=2.2),
+        "f 900, 2.1 m": LabCamera(small, (0.02, -0.03, 2.1)),
+        "f 900, 2.1 m, gamma 2.2": LabCamera(small, (0.02, -0.03, 2.1), gamma=2.2),
+        "f 1391, noise 20": LabCamera(lens, noise=20.0),
+        "f 1391, blur 1.8 px": LabCamera(lens, blur_px=1.8),
+    }
+    print(
+        "tags found, by the light that a shadow leaves on one side of an edge across each tag, and ms of CPU per image"
+    )
+    for name, lab in cameras.items():
+        shares = []
+        for shade in (1.0, 0.6, 0.4, 0.25):
+            results = []
+            for seed in range(seeds):
+                random = np.random.RandomState(seed)
+                tags = [
+                    tag._replace(shade=shade, edge_rad=random.uniform(-3, 3), edge_m=random.uniform(-0.014, 0.014))
+                    for tag in place_tags(lab, random, 20)
+                ]
+                results.append(run_search(lab, tags, [lab.render(tags, random) for _ in range(3)], FRAMES))
+            share, cpu_ms = np.mean(results, axis=0)
+            shares.append(f"x {shade:g}: {100.0 * share:.1f} % {cpu_ms:.0f} ms")
+        print(f"  {name:32} {', '.join(shares)}", flush=True)
 
 
 def measure_losses(seeds: int) -> None:
@@ -346,6 +377,7 @@ def measure_lenses(seeds: int) -> None:
 
 PARTS: Dict[str, Callable[[int], None]] = {
     "tags": measure_tags,
+    "shadows": measure_shadows,
     "losses": measure_losses,
     "mistakes": measure_mistakes,
     "knocks": measure_knocks,

@@ -1,5 +1,6 @@
 """The detector's process: same tags as in this process, wrong options named, ends with its parent, deaf to Ctrl-C."""
 
+import math
 import os
 import signal
 import socket
@@ -160,17 +161,25 @@ def test_the_process_answers_with_what_it_finds():
     assert len(answers) == 2
 
 
-@pytest.mark.parametrize(("backend", "fine"), [("apriltag", ["fine 16h5"]), ("aruco", [])])
-def test_only_apriltag_has_fine_detectors(backend, fine, monkeypatch):
+@pytest.mark.parametrize(
+    ("backend", "fine", "smallest_px", "decimate"),
+    [
+        ("apriltag", ["fine 16h5"], 9.0, 1.5),
+        ("aruco", [], 9.0, 1.5),
+        ("aruco", [], 48.0, 3.0),
+        ("aruco", [], math.inf, 1.5),
+    ],
+)
+def test_only_apriltag_is_fine_and_large_tags_are_decimated(backend, fine, smallest_px, decimate, monkeypatch):
     made = []
     monkeypatch.setattr(detector_process, "create_detector", lambda *given: given)
     monkeypatch.setattr(detector_process, "create_fine_detectors", lambda family: ["fine " + family])
     monkeypatch.setattr(detector_process, "TagSearch", lambda *given: made.append(given))
     memory = make_memory(np.zeros((4, 6), np.uint8))
     with pytest.raises(EOFError):
-        detector_process.serve(FakeConnection((backend, "16h5", 1.5, 6, 4, 9.0)), memory)
+        detector_process.serve(FakeConnection((backend, "16h5", 1.5, 6, 4, smallest_px)), memory)
     os.close(memory)
-    assert made == [((backend, "16h5", 1.5), 6, 4, fine, 9.0)]
+    assert made == [((backend, "16h5", decimate), 6, 4, fine, smallest_px)]
 
 
 def test_a_detector_that_cannot_be_made_is_told_to_the_parent(monkeypatch):

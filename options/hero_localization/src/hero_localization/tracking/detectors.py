@@ -7,7 +7,7 @@ python3-apriltag puts pixel centers at half integers and begins at the lower lef
 """
 
 from importlib.util import find_spec
-from typing import Dict, List, Tuple
+from typing import Dict, List, NamedTuple, Optional, Tuple
 
 import cv2
 import numpy as np
@@ -19,10 +19,53 @@ from .tag_corners import TagCorners
 _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 """Minimum contrast of black and white, of 255: false detections of 16h5 in noise and floor textures stay below."""
 
-SHARPEN_PX = 1.0
-"""Radius of the unsharp mask of fine detectors: cells of 2 px are as wide as the blur of a webcam."""
+MAX_ENLARGED_PX = 200
+"""Side of the largest window that is enlarged: tags in larger ones have pixels enough."""
 
-EVEN_CONTRAST, EVEN_FROM_PX = 8, 200 * 200
+EVEN_SHARE, MIN_SPAN = 0.15, 40
+"""Side of the neighborhood to whose contrast shades are related, by the window's: half a tag's; least contrast."""
+
+
+class Look(NamedTuple):
+    """A preparation of images for what else is missed.
+
+    Attributes:
+        enlarged: factor.
+        sharpening, radius_px: amount and radius of an unsharp mask: cells of 2 px are as wide as the blur of a webcam.
+        dark: shade, of 255, from which on ratios of shades count, as evened out by their neighborhood's: white in a
+            shadow may be darker than gray beside it. 0: shades stay as they are.
+    """
+
+    enlarged: int
+    sharpening: float
+    radius_px: float
+    dark: float = 0.0
+
+    def apply(self, gray: np.ndarray, scale: int) -> np.ndarray:
+        """Return an image (H, W) so prepared, scale times as large."""
+        if scale > 1:
+            gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+        blurred = cv2.GaussianBlur(gray, (0, 0), scale * self.radius_px)
+        gray = cv2.addWeighted(gray, 1.0 + self.sharpening, blurred, -self.sharpening, 0.0)
+        return self._even_out(gray, scale) if self.dark else gray
+
+    def _even_out(self, gray: np.ndarray, scale: int) -> np.ndarray:
+        logarithms = np.log1p(np.arange(256) / self.dark)
+        shades = cv2.LUT(gray, (255.0 / logarithms[-1] * logarithms).astype(np.float32))
+        shades = cv2.GaussianBlur(shades, (0, 0), EVEN_BLUR_PX * scale)
+        side = (max(3, round(EVEN_SHARE * min(gray.shape))) | 1,) * 2
+        around = np.ones(side, np.uint8)
+        low, high = (cv2.blur(part, side) for part in (cv2.erode(shades, around), cv2.dilate(shades, around)))
+        even = 128.0 + EVEN_GAIN * 255.0 * (shades - (low + high) / 2.0) / np.maximum(high - low, MIN_SPAN)
+        evened: np.ndarray = np.clip(even, 0.0, 255.0).astype(np.uint8)
+        return evened
+
+
+FINE_LOOKS = (Look(1, 1.0, 1.0), Look(2, 3.0, 1.5), Look(2, 2.5, 1.0, 4.0), Look(2, 3.0, 2.0, 60.0))
+"""The last two for edges of shadows, without and with the gamma of a camera."""
+EVEN_BLUR_PX, EVEN_GAIN = 0.5, 1.2
+
+EVEN_CONTRAST, EVEN_FROM_PX = 8, 80 * 80
 """Most that means of 4 x 4 px differ by on even ground, of 255; pixels of the smallest image that has much of it."""
 
 MIN_MISTAKEN_TAGS = 3
@@ -48,8 +91,8 @@ class AprilTagDetector(TagDetector):
     It holds the GIL and takes SIGINT over while it detects: programs with other threads run it in its own process.
     """
 
-    def __init__(self, family: str, decimate: float, enlarge: int = 0) -> None:
-        """enlarge: sharpen images first, this many times enlarged; 0: take them as they are."""
+    def __init__(self, family: str, decimate: float, look: Optional[Look] = None) -> None:
+        """look: how to prepare images; None: take them as they are."""
         try:
             from apriltag import apriltag
         except ImportError:
@@ -59,15 +102,15 @@ class AprilTagDetector(TagDetector):
         # Corrected bits bring false tags in, of which 16h5 has many already.
         self._detector = apriltag("tag" + family, threads=1, maxhamming=0 if family == "16h5" else 1, decimate=decimate)
         self._least_margin = _MIN_MARGIN[family]
-        self._enlarge = enlarge
+        self._look = look
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
-        shift, scale = np.array(origin) - 0.5, max(self._enlarge, 1)
+        shift, scale = np.array(origin) - 0.5, 1
         if gray.size > EVEN_FROM_PX:
             gray = _remove_noise(gray)
-        if self._enlarge:
-            gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
-            gray = cv2.addWeighted(gray, 2.0, cv2.GaussianBlur(gray, (0, 0), scale * SHARPEN_PX), -1.0, 0.0)
+        if self._look is not None:
+            scale = self._look.enlarged if max(gray.shape) <= MAX_ENLARGED_PX else 1
+            gray = self._look.apply(gray, scale)
         return [
             TagCorners(int(found["id"]), np.asarray(found["lb-rb-rt-lt"], dtype=float)[::-1] / scale + shift)
             for found in self._detector.detect(np.ascontiguousarray(gray))
@@ -140,9 +183,9 @@ def create_detector(backend: str = DEFAULT_BACKEND, family: str = "36h11", decim
 
 
 def create_fine_detectors(family: str) -> List[TagDetector]:
-    """Return detectors that find smaller and smaller tags, at more and more cost: of 18 px, then of 16 px."""
+    """Return detectors that find what others miss, at more and more cost: small tags, blur, edges of shadows."""
     # Enlarged noise looks like tags of 16h5, whose cells are larger anyway.
-    return [AprilTagDetector(family, 1.0, enlarge) for enlarge in ((1, 2) if family == "36h11" else (1,))]
+    return [AprilTagDetector(family, 1.0, look) for look in (FINE_LOOKS if family == "36h11" else FINE_LOOKS[:1])]
 
 
 def find_print_mistake(gray: np.ndarray, family: str) -> str:

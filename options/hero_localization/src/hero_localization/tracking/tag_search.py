@@ -2,9 +2,10 @@
 
 A detector takes 15 to 90 ms for a whole image of 1920 by 1080, by its noise and texture, and 0.1 ms for a window around
 one tag. So known tags are looked for where they are expected, in every frame, and the rest of the image is searched in
-turn, in two seconds. Where tags are small, finer detectors that use all pixels look where the first one found nothing,
-and one takes every other turn. A tag that was seen steadily and is lost is also searched around its place, at most one
-image's pixels per second.
+turn, in two seconds. Finer detectors look where the first one found nothing: all of them for a tag that was seen a
+moment ago, then one after another at longer and longer intervals. Where tags are small, one of them takes every other
+turn of the sweep. A tag that was seen steadily and is lost is also searched around its place, at most one image's
+pixels per second.
 """
 
 import math
@@ -15,9 +16,13 @@ import numpy as np
 from .detectors import TagDetector
 from .tag_corners import TagCorners
 
-FINE_BELOW_PX, FINEST_BELOW_PX = 36.0, 20.0
-"""In an image at half its size, tags of less than this are missed with blur and gamma; at full size, some below
-the second."""
+FINE_BELOW_PX = 36.0
+"""In an image at half its size, tags of less than this are missed with blur and gamma."""
+
+PATIENCE_S = 0.15
+BACKOFF, MAX_BACKOFF_S = 0.2, 0.6
+"""A tag that is missed for longer than the first is looked for by one finer detector at a time, at intervals of this
+share of the time for which it is missed: most are covered or gone."""
 
 FINE_S = 2.0
 """Time for which coarser detectors skip a tag that only a finer one found."""
@@ -49,8 +54,9 @@ KEPT_S = 1.0
 """A lost tag is searched near its last place for this long; where it is expected, for ever."""
 
 TILE_PX = (480, 360)
-OVERLAP_PX = 96
-"""Overlap of neighboring tiles: a tag on their border, with its white margin, lies wholly in one of them."""
+OVERLAP_PX, OVERLAP_SHARE = 96, 0.06
+"""Overlap of neighboring tiles, the second by the width of images above 1920 px: a tag on their border, with its white
+margin, lies wholly in one of them, also a turned reference tag of 100 mm 2.2 m below the camera."""
 
 WINDOW_SIDES = 0.9
 """Half a window's side, in sides of the tag: half its diagonal, and its white margin."""
@@ -116,13 +122,14 @@ class TagSearch:
         fine_detectors: Sequence[TagDetector] = (),
         smallest_px: float = math.inf,
     ) -> None:
-        """fine_detectors: two that find smaller tags at more cost; smallest_px: side of the smallest tag expected."""
+        """fine_detectors: find what others miss at more cost; smallest_px: side of the smallest tag expected."""
         self._detector = detector
         self._detectors = [detector, *fine_detectors]
         self._sweeps = [*fine_detectors[:1], detector] if smallest_px < FINE_BELOW_PX else [detector]
         self._tracks: List[_Track] = []
         self._lost: Dict[int, _Track] = {}
         self._size_px = np.array((width_px, height_px))
+        self._whole = (0, 0, width_px, height_px)
         self._tiles = _list_tiles(width_px, height_px)
         self._next_tile = 0
         self._due = 0.0
@@ -132,6 +139,8 @@ class TagSearch:
         self._sides_px: Dict[int, float] = {}
         self._hard: Dict[int, Tuple[int, float]] = {}
         """The detector that found a tag which coarser ones missed, and when; by tag."""
+        self._turns: Dict[int, Tuple[int, float]] = {}
+        """The finer detector whose turn it is to look for a tag that is missed, and when; by tag."""
 
     def search(
         self, gray: np.ndarray, stamp_s: float, expected: Optional[Mapping[int, Tuple[float, float]]] = None
@@ -154,17 +163,14 @@ class TagSearch:
             # First where it was: what is known from elsewhere is newer than the frame.
             centers = [track.center, *([places[track.tag_id]] if track.tag_id in places else [])]
             windows_s = (NARROW_S, elapsed_s) if elapsed_s > NARROW_S else (elapsed_s,)
-            any(
-                self._look_for(frame, track.tag_id, center, track.side_px, window_s)
-                for window_s in windows_s
-                for center in centers
-            )
+            windows = [(center, window_s) for window_s in windows_s for center in centers]
+            self._look_for(frame, track.tag_id, track.side_px, windows, elapsed_s)
         tracked = {track.tag_id for track in self._tracks}
         for tag_id, place in places.items():
             # Lost for long, or too small for the tiles: where it is expected, it costs no more than a window.
             side_px = self._sides_px.get(tag_id, self._smallest_px)
             if tag_id not in tracked and math.isfinite(side_px):
-                self._look_for(frame, tag_id, place, side_px, MAX_STEP_S)
+                self._look_for(frame, tag_id, side_px, [(place, MAX_STEP_S)], math.inf)
         for detector, tile in self._take_tiles(stamp_s):
             frame.search(detector, *tile)
         self._search_nearby(frame, places)
@@ -172,25 +178,43 @@ class TagSearch:
         self._previous_s = stamp_s
         return frame.found
 
-    def _look_for(self, frame: _Frame, tag_id: int, center: np.ndarray, side_px: float, elapsed_s: float) -> bool:
-        """Search a window for a tag that was last seen elapsed_s ago, and return whether it is there."""
-        slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
-        half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
-        count = 1 + (side_px < FINE_BELOW_PX) + (side_px < FINEST_BELOW_PX)
+    def _look_for(
+        self,
+        frame: _Frame,
+        tag_id: int,
+        side_px: float,
+        windows: Sequence[Tuple[np.ndarray, float]],
+        missed_s: float,
+    ) -> None:
+        """Search windows for a tag that was missed for this long: around places, seen so many seconds ago."""
+        for index in self._choose_detectors(tag_id, frame.stamp_s, missed_s):
+            for center, elapsed_s in windows:
+                slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
+                half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
+                if frame.search_around(self._detectors[index], tag_id, center, side_px, half_px):
+                    first, found_s = self._hard.get(tag_id, (0, -math.inf))
+                    if index != first or frame.stamp_s >= found_s + FINE_S:
+                        self._hard[tag_id] = index, frame.stamp_s
+                    self._turns.pop(tag_id, None)
+                    return
+
+    def _choose_detectors(self, tag_id: int, stamp_s: float, missed_s: float) -> List[int]:
+        """Return the detectors that look for a tag in this frame, in their order."""
         first, found_s = self._hard.get(tag_id, (0, -math.inf))
-        for index, detector in enumerate(self._detectors[:count]):
-            if index < first and frame.stamp_s < found_s + FINE_S:
-                continue
-            if frame.search_around(detector, tag_id, center, side_px, half_px):
-                if index != first or frame.stamp_s >= found_s + FINE_S:
-                    self._hard[tag_id] = index, frame.stamp_s
-                return True
-        return False
+        count = len(self._detectors)
+        if missed_s <= PATIENCE_S:
+            first = first if stamp_s < found_s + FINE_S else 0
+            return [first, *(index for index in range(count) if index != first)]
+        turn, due_s = self._turns.get(tag_id, (max(first, 1), -math.inf))
+        if count == 1 or due_s - MAX_BACKOFF_S <= stamp_s < due_s:
+            return [0]
+        self._turns[tag_id] = turn % (count - 1) + 1, stamp_s + min(BACKOFF * missed_s, MAX_BACKOFF_S)
+        return [0, turn]
 
     def _take_tiles(self, stamp_s: float) -> List[Tuple[TagDetector, Tuple[int, int, int, int]]]:
         """Return the tiles to be searched in this frame, and the detector for each."""
         if self._previous_s is None:
-            return [(self._sweeps[0], tile) for tile in self._tiles]
+            return [(self._sweeps[0], self._whole)]
         elapsed_s = min(max(stamp_s - self._previous_s, 0.0), MAX_STEP_S)
         image_px = float(self._size_px.prod())
         self._nearby_px = min(self._nearby_px + NEARBY_IMAGES_S * elapsed_s * image_px, image_px)
@@ -258,8 +282,9 @@ def _list_tiles(width_px: int, height_px: int) -> List[Tuple[int, int, int, int]
         [round(size * index / math.ceil(size / tile)) for index in range(math.ceil(size / tile) + 1)]
         for size, tile in zip((width_px, height_px), TILE_PX)
     ]
+    overlap_px = round(max(OVERLAP_PX, OVERLAP_SHARE * width_px)) if width_px > 1920 else OVERLAP_PX
     return [
-        (left, top, min(right + OVERLAP_PX, width_px), min(bottom + OVERLAP_PX, height_px))
+        (left, top, min(right + overlap_px, width_px), min(bottom + overlap_px, height_px))
         for top, bottom in zip(edges[1], edges[1][1:])
         for left, right in zip(edges[0], edges[0][1:])
     ]
