@@ -1,14 +1,10 @@
 """Python package of hero_client, for catkin_python_setup(); not to be run by hand."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
-
-ROOMS = ("values", "controllers", "ros", "robots", "apps")
+from setuptools import find_packages, setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_client", *("hero_client." + room for room in ROOMS)],
-        package_dir={"": "src"},
-        package_data={"hero_client": ["py.typed"]},
+        packages=find_packages("src"), package_dir={"": "src"}, package_data={"hero_client": ["py.typed"]}
     )
 )

@@ -1,12 +1,10 @@
 """Python package of hero_node, for catkin_python_setup(); not to be run by hand."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
+from setuptools import find_packages, setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_node", "hero_node.files", "hero_node.parameters", "hero_node.ros"],
-        package_dir={"": "src"},
-        package_data={"hero_node": ["py.typed"]},
+        packages=find_packages("src"), package_dir={"": "src"}, package_data={"hero_node": ["py.typed"]}
     )
 )

@@ -1,14 +1,10 @@
 """Python package of hero_sim, for catkin_python_setup(); not to be run by hand."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
-
-ROOMS = ("link", "robot", "stepped", "stepped.rules", "world", "world.pushing")
+from setuptools import find_packages, setup
 
 setup(
     **generate_distutils_setup(
-        packages=["hero_sim", *("hero_sim." + room for room in ROOMS)],
-        package_dir={"": "src"},
-        package_data={"hero_sim.world": ["arenas/*.yaml"]},
+        packages=find_packages("src"), package_dir={"": "src"}, package_data={"hero_sim.world": ["arenas/*.yaml"]}
     )
 )

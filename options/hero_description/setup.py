@@ -1,6 +1,6 @@
 """Python package of hero_description, for catkin_python_setup(); not to be run by hand."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
+from setuptools import find_packages, setup
 
-setup(**generate_distutils_setup(packages=["hero_description"], package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}))

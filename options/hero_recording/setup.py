@@ -1,7 +1,6 @@
 """Python package of hero_recording, for catkin_python_setup(); not to be run by hand."""
 
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
+from setuptools import find_packages, setup
 
-packages = ["hero_recording", "hero_recording.bags", "hero_recording.formats", "hero_recording.plots"]
-setup(**generate_distutils_setup(packages=packages, package_dir={"": "src"}))
+setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}))

@@ -50,11 +50,11 @@ def test_a_formation_has_its_spacing_and_its_center(shape):
 @pytest.mark.parametrize(
     "formation, says",
     [
-        ([], "must be a table"),
+        ([], "must be a mapping"),
         ({"shape": "star"}, "shape is 'star'"),
-        ({"spacing": 1}, "unknown key 'spacing'"),
+        ({"spacing": 1}, "formation: unknown 'spacing'; allowed are: shape, center"),
         ({"spacing_m": 0.1}, "make spacing_m larger"),
-        ({"center": [1]}, "center holds"),
+        ({"center": [1]}, r"center is 'a list', but must be \[x, y\]"),
         ({"turn_deg": True}, "turn_deg is True"),
         ({"shape": "grid", "columns": 0}, "columns is 0"),
         ({"shape": "points", "points": [[0, 0]]}, "at least 3 places"),

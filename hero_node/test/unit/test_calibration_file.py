@@ -50,14 +50,14 @@ def test_what_is_no_file_or_cannot_be_opened_is_told_of(tmp_path, monkeypatch):
     (tmp_path / "hero_3.yaml").symlink_to(tmp_path / "gone")
     (tmp_path / "hero_4.yaml").write_text("robot: hero_4\n")
     (tmp_path / "hero_7.yaml").write_text(GOOD)
-    read_text = calibration_file.read_text
+    os_open = os.open
 
-    def refuse(path):
+    def refuse(path, *flags):
         if path.endswith("hero_4.yaml"):
             raise PermissionError(13, "Permission denied", path)
-        return read_text(path)
+        return os_open(path, *flags)
 
-    monkeypatch.setattr(calibration_file, "read_text", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     calibrations = read_calibrations(str(tmp_path))
     assert list(calibrations.found) == ["hero_7"]
     reasons = ("Is a directory", "it is a pipe", "No such file", "Permission denied")

@@ -61,19 +61,19 @@ def test_a_file_is_read_with_all_its_parts(tmp_path):
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("walls_m:\n  - [[0, 0], [1, b]]\n", "walls_m: [['0', '0'], ['1', 'b']] is not a list"),
-        ("walls_m:\n  - [[0, 0]]\n", "at least 2 entries"),
-        ("walls_m:\n  - [[0, 0], [1, 1, 1]]\n", "entries of 2 numbers"),
-        ("walls_m:\n  - [0, 0, 1, 1]\n", "entries of 2 numbers"),
-        ("walls_m: 3\n", "walls_m must be a list, not '3'"),
-        ("wals_m: []\n", "unknown key 'wals_m'"),
+        ("walls_m:\n  - [[0, 0], [1, b]]\n", ", line 2: walls_m is 'b', but must be a number from -1000 to 1000"),
+        ("walls_m:\n  - [[0, 0]]\n", "line 2: walls_m is 'a list', but must be a list of at least 2 points"),
+        ("walls_m:\n  - [[0, 0], [1, 1, 1]]\n", "a list of 2 numbers: x and y"),
+        ("walls_m:\n  - [0, 0, 1, 1]\n", "a list of 2 numbers: x and y"),
+        ("walls_m: 3\n", "walls_m is '3', but must be a list"),
+        ("wals_m: []\n", "line 1: unknown 'wals_m'; allowed are: name, "),
         ("bounds_m: [0, 0, 1, 1]\ncircles_m:\n  - [0, 0, -1]\n", "radius"),
         ("bounds_m: [1, 0, 1, 1]\n", "minimum"),
         ("name: x\n", "needs bounds_m"),
         ("bounds_m: [0, 0, 1, nan]\n", "from -1000 to 1000"),
         ("bounds_m: [0, 0, 1, 1e9]\n", "from -1000 to 1000"),
-        ("- 1\n", "a mapping"),
-        ("", "a mapping"),
+        ("- 1\n", "must hold names and values"),
+        ("", "must hold names and values"),
         ("a: [1\nb: 2\n", "line 2"),
     ],
 )
@@ -81,7 +81,7 @@ def test_a_wrong_file_is_refused_with_file_and_reason(tmp_path, text, words):
     path = write(tmp_path, text)
     with pytest.raises(OptionError) as caught:
         load_arena(path)
-    assert str(caught.value).startswith("arena %s: " % path)
+    assert str(caught.value).startswith("arena %s" % path)
     assert words in str(caught.value)
 
 
@@ -99,7 +99,7 @@ def test_a_start_that_touches_something_is_refused_by_its_place(tmp_path, second
         "starts_m_deg:\n  - [0.5, 0.5, 0]\n  - %s\n" % second,
     )
     x, y, _ = second.strip("[]").split(", ")
-    with pytest.raises(OptionError, match=r"arena\.yaml: the start at \(%s, %s\)" % (x, y)):
+    with pytest.raises(OptionError, match=r"arena\.yaml, line 7: the start at \(%s, %s\)" % (x, y)):
         load_arena(path)
 
 
@@ -202,7 +202,7 @@ def test_viewers_draw_objects_by_their_edges_and_rims():
 
 def test_a_pipe_as_arena_is_refused_at_once(tmp_path):
     os.mkfifo(str(tmp_path / "arena.yaml"))
-    with pytest.raises(OptionError, match=r"arena\.yaml cannot be read: it is a pipe, device or socket"):
+    with pytest.raises(OptionError, match=r"arena\.yaml: cannot be read: it is a pipe, device or socket"):
         load_arena(str(tmp_path / "arena.yaml"))
 
 

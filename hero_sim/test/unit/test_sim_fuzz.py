@@ -81,7 +81,7 @@ def test_any_arena_file_is_read_or_refused_with_file_and_reason(path, content):
         text = str(error)
         assert text.isprintable(), ascii(text)
         assert len(text) < len(str(path)) + 1200, text
-        assert re.match(r"arena %s: ." % re.escape(str(path)), text), text
+        assert re.match(r"arena %s(, line \d+)?: ." % re.escape(str(path)), text), text
         return
     assert type(arena) is Arena and arena.name.isprintable()
     for part in (arena.segments_m, arena.circles_m, *arena.polygons_m, *arena.starts, arena.bounds_m):
@@ -122,17 +122,17 @@ def test_any_flash_file_is_read_or_refused_with_file_and_remedy(path, script):
     "text, words",
     [
         ("bounds_m: [0, 0, 1, 1]\nname: \x00\n", "special characters are not allowed"),
-        ("name: x\n? [a]\n: 1\n", "unhashable key"),
-        ("name: x\nbounds_m: [0, 0, 1, [1]]\n", "bounds_m: [['0', '0', '1', [...]]] is not a list"),
-        ("bounds_m: &a [0, 0, 1, *a]\n", "recursive"),
-        ("name: [a]\nbounds_m: [0, 0, 1, 1]\n", "name must be one line of text"),
-        ('name: "\\e[2J"\nbounds_m: [0, 0, 1, 1]\n', "name must be one line of text"),
-        pytest.param("[" * 2000, "deeper than can be read", id="2,000 brackets"),
+        ("name: x\n? [a]\n: 1\n", "a name must be a text"),
+        ("name: x\nbounds_m: [0, 0, 1, [1]]\n", "bounds_m is 'a list', but must be a number"),
+        ("bounds_m: &a [0, 0, 1, *a]\n", "anchors cannot be used"),
+        ("name: [a]\nbounds_m: [0, 0, 1, 1]\n", "name is 'a list', but must be a text"),
+        ('name: "\\e[2J"\nbounds_m: [0, 0, 1, 1]\n', "name is .*but must be one line of text"),
+        pytest.param("[" * 2000, "more than 20 levels", id="2,000 brackets"),
     ],
 )
 def test_what_fuzzing_found_is_refused_with_file_and_reason(path, text, words):
     path.write_text(text, encoding="utf-8")
     with pytest.raises(OptionError) as caught:
         load_arena(str(path))
-    assert str(caught.value).startswith("arena %s: " % path)
-    assert words in str(caught.value)
+    assert str(caught.value).startswith("arena %s" % path)
+    assert re.search(words, str(caught.value))

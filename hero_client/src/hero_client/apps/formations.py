@@ -14,9 +14,9 @@ from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
 
-from hero_node import ProgramError, shorten
-from hero_node.files import YamlError, parse_yaml
-from hero_node.parameters import is_number, is_whole_number
+from hero_node import ProgramError
+from hero_node.files import Entry, EntryError, mark_values, read_entries
+from hero_node.parameters import MAX_COORDINATE_M
 
 from ..values.assignment import assign_rows
 
@@ -27,6 +27,8 @@ SHAPES = ("circle", "grid", "line", "points")
 KEYS = ("shape", "center", "spacing_m", "turn_deg", "columns", "points")
 
 DEFAULT_SPACING_M = 0.25
+
+MAX_COLUMNS = 1000
 
 
 class FormationError(ProgramError):
@@ -39,30 +41,30 @@ def place_formation(formation: Any, count: int, min_spacing_m: float) -> List[Po
     formation: a table, or its text in YAML. min_spacing_m: closer together robots could not reach their places.
     Raises: FormationError.
     """
-    if isinstance(formation, str):
-        try:
-            formation = parse_yaml(formation)
-        except YamlError as error:
-            raise FormationError(f"formation: not YAML: {error}") from None
-    if not isinstance(formation, dict):
-        raise FormationError(f"formation: must be a table with {', '.join(KEYS)}, not {shorten(formation)}")
-    unknown = sorted(set(formation) - set(KEYS), key=str)
-    if unknown:
-        raise FormationError(f"formation: unknown key {shorten(unknown[0])}; known are: {', '.join(KEYS)}")
-    shape = formation.get("shape", "circle")
-    if shape not in SHAPES:
-        raise FormationError(f"formation: shape is {shorten(shape)}, but must be one of: {', '.join(SHAPES)}")
-    center = _read_point("center", formation.get("center", [0.0, 0.0]))
-    spacing_m = _read_number("spacing_m", formation.get("spacing_m", DEFAULT_SPACING_M))
-    angle_rad = math.radians(_read_number("turn_deg", formation.get("turn_deg", 0.0)))
+    try:
+        if isinstance(formation, str):
+            root = read_entries(formation, "formation", "shape: circle")
+        else:
+            root = mark_values(formation, "formation")
+        return _place(root.mapping(KEYS), count, min_spacing_m)
+    except EntryError as error:
+        raise FormationError(str(error)) from None
+
+
+def _place(fields: Dict[str, Entry], count: int, min_spacing_m: float) -> List[Point]:
+    shape = fields["shape"].choice(SHAPES) if "shape" in fields else "circle"
+    center = _read_point(fields["center"]) if "center" in fields else (0.0, 0.0)
+    spacing_m = _read_number(fields, "spacing_m", DEFAULT_SPACING_M)
+    angle_rad = math.radians(_read_number(fields, "turn_deg", 0.0))
     if shape == "circle":
         places = _circle(count, spacing_m)
     elif shape == "line":
         places = [((index - (count - 1) / 2.0) * spacing_m, 0.0) for index in range(count)]
     elif shape == "grid":
-        places = _grid(count, spacing_m, formation)
+        columns = fields["columns"].whole(1, MAX_COLUMNS) if "columns" in fields else math.ceil(math.sqrt(count))
+        places = _grid(count, spacing_m, columns)
     else:
-        places = _read_points(formation, count)
+        places = _read_points(fields, count)
     _check_spacing(places, min_spacing_m)
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return [(center[0] + x * cos - y * sin, center[1] + x * sin + y * cos) for x, y in places]
@@ -77,10 +79,7 @@ def _circle(count: int, spacing_m: float) -> List[Point]:
     return [(radius_m * math.cos(angle), radius_m * math.sin(angle)) for angle in angles]
 
 
-def _grid(count: int, spacing_m: float, formation: Dict[str, Any]) -> List[Point]:
-    columns = formation.get("columns", math.ceil(math.sqrt(count)))
-    if not is_whole_number(columns, low=1):
-        raise FormationError(f"formation: columns is {shorten(columns)}, but must be a whole number, 1 or more")
+def _grid(count: int, spacing_m: float, columns: int) -> List[Point]:
     rows = math.ceil(count / columns)
     return [
         (
@@ -91,11 +90,11 @@ def _grid(count: int, spacing_m: float, formation: Dict[str, Any]) -> List[Point
     ]
 
 
-def _read_points(formation: Dict[str, Any], count: int) -> List[Point]:
-    points = formation.get("points")
-    if not isinstance(points, list) or len(points) < count:
+def _read_points(fields: Dict[str, Entry], count: int) -> List[Point]:
+    points = [_read_point(entry) for entry in fields["points"].entries()] if "points" in fields else []
+    if len(points) < count:
         raise FormationError("formation: points must be a list of at least %d places [x, y] in m" % count)
-    return [_read_point("points", point) for point in points]
+    return points
 
 
 def _check_spacing(places: List[Point], min_spacing_m: float) -> None:
@@ -105,16 +104,13 @@ def _check_spacing(places: List[Point], min_spacing_m: float) -> None:
         raise FormationError(text % (apart_m, min_spacing_m))
 
 
-def _read_number(key: str, value: Any) -> float:
-    if not is_number(value):
-        raise FormationError(f"formation: {key} is {shorten(value)}, but must be a number")
-    return float(value)
+def _read_number(fields: Dict[str, Entry], key: str, default: float) -> float:
+    return fields[key].number(-MAX_COORDINATE_M, MAX_COORDINATE_M, "") if key in fields else default
 
 
-def _read_point(key: str, value: Any) -> Point:
-    if not isinstance(value, (list, tuple)) or len(value) != 2:
-        raise FormationError(f"formation: {key} holds {shorten(value)}, but must hold [x, y] in m")
-    return _read_number(key, value[0]), _read_number(key, value[1])
+def _read_point(entry: Entry) -> Point:
+    x_m, y_m = entry.numbers(2, -MAX_COORDINATE_M, MAX_COORDINATE_M, "[x, y] in m")
+    return x_m, y_m
 
 
 def assign_goals(starts: Sequence[Point], goals: Sequence[Point]) -> List[int]:

@@ -11,7 +11,7 @@ from .calibration_file import (
     read_calibration,
     read_calibrations,
 )
-from .marked_yaml import Entry, EntryError, read_entries
+from .marked_yaml import Entry, EntryError, load_entries, mark_values, read_entries
 from .safe_file import hold_file, lock_file, make_new_name, name_file, read_file, replace_file, write_file
 from .yaml_edit import replace_values
 from .yaml_text import YamlError, decode_text, parse_yaml, read_text

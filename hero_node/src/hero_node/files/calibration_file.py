@@ -11,8 +11,7 @@ from typing import Any, Dict, List, NamedTuple, Tuple
 from ..errors import HeroError
 from ..parameters.number_checks import is_number
 from ..texts import make_printable, shorten
-from .marked_yaml import Entry, EntryError, read_entries
-from .yaml_text import YamlError, read_text
+from .marked_yaml import Entry, EntryError, load_entries
 
 STOCK, HERO_PLUS = "hero", "hero_plus"
 """Models of the robot."""
@@ -121,14 +120,10 @@ def read_calibration(path: str) -> KeptCalibration:
     """Read a file. Raises: CalibrationFileError with file, line, key, value and what is allowed."""
     robot = ""
     try:
-        content = read_entries(read_text(path), path, "robot: hero_3").mapping(None, ("robot",))
+        content = load_entries(path, "robot: hero_3").mapping(None, ("robot",))
         robot_id = _read_robot_id(content["robot"])
         robot = "hero_%d" % robot_id
         values, others = _read_values(content)
-    except OSError as error:
-        raise CalibrationFileError(f"{path}: cannot be read: {error.strerror}; {REMEDY}") from error
-    except YamlError as error:
-        raise CalibrationFileError(f"{path}: {error}; {REMEDY}") from error
     except EntryError as error:
         raise CalibrationFileError(f"{error}; {REMEDY}", robot) from error
     date = str(content["date"].value) if "date" in content else ""

@@ -4,14 +4,16 @@ Anchors and merge keys are refused: a line would not be unique, and a short file
 """
 
 import math
-from typing import Any, Collection, Dict, List, NamedTuple, NoReturn, Optional, Tuple
+from contextlib import suppress
+from typing import Any, Callable, Collection, Dict, List, NamedTuple, NoReturn, Optional, Tuple
 
 import yaml
 
 from ..errors import HeroError
 from ..parameters.number_checks import is_number, is_whole_number
 from ..texts import make_printable, one_line, shorten
-from .yaml_text import MAX_CHARACTERS
+from .safe_file import read_file
+from .yaml_text import MAX_CHARACTERS, YamlError, decode_text
 
 MAX_DEPTH = 20
 """Levels of lists and mappings within each other; an experiment has four."""
@@ -44,8 +46,11 @@ class Entry(NamedTuple):
         raise EntryError(f"{self.place}: {self.name} is {shorten(shown)}, but must be {text}")
 
     def number(self, low: float, high: float, unit: str) -> float:
-        """Return a number in low..high."""
+        """Return a number in low..high; YAML takes some, such as 1e3, for texts."""
         value = self.value
+        if isinstance(value, str):
+            with suppress(ValueError):
+                value = float(value)
         if not is_number(value) or not low <= value <= high:
             limits = f" from {low:g} to {high:g}" if math.isfinite(high - low) else ""
             self.refuse(f"a number{limits}{' ' + unit if unit else ''}")
@@ -76,6 +81,18 @@ class Entry(NamedTuple):
             self.refuse("a list such as [a, b]")
         return list(self.value)
 
+    def numbers(self, count: int, low: float, high: float, what: str) -> List[float]:
+        """Return the numbers in low..high of a list of count, which what describes."""
+        if not isinstance(self.value, list) or len(self.value) != count:
+            self.refuse(what)
+        return [item.number(low, high, "") for item in self.value]
+
+    def plain(self) -> Any:
+        """Return the value without marks."""
+        if isinstance(self.value, dict):
+            return {name: entry.plain() for name, entry in self.value.items()}
+        return [entry.plain() for entry in self.value] if isinstance(self.value, list) else self.value
+
     def mapping(self, allowed: Optional[Collection[str]] = None, required: Collection[str] = ()) -> Dict[str, "Entry"]:
         """Return name -> entry of a mapping with only the allowed names (None: any), and all the required ones."""
         if not isinstance(self.value, dict):
@@ -98,40 +115,72 @@ class Entry(NamedTuple):
         return next(iter(mapping.items()))
 
 
-def read_entries(text: str, file: str, example: str) -> Entry:
+def load_entries(path: str, example: str, read: Callable[[str], bytes] = read_file, **options: bool) -> Entry:
+    """Return what a file holds, as read_entries(). Raises: EntryError also for one that cannot be read."""
+    try:
+        return read_entries(decode_text(read(path)), path, example, **options)
+    except OSError as error:
+        raise EntryError(f"{path}: cannot be read: {error.strerror}") from error
+    except YamlError as error:
+        raise EntryError(f"{path}: not YAML: {error}") from error
+
+
+def mark_values(value: Any, place: str, name: str = "") -> Entry:
+    """Return values that come from no file as entries; place: where they come from."""
+    if isinstance(value, dict):
+        value = {
+            str(key): mark_values(item, place, f"{name}.{key}" if name else str(key)) for key, item in value.items()
+        }
+    elif isinstance(value, (list, tuple)):
+        value = [mark_values(item, place, name) for item in value]
+    return Entry(value, name, place)
+
+
+def read_entries(text: str, file: str, example: str, as_texts: bool = False, may_be_empty: bool = False) -> Entry:
     """Return the mapping that text, the contents of file, holds; example: of a line in it.
 
+    as_texts: no value is a date, truth value or None; numbers are texts, which number() takes.
     Raises: EntryError with file and line for what is not YAML, not a mapping, or too large.
     """
     if len(text) > MAX_CHARACTERS:
         raise EntryError("%s: longer than %d characters" % (file, MAX_CHARACTERS))
     try:
-        loader = _Loader(text)
+        loader = (_TextLoader if as_texts else _Loader)(text)
         loader.name = file
         node = loader.get_single_node()
     except yaml.MarkedYAMLError as error:
         raise EntryError(f"{_find_place(error.problem_mark)}: not YAML: {error.problem}") from None
     except yaml.YAMLError as error:
         raise EntryError(f"{file}: not YAML: {one_line(error)}") from None
+    if node is None and may_be_empty:
+        return Entry({}, "", file)
     if not isinstance(node, yaml.MappingNode):
         raise EntryError(f"{file}: must hold names and values, such as {example}")
     return _convert(node, "", loader)
 
 
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]
+class _Limits:
     """Refuses deep nesting and anchors before anything that works recursively meets them."""
 
     _depth = 0
 
-    def compose_node(self, parent: Any, index: Any) -> Any:
+    def compose_node(self: Any, parent: Any, index: Any) -> Any:
         event = self.peek_event()
         self._depth += isinstance(event, yaml.CollectionStartEvent)
         if event.anchor is not None or self._depth > MAX_DEPTH:
             what = "more than %d levels" % MAX_DEPTH if event.anchor is None else "anchors cannot be used"
             raise EntryError(f"{_find_place(event.start_mark)}: {what}")
-        node = super().compose_node(parent, index)
+        node = super().compose_node(parent, index)  # type: ignore[misc]
         self._depth -= isinstance(event, yaml.CollectionStartEvent)
         return node
+
+
+class _Loader(_Limits, yaml.SafeLoader):  # type: ignore[misc]
+    pass
+
+
+class _TextLoader(_Limits, yaml.BaseLoader):  # type: ignore[misc]
+    pass
 
 
 def _find_place(mark: yaml.Mark) -> str:
@@ -159,5 +208,9 @@ def _convert_mapping(node: yaml.MappingNode, name: str, loader: Any) -> Dict[str
         key = str(key_node.value)
         if key in mapping:
             raise EntryError(f"{place}: {shorten(key)} appears twice")
-        mapping[key] = _convert(value_node, f"{name}.{key}" if name else key, loader)
+        mapping[key] = _convert(value_node, _join(name, key), loader)
     return mapping
+
+
+def _join(name: str, key: str) -> str:
+    return f"{name}.{key}" if name else key

@@ -3,12 +3,11 @@
 What is not free is solid: obstacles, and unknown cells. Source: wiki.ros.org/map_server.
 """
 
-import math
-from typing import Any, Dict, List, Tuple
+from typing import Dict, List, Tuple
 
 import numpy as np
 
-from hero_node import shorten
+from hero_node.files import Entry
 
 from .arena import Arena
 
@@ -22,30 +21,22 @@ def check_size(width: int, height: int) -> None:
         raise ValueError("the picture has %d x %d pixels, more than %d in all" % (width, height, _MAX_CELLS))
 
 
-def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Arena:
+def build_map_arena(name: str, content: Dict[str, Entry], gray: np.ndarray) -> Arena:
     """Return the arena of a map's YAML content, whose values are texts, and its picture (rows, columns), 0..255.
 
-    Raises: ValueError for invalid values, a turned map, or one without a free cell.
+    Raises: EntryError for invalid values or a turned map, ValueError for one without a free cell.
     """
-    cell_m = _read_number(content, "resolution", 0.05)
-    free_share = _read_number(content, "free_thresh", 0.196)
-    if not 0.0 < free_share <= 1.0:
-        raise ValueError(f"free_thresh must be above 0 and at most 1, such as 0.25 for 25 %, not {free_share:g}")
-    negate = content.get("negate", "0")
-    if negate not in ("0", "1"):
-        raise ValueError(f"negate must be 0 or 1, not {shorten(negate)}")
-    origin = content.get("origin", ["0", "0", "0"])
-    try:
-        x_m, y_m, yaw_rad = (float(value) for value in origin)
-    except (TypeError, ValueError):
-        raise ValueError(f"origin must be x, y and yaw, not {shorten(origin)}") from None
-    if not (abs(x_m) <= _MAX_ORIGIN_M and abs(y_m) <= _MAX_ORIGIN_M and yaw_rad == 0.0):
-        text = "origin must be within %.0f m (x and y, in m) and its yaw 0, not %s"
-        raise ValueError(text % (_MAX_ORIGIN_M, shorten(origin)))
-    if not 0.001 <= cell_m <= 1.0:
-        raise ValueError(f"resolution must be from 0.001 to 1 m, not {cell_m:g}")
+    cell_m = content["resolution"].number(0.001, 1.0, "m") if "resolution" in content else 0.05
+    free_share = content["free_thresh"].number(1e-6, 1.0, "(0.25 is 25 %)") if "free_thresh" in content else 0.196
+    is_negated = "negate" in content and content["negate"].choice(("0", "1")) == "1"
+    x_m = y_m = 0.0
+    if "origin" in content:
+        origin = content["origin"]
+        x_m, y_m, yaw_rad = origin.numbers(3, -_MAX_ORIGIN_M, _MAX_ORIGIN_M, "a list of x m, y m and yaw")
+        if yaw_rad:
+            origin.refuse("a list of x m, y m and a yaw of 0")
     shade = gray[::-1] / 255.0  # the first row of a picture is its upper one
-    occupied_share = shade if negate == "1" else 1.0 - shade
+    occupied_share = shade if is_negated else 1.0 - shade
     solid = occupied_share >= free_share
     rows, columns = np.nonzero(~solid)
     if not len(rows):
@@ -61,16 +52,6 @@ def build_map_arena(name: str, content: Dict[str, Any], gray: np.ndarray) -> Are
     ]
     bounds_m = np.array([*place(columns.min(), rows.min()), *place(columns.max() + 1, rows.max() + 1)])
     return Arena(name, np.array(segments_m).reshape(-1, 4), np.empty((0, 3)), (), bounds_m, tuple(polygons_m))
-
-
-def _read_number(content: Dict[str, Any], key: str, default: float) -> float:
-    try:
-        value = float(content.get(key, default))
-    except (TypeError, ValueError):
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f"{key} must be a number, not {content.get(key)!r}")
-    return value
 
 
 def _find_borders(solid: np.ndarray) -> List[Tuple[Tuple[int, int], Tuple[int, int]]]:

@@ -99,47 +99,53 @@ def test_yaml_of_any_form_keeps_its_values(path, text):
 @pytest.mark.parametrize(
     "text, reason",
     [
-        ("family 36h11", "must hold keys and values"),
-        ("a: [", "is no YAML file"),
-        ("sizes: 3", "unknown key sizes; known are: detector, family"),
+        ("family 36h11", "must hold names and values"),
+        ("a: [", "line 1: not YAML"),
+        ("sizes: 3", "line 1: unknown 'sizes'; allowed are: detector, family"),
         ("detector: zbar", "detector is 'zbar', but must be one of: apriltag, aruco"),
-        ("detector: [apriltag]", "detector is .'apriltag'., but must be one of: apriltag, aruco"),
+        ("detector: [apriltag]", "detector is 'a list', but must be one of: apriltag, aruco"),
         ("family: 25h9", "family is '25h9', but must be one of: 16h5, 36h11"),
         ("decimate: .nan", "decimate is nan, but must be a number from 1 to 8"),
         ("tag_size_m: large", "tag_size_m is 'large', but must be a number from 0.005 to 1"),
-        ("references: {100: [0.5]}", r"references must hold ID: \[x_m, y_m, yaw_deg\] for each tag"),
-        ("references: {100: '123'}", r"references must hold ID: \[x_m, y_m, yaw_deg\] for each tag"),
-        ("references: {1.5: [0, 0, 0]}", r"references must hold ID: \[x_m, y_m, yaw_deg\] for each tag"),
-        ("mounts: {0: [.nan, 0, 0]}", "mounts must hold ID: .* for each tag, not {0:"),
-        ("mounts: 0", "mounts must hold ID: .* for each tag, not 0"),
-        ("tag_robots: {17: 2.7}", "tag_robots must hold ID: the number of a robot for each tag, not {17: 2.7}"),
-        ("tag_robots: {17: -2}", "tag_robots must hold ID: the number of a robot"),
+        ("references: {100: [0.5]}", r"references.100 is 'a list', but must be \[x_m, y_m, yaw_deg\]"),
+        ("references: {100: '123'}", r"references.100 is '123', but must be \[x_m, y_m, yaw_deg\]"),
+        ("references: {1.5: [0, 0, 0]}", r"references has '1.5' for a tag, but must have its number"),
+        ("mounts: {0: [.nan, 0, 0]}", "mounts.0 is nan, but must be a number"),
+        ("mounts: 0", "mounts is 0, but must be a mapping"),
+        ("tag_robots: {17: 2.7}", "tag_robots.17 is 2.7, but must be a whole number"),
+        ("tag_robots: {17: -2}", "tag_robots.17 is -2, but must be a whole number"),
         ("tag_robots: {17: 2, 18: 2}", "tag_robots names robot 2 more than once"),
-        ("references: {100: [%s, 0, 0]}" % (400 * "9"), "references must hold ID: .* for each tag"),
-        ("references: {100: [1e300, 0, 0]}", "references must hold ID: .* for each tag"),
+        ("references: {100: [%s, 0, 0]}" % (400 * "9"), "references.100 is 9+.* must be a number"),
+        ("references: {100: [1e300, 0, 0]}", "references.100 is '1e300', but must be a number"),
         ("decimate: " + 400 * "9", "decimate is 9+.* must be a number from 1 to 8"),
         ("delay_s: -" + 400 * "9", "delay_s is -9+.* must be a number"),
-        (LENS_TEXT.replace("[9, 0", "[%s, 0" % (400 * "9")), "lens is .*: calibrate the lens"),
-        (LENS_TEXT.replace("10", 400 * "9", 1), "lens: images must have 1 to 20000 pixels .*: calibrate the lens"),
+        (LENS_TEXT.replace("[9, 0", "[%s, 0" % (400 * "9")), "lens: .*: calibrate the lens"),
+        (LENS_TEXT.replace("10", 400 * "9", 1), "lens.width_px is 9+.* must be a whole number"),
         (LENS_TEXT.replace("10", "-1920", 1), "lens: images must have 1 to 20000 pixels .* not -1920 x 10"),
         (
             LENS_TEXT + "camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], position_m: [%s, 0, 0]}" % (400 * "9"),
-            "camera is .*: calibrate the arena",
+            "camera.position_m is 9+.* must be a number",
         ),
         ("references: {5: [0, 0, 0]}\nobjects: {5: box}", "tag 5 is named in references and in objects, but has one"),
         ("tag_robots: {5: 3}\nobjects: {5: box}", "tag 5 is named in objects and in tag_robots"),
         ("tag_robots: {7: 3, 5: 4}\nreferences: {5: [0, 0, 0]}", "tag 5 is named in references and in tag_robots"),
-        ("objects: [box]", "objects must hold ID: a name"),
-        ("objects: {9: }", "objects must hold ID: a name for each tag, not {9: None}"),
-        ("lens: 5", "lens is 5, but must hold width_px, .*: calibrate the lens"),
-        ("lens: {width_px: 10}", "lens is {'width_px': 10}, but must hold width_px, .*: calibrate the lens"),
-        (LENS_TEXT + "camera:", "camera is None, but must hold rotation .*: calibrate the arena"),
-        (LENS_TEXT + "camera: {rotation: [1], position_m: [0, 0, 2]}", "must hold rotation .nine numbers"),
-        (LENS_TEXT + "camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, -1], position_m: [0, 0, 2]}", "must hold rotation"),
+        ("objects: [box]", "objects is 'a list', but must be a mapping"),
+        ("objects: {9: }", "objects.9 is None, but must be"),
+        ("lens: 5", "lens is 5, but must be a mapping"),
+        ("lens: {width_px: 10}", "height_px is missing in lens"),
+        (LENS_TEXT + "camera:", "camera is None, but must be a mapping"),
+        (
+            LENS_TEXT + "camera: {rotation: [1], position_m: [0, 0, 2]}",
+            "must be rotation .nine numbers.*: calibrate the arena",
+        ),
+        (
+            LENS_TEXT + "camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, -1], position_m: [0, 0, 2]}",
+            "camera.rotation .* a turn, without mirroring",
+        ),
         ("camera: {rotation: [1, 0, 0, 0, 1, 0, 0, 0, 1], position_m: [0, 0, 2]}", "calibrate the lens, then"),
         ("lens: {width_px: 10, height_px: 10, matrix: [0], distortion: []}", "not calibrated"),
         ("exposure_s: 8", "exposure_s is 8, but must be a number from 0.0001 to 1"),
-        ("focus: auto", "focus is 'auto', but must be a whole number from 0 on"),
+        ("focus: auto", "focus is 'auto', but must be a whole number from 0 to"),
         ("power_line_hz: 55", "power_line_hz is 55, but must be 0, 50 or 60"),
     ],
 )
@@ -182,7 +188,7 @@ def test_a_full_disk_leaves_the_settings_as_they_were(path, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", fail)
-    with pytest.raises(SettingsError, match=r"camera\.yaml cannot be written: No space left on device"):
+    with pytest.raises(SettingsError, match=r"camera\.yaml cannot be read or written: No space left on device"):
         settings.update(path, {"decimate": 2.0})
     assert read(path) == {"decimate": 1.0} and os.listdir(os.path.dirname(path)) == ["camera.yaml"]
 
@@ -247,7 +253,7 @@ def test_a_file_that_is_no_text_is_refused_by_its_name(path):
     settings.update(path, {})
     with open(path, "wb") as file:
         file.write(b"family: \xff\xfe\x00")
-    with pytest.raises(SettingsError, match="camera.yaml is no YAML file"):
+    with pytest.raises(SettingsError, match="camera.yaml: not YAML"):
         settings.load(path)
 
 

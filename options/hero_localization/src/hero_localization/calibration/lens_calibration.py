@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from hero_node import one_line
-from hero_node.files import YamlError, parse_yaml, read_text
+from hero_node.files import EntryError, load_entries
 
 from ..camera.camera_model import Intrinsics
 from ..errors import CalibrationError
@@ -39,6 +39,10 @@ REGIONS = (
     ("lower left", "lower middle", "lower right"),
 )
 MIN_IN_REGION = 20
+
+
+MAX_PX = 10**6
+"""Limit of sizes in a file, px: Intrinsics knows what is possible."""
 
 
 class BoardView(NamedTuple):
@@ -195,19 +199,13 @@ def _list_empty_regions(views: Sequence[BoardView], width_px: int, height_px: in
 def load_lens(path: str) -> Intrinsics:
     """Return the intrinsics in a file of camera_calibration. Raises: CalibrationError."""
     try:
-        content = parse_yaml(read_text(path))
-        return Intrinsics.from_camera_info(
-            int(content["image_width"]),
-            int(content["image_height"]),
-            content["camera_matrix"]["data"],
-            str(content.get("distortion_model", "plumb_bob")),
-            content["distortion_coefficients"]["data"],
-        )
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be read: {error.strerror}") from None
-    except YamlError as error:
-        raise CalibrationError(f"{path} is no YAML file: {error}") from None
-    except KeyError as error:
-        raise CalibrationError(f"{path}: {error} is missing; is it a file of camera_calibration?") from None
-    except (AttributeError, OverflowError, TypeError, ValueError) as error:
+        needed = ("image_width", "image_height", "camera_matrix", "distortion_coefficients")
+        content = load_entries(path, "image_width: 640").mapping(None, needed)
+        width_px, height_px = (content[key].whole(-MAX_PX, MAX_PX) for key in needed[:2])
+        matrix, distortion = (content[key].mapping(None, ("data",))["data"].plain() for key in needed[2:])
+        model = content["distortion_model"].text() if "distortion_model" in content else "plumb_bob"
+        return Intrinsics.from_camera_info(width_px, height_px, matrix, model, distortion)
+    except EntryError as error:
+        raise CalibrationError(f"{error}; is it a file of camera_calibration?") from None
+    except (OverflowError, TypeError, ValueError) as error:
         raise CalibrationError(f"{path} is no file of camera_calibration: {one_line(error)}") from None

@@ -6,14 +6,24 @@ Pure but for the file. Lengths in m, angles in degrees, pixels as in camera_mode
 import itertools
 import math
 import os
-from typing import Any, Callable, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
 from hero_client.values import is_plausible
-from hero_node import Pose, shorten
-from hero_node.files import YamlError, lock_file, parse_yaml, read_text, replace_values, write_file
-from hero_node.parameters import is_number, is_whole_number
+from hero_node import Pose, one_line, shorten
+from hero_node.files import (
+    Entry,
+    EntryError,
+    YamlError,
+    load_entries,
+    lock_file,
+    parse_yaml,
+    read_text,
+    replace_values,
+    write_file,
+)
+from hero_node.parameters import MAX_COORDINATE_M
 
 from ..camera.camera_model import Camera, Intrinsics
 from ..camera.device_controls import POWER_LINES_HZ, DeviceControls
@@ -24,6 +34,8 @@ from .tag_pose import DEFAULT_HEIGHT_M, TagLayout
 
 DEFAULT_PATH = "~/hero_localization/camera.yaml"
 POSE_FORM = "[x_m, y_m, yaw_deg]"
+MAX_ID = 2**31 - 1
+MAX_ID_DIGITS = 9
 
 
 class Settings(NamedTuple):
@@ -45,13 +57,15 @@ class Settings(NamedTuple):
 def load(path: str) -> Settings:
     """Return the settings of a file; of one that does not exist, those of an uncalibrated camera.
 
-    Raises: SettingsError with the file, the key and what it must be.
+    Raises: SettingsError with the file, the line, the key and what it must be.
     """
-    _, content = _read(path)
+    path = os.path.expanduser(path)
+    if not os.path.lexists(path):
+        return Settings()
     try:
-        return _build(content)
-    except ValueError as error:
-        raise SettingsError(f"{path}: {error}") from None
+        return _build(load_entries(path, "family: 36h11", may_be_empty=True))
+    except EntryError as error:
+        raise SettingsError(str(error)) from None
 
 
 def find_change_s(path: str) -> float:
@@ -68,10 +82,15 @@ def update(path: str, parts: Mapping[str, Any]) -> None:
     try:
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
         with lock_file(path):
-            text, content = _read(path)
+            text = read_text(path) if os.path.lexists(path) else ""
+            content = parse_yaml(text) or {}
+            if not isinstance(content, dict):
+                raise SettingsError(f"{path}: must hold names and values, such as family: 36h11")
             write_file(path, replace_values(text, {**content, **parts}).encode())
+    except YamlError as error:
+        raise SettingsError(f"{path}: not YAML: {error}") from None
     except OSError as error:
-        raise SettingsError(f"{path} cannot be written: {error.strerror}") from None
+        raise SettingsError(f"{path} cannot be read or written: {error.strerror}") from None
 
 
 def describe_lens(lens: Intrinsics) -> Dict[str, Any]:
@@ -100,147 +119,108 @@ def describe_pose(pose: Pose) -> List[float]:
     return [round(float(pose.x_m), 5), round(float(pose.y_m), 5), round(math.degrees(pose.yaw_rad), 3)]
 
 
-def _read(path: str) -> Tuple[str, Dict[str, Any]]:
-    """Return the text of a file and what it says, nothing if it does not exist. Raises: SettingsError."""
-    try:
-        text = read_text(os.path.expanduser(path))
-        content = parse_yaml(text)
-    except FileNotFoundError:
-        return "", {}
-    except OSError as error:
-        raise SettingsError(f"{path} cannot be read: {error.strerror}") from None
-    except YamlError as error:
-        raise SettingsError(f"{path} is no YAML file: {error}") from None
-    if not isinstance(content, (dict, type(None))):
-        raise SettingsError(f"{path} must hold keys and values, such as family: 36h11")
-    return text, content or {}
+_NUMBERS = {
+    "tag_size_m": (DEFAULT_SIZE_M, 0.005, 1.0),
+    "tag_height_m": (DEFAULT_HEIGHT_M, 0.0, 1.0),
+    "reference_size_m": (REFERENCE_SIZE_M, 0.005, 1.0),
+    "decimate": (2.0, 1.0, 8.0),
+    "delay_s": (0.0, -1.0, 5.0),
+    "exposure_s": (None, 0.0001, 1.0),
+}
+"""Default and limits."""
+
+_OTHERS = (
+    "detector family lens camera references seen_references objects tag_robots mounts gain focus power_line_hz".split()
+)
 
 
-def _build(content: Mapping[str, Any]) -> Settings:
-    known = (
-        "detector family decimate tag_size_m tag_height_m lens camera delay_s references reference_size_m"
-        " seen_references objects tag_robots mounts exposure_s gain focus power_line_hz"
-    ).split()
-    for key in content:
-        if key not in known:
-            raise ValueError(f"unknown key {key}; known are: {', '.join(known)}")
-    tag_robots = _by_tag(content, "tag_robots", "the number of a robot", _whole_number)
+def _build(root: Entry) -> Settings:
+    content = root.mapping((*_OTHERS, *_NUMBERS))
+    numbers: Dict[str, Any] = {
+        key: content[key].number(low, high, "") if key in content else default
+        for key, (default, low, high) in _NUMBERS.items()
+    }
+    tag_robots = _by_tag(content, "tag_robots", lambda entry: entry.whole(0, MAX_ID))
     for robot in tag_robots.values():
         if list(tag_robots.values()).count(robot) > 1:
-            raise ValueError("tag_robots names robot %d more than once, but a robot wears one tag" % robot)
+            text = "%s: tag_robots names robot %d more than once, but a robot wears one tag"
+            raise EntryError(text % (content["tag_robots"].place, robot))
     layout = TagLayout(
         tag_robots=tag_robots,
-        mounts=_by_tag(content, "mounts", POSE_FORM, _pose),
-        objects=_by_tag(content, "objects", "a name", _name),
-        references=_by_tag(content, "references", POSE_FORM, _pose),
-        size_m=_number(content, "tag_size_m", DEFAULT_SIZE_M, 0.005, 1.0),
-        height_m=_number(content, "tag_height_m", DEFAULT_HEIGHT_M, 0.0, 1.0),
-        reference_size_m=_number(content, "reference_size_m", REFERENCE_SIZE_M, 0.005, 1.0),
+        mounts=_by_tag(content, "mounts", _read_pose),
+        objects=_by_tag(content, "objects", _read_name),
+        references=_by_tag(content, "references", _read_pose),
+        size_m=numbers["tag_size_m"],
+        height_m=numbers["tag_height_m"],
+        reference_size_m=numbers["reference_size_m"],
     )
-    _check_meanings(layout)
+    _check_meanings(layout, content)
     lens = _build_lens(content["lens"]) if "lens" in content else None
+    gain, focus = (content[key].whole(0, MAX_ID) if key in content else None for key in ("gain", "focus"))
+    line_hz = content["power_line_hz"].whole(0, 60) if "power_line_hz" in content else None
+    if line_hz not in (None, *POWER_LINES_HZ):
+        content["power_line_hz"].refuse("0, 50 or 60")
     return Settings(
-        _choice(content, "detector", DEFAULT_BACKEND, BACKENDS),
-        _choice(content, "family", "36h11", FAMILIES),
-        _number(content, "decimate", 2.0, 1.0, 8.0),
+        content["detector"].choice(sorted(BACKENDS)) if "detector" in content else DEFAULT_BACKEND,
+        content["family"].choice(sorted(FAMILIES)) if "family" in content else "36h11",
+        numbers["decimate"],
         layout,
         lens,
         _build_camera(content["camera"], lens) if "camera" in content else None,
-        _number(content, "delay_s", 0.0, -1.0, 5.0),
-        _by_tag(content, "seen_references", POSE_FORM, _pose),
-        _build_controls(content),
+        numbers["delay_s"],
+        _by_tag(content, "seen_references", _read_pose),
+        DeviceControls(numbers["exposure_s"], gain, focus, line_hz),
     )
 
 
-def _check_meanings(layout: TagLayout) -> None:
-    """Check that no tag has two meanings. Raises: ValueError."""
+def _check_meanings(layout: TagLayout, content: Mapping[str, Entry]) -> None:
+    """Check that no tag has two meanings. Raises: EntryError."""
     meanings = {"references": layout.references, "objects": layout.objects, "tag_robots": layout.tag_robots}
     for (one, tags), (other, others) in itertools.combinations(meanings.items(), 2):
         for tag_id in sorted(tags.keys() & others.keys()):
-            text = "tag %d is named in %s and in %s, but has one meaning: remove it from one of them"
-            raise ValueError(text % (tag_id, one, other))
+            text = "%s: tag %d is named in %s and in %s, but has one meaning: remove it from one of them"
+            raise EntryError(text % (content[other].place, tag_id, one, other))
 
 
-def _build_controls(content: Mapping[str, Any]) -> DeviceControls:
-    exposure_s = _number(content, "exposure_s", 0.0, 0.0001, 1.0) if "exposure_s" in content else None
-    for key in ("gain", "focus"):
-        if not is_whole_number(content.get(key, 0), low=0):
-            raise ValueError(f"{key} is {shorten(content[key])}, but must be a whole number from 0 on")
-    power_line_hz = content.get("power_line_hz", 0)
-    if power_line_hz not in POWER_LINES_HZ:
-        raise ValueError(f"power_line_hz is {shorten(power_line_hz)}, but must be 0, 50 or 60")
-    return DeviceControls(exposure_s, content.get("gain"), content.get("focus"), content.get("power_line_hz"))
-
-
-def _number(content: Mapping[str, Any], key: str, default: float, low: float, high: float) -> float:
-    value = content.get(key, default)
-    if not is_number(value, low, high):
-        raise ValueError(f"{key} is {shorten(value)}, but must be a number from {low:g} to {high:g}")
-    return float(value)
-
-
-def _choice(content: Mapping[str, Any], key: str, default: str, known: Iterable[str]) -> str:
-    value = content.get(key, default)
-    if value not in list(known):
-        raise ValueError(f"{key} is {shorten(value)}, but must be one of: {', '.join(sorted(known))}")
-    return str(value)
-
-
-def _by_tag(content: Mapping[str, Any], key: str, form: str, read: Callable[[Any], Any]) -> Dict[int, Any]:
+def _by_tag(content: Mapping[str, Entry], key: str, read: Callable[[Entry], Any]) -> Dict[int, Any]:
     """Return a mapping from ids of tags to what read makes of the values."""
-    given = content.get(key)
-    if given is None:
+    if key not in content or content[key].value is None:
         return {}
-    try:
-        return {_whole_number(tag_id): read(value) for tag_id, value in given.items()}
-    except (AttributeError, OverflowError, TypeError, ValueError):
-        raise ValueError(f"{key} must hold ID: {form} for each tag, not {shorten(given)}") from None
+    entries = content[key].mapping()
+    for name in entries:
+        if not name.isdecimal() or len(name) > MAX_ID_DIGITS:
+            raise EntryError(f"{entries[name].place}: {key} has {shorten(name)} for a tag, but must have its number")
+    return {int(name): read(entry) for name, entry in entries.items()}
 
 
-def _whole_number(value: Any) -> int:
-    if not is_whole_number(value, low=0):
-        raise ValueError
-    return int(value)
+def _read_name(entry: Entry) -> str:
+    return entry.text() if isinstance(entry.value, str) else str(entry.whole(0, MAX_ID))
 
 
-def _name(value: Any) -> str:
-    if not isinstance(value, (str, int)) or value == "":
-        raise ValueError
-    return str(value)
-
-
-def _pose(values: Any) -> Pose:
-    if not isinstance(values, list):
-        raise ValueError
-    x_m, y_m, yaw_deg = map(float, values)
+def _read_pose(entry: Entry) -> Pose:
+    x_m, y_m, yaw_deg = entry.numbers(3, -MAX_COORDINATE_M, MAX_COORDINATE_M, POSE_FORM)
     pose = Pose(x_m, y_m, math.radians(yaw_deg))
-    if not is_plausible(pose):
-        raise ValueError
-    return pose
+    return pose if is_plausible(pose) else entry.refuse(POSE_FORM)
 
 
-def _build_lens(part: Any) -> Intrinsics:
+def _build_lens(entry: Entry) -> Intrinsics:
+    keys = ("width_px", "height_px", "matrix", "distortion")
+    part = entry.mapping(keys, keys)
+    size_px = [part[key].whole(-MAX_ID, MAX_ID) for key in keys[:2]]
+    matrix, distortion = (part[key].plain() for key in keys[2:])
     try:
-        return Intrinsics.from_camera_info(
-            int(part["width_px"]), int(part["height_px"]), part["matrix"], "plumb_bob", part["distortion"]
-        )
-    except (KeyError, TypeError, OverflowError):
-        keys = "width_px, height_px, matrix (nine numbers) and distortion"
-        raise ValueError(f"lens is {shorten(part)}, but must hold {keys}: calibrate the lens") from None
-    except ValueError as error:
-        raise ValueError(f"lens: {error}: calibrate the lens") from None
+        return Intrinsics.from_camera_info(*size_px, matrix, "plumb_bob", distortion)
+    except (TypeError, OverflowError, ValueError) as error:
+        raise EntryError(f"{entry.place}: lens: {one_line(error)}: calibrate the lens") from None
 
 
-def _build_camera(part: Any, lens: Optional[Intrinsics]) -> Camera:
+def _build_camera(entry: Entry, lens: Optional[Intrinsics]) -> Camera:
     if lens is None:
-        raise ValueError("camera needs lens: calibrate the lens, then the arena")
-    try:
-        rotation = np.asarray(part["rotation"], dtype=float).reshape(3, 3)
-        position_m = np.asarray(part["position_m"], dtype=float).reshape(3)
-        is_rotation = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) and np.linalg.det(rotation) > 0.0
-        if is_rotation and np.isfinite(position_m).all():
-            return Camera(lens, rotation, position_m)
-    except (KeyError, OverflowError, TypeError, ValueError):
-        pass  # keys that are missing, other values than numbers, or too few of them
-    keys = "rotation (nine numbers) and position_m (three)"
-    raise ValueError(f"camera is {shorten(part)}, but must hold {keys}: calibrate the arena")
+        raise EntryError(f"{entry.place}: camera needs lens: calibrate the lens, then the arena")
+    keys = "rotation (nine numbers) and position_m (three): calibrate the arena"
+    part = entry.mapping(("rotation", "position_m"), ("rotation", "position_m"))
+    rotation = np.reshape(part["rotation"].numbers(9, -1.1, 1.1, keys), (3, 3))
+    position_m = np.array(part["position_m"].numbers(3, -MAX_COORDINATE_M, MAX_COORDINATE_M, keys))
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-3) or np.linalg.det(rotation) <= 0.0:
+        part["rotation"].refuse("a turn, without mirroring or scaling: calibrate the arena")
+    return Camera(lens, rotation, position_m)
