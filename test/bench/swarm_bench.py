@@ -13,6 +13,7 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 import numpy as np
 from measuring import measure_machine_us, print_machine
 
+from hero_client.controllers import steer
 from hero_client.values import BODY_RADIUS_M
 from hero_sim.world.arena import build_rectangle
 from hero_swarm import Behavior
@@ -21,7 +22,6 @@ from hero_swarm.behaviors import find_behavior
 from hero_swarm.metrics import METRICS, cluster_fraction, dispersion_ratio, time_until
 from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.safety import OFF, ROBOTS, SafetyFilter
-from hero_swarm.steering import steer
 from hero_swarm.trial import OPEN, Trial
 
 PARTS = ("aggregation", "evolved", "filter", "speed")

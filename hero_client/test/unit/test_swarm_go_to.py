@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.controllers.orca import AvoidanceLaw, avoid_others, avoid_sensed, half_plane, nearest_allowed, steer
+from hero_client.controllers.half_planes import nearest_allowed, steer
+from hero_client.controllers.orca import AvoidanceLaw, avoid_others, avoid_sensed, keep_apart
 from hero_client.controllers.swarm_go_to import (
     ASIDE_S,
     DOCKING_M,
@@ -122,46 +123,38 @@ def test_what_is_sensed_turns_the_wanted_velocity_to_the_right():
         (0.0, -0.03, (-0.03, 0.0)),
     ):
         ranges = [BODY_RADIUS_M + gap_m] + [math.inf] * 7
-        wanted, normals, bounds = avoid_sensed(HERE, ranges, np.array([speed_m_s, 0.0]), LAW)
-        assert wanted == pytest.approx(expected)
-        assert len(bounds) == len(normals) == (gap_m < LAW.sense_m)
-        if len(bounds):
-            assert normals[0] == pytest.approx((-1.0, 0.0)) and bounds[0] == pytest.approx(-max(gap_m - 0.03, -0.02))
+        wanted, normals, bounds = avoid_sensed(np.zeros(1), [ranges], np.array([(speed_m_s, 0.0)]), LAW)
+        assert wanted[0] == pytest.approx(expected) and normals[0, 0] == pytest.approx((-1.0, 0.0))
+        limit = -max(gap_m - 0.03, -0.02) if gap_m < LAW.sense_m else -math.inf
+        assert bounds[0] == pytest.approx([limit] + [-math.inf] * 7)
 
 
 def test_robots_that_overlap_come_apart_within_a_step():
     for offset in ((0.1, 0.0), (0.0, -0.05)):
         offset, radius_m = np.array(offset), 0.15
         for velocity in (np.zeros(2), np.array([0.05, 0.02])):
-            normal, depth = half_plane(offset, velocity, radius_m, 3.0, 0.1)
+            normal, depth = keep_apart(offset, velocity, radius_m, 3.0, 0.1)
             changed = velocity + normal * depth
             assert np.hypot(*(offset - changed * 0.1)) == pytest.approx(radius_m)
-    normal, depth = half_plane(np.zeros(2), np.zeros(2), 0.15, 3.0, 0.1)
+    normal, depth = keep_apart(np.zeros(2), np.zeros(2), 0.15, 3.0, 0.1)
     assert normal.tolist() == [-1.0, 0.0] and depth == pytest.approx(1.5)
 
 
 def test_each_robot_takes_half_of_the_change_and_looks_at_the_nearest_ones():
-    none = (np.empty((0, 2)), np.empty(0))
     places, ahead = np.array([(0.0, 0.0), (0.3, 0.0)]), np.array((0.08, 0.0))
     gap_m = 0.3 - 2.0 * LAW.radius_m
 
-    def avoid(own, places, wanted, planes):
-        return avoid_others(own, places, np.zeros_like(places), wanted, LAW, STEP_S, *planes)
+    def avoid(places, wanted):
+        planes = avoid_others(places, np.zeros_like(places), LAW, STEP_S)
+        return nearest_allowed(np.tile(wanted, (len(places), 1)), *planes, LAW.max_linear_m_s)
 
     # Head on, from rest: together they may close the gap within the horizon, each half of it.
-    assert avoid(0, places, ahead, none) == pytest.approx((0.5 * gap_m / LAW.horizon_s, 0.0))
-    fence = (np.array([(-1.0, 0.0)]), np.array([-0.01]))
-    assert avoid(0, places, ahead, fence)[0] == pytest.approx(0.01)
-    assert avoid(1, places, np.zeros(2), none).tolist() == [0.0, 0.0]
+    assert avoid(places, ahead)[0] == pytest.approx((0.5 * gap_m / LAW.horizon_s, 0.0))
+    assert avoid(places, np.zeros(2)).tolist() == [[0.0, 0.0], [0.0, 0.0]]
     crowd = np.vstack((places, [(-0.2, 0.001 * index) for index in range(LAW.neighbors)]))
-    assert avoid(0, crowd, ahead, none)[0] > 0.07 and LAW.neighbors == 6, "as many as fit around one are nearer"
-    assert avoid(0, crowd[:-1], ahead, none)[0] < 0.07
-
-
-def test_where_nothing_is_allowed_all_give_way_by_the_same():
-    normals, bounds = np.array([(1.0, 0.0), (-1.0, 0.0)]), np.array([0.06, 0.02])
-    found = nearest_allowed(np.zeros(2), normals, bounds, 0.1)
-    assert bounds - normals @ found == pytest.approx([0.04, 0.04], abs=1e-3)
+    assert avoid(crowd, ahead)[0, 0] > 0.07 and LAW.neighbors == 6, "as many as fit around one are nearer"
+    assert avoid(crowd[:-1], ahead)[0, 0] < 0.07
+    assert avoid(places[:1], ahead).tolist() == [[0.08, 0.0]], "a robot alone"
 
 
 def test_commands_beyond_the_limits_are_slowed_down_as_a_whole():
@@ -171,4 +164,4 @@ def test_commands_beyond_the_limits_are_slowed_down_as_a_whole():
         ((0.02, -0.15), (0.01, -2.5)),
         ((-0.1, 0.0), (-0.08, 0.0)),
     ):
-        assert steer(HERE, np.array(velocity), LAW) == pytest.approx(expected)
+        assert steer(*velocity, LAW.max_linear_m_s, LAW.lookahead_m) == pytest.approx(expected)

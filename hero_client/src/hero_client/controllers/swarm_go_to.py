@@ -7,9 +7,10 @@ import numpy as np
 
 from hero_node import STOP, Pose, Velocity
 
+from .half_planes import nearest_allowed, steer
 from .lateness import Lateness
 from .motion import AIM_SHARE
-from .orca import AvoidanceLaw, avoid_others, avoid_sensed, steer, steered_point
+from .orca import AvoidanceLaw, avoid_others, avoid_sensed
 from .unicycle import GoToLaw, go_to_point
 
 DOCKING_M = 0.05
@@ -26,6 +27,9 @@ PATIENCE_S = 4.0
 
 ASIDE_S = 2.0
 """For this long, then it tries again."""
+
+SOFTNESS = 0.1
+"""Softness of half planes: with none, crowds were driven into each other; margin_m is wider than what is given way."""
 
 PROGRESS_M = 0.01
 """Nearer by more than this counts as nearer."""
@@ -89,7 +93,9 @@ class SwarmGoToController:
     def _steer(
         self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]], elapsed_s: float
     ) -> List[Velocity]:
-        places = np.array([steered_point(pose, self.law.lookahead_m) for pose in poses])
+        yaws_rad = np.array([pose.yaw_rad for pose in poses])
+        headings = np.column_stack((np.cos(yaws_rad), np.sin(yaws_rad)))
+        places = np.array([pose[:2] for pose in poses]) + self.law.lookahead_m * headings
         last_places = places if self._last_places is None else self._last_places
         # Measured, not commanded: the motors take half a second to follow.
         velocities = (places - last_places) / elapsed_s
@@ -99,18 +105,21 @@ class SwarmGoToController:
             distance_m < (self._tolerance_m if done else self._dock_law.tolerance_m)
             for done, distance_m in zip(self.arrived, distances_m)
         ]
-        straight = [self._want(*item, elapsed_s) for item in zip(self.goals, poses, distances_m, self._jams)]
-        commands = [STOP] * len(poses)
+        straight = np.array([self._want(*item, elapsed_s) for item in zip(self.goals, poses, distances_m, self._jams)])
+        wanted, *sensed = avoid_sensed(yaws_rad, ranges or [()] * len(poses), straight, self.law)
+        others = avoid_others(places, velocities, self.law, elapsed_s)
+        normals, bounds = (np.concatenate(parts, axis=1) for parts in zip(others, sensed))
+        allowed = nearest_allowed(wanted, normals, bounds, self.law.max_linear_m_s, SOFTNESS)
+        free = np.hypot(*(allowed - straight).T) < 0.25 * np.hypot(*straight.T)
+        forward_m_s = (allowed * headings).sum(axis=1)
+        left_m_s = allowed[:, 1] * headings[:, 0] - allowed[:, 0] * headings[:, 1]
+        limits = self.law.max_linear_m_s, self.law.lookahead_m, self.law.max_angular_rad_s
+        commands = [Velocity(*map(float, speeds)) for speeds in zip(*steer(forward_m_s, left_m_s, *limits))]
         for index, pose in enumerate(poses):
             if self.arrived[index]:
-                continue
-            wanted, normals, bounds = avoid_sensed(pose, ranges[index] if ranges else (), straight[index], self.law)
-            velocity = avoid_others(index, places, velocities, wanted, self.law, elapsed_s, normals, bounds)
-            free = float(np.hypot(*(velocity - straight[index]))) < 0.25 * float(np.hypot(*straight[index]))
-            if distances_m[index] < DOCKING_M and free:
+                commands[index] = STOP
+            elif distances_m[index] < DOCKING_M and free[index]:
                 commands[index] = go_to_point(pose, *self.goals[index], self._dock_law)
-            else:
-                commands[index] = steer(pose, velocity, self.law)
         return commands
 
     def _want(

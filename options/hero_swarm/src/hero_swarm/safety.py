@@ -11,7 +11,7 @@ from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from hero_client.controllers import nearest_allowed_all
+from hero_client.controllers import LOOKAHEAD_M, MARGIN_M, NEIGHBORS, nearest_allowed
 from hero_client.values import HERO, MAX_LINEAR_M_S, MAX_WHEEL_M_S, RobotModel
 
 OFF, FENCE, ROBOTS = "off", "fence", "fence and robots"
@@ -45,11 +45,11 @@ class SafetyFilter:
         calls, limited_calls: number of all calls, and of those in which a robot was limited.
     """
 
-    lookahead_m = 0.03
-    margin_m = 0.012
+    lookahead_m = LOOKAHEAD_M
+    margin_m = MARGIN_M
     gain_1_s = 4.0
     fence_gain_1_s = 2.0
-    neighbors = 6
+    neighbors = NEIGHBORS
     sidestep = 3.0
     max_speed_m_s = MAX_LINEAR_M_S
     max_angular_rad_s = 6.0
@@ -120,7 +120,7 @@ class SafetyFilter:
         right = np.stack((-normals[..., 1], normals[..., 0]), axis=-1)
         wanted = wanted + self.sidestep * (lacking[..., None] * right).sum(axis=2)
         rows = known.size  # not -1: a robot alone has no half planes
-        found = nearest_allowed_all(
+        found = nearest_allowed(
             wanted.reshape(rows, 2), normals.reshape(rows, *normals.shape[2:]), bounds.reshape(rows, bounds.shape[2]),
             self.max_speed_m_s,
         ).reshape(wanted.shape)  # fmt: skip

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from hero_client.controllers import steer
 from hero_client.values import BODY_RADIUS_M, NO_OBJECTS, Neighbors, PlacedObjects
 from hero_swarm import metrics
 from hero_swarm.behavior import PULSES, Random, derive_seed, sense
 from hero_swarm.behaviors import find_behavior, list_names
-from hero_swarm.steering import steer
 
 SEPARATION_M = 0.063
 STILL = (0.0, 0.0)

@@ -5,13 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.controllers import nearest_allowed_all
+from hero_client.controllers import nearest_allowed, steer
 from hero_client.values import BODY_RADIUS_M, MAX_WHEEL_M_S, MODELS, WHEEL_SEPARATION_M
 from hero_sim.stepped import StepSwarm
 from hero_swarm.behavior import Behavior
 from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.safety import OFF, ROBOTS, TOLERANCE_M_S, SafetyFilter
-from hero_swarm.steering import steer
 from hero_swarm.trial import OPEN, Trial
 
 FENCE_M = np.array((-0.7, -0.7, 0.7, 0.7))
@@ -77,9 +76,9 @@ def test_a_speed_that_was_no_number_once_disturbs_nobody_later():
 def test_of_the_allowed_velocities_the_nearest_is_found():
     normals = np.array([[(1.0, 0.0), (0.0, 1.0)], [(-1.0, 0.0), (0.0, 1.0)]])
     bounds = np.array([[0.1, -np.inf], [0.0, 0.05]])
-    found = nearest_allowed_all(np.array([(0.0, 0.02), (0.1, 0.0)]), normals, bounds, 0.2)
+    found = nearest_allowed(np.array([(0.0, 0.02), (0.1, 0.0)]), normals, bounds, 0.2)
     assert found == pytest.approx(np.array([(0.1, 0.02), (0.0, 0.05)]))
-    fast = nearest_allowed_all(np.array([(0.3, 0.4)]), normals[:1], np.array([[-1.0, -1.0]]), 0.2)
+    fast = nearest_allowed(np.array([(0.3, 0.4)]), normals[:1], np.array([[-1.0, -1.0]]), 0.2)
     assert fast == pytest.approx(np.array([(0.12, 0.16)]))
 
 

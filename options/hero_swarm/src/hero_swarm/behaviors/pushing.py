@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hero_client.controllers import steer
 from hero_client.values import BODY_RADIUS_M, OBJECT, ROBOT
 from hero_sim.world import join_wheels
 
 from ..behavior import Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
-from ..steering import steer
 
 
 class ObjectClustering(Behavior):

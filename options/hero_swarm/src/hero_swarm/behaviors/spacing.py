@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from hero_client.controllers import steer
+
 from ..behavior import Behavior, Command, Neighbors, Random, Sensed
-from ..steering import steer
 
 
 class Dispersion(Behavior):
