@@ -16,6 +16,8 @@ from hero_sim.world.robot_errors import draw_errors, set_known
 from hero_sim.world.world import World
 
 MAX_OVERLAP_M = 5e-4
+MAX_CREPT_M = 0.002
+"""In a second, of robots that press on each other in vain."""
 WIDE = build_rectangle(20.0, 20.0, 1)
 
 
@@ -121,13 +123,24 @@ def press(robots, towards_rad, steps):
     world.commands_m_s[:] = 0.28
     for _ in range(steps):
         step(world)
-    return world.poses
+    return world
 
 
 @pytest.mark.parametrize("robots, towards_rad", [(16, math.pi / 4), (40, 0.0)])
 def test_robots_that_press_into_a_corner_or_wall_stay_apart(robots, towards_rad):
-    poses = press(robots, towards_rad, 300)
+    poses = press(robots, towards_rad, 300).poses
     assert np.sort(poses[:, 0])[-4:].min() > poses[:, 0].max() - 2.0 * BODY_RADIUS_M
+
+
+@pytest.mark.slow
+def test_forty_robots_that_press_into_a_corner_come_to_rest():
+    world = press(40, math.pi / 4, 1000)
+    before, overlaps_m = world.poses.copy(), []
+    for _ in range(100):
+        step(world)
+        overlaps_m.append(world.measure_overlaps()[0].max())
+    assert max(overlaps_m) < 1e-4
+    assert np.hypot(*(world.poses - before)[:, :2].T).max() < MAX_CREPT_M
 
 
 @pytest.mark.option("numba")
@@ -135,7 +148,7 @@ def test_pressed_robots_give_the_same_bytes_compiled_and_not(monkeypatch):
     results = []
     for rows in (10**9, 0):
         monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
-        results.append(press(20, math.pi / 4, 300).tobytes())
+        results.append(press(20, math.pi / 4, 300).poses.tobytes())
     assert results[0] == results[1]
 
 

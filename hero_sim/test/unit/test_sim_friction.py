@@ -105,7 +105,7 @@ def test_what_a_wall_does_to_a_robot_balances_the_floor(speeds_m_s, degrees, fri
         assert slid_m_s * drag_n > 0.0, "the wall drags against the slide"
 
 
-@pytest.mark.parametrize("standing", [1, 2, 4])
+@pytest.mark.parametrize("standing", [1, 2, 4, 8])
 def test_one_robot_pushes_no_other_and_no_row(standing):
     """Their traction is equal: a row of n moves at a creep, CREEP_M_S / n."""
     world = build_world([(ACROSS_M * k, 0.0, 0.0) for k in range(standing + 1)], [0.1] + [0.0] * standing)
