@@ -22,23 +22,28 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def main(arguments: Optional[Sequence[str]] = None) -> None:
-    """Fit each robot, print what was found, and write the file. Raises: ExperimentError."""
+def main(arguments: Optional[Sequence[str]] = None) -> int:
+    """Fit each robot, print what was found, and write the file; return 1 if a robot was left out.
+
+    Raises: ExperimentError if no robot could be fitted: then nothing is written.
+    """
     options = parse_options(arguments)
     from .recording_reader import read_recordings  # imports rosbag, where there is ROS, which takes long
 
     arena = load_arena(options.arena) if options.arena else None
     lines = ["# slip cannot be told from smaller wheels: it is the usual one, and wheels are fitted with it"]
-    found = len(lines)
+    found, left_out = len(lines), 0
     for robot_id, recordings in sorted(read_recordings(options.bags).items()):
         try:
             own = describe_fit(fit_robot(recordings, arena), robot_id)
         except ValueError as error:
-            print("hero_%d: %s" % (robot_id, error), file=sys.stderr)
+            print("hero_%d: left out: %s" % (robot_id, error), file=sys.stderr)
+            left_out = 1
             continue
         print("\n".join(own))
         lines += own
     if len(lines) == found:
-        raise ExperimentError("no robot could be fitted")
+        raise ExperimentError(f"no robot could be fitted; {options.out} is as it was")
     write_file(options.out, ("\n".join(lines) + "\n").encode())
     print(f"written: {options.out}")
+    return left_out

@@ -13,15 +13,24 @@ from hero_sim.stepped import RobotRows
 from hero_sim.world import KINDS, World, draw_errors, read_known
 from hero_sim.world.arena import build_rectangle
 from hero_sim.world.robot_errors import set_known
+from hero_swarm import fit as fit_program
 from hero_swarm.experiments.batch import build_trial, load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
-from hero_swarm.fitting import infrared_fit
+from hero_swarm.fitting import infrared_fit, robot_fit
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body
 from hero_swarm.fitting.infrared_fit import _list_readings, fit_infrared
 from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
-from hero_swarm.fitting.recording import PULSES, VELOCITY, Recording, interpolate_poses, measure_wheels, sample_times
+from hero_swarm.fitting.recording import (
+    PULSES,
+    VELOCITY,
+    Recording,
+    find_slips,
+    interpolate_poses,
+    measure_wheels,
+    sample_times,
+)
 from hero_swarm.fitting.replay import Motors, build_errors
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
 from hero_swarm.trial import OPEN
@@ -255,7 +264,7 @@ def test_a_body_is_fitted_to_stretches_that_have_poses_throughout():
         [round(stretches[index][1][0, 0], 2) for index in (0, 2, 3)]
     ), "a second without poses leaves a stretch out"
     assert not list(_list_stretches(recording._replace(poses=np.empty((0, 4)))))
-    with pytest.raises(ValueError, match="turned by 5.8 rad only; 6 are needed"):
+    with pytest.raises(ValueError, match="turned by 5.8 rad only where it touched no wall; 6 are needed"):
         fit_body([make_recording(32.1, turn_rad_s=0.184)])
 
 
@@ -265,3 +274,79 @@ def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
         fits = [(Motors({}), np.ones(3)), (Motors({"lag_s": 0.2}, 0.1), np.ones(3))]
         ends_m = predict_ends(recording, fits, start_share, 2.0)
         assert ends_m == pytest.approx(np.full((2, paths), 0.2), abs=1e-6)
+
+
+def drive_in_square(side_m, avoids, time_s=60.0):
+    """Return the recording of a robot that wanders in a square, with or without a look at its walls."""
+    errors = draw_errors([np.random.RandomState(5)])
+    walls = build_rectangle(side_m, side_m, 1)
+    rows = RobotRows(World(walls, np.zeros((1, 3)), [np.random.RandomState(2)], errors))
+    rows.advance(START_MS)
+    random, commands, odometry, poses = np.random.RandomState(4), [], [], []
+    command, next_ms = (0.1, 0.0), 0.0
+    for now_ms in range(0, round(1000.0 * time_s), PERIOD_MS):
+        if now_ms >= next_ms:
+            command, next_ms = (random.uniform(-0.05, 0.15), random.uniform(-2.0, 2.0)), now_ms + 1000.0
+        linear_m_s, angular_rad_s = command
+        ranges_m = rows.proximity_m[0]
+        if avoids and linear_m_s > 0.0 and (ranges_m[[7, 0, 1]] < 0.14).any():
+            linear_m_s = -0.08
+        if avoids and linear_m_s < 0.0 and (ranges_m[[3, 4, 5]] < 0.14).any():
+            linear_m_s = 0.08
+        commands.append((now_ms / 1000.0, VELOCITY, linear_m_s, angular_rad_s))
+        rows.send_velocity(np.arange(1), linear_m_s, angular_rad_s)
+        rows.advance(START_MS + now_ms + PERIOD_MS)
+        if not odometry or rows.odometry_ms[0] / 1000.0 > odometry[-1][0]:
+            odometry.append((rows.odometry_ms[0] / 1000.0, *rows.odometry[0, :3]))
+        noise = random.normal(0.0, (0.001, 0.001, 0.01))
+        poses.append((rows.now_ms / 1000.0, *(rows.world.poses[0] + noise)))
+    shift = np.array((START_MS / 1000.0, 0.0, 0.0, 0.0))
+    return Recording(np.array(commands), np.array(odometry) - shift, np.array(poses) - shift)
+
+
+def test_stretches_in_which_wheels_turn_at_a_wall_are_left_out():
+    pushing, free = drive_in_square(0.4, avoids=False), drive_in_square(1.5, avoids=True)
+    assert len(find_slips(pushing)) * 0.05 > 15.0, "it pushes walls for a third of the time"
+    assert len(find_slips(free)) * 0.05 < 0.5
+    kept = [len(list(_list_stretches(recording))) for recording in (pushing, free)]
+    assert kept[0] <= 2 < 6 <= kept[1]
+
+
+@pytest.mark.slow
+def test_a_robot_at_walls_gives_a_good_model_or_none():
+    for side_m, avoids in ((0.4, False), (1.5, True)):
+        try:
+            fit = fit_robot([drive_in_square(side_m, avoids)])
+        except ValueError as error:
+            assert not avoids and re.search("touched no wall|after the fit|implausible|too short", str(error))
+        else:
+            assert fit.after_m < fit.before_m and fit.values["wheel_separation_m"] == pytest.approx(0.063, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ((1.0, 1.0, 0.78), "distance between the wheels 49.1 mm is implausible, more than 15 % off"),
+        ((1.0, 1.2, 1.0), "right wheel 1.2 times the nominal one is implausible"),
+    ],
+)
+def test_an_implausible_body_is_refused_with_its_value(body, words, monkeypatch):
+    monkeypatch.setattr(robot_fit, "fit_body", lambda recordings: np.array(body))
+    monkeypatch.setattr(robot_fit, "predict_ends", lambda *arguments: np.array([[0.02], [0.01]]))
+    with pytest.raises(ValueError, match=words):
+        fit_robot([record(VELOCITY, 20.0)])
+
+
+def test_a_fit_that_predicts_worse_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(robot_fit, "predict_ends", lambda *arguments: np.array([[0.031], [0.045]]))
+    recordings = {3: [record(VELOCITY, 30.0)]}
+    monkeypatch.setattr("hero_swarm.recording_reader.read_recordings", lambda paths: recordings)
+    out = tmp_path / "robots.errors"
+    out.write_text("slip=0\n")
+    with pytest.raises(ExperimentError, match="no robot could be fitted; .*robots.errors is as it was"):
+        fit_program.main(["x.bag", "--out", str(out)])
+    assert out.read_text() == "slip=0\n"
+    assert (
+        "hero_3: left out: held-out paths of 5 s end 45.0 mm off after the fit, 31.0 mm before: nothing is told"
+        in capsys.readouterr().err
+    )

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from hero_client.values import WHEEL_SEPARATION_M, follow_wheels
 
-from .recording import Recording, measure_wheels
+from .recording import Recording, find_slips, measure_wheels
 
 STRETCH_S = 8.0
 POSE_PERIOD_S = 0.1
@@ -39,7 +39,8 @@ def fit_body(recordings: List[Recording]) -> np.ndarray:
     stretches = [stretch for recording in recordings for stretch in _list_stretches(recording)]
     turned_rad = sum(float(np.abs(np.diff(np.unwrap(poses[:, 2]))).sum()) for _, poses in stretches)
     if turned_rad < MIN_TURN_RAD:
-        raise ValueError(f"turned by {turned_rad:.1f} rad only; {MIN_TURN_RAD:.0f} are needed, with poses")
+        text = "turned by %.1f rad only where it touched no wall; %.0f are needed, with poses"
+        raise ValueError(text % (turned_rad, MIN_TURN_RAD))
     return np.clip(least_squares(lambda body: _compare(stretches, body), np.ones(3)).x, 0.5, 2.0)
 
 
@@ -48,12 +49,14 @@ def _list_stretches(recording: Recording) -> Iterator[List[np.ndarray]]:
     times_s = recording.poses[:, 0]
     if not len(times_s):
         return
+    slips_s = find_slips(recording)
     for start_s in np.arange(times_s[0], times_s[-1] - STRETCH_S, STRETCH_S):
         wanted_s = start_s + np.arange(0.0, STRETCH_S, POSE_PERIOD_S)
         index = np.unique(np.searchsorted(times_s, wanted_s))
         index = index[index < len(times_s)]
         chosen = recording.poses[index]
-        if len(chosen) > STRETCH_S and np.diff(chosen[:, 0]).max() < 1.0:
+        slips = ((slips_s >= start_s) & (slips_s <= start_s + STRETCH_S)).any()
+        if not slips and len(chosen) > STRETCH_S and np.diff(chosen[:, 0]).max() < 1.0:
             yield [measure_wheels(recording, chosen[:, 0]), chosen[:, 1:]]
 
 

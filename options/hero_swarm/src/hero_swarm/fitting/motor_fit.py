@@ -11,7 +11,7 @@ import numpy as np
 from hero_sim.robot import SPIN_MS
 
 from .body_fit import follow_body
-from .recording import PULSES, SAMPLE_S, Recording, interpolate_poses, measure_wheels, sample_times
+from .recording import PULSES, SAMPLE_S, Recording, find_slips, interpolate_poses, measure_wheels, sample_times
 from .replay import Motors, replay_commands
 
 DELAY = "delay_s"
@@ -85,6 +85,7 @@ def predict_ends(
 ) -> np.ndarray:
     """Return how far off (m) the ends of paths of path_s are that start after a share of the recording (R, paths).
 
+    Paths on which it touched a wall are left out.
     Each path begins where the robot was; the simulated robots, motors and body (3,), know the commands alone.
     """
     wheels_m = replay_commands(recording, [motors for motors, _ in robots])
@@ -94,6 +95,8 @@ def predict_ends(
     span = round(path_s / SAMPLE_S)
     first = np.searchsorted(times_s, max(start_share * recording.time_s, recording.poses[0, 0]))
     starts = np.arange(first, np.searchsorted(times_s, recording.poses[-1, 0]) - span, span)
+    slips_s = find_slips(recording)
+    starts = starts[np.searchsorted(slips_s, times_s[starts]) == np.searchsorted(slips_s, times_s[starts + span])]
     if not len(starts):
         return np.empty((len(robots), 0))
     true_m = _see_from(measured[starts], measured[starts + span])

@@ -11,6 +11,11 @@ VELOCITY, PULSES = 0, 1
 
 SAMPLE_S = 0.05
 
+_SLIP_WINDOW = 20
+"""Samples, over which wheels and poses are compared."""
+_MIN_ROLLED_M, _MAX_MOVED_SHARE = 0.02, 0.5
+"""Wheels that roll farther than this, and poses that move by less than this share of it, are of a robot at a wall."""
+
 NO_SCANS = np.empty((0, 9))
 
 
@@ -56,6 +61,21 @@ def measure_wheels(recording: Recording, times_s: np.ndarray) -> np.ndarray:
     halves_m = turns_rad * (WHEEL_SEPARATION_M / 2.0)
     rolled_m = np.cumsum(np.vstack(([(0.0, 0.0)], np.column_stack((paths_m - halves_m, paths_m + halves_m)))), axis=0)
     return np.column_stack([np.interp(times_s, recording.odometry[:, 0], column) for column in rolled_m.T])
+
+
+def find_slips(recording: Recording) -> np.ndarray:
+    """Return the times (s) of samples at which wheels turn while the pose rests, as at a wall (K,)."""
+    times_s = sample_times(recording)
+    times_s = times_s[(times_s >= recording.poses[0, 0]) & (times_s <= recording.poses[-1, 0])]
+    if len(times_s) <= _SLIP_WINDOW:
+        return np.empty(0)
+    wheels_m, poses = measure_wheels(recording, times_s), interpolate_poses(recording.poses, times_s)
+    rolled_m, moved = (values[_SLIP_WINDOW:] - values[:-_SLIP_WINDOW] for values in (wheels_m, poses))
+    # A wheel's contact moves with the body's center and its turn.
+    moved_m = np.hypot(moved[:, 0], moved[:, 1]) + np.abs(moved[:, 2]) * WHEEL_SEPARATION_M / 2.0
+    rolled_m = np.abs(rolled_m.mean(axis=1)) + np.abs(np.diff(rolled_m, axis=1)[:, 0]) / 2.0
+    slips: np.ndarray = times_s[_SLIP_WINDOW:][(rolled_m > _MIN_ROLLED_M) & (moved_m < _MAX_MOVED_SHARE * rolled_m)]
+    return slips
 
 
 def interpolate_poses(poses: np.ndarray, times_s: np.ndarray) -> np.ndarray:

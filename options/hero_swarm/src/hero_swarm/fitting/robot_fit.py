@@ -18,6 +18,10 @@ HELD_OUT_SHARE = 1.0 / 3.0
 
 PATH_S = 5.0
 
+MAX_DEVIATION = 0.15
+"""Deviation of wheels and their distance from nominal ones beyond which a fit is refused; published odometry is off by
+3 % of the path."""
+
 SLIP = 0.02
 """Cannot be told from rolling less far: the usual one; what is lost by it, wheels roll farther."""
 
@@ -46,7 +50,7 @@ class Fit(NamedTuple):
 def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit:
     """Return the differences of the robot of these recordings, its infrared sensors in the arena that it saw only.
 
-    Raises: ValueError if they tell too little.
+    Raises: ValueError if they tell too little, the fit predicts no better than a nominal robot, or is implausible.
     """
     share = 1.0 - HELD_OUT_SHARE
     seen = [recording.cut(share) for recording in recordings]
@@ -58,12 +62,27 @@ def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit
     if not ends_m.size:
         raise ValueError(f"too short: {recordings[0].time_s:.0f} s hold no path that the fit has not seen")
     before_m, after_m = np.median(ends_m, axis=1).tolist()
+    if after_m >= before_m:
+        text = "held-out paths of %g s end %.1f mm off after the fit, %.1f mm before: nothing is told; drive longer"
+        raise ValueError(text % (PATH_S, 1e3 * after_m, 1e3 * before_m))
+    _check_plausible(body)
     left_wheel, right_wheel = (body[:2] / (1.0 - SLIP * _SLIP_MEAN)).tolist()
     rolled = {"left_wheel": left_wheel, "right_wheel": right_wheel, "slip": SLIP}
     separation = {"wheel_separation_m": float(body[2]) * WHEEL_SEPARATION_M}
     infrared = None if arena is None else fit_infrared(recordings, arena, share)
     values = {**motors[0].values, **rolled, **separation, **(infrared.values if infrared else {})}
     return Fit(values, motors[0].delay_s, before_m, after_m, infrared)
+
+
+def _check_plausible(body: np.ndarray) -> None:
+    """Raise ValueError for wheels, or a distance between them, that no robot has."""
+    for name, value, nominal, unit in zip(
+        ("left wheel", "right wheel", "distance between the wheels"), body, (1.0, 1.0, 1e3 * WHEEL_SEPARATION_M),
+        ("times the nominal one", "times the nominal one", "mm"),
+    ):  # fmt: skip
+        if abs(value - 1.0) > MAX_DEVIATION:
+            text = "%s %.3g %s is implausible, more than %.0f %% off: did it touch walls, or do poses lag behind?"
+            raise ValueError(text % (name, value * nominal, unit, 100.0 * MAX_DEVIATION))
 
 
 def describe_fit(fit: Fit, robot_id: int) -> List[str]:
