@@ -230,7 +230,7 @@ def test_what_a_file_leaves_out_has_its_default(path):
     write(path, "references: {100: [1, 2, 90]}\nmounts: {3: [0.01, 0.02, -90]}\n")
     found = settings.load(path)
     assert (found.decimate, found.delay_s, found.controls) == (2.0, 0.0, (None, None, None, None))
-    assert settings.Settings()[2:] == (2.0, TagLayout(), None, None, 0.0, {}, (None, None, None, None))
+    assert settings.Settings()[2:] == (2.0, TagLayout(), None, None, 0.0, {}, (None, None, None, None), 0.0)
     assert found.layout[-3:] == (0.04, 0.076, 0.1)
     assert found.layout.references[100] == Pose(1.0, 2.0, math.pi / 2.0)
     assert found.layout.mounts[3] == pytest.approx((0.01, 0.02, -math.pi / 2.0))

@@ -124,7 +124,8 @@ class PoseFilter:
             self._main = self._rival
         self._rival = None
         # Of a motion capture system that claims less, no more than it claims.
-        self._systematic = np.minimum(SYSTEMATIC, np.diagonal(measurement.covariance))
+        told = np.diagonal(measurement.covariance)
+        self._systematic = told if measurement.is_systematic else np.minimum(SYSTEMATIC, told)
         return outcome
 
     def _was_moved(self, outlier: StampedPose) -> bool:

@@ -64,6 +64,8 @@ class StampedPose(NamedTuple):
     """Covariance of x, y and yaw, (3, 3), m and rad."""
     source: str = ""
     """Topic and node that a measured pose came from; empty if unknown."""
+    is_systematic: bool = False
+    """Whether its errors stay however many are joined, as those of a camera's calibration do."""
 
 
 class _Step(NamedTuple):

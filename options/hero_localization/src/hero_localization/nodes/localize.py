@@ -87,7 +87,7 @@ class LocalizationNode:
             if robot.id in self._inputs and robot.state == RobotPose.TRACKED and is_plausible(pose):
                 is_told = 0.0 < robot.position_sd < MAX_SD and 0.0 < robot.yaw_sd < MAX_SD
                 covariance = make_covariance(robot.position_sd, robot.yaw_sd) if is_told else self._covariance
-                measurement = StampedPose(robot.stamp.to_sec(), pose, covariance, source)
+                measurement = StampedPose(robot.stamp.to_sec(), pose, covariance, source, is_told)
                 self._call(self._localizer.add_measurement, robot.id, measurement)
         with self._lock:
             lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]

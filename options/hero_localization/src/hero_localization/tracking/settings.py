@@ -52,6 +52,8 @@ class Settings(NamedTuple):
     seen_references: Mapping[int, Pose] = {}
     """Poses of the reference tags in the calibration of the arena."""
     controls: DeviceControls = DeviceControls()
+    arena_sd_m: float = 0.0
+    """Standard deviation of places by that of the reference tags' places."""
 
 
 def load(path: str) -> Settings:
@@ -105,12 +107,16 @@ def describe_lens(lens: Intrinsics) -> Dict[str, Any]:
     }
 
 
-def describe_camera(camera: Camera, seen: Mapping[int, Pose]) -> Dict[str, Any]:
-    """Return the parts of the file that hold a camera's intrinsics, its pose, and the reference tags that it saw."""
+def describe_camera(camera: Camera, seen: Mapping[int, Pose], arena_sd_m: float = 0.0) -> Dict[str, Any]:
+    """Return the parts of the file that hold a camera's intrinsics, its pose, and the reference tags that it saw.
+
+    arena_sd_m: standard deviation of that pose's places.
+    """
     return {
         **describe_lens(camera.lens),
         "camera": {"rotation": camera.rotation.ravel().tolist(), "position_m": camera.position_m.tolist()},
         "seen_references": {tag_id: describe_pose(pose) for tag_id, pose in sorted(seen.items())},
+        "arena_sd_m": round(arena_sd_m, 5),
     }
 
 
@@ -125,6 +131,7 @@ _NUMBERS = {
     "reference_size_m": (REFERENCE_SIZE_M, 0.005, 1.0),
     "decimate": (2.0, 1.0, 8.0),
     "delay_s": (0.0, -1.0, 5.0),
+    "arena_sd_m": (0.0, 0.0, 1.0),
     "exposure_s": (None, 0.0001, 1.0),
 }
 """Default and limits."""
@@ -170,6 +177,7 @@ def _build(root: Entry) -> Settings:
         numbers["delay_s"],
         _by_tag(content, "seen_references", _read_pose),
         DeviceControls(numbers["exposure_s"], gain, focus, line_hz),
+        numbers["arena_sd_m"],
     )
 
 

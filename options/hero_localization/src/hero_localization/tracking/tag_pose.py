@@ -102,8 +102,13 @@ class Sightings(NamedTuple):
     misshapen: Dict[int, float]
 
 
-def fit_squares(camera: Camera, tags: Sequence[TagCorners], height_m: Union[float, np.ndarray]) -> List[TagPose]:
-    """Return the poses of tags that lie flat at height_m, of all or of each (N,); nan for those that no ray meets."""
+def fit_squares(
+    camera: Camera, tags: Sequence[TagCorners], height_m: Union[float, np.ndarray], calibration_sd_m: float = 0.0
+) -> List[TagPose]:
+    """Return the poses of tags that lie flat at height_m, of all or of each (N,); nan for those that no ray meets.
+
+    calibration_sd_m: standard deviation, in x and y each, of places by an error of the camera's pose.
+    """
     if not tags:
         return []
     corners = np.array([tag.corners for tag in tags], dtype=float)
@@ -117,7 +122,7 @@ def fit_squares(camera: Camera, tags: Sequence[TagCorners], height_m: Union[floa
     for tag, center, turn, side_px in zip(tags, centers, turns, sides_px):
         pose = Pose(float(center.real), float(center.imag), math.atan2(turn.imag, turn.real))
         size_m, corner_share = 2.0 * float(abs(turn)), CORNER_PX / max(float(side_px), CORNER_PX)
-        place_m2 = (corner_share * size_m) ** 2 / 4.0 + SYSTEMATIC_M**2
+        place_m2 = (corner_share * size_m) ** 2 / 4.0 + SYSTEMATIC_M**2 + calibration_sd_m**2
         yaw_rad2 = corner_share**2 / 2.0 + SYSTEMATIC_RAD**2
         poses.append(TagPose(tag.tag_id, pose, size_m, np.diag((place_m2, place_m2, yaw_rad2))))
     return poses
@@ -141,13 +146,13 @@ def list_corners(pose: Pose, size_m: float, height_m: float) -> np.ndarray:
     return np.column_stack((square @ np.array(((cos, sin), (-sin, cos))) + pose[:2], np.full(4, height_m)))
 
 
-def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout) -> Sightings:
-    """Return what the tags of one image say."""
+def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout, calibration_sd_m: float = 0.0) -> Sightings:
+    """Return what the tags of one image say; calibration_sd_m: as for fit_squares()."""
     counts = Counter(tag.tag_id for tag in tags)
     sightings = Sightings({}, {}, {}, [], sorted(tag_id for tag_id, count in counts.items() if count > 1), {})
     single = [tag for tag in tags if counts[tag.tag_id] == 1]
     on_floor = [tag.tag_id in layout.references for tag in single]
-    fits = fit_squares(camera, single, np.where(on_floor, 0.0, layout.height_m))
+    fits = fit_squares(camera, single, np.where(on_floor, 0.0, layout.height_m), calibration_sd_m)
     for found, is_reference in zip(fits, on_floor):
         tag_id = found.tag_id
         share = found.size_m / (layout.reference_size_m if is_reference else layout.size_m)

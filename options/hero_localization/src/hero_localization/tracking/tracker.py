@@ -9,6 +9,8 @@ import numpy as np
 from hero_node import Pose, measure_distance, transform_pose
 
 from ..camera.camera_model import Camera
+from .camera_shift import CameraShift
+from .image_quality import ImageQuality
 from .settings import Settings
 from .tag_corners import TagCorners
 from .tag_pose import Sightings, find_smallest_side, locate
@@ -42,8 +44,8 @@ MIN_SIDE_PX = 14.0
 MARGIN_PX = 40.0
 """A tag that is expected nearer to the border than this need not be seen."""
 
-DARK, BRIGHT = 35.0, 225.0
-"""Mean shade, of 255."""
+SHIFTED_M, WRONG_M = 0.001, 0.002
+"""A camera that moved by more since its calibration is named, though poses are corrected; so is a tag that did."""
 
 
 class Problem(NamedTuple):
@@ -60,7 +62,7 @@ class Tracker:
     """One camera.
 
     Attributes:
-        camera: lens and place.
+        camera: lens and place, which follows small shifts that the reference tags show.
         found: the tags in the last image.
         sightings: what they stand for.
         smallest_px: side of the smallest robot's tag that lies wholly in the image.
@@ -75,7 +77,8 @@ class Tracker:
         self.camera = camera
         self.smallest_px = find_smallest_side(camera, settings.layout.size_m, settings.layout.height_m)
         self._images: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
-        self._shade = math.nan
+        self._quality = ImageQuality()
+        self._shift = CameraShift(camera, settings.seen_references)
         self._tag_problems: Dict[int, Tuple[float, str]] = {}
         self.is_moved = False
         self._expected: Dict[int, Deque[bool]] = {}
@@ -83,8 +86,8 @@ class Tracker:
         self._reference_seen_s: Dict[int, float] = {}
 
     def measure_shade(self, gray: np.ndarray) -> None:
-        """Look how bright an image (H, W), 8 bit, is."""
-        self._shade = float(gray[::16, ::16].mean())
+        """Look at the light, noise and blur of an image (H, W), 8 bit, before take() has its tags."""
+        self._quality.measure(gray, [(tag.center, tag.side_px) for tag in self.found])
 
     def take(
         self,
@@ -101,8 +104,12 @@ class Tracker:
         self._note_expected({tag.tag_id for tag in tags}, expected or {})
         self._images.append((stamp_s, number))
         self.found = tags
-        self.sightings = sightings = locate(self.camera, tags, self._settings.layout)
+        calibration_sd_m = math.hypot(self._settings.arena_sd_m, self._shift.rest_m)
+        self.sightings = sightings = locate(self.camera, tags, self._settings.layout, calibration_sd_m)
         self._note_problems(sightings, stamp_s)
+        if not self.is_moved:
+            self._shift.add(tags, stamp_s)
+            self.camera = self._shift.camera
         return sightings
 
     def taken_s(self, stamp_s: float) -> float:
@@ -176,12 +183,14 @@ class Tracker:
         if used_hz < MIN_USED_SHARE * sent_hz and len(self._images) == RATE_FRAMES:
             text = f"{self.describe_rate()} are used: this computer is busy, or too slow for more"
             problems.append(Problem("camera", text, False))
-        if self._shade < DARK or self._shade > BRIGHT:
-            kind, remedy = ("dark", "more") if self._shade < DARK else ("bright", "less")
-            text = f"images are too {kind} (mean {self._shade:.0f} of 255): give {remedy} light or exposure"
-            problems.append(Problem("camera", text, True))
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
         smallest_px = min(sides_px, default=self.smallest_px)
+        problems += [Problem("camera", *problem) for problem in self._quality.list_problems(smallest_px)]
+        if self._shift.shift_m > SHIFTED_M:
+            text = (
+                "the camera has moved by %.0f mm at the field's rim, which is corrected: calibrate the arena again soon"
+            )
+            problems.append(Problem("camera", text % (1e3 * self._shift.shift_m), False))
         if smallest_px < MIN_SIDE_PX:
             text = "tags measure only %.0f px, less than %.0f: mount the camera lower, or print larger tags"
             problems.append(Problem("camera", text % (smallest_px, MIN_SIDE_PX), False))
@@ -193,6 +202,10 @@ class Tracker:
         if missed:
             text = "tags %s are often missed where their robots are: occluded, too dark, too small, or removed?"
             problems.append(Problem("camera", text % ", ".join(map(str, missed)), False))
+        wrong_id, off_m = self._shift.wrong or (-1, 0.0)
+        if WRONG_M < off_m <= MOVED_M:
+            text = "this reference tag moved by %.0f mm, and does not count: put it back, or calibrate the arena again"
+            problems.append(Problem("tag %d" % wrong_id, text % (1e3 * off_m), False))
         moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - MOVED_S]
         missing = [tag_id for tag_id, seen_s in self._reference_seen_s.items() if seen_s < newest_s - MISSING_S]
         if moved and self.is_moved:
