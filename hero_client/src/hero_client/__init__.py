@@ -6,7 +6,7 @@ Public names are imported on first use (PEP 562), so that pure modules of this p
 # ruff: noqa: PLC0414
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, List
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping
 
 if TYPE_CHECKING:  # for editors and mypy, to which a name with `as` is public
     from hero_node import Clock as Clock
@@ -72,8 +72,17 @@ _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = list(_MODULES)
 
+_CHOSEN: Dict[str, Any] = {}
+
+
+def choose_backend(names: Mapping[str, Any]) -> None:
+    """Give programs these in place of public names that need ROS: other robots, their time and their parameters."""
+    _CHOSEN.update(names)
+
 
 def __getattr__(name: str) -> Any:
+    if name in _CHOSEN:
+        return _CHOSEN[name]
     if name not in _MODULES:
         raise AttributeError(f"hero_client has no attribute {name!r}")
     try:

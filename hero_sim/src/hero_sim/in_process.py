@@ -5,10 +5,12 @@ its computation, and gives the same each time.
 """
 
 import argparse
+import builtins
 import runpy
 import sys
 import time
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Dict, Iterable, Mapping, Optional, Sequence
 
 import yaml
@@ -41,6 +43,7 @@ def run_script(options: argparse.Namespace) -> None:
         raise ProgramError(f"{options.script}: no such script")
     swarm = StepSwarm(options.count, options.seed, options.arena, options.wifi, options.perfect, model=options.model)
     replace_ros(swarm)
+    give_script_clock(swarm)
     if options.seconds is not None:
         StepMotion(swarm._clock, end_at(options.seconds))
     sys.argv = [options.script, *options.arguments]
@@ -61,7 +64,7 @@ def end_at(duration_s: float) -> Steps:
 
 
 def replace_ros(swarm: StepSwarm) -> None:
-    """Replace what scripts import from hero_client and time by these robots', in this process from now on."""
+    """Give scripts these robots by what they import from hero_client."""
 
     def find_robot(robot_id: int, odom: bool = True, proximity: bool = True) -> StepRobot:
         if robot_id not in swarm._by_id:
@@ -104,11 +107,20 @@ def replace_ros(swarm: StepSwarm) -> None:
         "read_parameters": read_parameters,
         "run": command_line.run,
     }
-    for name, replacement in replacements.items():
-        setattr(hero_client, name, replacement)
-    for name in ("time", "monotonic"):
-        setattr(time, name, lambda: swarm.now_s)
-    time.sleep = swarm.sleep  # type: ignore[assignment]  # its answer is left alone
+    hero_client.choose_backend(replacements)
+
+
+def give_script_clock(swarm: StepSwarm) -> None:
+    """Let `import time` in the script, and in no other module, give the time of these robots."""
+    clock = ModuleType("time")
+    vars(clock).update(vars(time), time=lambda: swarm.now_s, monotonic=lambda: swarm.now_s, sleep=swarm.sleep)
+    import_module = builtins.__import__
+
+    def import_for(name: str, variables: Optional[Mapping[str, Any]] = None, *arguments: Any) -> Any:
+        is_clock = name == "time" and variables is not None and variables.get("__name__") == "__main__"
+        return clock if is_clock else import_module(name, variables, *arguments)
+
+    builtins.__import__ = import_for
 
 
 if __name__ == "__main__":

@@ -40,6 +40,12 @@ def test_a_script_for_robots_runs_unchanged_on_stepped_ones(tmp_path):
     assert first.stdout == again.stdout
 
 
+def test_only_the_script_itself_has_simulated_time(tmp_path):
+    text = "import time, threading\nfrom time import monotonic\nthreading.Event().wait(0.01)\n"
+    ended = run(tmp_path, text + "import sched\nassert sched._time is not monotonic\nprint(monotonic(), time.time())\n")
+    assert (ended.returncode, ended.stdout) == (0, "0.0 0.0\n"), ended.stderr
+
+
 PROGRAM = """
 from hero_client import Program, open_swarm, read_parameters, run
 from hero_node.parameters import number, robot_ids

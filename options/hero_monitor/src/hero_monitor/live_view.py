@@ -26,8 +26,6 @@ from .serving.server import Server
 WAITING_MAX = 20_000
 """Messages between two turns of the server; the oldest are dropped."""
 
-_sleep, _monotonic = time.sleep, time.monotonic  # hero_sim.in_process replaces those of scripts
-
 
 class LiveView(ExitStack):
     """A Foxglove endpoint on this PC that shows robots until close(); then time passes as fast as it can.
@@ -59,7 +57,7 @@ class LiveView(ExitStack):
         topics = StepTopics(rows, robot_ids, self._receive)
         self._types = {name: TopicType(kind.name, kind.definition) for name, kind in topics.types.items()}
         self._loop: Any = None
-        self._start_s = _monotonic() - rows.now_ms / 1000.0 / speed
+        self._start_s = time.monotonic() - rows.now_ms / 1000.0 / speed
         listening: Future[int] = Future()
         thread = threading.Thread(target=self._serve, args=(port, origins, listening), name="live view", daemon=True)
         thread.start()
@@ -78,9 +76,9 @@ class LiveView(ExitStack):
         """Wait until real time has come as far; a program that was slower does not catch up."""
         del rows
         due_s = self._start_s + self._rows.now_ms / 1000.0 / self._speed
-        ahead_s = due_s - _monotonic()
+        ahead_s = due_s - time.monotonic()
         if ahead_s > 0.0:
-            _sleep(ahead_s)
+            time.sleep(ahead_s)
         else:
             self._start_s -= ahead_s
 

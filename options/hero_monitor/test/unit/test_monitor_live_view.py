@@ -4,6 +4,7 @@ import asyncio
 import json
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 import tornado.httpclient
@@ -81,8 +82,8 @@ def test_pages_of_other_servers_are_refused_but_those_that_were_named(stepped):
 
 def test_time_is_slowed_to_real_time_until_the_view_is_closed(swarm, monkeypatch):
     slept = []
-    monkeypatch.setattr("hero_monitor.live_view._monotonic", lambda: sum(slept))
-    monkeypatch.setattr("hero_monitor.live_view._sleep", slept.append)
+    clock = SimpleNamespace(monotonic=lambda: sum(slept), sleep=slept.append)
+    monkeypatch.setattr("hero_monitor.live_view.time", clock)
     swarm.sleep(1.0)  # before somebody looks
     with LiveView(swarm.rows, range(2), port=0, speed=2.0):
         swarm.sleep(3.0)
