@@ -111,7 +111,7 @@ def replace_ros(swarm: StepSwarm) -> None:
 
 
 def give_script_clock(swarm: StepSwarm) -> None:
-    """Let `import time` in the script, and in no other module, give the time of these robots."""
+    """Give the script, and no other module, these robots' time where it imports `time`."""
     clock = ModuleType("time")
     vars(clock).update(vars(time), time=lambda: swarm.now_s, monotonic=lambda: swarm.now_s, sleep=swarm.sleep)
     import_module = builtins.__import__

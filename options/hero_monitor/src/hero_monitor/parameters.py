@@ -45,6 +45,7 @@ class Parameters:
     rate_hz: float = declare(number(10.0, 1.0, 30.0, "Hz"))
     map_frame: str = declare(Parameter("world", _read_text))
     record_folder: str = declare(Parameter("~/hero_recordings", _read_text))
+    behavior_folder: str = declare(Parameter("~/hero_behaviors", _read_text))
     foxglove_origins: Sequence[str] = declare(Parameter("", _read_words))
     foxglove_publish: bool = declare(flag(False))
     classroom: bool = declare(flag(False))

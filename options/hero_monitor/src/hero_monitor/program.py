@@ -15,8 +15,8 @@ from hero_node.ros import Program
 
 from .background import Background
 from .control.drive_requests import STOP_PERIOD_S, DriveRequests
-from .control.offers import describe_offers
-from .control.programs import find_programs
+from .control.offers import OFFERS, describe_offers
+from .control.programs import find_behaviors, find_programs
 from .control.requests import CLOCK_PERIOD_S, read_clock_ms
 from .fleet_feed.feed import FleetFeed
 from .fleet_feed.page_state import encode
@@ -119,7 +119,7 @@ class Monitor:
         rospy.loginfo("fleet monitor: http://%s:%d%s", host, port, hint)
         self._end_check.start()
         if wanted.control:
-            finding = self._background.submit(find_programs)
+            finding = self._background.submit(self._find_programs)
             finding.add_done_callback(lambda found: self._loop.add_callback(self._offer, found.result()))
         try:
             self._loop.start()
@@ -129,6 +129,10 @@ class Monitor:
             self._foxglove.close()
             self._server.close()
             self._background.shutdown(wait=False)
+
+    def _find_programs(self) -> Dict[str, str]:
+        OFFERS.update(find_behaviors(self._parameters.behavior_folder))
+        return find_programs()
 
     def _offer(self, paths: Dict[str, str]) -> None:
         self._programs.paths = paths

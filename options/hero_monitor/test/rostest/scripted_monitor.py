@@ -6,13 +6,17 @@ import threading
 
 import tornado.ioloop
 
-from hero_monitor.control.offers import OFFERS, describe_offers
+from hero_monitor.control.offers import OFFERS, describe_offers, read_behaviors
 from hero_monitor.control.requests import CLOCK_PERIOD_S, read_clock_ms
 from hero_monitor.fleet_feed.page_state import encode
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import Actions, Server
+from hero_swarm.describe import describe_behaviors
 from hero_test.waiting import wait_for
+
+OFFERS.update(read_behaviors(describe_behaviors()))
+
 
 LONG_CAUSE = "No answer from " + ", ".join("hero_driver_%d" % number for number in range(30))
 

@@ -12,11 +12,14 @@ import yaml
 import sources
 from hero_client.apps.formations import FormationError
 from hero_monitor.control import programs as programs_module
-from hero_monitor.control.offers import BEHAVIORS, OFFERS, check_values, make_arguments, place_robots
+from hero_monitor.control.offers import OFFERS, check_values, make_arguments, place_robots, read_behaviors
 from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import RequestError
-from hero_swarm.behaviors import find_behavior, list_names
+from hero_swarm.behaviors import list_names
+from hero_swarm.describe import describe_behaviors
 from hero_test.waiting import wait_for
+
+OFFERS.update(read_behaviors(describe_behaviors()))
 
 DEADLINE_S = 300.0
 
@@ -45,11 +48,31 @@ def test_all_that_pages_may_set_are_parameters_of_the_program(program):
     assert ("frame" in arguments) == offer.has_frame
 
 
-def test_all_built_in_behaviors_are_offered_with_numbers_they_have():
-    assert sorted(BEHAVIORS) == list_names()
-    for name, fields in BEHAVIORS.items():
-        numbers = find_behavior(name)().numbers()
-        assert {key: field.default for key, field in fields.items()} == {key: numbers[key] for key in fields}
+def test_all_built_in_behaviors_are_offered():
+    assert [name for name in OFFERS if name.startswith("behavior_")] == ["behavior_" + name for name in list_names()]
+
+
+OWN = """
+from hero_node.parameters import number
+from hero_swarm import Behavior
+
+class Dance(Behavior):
+    swing_m = 0.3
+    settings = {"swing_m": number(0.3, 0.1, 1.0, "m")}
+"""
+
+
+def test_behaviors_of_users_are_offered_and_a_broken_file_is_left_out(tmp_path, capfd):
+    (tmp_path / "dance.py").write_text(OWN)
+    (tmp_path / "broken.py").write_text("import nothing_of_this_name")
+    (tmp_path / "two.py").write_text(OWN + "class Rest(Behavior):\n    pass\n")
+    found = programs_module.find_behaviors(str(tmp_path))
+    own = {name: offer for name, offer in found.items() if name not in OFFERS}
+    assert [offer.title for offer in own.values()] == ["dance", "Dance", "Rest"]
+    dance = next(iter(own.values()))
+    assert dance.behavior == f"{tmp_path}/dance.py:Dance"
+    assert (dance.fields["swing_m"].default, dance.fields["swing_m"].limits) == (0.3, (0.1, 1.0))
+    assert "broken.py, line 1: ModuleNotFoundError" in capfd.readouterr().err
 
 
 def test_numbers_of_a_behavior_are_one_parameter_of_its_program():

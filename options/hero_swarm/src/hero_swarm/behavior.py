@@ -19,6 +19,7 @@ from typing import Any, Dict, Optional, Sequence, Tuple
 import numpy as np
 
 from hero_client.values import (
+    MAX_LINEAR_M_S,
     NO_OBJECTS,
     Binary,
     Neighborhood,
@@ -29,7 +30,7 @@ from hero_client.values import (
     Sight,
 )
 from hero_node import shorten
-from hero_node.parameters import is_number
+from hero_node.parameters import Parameter, is_number, number
 
 from .sensors import Surroundings, is_sensor, read_sensor
 from .sensors.own import Distance, NeighborColors, Odometry, Proximity
@@ -43,6 +44,11 @@ __all__ = [
 MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 100.0
 
 VELOCITY, PULSES = DRIVES = ("velocity", "pulses")
+
+SPEED = number(0.1, 0.01, MAX_LINEAR_M_S, "m/s")
+GAIN = number(0.5, 0.0, 5.0, "1/s")
+RANGE = number(0.5, 0.05, 5.0, "m")
+"""Settings of many behaviors."""
 
 Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
@@ -119,11 +125,13 @@ class Behavior:
         metric: name of the metric (hero_swarm.metrics) that shows how well it does.
         drive: how its speeds reach the wheels: "velocity", the firmware's velocity controller, or "pulses", servo
             pulses, which wheels follow sooner (see wheel_pulses) and which robots with calibrated motors take.
+        settings: those of its numbers that pages may set, with limits and units; the numbers are the defaults.
     """
 
     rate_hz: float = 20.0
     metric: str = "dispersion_ratio"
     drive: str = VELOCITY
+    settings: Dict[str, Parameter] = {}
 
     def __init__(self, **parameters: Any) -> None:
         """Set parameters by name, and fields of sensors by SENSOR.FIELD.
@@ -146,7 +154,7 @@ class Behavior:
 
     def parameters(self) -> Dict[str, Any]:
         """Return all parameters and sensors with their values."""
-        names = [name for name in dir(self) if not name.startswith("_")]
+        names = [name for name in dir(self) if not name.startswith("_") and name != "settings"]
         return {name: getattr(self, name) for name in names if not callable(getattr(self, name))}
 
     def numbers(self) -> Dict[str, float]:

@@ -21,60 +21,18 @@ class ProgramDescription(NamedTuple):
     fields: Dict[str, Parameter] = {}
     has_frame: bool = False  # it needs the robots' places on the map
     drives: slice = slice(None)  # which of its robots, in their order; pages may drive the others meanwhile
-    behavior: str = ""  # the built-in one that program behavior runs; fields but safety are numbers of its class
+    behavior: str = ""  # what program behavior runs; fields but safety are numbers of its class
 
 
 _SPEED = number(0.08, 0.01, MAX_LINEAR_M_S, "m/s")
-_SPEED_LIMIT = {"max_linear_m_s": _SPEED._replace(default=0.1)}
-_WHEELS = {"wheel_m_s": _SPEED._replace(default=0.12)}
-_GAIN = number(0.5, 0.0, 5.0, "1/s")
-_RANGE = number(0.5, 0.05, 5.0, "m")
 _COORDINATE = number(0.0, -MAX_GOAL_M, MAX_GOAL_M, "m")
-_PUSH = {"goal_x_m": _COORDINATE, "goal_y_m": _COORDINATE, "linear_m_s": _SPEED}
-_VOTE = {"changes_hz": number(0.5, 0.01, 10.0, "1/s"), "cruise_m_s": _SPEED._replace(default=0.1)}
-
-BEHAVIORS: Dict[str, Dict[str, Parameter]] = {
-    "aggregation": {},
-    "evolved_aggregation": _WHEELS,
-    "cyclic_pursuit": _WHEELS,
-    "dispersal": _WHEELS,
-    "milling": _WHEELS,
-    "wall_following": _WHEELS,
-    "flocking": {
-        "spacing_m": _RANGE._replace(default=0.25),
-        "alignment": number(0.1, 0.0, 1.0, "m/s"),
-        "cohesion": number(0.15, 0.0, 2.0, "1/s"),
-        "cruise_m_s": _SPEED._replace(default=0.05),
-        **_SPEED_LIMIT,
-    },
-    "dispersion": {"spacing_m": _RANGE, "gain_1_s": _GAIN._replace(default=0.4), **_SPEED_LIMIT},
-    "segregation": {
-        "groups": whole_number(2, 2, 6),
-        "own_m": _RANGE._replace(default=0.15),
-        "others_m": _RANGE._replace(default=1.0),
-        **_SPEED_LIMIT,
-    },
-    "rendezvous": {"gain_1_s": _GAIN, **_SPEED_LIMIT},
-    "leader_followers": {"gap_m": _RANGE._replace(default=0.15), "leader_m_s": _SPEED._replace(default=0.05)},
-    "formation": {"side_m": _RANGE._replace(default=0.25), "max_linear_m_s": _SPEED},
-    "coverage": {"width_m": number(2.0, 0.2, 20.0, "m"), "height_m": number(2.0, 0.2, 20.0, "m"), **_SPEED_LIMIT},
-    "object_clustering": _WHEELS,
-    "box_pushing": _PUSH,
-    "cooperative_transport": _PUSH,
-    "voter": _VOTE,
-    "majority": _VOTE,
-}
-"""Built-in behaviors, with those of their numbers that pages may set."""
 
 _SAFETY = choice("fence and robots", ("off", "fence and robots"))
 
 _PLACE = {"turn_deg": number(0.0, -360.0, 360.0, "deg"), "x_m": _COORDINATE, "y_m": _COORDINATE}
 """Parameters of a formation: a click on the map sets it."""
 
-_BEHAVIOR_TITLES = {"formation": "formation by distances"}
-"""Titles other than the name without underscores."""
-
-OFFERS = {
+OFFERS: Dict[str, ProgramDescription] = {
     "swarm_go_to": ProgramDescription(
         "hero_examples",
         "swarm_go_to",
@@ -113,19 +71,27 @@ OFFERS = {
         },
         drives=slice(0, 0),
     ),
-    **{
-        "behavior_" + name: ProgramDescription(
-            "hero_swarm",
-            "behavior",
-            _BEHAVIOR_TITLES.get(name, name.replace("_", " ")),
-            {**fields, "safety": _SAFETY},
-            has_frame=True,
-            behavior=name,
-        )
-        for name, fields in BEHAVIORS.items()
-    },
 }
-"""The programs, in the order in which pages list them. Pages send "values" for the fields of one."""
+"""The programs, in the order in which pages list them. Pages send "values" for the fields of one.
+
+Programs adds the behaviors that are installed.
+"""
+
+
+def read_behaviors(described: Sequence[Dict[str, Any]]) -> Dict[str, ProgramDescription]:
+    """Return the behaviors that `python3 -m hero_swarm describe` lists."""
+    return {"behavior_" + behavior["behavior"]: _read_behavior(**behavior) for behavior in described}
+
+
+def _read_behavior(behavior: str, title: str, fields: Sequence[Dict[str, Any]]) -> ProgramDescription:
+    settings = {
+        field["name"]: (whole_number if isinstance(field["default"], int) else number)(
+            field["default"], *field["limits"], field["unit"]
+        )
+        for field in fields
+    }
+    settings["safety"] = _SAFETY
+    return ProgramDescription("hero_swarm", "behavior", title, settings, has_frame=True, behavior=behavior)
 
 
 def check_values(program: str, values: Dict[str, Any]) -> Dict[str, Any]:

@@ -5,7 +5,9 @@ robots are stopped afterwards. Those that have robots also end when all robots a
 """
 
 import contextlib
+import importlib.util
 import itertools
+import json
 import math
 import os
 import signal
@@ -20,10 +22,10 @@ from typing import Any, Callable, Dict, List, Optional, Sequence
 import roslib.packages
 
 from hero_client.apps.formations import Point
-from hero_node import make_printable
+from hero_node import make_printable, print_error
 
 from . import guard
-from .offers import OFFERS
+from .offers import OFFERS, ProgramDescription, read_behaviors
 
 PROGRAMS_MAX = 20
 
@@ -38,6 +40,23 @@ SIZE_PERIOD_S = 1.0
 
 LAST_BYTES = 2000
 """End of what a program has printed: the end tells why it failed."""
+
+
+DESCRIBE_TIMEOUT_S = 60.0
+
+
+def find_behaviors(folder: str) -> Dict[str, ProgramDescription]:
+    """Return the behaviors of the suite, of installed packages and of files in a folder; may take seconds."""
+    if importlib.util.find_spec("hero_swarm") is None:
+        return {}
+    command = [sys.executable, "-m", "hero_swarm", "describe", os.path.expanduser(folder)]
+    try:
+        # In a process of its own: what users wrote runs when it is loaded.
+        described = subprocess.run(command, stdout=subprocess.PIPE, timeout=DESCRIBE_TIMEOUT_S, check=True).stdout
+        return read_behaviors(json.loads(described))
+    except (OSError, ValueError, subprocess.SubprocessError) as error:
+        print_error(f"no behaviors are offered: {error}")
+        return {}
 
 
 def find_programs() -> Dict[str, str]:

@@ -11,7 +11,7 @@ from ..behavior import MAX_RATE_HZ, MIN_RATE_HZ, Behavior
 from ..sources import Sources
 from ..user_module import load_file
 
-__all__ = ["find_behavior", "list_names", "make_behavior"]
+__all__ = ["find_behavior", "list_classes", "list_names", "make_behavior"]
 
 MAX_NUMBER = 1e6
 """Limit of the other parameters, whatever their unit."""
@@ -56,11 +56,7 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
     path, _, class_name = name.partition(":")
     if not path.endswith(".py"):
         raise ValueError(f"behavior {name!r}: must be FILE.py, FILE.py:Class, or one of {', '.join(list_names())}")
-    loaded = load_file("behavior", path, sources)
-    classes = {
-        key: value for key, value in vars(loaded).items()
-        if inspect.isclass(value) and issubclass(value, Behavior) and value.__module__ == loaded.__name__
-    }  # fmt: skip
+    classes = list_classes(path, sources)
     if class_name in classes:
         return classes[class_name]
     if class_name or len(classes) != 1:
@@ -68,6 +64,15 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
             f"behavior {name}: name one class as {path}:CLASS; it has {', '.join(sorted(classes)) or 'none'}"
         )
     return next(iter(classes.values()))
+
+
+def list_classes(path: str, sources: Sources) -> Dict[str, Type[Behavior]]:
+    """Return the behaviors in a file by the names of their classes. Raises: ValueError."""
+    loaded = load_file("behavior", path, sources)
+    return {
+        key: value for key, value in vars(loaded).items()
+        if inspect.isclass(value) and issubclass(value, Behavior) and value.__module__ == loaded.__name__
+    }  # fmt: skip
 
 
 def make_behavior(name: str, numbers: Any) -> Behavior:

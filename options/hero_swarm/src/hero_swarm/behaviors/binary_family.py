@@ -11,7 +11,7 @@ import numpy as np
 
 from hero_sim.world import join_wheels
 
-from ..behavior import PULSES, VELOCITY, Behavior, Binary, Command, Random, Sensed
+from ..behavior import PULSES, SPEED, VELOCITY, Behavior, Binary, Command, Random, Sensed
 
 
 class WheelGenome(Behavior):
@@ -21,6 +21,7 @@ class WheelGenome(Behavior):
     drive = PULSES
     rate_hz = 1000.0 / 60.0  # as often as the driver sends commands
     wheel_m_s = 0.12
+    settings = {"wheel_m_s": SPEED}
     left0 = right0 = left1 = right1 = 0.0
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:

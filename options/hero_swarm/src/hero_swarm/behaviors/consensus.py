@@ -6,7 +6,7 @@ import numpy as np
 
 from hero_client.controllers import steer
 
-from ..behavior import Behavior, Command, Neighbors, Random, Sensed
+from ..behavior import GAIN, RANGE, SPEED, Behavior, Command, Neighbors, Random, Sensed
 
 
 class Rendezvous(Behavior):
@@ -16,6 +16,7 @@ class Rendezvous(Behavior):
     metric = "consensus_error"
     gain_1_s = 0.5
     max_linear_m_s = 0.1
+    settings = {"gain_1_s": GAIN, "max_linear_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         near = sensed.near
@@ -32,6 +33,7 @@ class LeaderFollowers(Behavior):
     gain_1_s = 1.0
     leader_m_s, leader_rad_s = 0.05, 0.08
     max_linear_m_s = 0.12
+    settings = {"gap_m": RANGE, "leader_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         near, numbers = sensed.near, sensed.numbers
@@ -59,6 +61,7 @@ class Formation(Behavior):
     side_m = 0.25
     gain_1_m2s = 0.6
     max_linear_m_s = 0.08
+    settings = {"side_m": RANGE, "max_linear_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         near, count = sensed.near, sensed.count

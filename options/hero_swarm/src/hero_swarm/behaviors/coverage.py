@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from hero_client.controllers import steer
+from hero_node.parameters import number
 
-from ..behavior import Behavior, Command, Random, Sensed
+from ..behavior import SPEED, Behavior, Command, Random, Sensed
 
 
 class VoronoiCoverage(Behavior):
@@ -22,6 +23,7 @@ class VoronoiCoverage(Behavior):
     gain_1_s = 0.5
     rate_hz = 5.0
     max_linear_m_s = 0.1
+    settings = {**dict.fromkeys(("width_m", "height_m"), number(2.0, 0.2, 20.0, "m")), "max_linear_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         poses = sensed.poses.reshape(-1, sensed.count, 3)

@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from hero_client.controllers import steer
+from hero_node.parameters import number
 
-from ..behavior import Behavior, Command, Neighbors, Random, Sensed
+from ..behavior import RANGE, SPEED, Behavior, Command, Neighbors, Random, Sensed
 
 
 class Flocking(Behavior):
@@ -22,6 +23,13 @@ class Flocking(Behavior):
     cohesion = 0.15  # m/s for each meter off the spacing
     cruise_m_s = 0.05
     max_linear_m_s = 0.1
+    settings = {
+        "spacing_m": RANGE,
+        "alignment": number(0.1, 0.0, 1.0, "m/s"),
+        "cohesion": number(0.15, 0.0, 2.0, "1/s"),
+        "cruise_m_s": SPEED,
+        "max_linear_m_s": SPEED,
+    }
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         near = sensed.near

@@ -6,9 +6,12 @@ import numpy as np
 
 from hero_client.controllers import steer
 from hero_client.values import BODY_RADIUS_M, OBJECT, ROBOT
+from hero_node.parameters import number
 from hero_sim.world import join_wheels
 
-from ..behavior import Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
+from ..behavior import SPEED, Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
+
+_COORDINATE = number(0.0, -1000.0, 1000.0, "m")
 
 
 class ObjectClustering(Behavior):
@@ -21,6 +24,7 @@ class ObjectClustering(Behavior):
     sees = Sight()
     metric = "object_cluster_fraction"
     wheel_m_s = 0.12
+    settings = {"wheel_m_s": SPEED}
     left_nothing, right_nothing = 0.5, 1.0
     left_object, right_object = 1.0, 0.5
     left_robot, right_robot = 0.1, 0.5
@@ -61,6 +65,7 @@ class PushToGoal(Behavior):
     near = Neighbors(range_m=0.25)
     metric = "object_distance"
     goal_x_m = goal_y_m = 0.0
+    settings = {"goal_x_m": _COORDINATE, "goal_y_m": _COORDINATE, "linear_m_s": SPEED}
     goal_radius_m = 0.05
     linear_m_s = 0.08
     gap_m = 0.05

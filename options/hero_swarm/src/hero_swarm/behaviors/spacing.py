@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from hero_client.controllers import steer
+from hero_node.parameters import whole_number
 
-from ..behavior import Behavior, Command, Neighbors, Random, Sensed
+from ..behavior import GAIN, RANGE, SPEED, Behavior, Command, Neighbors, Random, Sensed
 
 
 class Dispersion(Behavior):
@@ -17,6 +18,7 @@ class Dispersion(Behavior):
     spacing_m = 0.5
     gain_1_s = 0.4
     max_linear_m_s = 0.1
+    settings = {"spacing_m": RANGE, "gain_1_s": GAIN, "max_linear_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         near = sensed.near
@@ -42,6 +44,7 @@ class Segregation(Behavior):
     gain_1_s = 0.1
     wander_m_s = 0.03
     max_linear_m_s = 0.1
+    settings = {"groups": whole_number(2, 2, 6), "own_m": RANGE, "others_m": RANGE, "max_linear_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         """The memory is the group of each robot."""

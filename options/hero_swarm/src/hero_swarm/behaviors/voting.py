@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from ..behavior import Behavior, Command, Neighbors, Random, Sensed
+from hero_node.parameters import number
+
+from ..behavior import SPEED, Behavior, Command, Neighbors, Random, Sensed
 
 
 class Voter(Behavior):
@@ -21,6 +23,7 @@ class Voter(Behavior):
     cruise_m_s = 0.1
     angular_rad_s = 1.5
     clear_m = 0.12
+    settings = {"changes_hz": number(0.5, 0.01, 10.0, "1/s"), "cruise_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         near = sensed.near

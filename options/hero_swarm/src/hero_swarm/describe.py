@@ -1,0 +1,65 @@
+"""Prints the behaviors that pages may start as JSON: python3 -m hero_swarm describe [FOLDER ...].
+
+Those that come with the suite, those of files in the folders, and those that installed packages export in package.xml:
+<export><hero_swarm behaviors="${prefix}/behaviors"/></export>.
+"""
+
+import argparse
+import glob
+import json
+import os
+from typing import Any, Dict, List, Sequence, Type
+
+from hero_node import print_error
+
+from .behavior import Behavior
+from .behaviors import find_behavior, list_classes, list_names
+from .sources import Sources
+
+_TITLES = {"formation": "formation by distances"}
+"""Titles other than the name without underscores."""
+
+
+def main() -> None:
+    """Run the program."""
+    parser = argparse.ArgumentParser(prog="python3 -m hero_swarm describe", description=__doc__.partition("\n")[0])
+    parser.add_argument("folders", nargs="*", help="folders of Python files with behaviors")
+    print(json.dumps(describe_behaviors([*parser.parse_args().folders, *find_exported()])))
+
+
+def find_exported() -> List[str]:
+    """Return the folders of behaviors in installed packages; none without ROS."""
+    try:
+        import rospkg
+    except ImportError:
+        return []
+    packages = rospkg.RosPack()
+    return [
+        folder.replace("${prefix}", packages.get_path(name))
+        for name in packages.get_depends_on("hero_swarm", implicit=False)
+        for folder in packages.get_manifest(name).get_export("hero_swarm", "behaviors")
+    ]
+
+
+def describe_behaviors(folders: Sequence[str] = ()) -> List[Dict[str, Any]]:
+    """Return what pages need of each behavior; a file that cannot be loaded is told of and left out."""
+    found = [_describe(name, name, find_behavior(name)) for name in list_names()]
+    for path in (path for folder in folders for path in sorted(glob.glob(os.path.join(folder, "*.py")))):
+        try:
+            classes = list_classes(path, Sources())
+        except ValueError as error:
+            print_error(str(error))
+            continue
+        for class_name, kind in classes.items():
+            name = os.path.splitext(os.path.basename(path))[0]
+            found.append(_describe(name if len(classes) == 1 else class_name, f"{path}:{class_name}", kind))
+    return found
+
+
+def _describe(name: str, behavior: str, kind: Type[Behavior]) -> Dict[str, Any]:
+    """Return a behavior; behavior: as the program of this name takes it."""
+    fields = [
+        {"name": key, "default": getattr(kind, key), "limits": setting.limits, "unit": setting.unit}
+        for key, setting in kind.settings.items()
+    ]
+    return {"behavior": behavior, "title": _TITLES.get(name, name.replace("_", " ")), "fields": fields}
