@@ -41,34 +41,27 @@ if TYPE_CHECKING:  # for editors and mypy, to which a name with `as` is public
     from .values.readings import Obstacle as Obstacle
 
 _NAMES = {
-    "hero_client.apps.go_to_goal_server": ["GoToGoalServer"],
-    "hero_client.robot": ["Robot"],
-    "hero_client.robots.common_frame": ["CommonFrame"],
-    "hero_client.robots.robot_base": ["BaseRobot"],
-    "hero_client.robots.swarm_base": ["BaseSwarm"],
-    "hero_client.ros.drivers": ["Drivers"],
-    "hero_client.ros.stop_status": ["StopStatus"],
-    "hero_client.swarm": ["Swarm", "open_swarm"],
-    "hero_client.values.background_motion": ["BackgroundMotion"],
-    "hero_client.values.colors": ["COLORS"],
-    "hero_client.values.errors": [
-        "FrameError",
-        "GoalError",
-        "RobotError",
-        "RobotNotReadyError",
-        "StaleDataError",
-        "StoppedError",
-    ],
-    "hero_client.values.readings": ["Obstacle"],
-    "hero_node.clock": ["Clock"],
-    "hero_node.command_line": ["run"],
-    "hero_node.errors": ["HeroError", "NodeError", "ProgramError"],
-    "hero_node.geometry": ["Pose", "Velocity"],
-    "hero_node.ros.private_parameters": ["read_parameters"],
-    "hero_node.ros.program": ["Program"],
-    "hero_node.ros.script": ["rate", "start_node"],
+    "hero_client.apps.go_to_goal_server": "GoToGoalServer",
+    "hero_client.robot": "Robot",
+    "hero_client.robots.common_frame": "CommonFrame",
+    "hero_client.robots.robot_base": "BaseRobot",
+    "hero_client.robots.swarm_base": "BaseSwarm",
+    "hero_client.ros.drivers": "Drivers",
+    "hero_client.ros.stop_status": "StopStatus",
+    "hero_client.swarm": "Swarm open_swarm",
+    "hero_client.values.background_motion": "BackgroundMotion",
+    "hero_client.values.colors": "COLORS",
+    "hero_client.values.errors": "FrameError GoalError RobotError RobotNotReadyError StaleDataError StoppedError",
+    "hero_client.values.readings": "Obstacle",
+    "hero_node.clock": "Clock",
+    "hero_node.command_line": "run",
+    "hero_node.errors": "HeroError NodeError ProgramError",
+    "hero_node.geometry": "Pose Velocity",
+    "hero_node.ros.private_parameters": "read_parameters",
+    "hero_node.ros.program": "Program",
+    "hero_node.ros.script": "rate start_node",
 }
-_MODULES = {name: module for module, names in _NAMES.items() for name in names}
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = list(_MODULES)
 
