@@ -6,7 +6,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 from hero_node import Pose
 
 from .robot_constants import BODY_RADIUS_M
-from .world.arena import Arena
+from .world.arena import Area, Arena
 from .world.pushing.shapes import PushedBody, list_outlines
 from .world.world import World
 
@@ -27,6 +27,8 @@ Color = Tuple[float, float, float, float]
 
 _WALL_COLOR = (0.6, 0.6, 0.6, 1.0)
 _OBJECT_COLOR = (0.8, 0.5, 0.2, 1.0)
+_LAMP_COLOR, _LAMP_M = (1.0, 0.85, 0.2, 1.0), 0.02
+_PLATE_M = 0.0005
 _DARK_COLOR = (0.15, 0.15, 0.15, 1.0)
 _NOSE_COLOR = (1.0, 1.0, 1.0, 1.0)
 
@@ -69,9 +71,33 @@ def draw_objects(bodies: Sequence[PushedBody]) -> List[Shape]:
 
 
 def draw_arena(arena: Arena) -> List[Shape]:
-    """Return walls and obstacles."""
+    """Return areas, lamps, walls and obstacles."""
+    floor = [_draw_area(*item) for item in enumerate(arena.areas)]
+    lamps = [
+        _draw_circle("lamps", number, (*lamp_m, _LAMP_M), _LAMP_COLOR)
+        for number, lamp_m in enumerate(arena.lamps_m.tolist())
+    ]
     walls = [_draw_wall("walls", *item, _WALL_COLOR) for item in enumerate(arena.segments_m.tolist())]
-    return walls + [_draw_circle("obstacles", *item, _WALL_COLOR) for item in enumerate(arena.circles_m.tolist())]
+    return (
+        floor
+        + lamps
+        + walls
+        + [_draw_circle("obstacles", *item, _WALL_COLOR) for item in enumerate(arena.circles_m.tolist())]
+    )
+
+
+def _draw_area(number: int, area: Area) -> Shape:
+    """Return a thin plate, later ones above earlier ones."""
+    color = (*area.color, 1.0)
+    z_m = _PLATE_M * (number + 1)
+    if len(area.shape_m) == 3:
+        x_m, y_m, radius_m = area.shape_m
+        return Shape(
+            "areas", number, CYLINDER, color, Pose(x_m, y_m, 0.0), z_m, (2.0 * radius_m, 2.0 * radius_m, _PLATE_M)
+        )
+    x_min, y_min, x_max, y_max = area.shape_m
+    middle = Pose((x_min + x_max) / 2.0, (y_min + y_max) / 2.0, 0.0)
+    return Shape("areas", number, CUBE, color, middle, z_m, (x_max - x_min, y_max - y_min, _PLATE_M))
 
 
 def _draw_wall(namespace: str, number: int, ends_m: Sequence[float], color: Color) -> Shape:

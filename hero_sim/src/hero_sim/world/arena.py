@@ -20,6 +20,32 @@ START_GAP_M = 0.05
 _MAX_TRIES = 2000
 
 
+BARE_GRAY = 0.5
+"""Gray level of the floor without an area, from 0, black, to 1, white."""
+
+
+class Area(NamedTuple):
+    """A painted part of the floor: a circle, x y radius, or a rectangle, x min, y min, x max, y max; lengths in m.
+
+    Attributes:
+        color: red green blue from 0 to 1.
+    """
+
+    name: str
+    shape_m: Tuple[float, ...]
+    color: Tuple[float, float, float]
+
+    def covers(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        """Return which points (R,) lie on it."""
+        if len(self.shape_m) == 3:
+            center_x_m, center_y_m, radius_m = self.shape_m
+            circle: np.ndarray = np.hypot(x_m - center_x_m, y_m - center_y_m) <= radius_m
+            return circle
+        x_min, y_min, x_max, y_max = self.shape_m
+        rectangle: np.ndarray = (x_m >= x_min) & (x_m <= x_max) & (y_m >= y_min) & (y_m <= y_max)
+        return rectangle
+
+
 class Arena(NamedTuple):
     """Walls, obstacles and starts of one world.
 
@@ -31,6 +57,8 @@ class Arena(NamedTuple):
         bounds_m: x min, y min, x max, y max of the area in which robots are placed, shape (4,).
         polygons_m: the corners of each solid polygon, whose edges are among the segments.
         objects: what robots can push, where it is at the start; each world moves copies.
+        areas: painted parts of the floor, later ones over earlier ones.
+        lamps_m: places of lamps (L, 2), x y.
     """
 
     name: str
@@ -40,6 +68,8 @@ class Arena(NamedTuple):
     bounds_m: np.ndarray
     polygons_m: Tuple[np.ndarray, ...] = ()
     objects: Tuple[PushedBody, ...] = ()
+    areas: Tuple[Area, ...] = ()
+    lamps_m: np.ndarray = np.empty((0, 2))
 
 
 def square_length(ways_m: np.ndarray) -> np.ndarray:

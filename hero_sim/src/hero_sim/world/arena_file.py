@@ -16,7 +16,7 @@ from hero_node.files import Entry, EntryError, load_entries, read_file
 
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
-from .arena import Arena, is_free, outline
+from .arena import Area, Arena, is_free, outline
 from .map_file import build_map_arena, check_size
 from .pushing.shapes import Disc, Polygon, PushedBody, Shape
 
@@ -25,7 +25,8 @@ SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
 
 _MAX_COORDINATE_M = 1000.0
 _MAX_STARTS = 1000
-_KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "objects", "starts_m_deg")
+_KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "objects", "starts_m_deg", "areas", "lamps_m")
+_AREA_KEYS = ("name", "circle_m", "rectangle_m", "color")
 _OBJECT_KEYS = ("circle_m", "polygon_m", "mass_kg", "friction")
 
 
@@ -83,7 +84,10 @@ def _build_arena(root: Entry, file_name: str) -> Arena:
     segments_m = np.vstack([np.empty((0, 4)), *edges_m])
     bounds_m = _read_bounds(content, segments_m)
     objects = tuple(_read_object(entry) for entry in _list_items(content, "objects"))
-    arena = Arena(name, segments_m, np.reshape(circles_m, (-1, 3)), (), bounds_m, tuple(polygons_m), objects)
+    areas = tuple(_read_area(entry) for entry in _list_items(content, "areas"))
+    lamps_m = np.reshape([_read_row(entry, "x and y") for entry in _list_items(content, "lamps_m")], (-1, 2))
+    circles = np.reshape(circles_m, (-1, 3))
+    arena = Arena(name, segments_m, circles, (), bounds_m, tuple(polygons_m), objects, areas, lamps_m)
     entries = _list_items(content, "starts_m_deg")
     if len(entries) > _MAX_STARTS:  # each is compared with all before it
         raise ValueError("starts_m_deg has %d starts, more than %d" % (len(entries), _MAX_STARTS))
@@ -96,6 +100,24 @@ def _build_arena(root: Entry, file_name: str) -> Arena:
             )
     starts = tuple(Pose(x_m, y_m, math.radians(heading_deg)) for x_m, y_m, heading_deg in rows.tolist())
     return arena._replace(starts=starts)
+
+
+def _read_area(entry: Entry) -> Area:
+    """Return a painted part of the floor. Raises: EntryError."""
+    item = entry.mapping(_AREA_KEYS, ("name", "color"))
+    if ("circle_m" in item) == ("rectangle_m" in item):
+        entry.refuse("a mapping with circle_m or rectangle_m, name and color")
+    if "circle_m" in item:
+        shape_m = _read_circle(item["circle_m"])
+    else:
+        shape_m = _read_row(item["rectangle_m"], "x min, y min, x max and y max")
+        if shape_m[0] >= shape_m[2] or shape_m[1] >= shape_m[3]:
+            item["rectangle_m"].refuse("[x min, y min, x max, y max], each minimum less than its maximum")
+    color = item["color"]
+    if isinstance(color.value, list):
+        red, green, blue = color.numbers(3, 0.0, 1.0, "[red, green, blue]")
+        return Area(item["name"].text(), tuple(shape_m), (red, green, blue))
+    return Area(item["name"].text(), tuple(shape_m), (color.number(0.0, 1.0, "(gray), or [red, green, blue]"),) * 3)
 
 
 def _read_object(entry: Entry) -> PushedBody:

@@ -373,7 +373,12 @@ def test_arena_and_ground_truth_are_drawn_in_millimeters():
     gone.action = Marker.DELETE
     odd = make_marker(Marker.CUBE, math.nan, 1.0, 1.0)
     shown = describe_arena(MarkerArray([box, disc, gone, other, odd]))
-    assert shown == {"boxes": [[1000, 0, 0, 500, 20]], "circles": [[1000, 0, 50]]}
+    assert shown == {"boxes": [[1000, 0, 0, 500, 20]], "circles": [[1000, 0, 50]], "areas": []}
+    painted = [make_marker(kind, 0.5, 0.2, 0.1, ns="areas") for kind in (Marker.CUBE, Marker.CYLINDER)]
+    for marker in painted:
+        marker.color.r, marker.color.g, marker.color.b = 1.0, 0.5, 0.0
+    areas = describe_arena(MarkerArray(painted))["areas"]
+    assert areas == [[1000, 0, 0, 500, 200, 255, 128, 0], [1000, 0, 250, 255, 128, 0]]
     assert len(describe_arena(MarkerArray([box] * (MARKERS_MAX + 1)))["boxes"]) == MARKERS_MAX
     heading, name = (
         make_marker(Marker.ARROW, 1, 1, 1, ns="headings", id=3),

@@ -34,11 +34,12 @@ from hero_node.parameters import Parameter, is_number, number
 
 from .sensors import Surroundings, is_sensor, read_sensor
 from .sensors.own import Distance, NeighborColors, Odometry, Proximity
+from .sensors.virtual import Floor, Light, Pheromone, RangeAndBearing
 
 __all__ = [
-    "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Distance", "NeighborColors", "Neighborhood",
-    "Neighbors", "Objects", "ObjectsInSight", "Odometry", "Proximity", "Random", "Sensed", "Sight", "decide",
-    "derive_seed", "lock", "sense",
+    "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Distance", "Floor", "Light", "NeighborColors",
+    "Neighborhood", "Neighbors", "Objects", "ObjectsInSight", "Odometry", "Pheromone", "Proximity", "Random",
+    "RangeAndBearing", "Sensed", "Sight", "act", "decide", "derive_seed", "lock", "sense",
 ]  # fmt: skip
 
 MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 100.0
@@ -176,6 +177,14 @@ class Behavior:
         """Return the color that each robot shows, red green blue from 0 to 1 (R, 3), or None."""
         return None
 
+    def messages(self, memory: Any) -> Optional[np.ndarray]:
+        """Return what each robot sends to RangeAndBearing sensors, one number (R,) or several (R, K), or None."""
+        return None
+
+    def deposits(self, memory: Any) -> Optional[np.ndarray]:
+        """Return how much pheromone each robot leaves where it is, per second (R,), or None."""
+        return None
+
 
 def sense(
     behavior: Behavior, time_s: float, poses: np.ndarray, random: Any, things: PlacedObjects = NO_OBJECTS, **around: Any
@@ -217,6 +226,19 @@ def decide(behavior: Behavior, sensed: Sensed, memory: Any, random: Random) -> T
             raise ValueError(text % (type(behavior).__name__, name, np.shape(values), robots, robots))
     linear_m_s, angular_rad_s = (np.broadcast_to(np.asarray(values, float), robots) for values in command[:2])
     return linear_m_s, angular_rad_s, command[2]
+
+
+def act(behavior: Behavior, memory: Any, robots: int) -> Dict[str, Optional[np.ndarray]]:
+    """Return colors, messages and deposits of all robots, by these names. Raises: ValueError for other shapes."""
+    acts: Dict[str, Optional[np.ndarray]] = {}
+    for name, columns in (("colors", (3,)), ("messages", None), ("deposits", ())):
+        given = acts[name] = getattr(behavior, name)(memory)
+        shape = np.shape(given)
+        if given is not None and (shape[:1] != (robots,) or (columns is not None and shape[1:] != columns)):
+            text = "%s.%s() gives an array of shape %s: it must have a row for each of %d robots (%s)"
+            wanted = ", ".join(map(str, (robots, *(columns or ()))))
+            raise ValueError(text % (type(behavior).__name__, name, shape, robots, wanted))
+    return acts
 
 
 def derive_seed(seed: int, purpose: str) -> int:

@@ -5,14 +5,14 @@ All that drives robots by a behavior steps this loop: trials on simulated robots
 
 import math
 from collections import deque
-from typing import Any, Deque, Optional, Tuple
+from typing import Any, Deque, Dict, Optional, Tuple
 
 import numpy as np
 
 from hero_client.controllers import Lateness
 from hero_client.values import NO_OBJECTS, PlacedObjects
 
-from .behavior import Behavior, Random, Sensed, decide, sense
+from .behavior import Behavior, Random, Sensed, act, decide, sense
 from .safety import MAX_AGE_S, SafetyFilter
 
 
@@ -24,7 +24,7 @@ class Control:
         steps_per_decision: calls of step() of which the first one senses and decides.
         has_decided: whether the last call did.
         sensed: what the behavior sensed then.
-        memory, colors: what it remembers and shows.
+        memory: what it remembers.
         wanted: linear m/s and angular rad/s of all robots (2, R), as it decided last.
         lateness: of its steps and of the poses that it is given; robots are slow meanwhile.
         share: of its speed at which each robot drives therefore, 0 to 1 (R,).
@@ -44,11 +44,16 @@ class Control:
         self.rate_hz = self.steps_per_decision * behavior.rate_hz
         self.has_decided = False
         self.memory: Any = None
-        self.colors: Optional[np.ndarray] = None
+        self._acts: Dict[str, Optional[np.ndarray]] = {}
         self.wanted = np.empty((2, 0))
         self.lateness = Lateness(1.0 / self.rate_hz)
         self._sent: Deque[Tuple[float, np.ndarray]] = deque()  # when, and which speeds (2, R)
         self._steps = 0
+
+    @property
+    def colors(self) -> Optional[np.ndarray]:
+        """Colors of the robots (R, 3), or None."""
+        return self._acts.get("colors")
 
     def step(
         self, time_s: float, poses: np.ndarray, things: PlacedObjects = NO_OBJECTS, ages_s: Optional[np.ndarray] = None
@@ -62,11 +67,11 @@ class Control:
         self.has_decided = self._steps % self.steps_per_decision == 0
         self._steps += 1
         if self.has_decided:
-            around = {**self._surroundings, "colors": self.colors}
+            around = {**self._surroundings, **self._acts}
             self.sensed = sense(self._behavior, time_s, poses, self._random, things, **around)
             *wanted, self.memory = decide(self._behavior, self.sensed, self.memory, self._random)
             self.wanted = np.array(wanted)
-            self.colors = self._behavior.colors(self.memory)
+            self._acts = act(self._behavior, self.memory, self.wanted.shape[1])
         speeds = self.wanted
         if self._safety is None and ages_s is None:
             return speeds[0], speeds[1]

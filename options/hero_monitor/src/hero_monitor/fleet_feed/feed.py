@@ -361,18 +361,25 @@ def describe_stop_of_others(origin: Optional[str], moving: Sequence[str]) -> Opt
 
 
 def describe_arena(message: MarkerArray) -> Dict[str, List[List[int]]]:
-    """Return boxes (x, y, yaw, length, width) and circles (x, y, radius) of the arena or of objects, in mm and mrad."""
-    boxes, circles = [], []
+    """Return boxes (x, y, yaw, length, width) and circles (x, y, radius) of the arena or of objects, in mm and mrad.
+
+    areas: either of these, and red, green and blue from 0 to 255.
+    """
+    boxes: List[List[int]] = []
+    circles: List[List[int]] = []
+    areas: List[List[int]] = []
     for marker in message.markers[:MARKERS_MAX]:
         pose = encode_pose(read_pose(marker.pose))
         size = encode_pose(Pose(marker.scale.x, marker.scale.y, 0.0))
         if pose is None or size is None or marker.action != Marker.ADD:
             continue
+        rgb = (marker.color.r, marker.color.g, marker.color.b) if marker.ns == "areas" else ()
+        ink = [round(255.0 * min(max(part, 0.0), 1.0)) for part in rgb]
         if marker.type == Marker.CUBE:
-            boxes.append([*pose, size[0], size[1]])
+            (areas if ink else boxes).append([*pose, size[0], size[1], *ink])
         elif marker.type == Marker.CYLINDER:
-            circles.append([pose[0], pose[1], size[0] // 2])
-    return {"boxes": boxes, "circles": circles}
+            (areas if ink else circles).append([pose[0], pose[1], size[0] // 2, *ink])
+    return {"boxes": boxes, "circles": circles, "areas": areas}
 
 
 def find_true_poses(message: MarkerArray) -> Dict[str, Optional[List[int]]]:

@@ -26,6 +26,11 @@ _FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.
 _PLOT_COLOR, _AXES_COLOR = ColorRGBA(0.9, 0.5, 0.0, 1.0), ColorRGBA(0.5, 0.5, 0.5, 1.0)
 
 
+def _has_places(behavior: Behavior, name: str, sensed: Sensed) -> bool:
+    """Return whether a sensor looks along a beam, or tells where others are."""
+    return isinstance(behavior.sensors()[name], (Binary, Sight)) or hasattr(getattr(sensed, name), "forward_m")
+
+
 class BehaviorMarkers:
     """The markers of one behavior in one frame."""
 
@@ -45,7 +50,8 @@ class BehaviorMarkers:
         # Where it was first, or higher: robots that drive into it would hide it.
         left_m, low_m = float(np.nanmean(poses[:, 0])) - PLOT_M[0] / 2.0, float(np.nanmax(poses[:, 1])) + PLOT_GAP_M
         self._corner = (left_m, low_m) if self._corner is None else (self._corner[0], max(self._corner[1], low_m))
-        beams = [self._draw_sensor(name, poses, sensed) for name in self._behavior.sensors()]
+        shown = [name for name in self._behavior.sensors() if _has_places(self._behavior, name, sensed)]
+        beams = [self._draw_sensor(name, poses, sensed) for name in shown]
         return [*beams, *self._draw_plot(self._corner, sensed.time_s, value)]
 
     def _make_marker(self, name: str, kind: int) -> Marker:

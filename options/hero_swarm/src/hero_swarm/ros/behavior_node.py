@@ -16,6 +16,7 @@ from hero_client.swarm import open_swarm
 from hero_client.values import BODY_RADIUS_M, PlacedObjects
 from hero_node.parameters import choice, number, robot_ids, string, whole_number
 from hero_node.ros import read_duration_clock_s
+from hero_sim.world import load_arena
 
 from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior
@@ -85,7 +86,8 @@ class BehaviorNode:
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         random, readings = Random([parameters["seed"]], len(ids)), OwnReadings(swarm, self.behavior.sensors())
-        self.control = Control(self.behavior, random, self._filter, robots=readings)
+        self._arena = arena = load_arena(parameters["arena"]) if parameters["arena"] else None
+        self.control = Control(self.behavior, random, self._filter, robots=readings, arena=arena)
         self._start_s = read_duration_clock_s()
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._sources = Sources()
@@ -140,7 +142,7 @@ class BehaviorNode:
         known = np.isfinite(velocities).all(axis=1)
         if not known.any():
             return
-        measured = poses[None, known], velocities[None, known], things.poses, BODY_RADIUS_M, None
+        measured = poses[None, known], velocities[None, known], things.poses, BODY_RADIUS_M, self._arena
         control = self.control
         state = State(now_s - self._start_s, *measured, control.sensed, control.memory, control.colors)
         value = float(measure_metric(self.behavior.metric, state, self._sources)[0])
@@ -164,6 +166,7 @@ PARAMETERS = {
     "parameters": {},
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
+    "arena": string("", "a name or file of the simulator, for Floor, Light and Pheromone"),
     "objects_topic": string("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
     "object_radius_m": number(0.05, 0.001, 5.0, "m", "of the circle around an object"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),

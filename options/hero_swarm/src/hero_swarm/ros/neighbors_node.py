@@ -52,48 +52,65 @@ def make_messages(
     return messages
 
 
-class NeighborsNode:
-    """Publishes the neighbors of all robots; robots that join a driver are added."""
+class SensingNode:
+    """Publishes what robots sense by their poses; robots that join a driver are added."""
 
     def __init__(self, parameters: Dict[str, Any]) -> None:
         """Begin with the robots of ~robots."""
-        self._chosen = parameters["robots"]
-        self._sensor = Neighbors(**{name: parameters[name] for name in Neighbors._fields})
-        self._seed = parameters["seed"]
+        self._chosen, self._seed = parameters["robots"], parameters["seed"]
         self._source = PoseSource([], parameters["frame"])
-        self._publishers: Dict[int, rospy.Publisher] = {}
+        self._ids: List[int] = []
         self._random = Random([self._seed], 0)
         self._add_robots(self._chosen or [])
 
     def _add_robots(self, ids: Sequence[int]) -> None:
-        new = [robot_id for robot_id in ids if robot_id not in self._publishers]
+        new = [robot_id for robot_id in ids if robot_id not in self._ids]
         if not new:
             return
         self._source.add_robots(new)
+        self._ids += new
         for robot_id in new:
-            topic = "/hero_%d/neighbors" % robot_id
-            self._publishers[robot_id] = rospy.Publisher(topic, NeighborsMessage, queue_size=1, tcp_nodelay=True)
-        self._random = Random([self._seed], len(self._publishers))
+            self._advertise(robot_id, "/hero_%d/" % robot_id)
+        self._random = Random([self._seed], len(self._ids))
+
+    def _advertise(self, robot_id: int, prefix: str) -> None:
+        raise NotImplementedError
+
+    def _publish(self, poses: np.ndarray, ages_s: np.ndarray) -> None:
+        raise NotImplementedError
 
     def step(self) -> None:
-        """Publish the neighbors of all robots."""
+        """Publish what all robots sense."""
         if self._chosen is None:
             report = share_drivers().read()
             self._add_robots(ready_ids(report) if report else [])
-        if not self._publishers:
+        if not self._ids:
             self._source.warn("no robot has joined a driver yet: are the robots on?")
             return
-        poses, ages_s = self._source.read()
-        now = rospy.Time.now()
-        for publisher, message in zip(
-            self._publishers.values(),
-            make_messages(list(self._publishers), poses, ages_s, self._sensor, self._random),
-        ):
-            message.header.stamp = now
-            publisher.publish(message)
+        self._publish(*self._source.read())
         missing = self._source.describe_missing()
         if missing:
             self._source.warn(missing + "; who has no pose senses nothing")
+
+
+class NeighborsNode(SensingNode):
+    """Publishes the neighbors of all robots."""
+
+    def __init__(self, parameters: Dict[str, Any]) -> None:
+        """Begin with the robots of ~robots."""
+        self._sensor = Neighbors(**{name: parameters[name] for name in Neighbors._fields})
+        self._publishers: List[rospy.Publisher] = []
+        super().__init__(parameters)
+
+    def _advertise(self, robot_id: int, prefix: str) -> None:
+        topic = prefix + "neighbors"
+        self._publishers.append(rospy.Publisher(topic, NeighborsMessage, queue_size=1, tcp_nodelay=True))
+
+    def _publish(self, poses: np.ndarray, ages_s: np.ndarray) -> None:
+        messages = make_messages(self._ids, poses, ages_s, self._sensor, self._random)
+        for publisher, message in zip(self._publishers, messages):
+            message.header.stamp = rospy.Time.now()
+            publisher.publish(message)
 
 
 def main() -> None:

@@ -32,7 +32,9 @@ class Surroundings(NamedTuple):
         things: objects.
         arena: with its areas and lamps; None where it is not known.
         robots: own readings of the robots as attributes, named as those of RobotRows; None without any.
-        colors: what robots showed in the last step, red green blue from 0 to 1 (R, 3); None: nothing.
+        colors: of robots since the last step, red green blue from 0 to 1 (R, 3); None: dark.
+        messages: what robots sent in the last step (R,) or (R, K); None: nothing.
+        deposits: pheromone that robots leave since the last step, per second (R,); None: nothing.
         kept: what the sensor keeps from step to step.
     """
 
@@ -43,6 +45,8 @@ class Surroundings(NamedTuple):
     arena: Optional[Arena] = None
     robots: Any = None
     colors: Optional[np.ndarray] = None
+    messages: Optional[np.ndarray] = None
+    deposits: Optional[np.ndarray] = None
     kept: Dict[str, Any] = {}
 
 

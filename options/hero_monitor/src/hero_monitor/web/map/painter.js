@@ -44,6 +44,7 @@ export class MapPainter {
     if (state.grid) this.paintOccupancy(state.grid);
     if (map.picture.box) this.paintPicture(map.picture);
     this.paintGrid();
+    this.paintAreas(state.arena.areas ?? []);
     this.paintShapes(state.arena, "--wall");
     this.paintShapes(state.objects, "--object");
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
@@ -141,6 +142,17 @@ export class MapPainter {
       this.at([x, y, yaw], () => context.fillRect(-length / 2, -thick / 2, length, thick));
     }
     for (const [x, y, radius] of circles) this.circle(x, y, radius).fill();
+  }
+
+  /** Paint parts of the floor: rectangles or circles, and their colors. */
+  paintAreas(areas) {
+    const { context } = this;
+    for (const area of areas) {
+      const [x, y] = area;
+      context.fillStyle = `rgb(${area.slice(-3).join(",")})`;
+      if (area.length === 6) this.circle(x, y, area[2]).fill();
+      else this.at([x, y, area[2]], () => context.fillRect(-area[3] / 2, -area[4] / 2, area[3], area[4]));
+    }
   }
 
   paintTrail(robot) {
