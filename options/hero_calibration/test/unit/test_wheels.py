@@ -117,3 +117,19 @@ def test_wheels_that_no_robot_has_are_refused():
 def test_a_leg_that_turns_far_ends_within_half_a_turn():
     ticks = np.column_stack((np.zeros(2), (0.0, 5.0 * WHEEL_SEPARATION_M / TICK_M)))
     assert follow_ticks(ticks, NOMINAL_M).yaw_rad == pytest.approx(5.0 - 2.0 * math.pi)
+
+
+@pytest.mark.parametrize(("mount", "is_right"), [((0.0, 0.0, 0.0), True), ((0.005, 0.0, 0.087), False)])
+def test_a_tag_that_sits_off_center_is_not_taken_for_wheels(mount, is_right):
+    straight = np.column_stack([np.linspace(0.0, 0.3 / TICK_M, 20)] * 2)
+    turn = np.linspace(0.0, WHEEL_SEPARATION_M * math.pi / 4.0 / TICK_M, 20)[:, None]
+    legs = []
+    for ticks in (straight, turn * (-1.0, 1.0), straight, turn * (1.0, -1.0)):
+        moved = follow_ticks(ticks, NOMINAL_M * (1.01, 0.99, 1.02))
+        seen = transform_pose(invert_pose(Pose(*mount)), transform_pose(moved, Pose(*mount)))
+        legs.append(Leg(ticks, seen))
+    if is_right:
+        assert fit_wheels(legs).wheels_m == pytest.approx(NOMINAL_M * (1.01, 0.99, 1.02), rel=1e-3)
+    else:
+        with pytest.raises(CalibrationError, match="is its tag off-center"):
+            fit_wheels(legs)

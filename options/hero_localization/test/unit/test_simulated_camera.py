@@ -236,7 +236,7 @@ def test_written_camera_file_holds_the_view_and_the_tags(tmp_path):
     points_m = np.array([(0.3, 0.2, 0.076), (-1.0, 0.5, 0.0)])
     assert np.abs(settings.camera.project(points_m) - SMALL.geometry.project(points_m)).max() < 1e-6
     assert settings.layout.mounts[3].x_m == 0.002 and settings.layout.size_m == 0.048
-    assert sorted(settings.seen_references) == sorted(settings.layout.references) == [100, 101, 102, 103]
+    assert sorted(settings.seen_references) == sorted(settings.layout.references) == list(range(100, 106))
 
 
 STRAIGHT = SMALL._replace(
@@ -366,11 +366,14 @@ def test_reference_tags_lie_beside_the_arena_and_are_described_by_place():
     arena = arena._replace(bounds_m=np.array([-0.5, 0.25, 1.5, 1.25]))
     tags = list_references(arena, "36h11")
     assert [(tag.tag_id, tag.x_m, tag.y_m) for tag in tags] == [
-        (100, -0.62, 0.35), (101, -0.62, 1.15), (102, 1.62, 0.35), (103, 1.62, 1.15),
+        (100, -0.62, 0.35), (101, -0.62, 0.75), (102, -0.62, 1.15),
+        (103, 1.62, 0.35), (104, 1.62, 0.75), (105, 1.62, 1.15),
     ]  # fmt: skip
     assert {(tag.size_m, tag.height_m, tag.yaw_rad) for tag in tags} == {(0.1, 0.0, 0.0)}
-    assert describe_references(tags[:2]) == "references: {100: [-0.620, 0.350, 0], 101: [-0.620, 1.150, 0]}"
-    assert [tag.tag_id for tag in list_references(arena, "16h5")] == [26, 27, 28, 29], "the last ones of a small family"
+    assert describe_references(tags[:2]) == "references: {100: [-0.620, 0.350, 0], 101: [-0.620, 0.750, 0]}"
+    assert [tag.tag_id for tag in list_references(arena, "16h5")] == [24, 25, 26, 27, 28, 29], (
+        "the last ones of a small family"
+    )
 
 
 def test_camera_hangs_over_the_middle_of_the_arena_as_high_as_it_must():

@@ -37,6 +37,9 @@ STRAIGHT_SD = (0.002, math.inf, math.inf)
 MAX_CHANGE = 0.1
 """Wheels that differ more from the nominal ones are implausible: the robot slipped, or was moved by hand."""
 
+MAX_DEVIATION_SD = 3.0
+"""Deviation of the legs, rms, above which the wheels found are not those of the robot: an off-center tag reaches 9."""
+
 DIAMETER_M = TICK_M * 288.0 / math.pi
 NOMINAL_M = np.array((DIAMETER_M, DIAMETER_M, WHEEL_SEPARATION_M))
 
@@ -103,6 +106,9 @@ def fit_wheels(legs: Sequence[Leg]) -> WheelResult:
         found_mm = "%.1f, %.1f and %.1f mm" % tuple(1e3 * NOMINAL_M * scales)
         raise CalibrationError(f"wheels and distance would be {found_mm}: did it slip, or was it touched?")
     rms = [float(np.sqrt(np.mean(np.square(values)))) for values in (before, measure_deviations(scales))]
+    if rms[1] > MAX_DEVIATION_SD:
+        text = "no wheels explain its paths (%.1f sd): did it slip, or is its tag off-center (calibrate_camera robots)?"
+        raise CalibrationError(text % rms[1])
     return WheelResult(NOMINAL_M * scales, *rms)
 
 

@@ -24,8 +24,13 @@ WORST_RESIDUAL_M = 0.006
 """Places that were measured with a tape are good to 2 mm."""
 
 WRONG_PLACE_M = 0.004
-WRONG_SHARE = 3.0
-"""A tag is wrong that lies this far from where all others put it, and this many times as far as these disagree."""
+WRONG_GAIN, LEFT_OUT_GAIN = 4.0, 10.0
+"""A tag is wrong that lies this far from where all others put it if without it the squared residuals sink, per degree
+of freedom, by this many times what remains (F statistic); it is left out from the second on. With a tape of 2 mm, a tag
+that is right reaches the second in one of ten arenas."""
+
+MIN_RESIDUAL_M = 0.0005
+"""Residual, in x and y each, that tapes leave at least: fewer tags than that many would claim less by chance."""
 
 AMBIGUOUS_M2 = 2e-6
 """Two tags may both be the wrong one if, without either, the others' squared residuals sum up to less than this apart:
@@ -34,7 +39,8 @@ with places right to 0.7 mm in x and y, another tag than the wrong one of five w
 SUSPICIOUS_RMS_M = 0.02
 """No tape is so wrong at all tags."""
 
-MAX_SCALE_ERROR = 0.007
+GOOD_SCALE_ERROR, MAX_SCALE_ERROR = 0.003, 0.007
+"""A tag of 65 px is measured to 0.1 %, whatever the gamma."""
 HEIGHTS_M = (0.2, 20.0)
 MAX_FIELD_M = 30.0
 
@@ -62,6 +68,12 @@ class ArenaCalibration(NamedTuple):
     def rms_m(self) -> float:
         """Root mean square of the residuals of the tags used."""
         return _compute_rms(self.residuals_m, self.left_out)
+
+    @property
+    def sd_m(self) -> float:
+        """Standard deviation of places in the field, in x and y each, by the errors of the tags' places."""
+        count = len(self.residuals_m) - len(self.left_out)  # of which the camera's six numbers leave 2 * count - 6 free
+        return self.rms_m * math.sqrt(1.5 / (count - 3.0))
 
 
 def average_tags(frames: Sequence[Sequence[TagCorners]]) -> List[TagCorners]:
@@ -108,13 +120,15 @@ def calibrate_arena(
     camera, left_out = fit.camera, []  # type: Camera, List[int]
     wrong = _find_wrong_tag(image)
     suspects = wrong.tag_ids if wrong is not None else []
-    if wrong is not None and len(suspects) == 1:
+    if wrong is not None and len(suspects) == 1 and wrong.gain > LEFT_OUT_GAIN:
         left_out, camera = suspects, wrong.camera_without
     residuals_m = measure_residuals(camera, seen, references)
-    if _compute_rms(residuals_m, left_out) < WORST_RESIDUAL_M:  # or it is no matter of scale
-        _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], size_m)
     problems = _judge(residuals_m, left_out, missing)
-    if wrong is not None and len(suspects) > 1:
+    if _compute_rms(residuals_m, left_out) < WORST_RESIDUAL_M:  # or it is no matter of scale
+        problems += _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], size_m)
+    if len(seen) == MIN_TAGS:
+        problems.append("four reference tags cannot be checked: one that is 5 mm off goes unnoticed; add two")
+    if wrong is not None and not left_out:
         text = "tag %s is about %.0f mm from its place: measure them again"
         problems.insert(0, text % (" or ".join(map(str, suspects)), 1e3 * wrong.off_m))
     return ArenaCalibration(camera, residuals_m, left_out, problems)
@@ -177,17 +191,27 @@ def _refuse_mistakes(image: _Image) -> None:
 
 
 class _WrongTag(NamedTuple):
-    """Tags of which one contradicts all others, the likeliest first; how far (m) it is off; the camera without it."""
+    """Tags of which one contradicts all others.
+
+    Attributes:
+        tag_ids: the likeliest first.
+        off_m: how far it is off.
+        camera_without: the camera without it.
+        gain: by how much the squared residuals are less without it, per degree of freedom, by what remains.
+    """
 
     tag_ids: List[int]
     off_m: float
     camera_without: Camera
+    gain: float
 
 
 def _find_wrong_tag(image: _Image) -> Optional[_WrongTag]:
     """Return the tags without one of which the others agree by far better; None if there is none, or none to spare."""
-    if len(image.tags) <= MIN_TAGS:
+    fit_of_all = image.fit()
+    if len(image.tags) <= MIN_TAGS or fit_of_all is None:
         return None
+    all_m2, free = len(image.tags) * fit_of_all.rms_m**2, 2.0 * len(image.tags) - 8.0
     found: Optional[_WrongTag] = None
     squares_m2: Dict[int, float] = {}
     for tag in image.tags:
@@ -198,8 +222,10 @@ def _find_wrong_tag(image: _Image) -> Optional[_WrongTag]:
         alone_m = measure_residuals(fit.camera, [tag], image.references)[tag.tag_id]
         squares_m2[tag.tag_id] = len(others) * fit.rms_m**2
         if squares_m2[tag.tag_id] == min(squares_m2.values()):
-            is_wrong = alone_m > WRONG_PLACE_M and alone_m > WRONG_SHARE * fit.rms_m
-            found = _WrongTag([tag.tag_id], alone_m, fit.camera) if is_wrong else None
+            rest_m2 = squares_m2[tag.tag_id]
+            gain = (all_m2 - rest_m2) / 2.0 / max(rest_m2 / free, MIN_RESIDUAL_M**2)
+            is_wrong = alone_m > WRONG_PLACE_M and gain > WRONG_GAIN
+            found = _WrongTag([tag.tag_id], alone_m, fit.camera, gain) if is_wrong else None
     if found is None:
         return None
     limit_m2 = min(squares_m2.values()) + AMBIGUOUS_M2
@@ -207,14 +233,17 @@ def _find_wrong_tag(image: _Image) -> Optional[_WrongTag]:
     return found._replace(tag_ids=sorted(suspects, key=squares_m2.__getitem__))
 
 
-def _check_sizes(camera: Camera, tags: Sequence[TagCorners], size_m: float) -> None:
-    """Compare the tags' measured size with the printed one. Raises: CalibrationError if places are out of scale."""
+def _check_sizes(camera: Camera, tags: Sequence[TagCorners], size_m: float) -> List[str]:
+    """Compare the tags' measured size with the printed one; return what is wrong.
+
+    Raises: CalibrationError if places are far out of scale.
+    """
     share = float(np.median([fit.size_m / size_m for fit in fit_squares(camera, tags, 0.0)]))
+    text = "reference tags measure %.1f %% of their size: measure the places again, is the tape right? and the side of"
+    text = text % (100.0 * share) + " a black square (reference_size_m)"
     if not abs(share - 1.0) <= MAX_SCALE_ERROR:
-        raise CalibrationError(
-            "reference tags measure %.1f %% of their size: measure the places again, is the tape right? and the side of"
-            " a black square (reference_size_m)" % (100.0 * share)
-        )
+        raise CalibrationError(text)
+    return [] if abs(share - 1.0) <= GOOD_SCALE_ERROR else [text]
 
 
 def _judge(residuals_m: Mapping[int, float], left_out: Sequence[int], missing: Sequence[int]) -> List[str]:

@@ -199,7 +199,8 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
     height_m = result.camera.position_m[2]
     say(f"residual {1000.0 * result.rms_m:.1f} mm rms; the camera is {height_m:.2f} m above the floor")
     fits = fit_references(result.camera, tags, layout.references)
-    parts = camera_file.describe_camera(result.camera, {fit.tag_id: fit.pose for fit in fits})
+    seen = {fit.tag_id: fit.pose for fit in fits}
+    parts = camera_file.describe_camera(result.camera, seen, result.sd_m)
     return _finish(options.file, parts, result.problems)
 
 

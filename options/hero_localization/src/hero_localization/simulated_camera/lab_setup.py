@@ -13,7 +13,7 @@ from ..prints.tag_images import FAMILIES, REFERENCE_SIZE_M
 from ..tracking import settings as camera_file
 from .view import CameraOptions, PrintedTag, tag_corners
 
-REFERENCES = 4
+REFERENCES = 6
 FIRST_REFERENCE_ID = 100
 """First reference tag of families that have this many tags; otherwise the last ones are reference tags."""
 
@@ -43,7 +43,7 @@ def list_references(arena: Arena, family: str) -> List[PrintedTag]:
     places_m = [
         (round(x_m, 3), round(middle_m + side * y_m, 3))
         for x_m in (x_min_m - REFERENCE_GAP_M, x_max_m + REFERENCE_GAP_M)
-        for side in (-1.0, 1.0)
+        for side in (-1.0, 0.0, 1.0)
     ]
     return [
         PrintedTag(find_first_reference(family) + index, REFERENCE_SIZE_M, 0.0, *place_m, family=family)
