@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import rospy
 import rostest
@@ -25,6 +26,7 @@ from hero_test.driver_case import (
     receives_topic,
 )
 from hero_test.fake_robot import READ_CYCLE_S, SUB
+from hero_test.processes import suspended
 from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller"
@@ -137,6 +139,24 @@ class TestDriverStop(OwnDriverCase):
         robot.is_silent = False
         self.call_stop(driver, True)
         self.wait_at_rest(driver, robot)
+
+    def test_a_suspended_driver_accuses_no_robot_of_a_tuning_that_is_over(self):
+        driver = self.start()
+        robot = self.dial_stock(driver, 54)
+        with suspended(driver.process.pid):
+            threads = Path("/proc/%d/task" % driver.process.pid)
+            wait_for(lambda: all(" T " in path.read_text() for path in threads.glob("*/stat")), "all threads to rest")
+            for _ in range(45):
+                robot.log("Tunning Motor Set: [0.000000,0.000000], [0.050000,0.050000]->[-50,210]")
+            for _ in range(45):  # what comes last, behind more than one read, is young again
+                robot.log("[%s] %s" % (robot.namespace, "-" * 90))
+            wait_for(lambda: robot.count_unacknowledged() == 0, "all of it to be in the driver's socket")
+        robot.log("this is read in time")
+        driver.wait_line("this is read in time")
+        self.assertEqual(driver.find_lines("tunes itself, without a request"), [])
+        robot.start_tuning()
+        driver.wait_line("hero_54 tunes itself, without a request from this driver: stopped")
+        wait_for(lambda: not robot.motors.is_tuning, "the tuning to end")
 
     def test_the_end_of_the_driver_ends_the_tuning_of_a_robot(self):
         driver = self.start(allow_self_tuning=True)

@@ -6,9 +6,12 @@ measured: ids in call order, publishers from 125, subscribers from 100; one burs
 """
 
 import contextlib
+import fcntl
 import select
 import socket
 import struct
+import sys
+import termios
 import threading
 import time
 from typing import Callable, Dict, List, NamedTuple, Optional
@@ -238,6 +241,11 @@ class FakeRobot:
         """Send anything; a connection that the driver has closed is no error, ended tells it."""
         with self._write_lock, contextlib.suppress(OSError):
             self._socket.sendall(data)
+
+    def count_unacknowledged(self) -> int:
+        """Return the bytes that the driver's TCP does not have yet."""
+        assert self._socket is not None
+        return int.from_bytes(fcntl.ioctl(self._socket.fileno(), termios.TIOCOUTQ, bytes(4)), sys.byteorder)
 
     def send_packet(self, topic_id: int, payload: bytes) -> None:
         """Send one packet."""
