@@ -1,4 +1,4 @@
-"""When the next burst may go to a robot that tunes itself: after three readings, or after a time that doubles."""
+"""When the next burst may go to a robot that tunes itself: after three readings, or, where there are none, after times that double."""
 
 import pytest
 
@@ -29,22 +29,19 @@ def test_the_next_burst_waits_for_readings_after_the_acknowledgement(wheels):
     assert gate.is_open(True, 0.2)
 
 
-def test_without_readings_bursts_go_after_times_that_double(wheels):
-    gate, now_s = BurstGate(wheels), 0.0
+def test_without_a_further_reading_no_further_burst_goes(wheels):
+    gate = BurstGate(wheels)
+    gate.note_sent(0.0)
+    wheels.is_late = True
+    for now_s in (0.1, 1.0, 10.0, 1000.0):
+        wheels.read_ticks(0.0, 0.0)
+        assert not gate.is_open(True, now_s), "readings that are late show nothing"
+
+
+def test_to_a_robot_without_readings_bursts_go_after_times_that_double():
+    gate, now_s = BurstGate(WheelMotion()), 0.0
     for wait_s in (WAIT_S, 2 * WAIT_S, 4 * WAIT_S):
         gate.note_sent(now_s)
         assert not gate.is_open(True, now_s + 0.99 * wait_s)
         now_s += wait_s
         assert gate.is_open(True, now_s)
-
-
-def test_a_burst_that_was_read_shortens_the_wait_after_the_next_one(wheels):
-    gate = BurstGate(wheels)
-    for now_s in (0.0, 1.0, 3.0):
-        gate.note_sent(now_s)
-    gate.is_open(True, 3.0)
-    for _ in range(READINGS_MIN):
-        wheels.read_ticks(0.0, 0.0)
-    assert gate.is_open(True, 3.1)
-    gate.note_sent(3.1)
-    assert not gate.is_open(True, 3.1) and gate.is_open(True, 3.1 + WAIT_S)

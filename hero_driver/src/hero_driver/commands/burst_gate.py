@@ -2,7 +2,7 @@
 
 A robot reads until nothing is left, and does nothing else meanwhile. A burst that reaches it before it has finished the
 one before keeps it there, deaf, and how long it takes for one is not known: 0.06 s and 0.17 s were measured. TCP
-acknowledges for it at once, so only its readings show that it has finished.
+acknowledges for it at once, so only its readings show that it has finished: without them no further burst goes.
 """
 
 from typing import Optional
@@ -12,9 +12,9 @@ from ..corrections.wheel_motion import WheelMotion
 READINGS_MIN = 3
 """Two readings (34 ms apart) may leave between the acknowledgement and the robot's next reading cycle (51 ms)."""
 
-WAIT_S = 0.5
-"""Without readings the next burst goes after this time, and each further one after twice the time of the last: the
-robot finishes sooner or later, whatever it takes for one."""
+WAIT_S = 2.0
+"""To a robot that never gives readings the next burst goes after this time, and each further one after twice the time
+of the last: the robot finishes sooner or later, whatever it takes for one."""
 
 
 class BurstGate:
@@ -41,4 +41,4 @@ class BurstGate:
             if self._acknowledged_readings is None:
                 self._acknowledged_readings = self._wheels.readings
             self._is_outstanding = self._wheels.readings - self._acknowledged_readings < READINGS_MIN
-        return not self._is_outstanding or now_s >= self._retry_s
+        return not self._is_outstanding or (self._wheels.readings == 0 and now_s >= self._retry_s)
