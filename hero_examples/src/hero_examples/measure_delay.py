@@ -7,14 +7,16 @@ from nav_msgs.msg import Odometry
 from hero_client import Program, open_swarm, read_parameters
 from hero_node import import_optional, wrap_angle, yaw_of
 from hero_node.parameters import robot_ids, whole_number
+from hero_node.ros import read_duration_clock_s
 
 
 def measure(program, robot, turns):
     """Return lists in ms: arrival minus stamp of odometry, and time from a command to the first 0.03 rad."""
-    log = []  # arrival (s), stamp (s) and yaw (rad) of each message
+    log = []  # delay (s), arrival (s, by a clock that nobody sets) and yaw (rad) of each message
 
     def receive(odometry):
-        log.append((rospy.get_time(), odometry.header.stamp.to_sec(), yaw_of(odometry.pose.pose.orientation)))
+        delay_s = rospy.get_time() - odometry.header.stamp.to_sec()
+        log.append((delay_s, read_duration_clock_s(), yaw_of(odometry.pose.pose.orientation)))
 
     subscriber = rospy.Subscriber(robot.namespace + "/odom", Odometry, receive, tcp_nodelay=True)
     motions_ms = []
@@ -22,17 +24,16 @@ def measure(program, robot, turns):
         robot.drive(0.0, 0.0)
         if not program.sleep(1.0) or not log:
             break
-        start_s, first_yaw_rad = rospy.get_time(), log[-1][2]
+        start_s, first_yaw_rad = read_duration_clock_s(), log[-1][2]
         robot.drive(0.0, 2.0 if turn % 2 == 0 else -2.0)
-        while rospy.get_time() - start_s < 2.0 and program.sleep(0.002):
-            arrival_s, _, yaw_rad = log[-1]
+        while read_duration_clock_s() - start_s < 2.0 and program.sleep(0.002):
+            _, arrival_s, yaw_rad = log[-1]
             if abs(wrap_angle(yaw_rad - first_yaw_rad)) > 0.03:  # one encoder tick is 0.017 rad
                 motions_ms.append(1000.0 * (arrival_s - start_s))
                 break
     robot.stop()
     subscriber.unregister()
-    delays_ms = [1000.0 * (arrival_s - stamp_s) for arrival_s, stamp_s, _ in log]
-    return {"message delay": delays_ms, "command to motion": motions_ms}
+    return {"message delay": [1000.0 * delay_s for delay_s, _, _ in log], "command to motion": motions_ms}
 
 
 def main():

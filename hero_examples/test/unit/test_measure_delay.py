@@ -22,9 +22,11 @@ class Stage:
     def __init__(self, monkeypatch, delay_s=0.1, yaw_rad=3.1, ends_s=1e9):
         self.now_s, self.delay_s, self.ends_s = 100.0, delay_s, ends_s
         self.yaw_rad, self.commands, self.stopped, self.receive = yaw_rad, [], 0, None
-        self.noise_rad = 0.003
+        self.noise_rad, self.set_s = 0.003, 0.0
         rospy = measure_delay.rospy
-        monkeypatch.setattr(rospy, "get_time", lambda: self.now_s)
+        self.ahead_s = 0.0  # of ROS
+        monkeypatch.setattr(rospy, "get_time", lambda: self.now_s + self.ahead_s)
+        monkeypatch.setattr(measure_delay, "read_duration_clock_s", lambda: self.now_s)
         monkeypatch.setattr(rospy, "Subscriber", self.subscribe)
 
     def subscribe(self, topic, kind, receive, tcp_nodelay):
@@ -35,6 +37,7 @@ class Stage:
     def drive(self, linear_m_s, angular_rad_s):
         assert linear_m_s == 0.0
         self.commands.append((self.now_s, angular_rad_s))
+        self.ahead_s += self.set_s
 
     def stop(self):
         self.stopped += 1
@@ -45,7 +48,7 @@ class Stage:
             told = [speed for time_s, speed in self.commands if time_s + self.delay_s <= self.now_s]
             self.yaw_rad = wrap_angle(self.yaw_rad + 0.01 * (told[-1] if told else 0.0))
             message = Odometry()
-            message.header.stamp = Time.from_sec(self.now_s - 0.015)
+            message.header.stamp = Time.from_sec(self.now_s + self.ahead_s - 0.015)
             orientation = message.pose.pose.orientation
             self.noise_rad = -self.noise_rad
             half_rad = (self.yaw_rad + self.noise_rad) / 2.0
@@ -70,6 +73,16 @@ def test_delays_of_messages_and_motions_are_measured_to_both_sides(monkeypatch, 
     rests_s = [after - before for (before, speed), (after, _) in zip(stage.commands, stage.commands[1:]) if not speed]
     assert rests_s == pytest.approx([1.0] * 4)
     assert stage.stopped == 1 and stage.receive is None
+
+
+@pytest.mark.parametrize("set_s", [-20.0, 3600.0])
+def test_setting_the_clock_changes_no_measured_delay(monkeypatch, set_s):
+    stage = Stage(monkeypatch)
+    stage.set_s = set_s  # at each command
+    stage.now_s = 1000.0
+    found = stage.measure(4)
+    assert found["command to motion"] == pytest.approx([115.0] * 4, abs=11.0)
+    assert set(map(round, found["message delay"])) == {15}
 
 
 def test_a_robot_that_does_not_move_is_given_two_seconds(monkeypatch):

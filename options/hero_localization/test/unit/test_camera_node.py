@@ -113,3 +113,28 @@ def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):
         expected = (x_m + moved_m * math.cos(heading_rad), 2.0 + moved_m * math.sin(heading_rad), 1.0 + moved_s)
         assert ids == [7] and speeds.tolist() == [[0.2, 1.0]]
         assert poses[0] == pytest.approx(expected), stamp_s
+
+
+@pytest.mark.parametrize("stamps_arrival", [False, True])
+def test_images_go_on_when_the_clock_is_set(monkeypatch, stamps_arrival):
+    now_s, ahead_s, published = [50.0], [1000.0], []
+    node = camera_node.CameraNode.__new__(camera_node.CameraNode)
+    node._options, node._seed, node._stamps_arrival = CameraOptions(delay_s=0.1, dropped_share=0.0), 0, stamps_arrival
+
+    def publish(stamp, taken_s):
+        published.append((now_s[0], stamp.to_sec() - now_s[0] - ahead_s[0], taken_s - now_s[0] - ahead_s[0]))
+        ahead_s[0] = 4600.0 - ahead_s[0]  # back and forth by an hour
+
+    def sleep(duration_s):
+        now_s[0] += duration_s
+
+    monkeypatch.setattr(node, "_publish", publish)
+    monkeypatch.setattr(camera_node, "read_duration_clock_s", lambda: now_s[0])
+    monkeypatch.setattr(camera_node.rospy, "get_time", lambda: now_s[0] + ahead_s[0])
+    monkeypatch.setattr(camera_node.rospy, "sleep", sleep)
+    monkeypatch.setattr(camera_node.rospy, "is_shutdown", lambda: len(published) >= 30)
+    node.run()
+    times_s, stamps_s, taken_s = np.array(published).T
+    assert times_s[-1] - 50.0 == pytest.approx(29 / 30.0 + 0.1, abs=0.03)
+    assert ((taken_s > -0.13) & (taken_s < -0.09)).all()
+    assert stamps_s == pytest.approx(np.zeros(30) if stamps_arrival else taken_s, abs=1e-6)

@@ -122,13 +122,14 @@ def test_pictures_without_a_stamp_are_as_new_as_now(source, monkeypatch):
 
 @pytest.fixture
 def clock(monkeypatch):
-    """Return the time of a clock that only goes on while somebody sleeps, as a list of one number."""
-    now_s = [100.0]
+    """Return the time of a clock that only goes on while somebody sleeps, and how far ROS is ahead, in a list."""
+    now_s = [100.0, 0.0]
 
     def sleep(duration_s):
         now_s[0] += duration_s
 
-    monkeypatch.setattr(rospy, "get_time", lambda: now_s[0])
+    monkeypatch.setattr(frame_source, "read_duration_clock_s", lambda: now_s[0])
+    monkeypatch.setattr(rospy, "get_time", lambda: now_s[0] + now_s[1])
     monkeypatch.setattr(frame_source.time, "sleep", sleep)
     return now_s
 
@@ -145,6 +146,13 @@ def video(clock, tmp_path, monkeypatch):
     yield source
     source.close()
     source.close()
+
+
+def test_a_video_is_played_on_when_the_clock_is_set(video, clock):
+    for ahead_s in (0.0, -3600.0, 7200.0, 0.0):
+        clock[1] = ahead_s
+        assert video.poll(TIMEOUT_S).stamp_s == video.arrived_s == clock[0] + ahead_s
+    assert clock[0] - 100.0 < len(SHADES) / RATE_HZ + 0.01
 
 
 def test_a_video_is_played_in_real_time_to_its_end(video, clock, tmp_path):

@@ -178,7 +178,7 @@ def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeyp
         return SimpleNamespace(unregister=scene.on_odometry.clear)
 
     monkeypatch.setattr(rospy, "Subscriber", subscribe)
-    monkeypatch.setattr(rospy, "get_time", lambda: scene.swarm.now_s)
+    monkeypatch.setattr(calibrate_camera, "read_duration_clock_s", lambda: scene.swarm.now_s)
     monkeypatch.setattr(calibrate_camera, "Robot", lambda robot_id: nullcontext(scene.swarm[robot_id]))
     program = SimpleNamespace(sleep=None)
     parsed = calibrate_camera.parse_options(["robots", "--robots", "0", "--file", path])

@@ -14,6 +14,7 @@ import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from hero_node import clamp
+from hero_node.ros import read_duration_clock_s
 
 from ..errors import FrameSourceError
 from .camera_model import Intrinsics
@@ -223,7 +224,7 @@ class VideoSource(FrameSource):
         super().__init__()
         self._path = path
         self._capture = _open_capture(path, cv2.CAP_ANY, "no video that OpenCV can read")
-        self._start_s = rospy.get_time()
+        self._start_s = read_duration_clock_s()
         self._numbers = itertools.count()
         self._next: Optional[Frame] = None
 
@@ -231,13 +232,13 @@ class VideoSource(FrameSource):
         """Return the next image as soon as it is due; None if that is later than timeout_s, or there is none."""
         if self._next is None:
             self._next = self._read()
-        wait_s = timeout_s if self._next is None else self._next.stamp_s - rospy.get_time()
+        wait_s = timeout_s if self._next is None else self._next.stamp_s - read_duration_clock_s()
         time.sleep(clamp(max(0.0, wait_s), timeout_s))
         if self._next is None or wait_s > timeout_s:
             return None
         frame, self._next = self._next, None
         self.arrived_s = rospy.get_time()
-        self._start_s += self.arrived_s - frame.stamp_s
+        self._start_s += read_duration_clock_s() - frame.stamp_s
         return frame._replace(stamp_s=self.arrived_s)
 
     def _read(self) -> Optional[Frame]:

@@ -20,6 +20,7 @@ from hero_client import Program, ProgramError, Robot
 from hero_client.values import is_plausible, read_pose
 from hero_node import HeroError, Pose, import_optional, say
 from hero_node.parameters import robot_ids_option
+from hero_node.ros import read_duration_clock_s
 
 from ..calibration.arena_calibration import MIN_TAGS, average_tags, calibrate_arena, fit_references
 from ..calibration.lens_calibration import (
@@ -264,10 +265,10 @@ def _watch_robot(images: Images, program: Program, robot_id: int, tag_id: int) -
     with Robot(robot_id) as robot:
         robot.wait_until_ready(READY_S, program.sleep)
         robot.check_not_stopped()
-        look_until_s, count = rospy.get_time() + LOOK_S, 0
+        look_until_s, count = read_duration_clock_s() + LOOK_S, 0
         while not seen:
             count = max(count, watch(images.take()))
-            if not seen and rospy.get_time() > look_until_s:
+            if not seen and read_duration_clock_s() > look_until_s:
                 reason = "appears more than once" if count else "is not in the image, or too dark"
                 raise CalibrationError("tag %d %s; the robot was not moved" % (tag_id, reason))
         say("hero_%d turns left and right, and drives forward and back" % robot_id)
@@ -276,8 +277,8 @@ def _watch_robot(images: Images, program: Program, robot_id: int, tag_id: int) -
         subscriber = rospy.Subscriber("/hero_%d/odom" % robot_id, Odometry, keep, queue_size=30, tcp_nodelay=True)
         try:
             for duration_s, linear_m_s, angular_rad_s in CALIBRATION_DRIVE:
-                end_s = rospy.get_time() + duration_s
-                while rospy.get_time() < end_s:
+                end_s = read_duration_clock_s() + duration_s
+                while read_duration_clock_s() < end_s:
                     robot.drive(linear_m_s, angular_rad_s)
                     watch(images.poll())
         finally:

@@ -19,7 +19,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
 from hero_node.parameters import within
-from hero_node.ros import check_master
+from hero_node.ros import check_master, read_duration_clock_s
 from hero_sim.world import Arena, build_default, load_arena
 
 from ..errors import SettingsError
@@ -165,15 +165,16 @@ class CameraNode:
 
     def run(self) -> None:
         """Publish images until ROS ends."""
-        for taken_s, arrival_s in list_frames(self._options, rospy.get_time(), self._seed):
-            wait_s = arrival_s - rospy.get_time()
+        for taken_s, arrival_s in list_frames(self._options, read_duration_clock_s(), self._seed):
+            wait_s = arrival_s - read_duration_clock_s()
             if wait_s > 0.0:
                 rospy.sleep(wait_s)
             if rospy.is_shutdown():
                 return
-            if rospy.get_time() - arrival_s < MISSED_S:
-                stamp_s = rospy.get_time() if self._stamps_arrival else taken_s
-                self._publish(rospy.Time.from_sec(stamp_s), taken_s)
+            now_s, ros_s = read_duration_clock_s(), rospy.get_time()
+            if now_s - arrival_s < MISSED_S:
+                taken_ros_s = ros_s - (now_s - taken_s)
+                self._publish(rospy.Time.from_sec(ros_s if self._stamps_arrival else taken_ros_s), taken_ros_s)
 
     def _publish(self, stamp: rospy.Time, taken_s: float) -> None:
         if not self._scene.is_complete:
