@@ -150,6 +150,9 @@ class Gateway(LinkHandler):
         peer = self.peers[link]
         for event in peer.session.poll(now_s):
             self._receive_event(peer, event, now_s)
+        if peer.session.begins_to_lack_data() and peer.bridge is not None:
+            text = f"{peer.label} is connected, but sends none of its topics any more: reboot it"
+            self._log.log_throttled("warn", "no data " + peer.label, text, peer.label)
         if peer.record is None and now_s - peer.session.opened_s > self._config.declare_timeout_s:
             link.close(f"did not identify itself as a robot within {self._config.declare_timeout_s:.1f} s")
         if peer.session.outgoing and not link.closed:

@@ -1,4 +1,4 @@
-"""When the next burst may go to a robot that tunes itself: after three readings, or, where there are none, after times that double."""
+"""When the next burst may go to a robot that tunes itself: after readings; without any, after times that double."""
 
 import pytest
 

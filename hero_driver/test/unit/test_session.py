@@ -254,6 +254,32 @@ def test_a_declared_session_does_not_end_while_the_robot_speaks():
         assert session.poll(T0 + step) == []
 
 
+def test_a_robot_that_only_asks_for_the_time_is_noticed_once_until_data_come():
+    session = open_declared_session()
+    noticed_s = []
+
+    def ask(start_s):
+        for step in range(100):
+            receive(session, TIME_REQUEST, start_s + 0.1 * step)
+            noticed_s.extend([0.1 * step] * session.begins_to_lack_data())
+
+    ask(T0)
+    receive(session, ODOM_MESSAGE, T0 + 20.0)
+    assert not session.begins_to_lack_data()
+    ask(T0 + 20.0)
+    assert noticed_s == pytest.approx([5.1, 5.1])
+    session.forgive_silence(T0 + 100.0)
+    receive(session, TIME_REQUEST, T0 + 104.0)
+    assert not session.begins_to_lack_data(), "while the driver could not read, robots may have sent data"
+
+
+def test_a_robot_that_is_silent_does_not_lack_data():
+    session = open_declared_session()
+    receive(session, ODOM_MESSAGE, T0 + 1.0)
+    session.poll(T0 + 6.9)
+    assert not session.begins_to_lack_data()
+
+
 # What the robot sends.
 
 

@@ -139,3 +139,18 @@ def test_a_broken_message_of_transforms_is_refused_whole():
     two = build_transform_message(*[build_transform(NOW_NS, "hero_0/base_link", "hero_0/hat_link")] * 2)
     assert robot.receive("/tf", b"\x01\x00\x00\x00" + two[4:], NOW_NS) == []
     assert robot.corrections.refused == len(message) + 2
+
+
+@pytest.mark.parametrize("number", [1e300, -10001.0, float("nan"), -float("inf")])
+@pytest.mark.parametrize("pair", [("hero_0/odom", "hero_0/base_link"), ("hero_0/base_link", "hero_0/hat_link")])
+def test_transforms_whose_numbers_cannot_be_true_are_refused_and_named(pair, number):
+    robot = CorrectedRobot()
+    right = (1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    for index in range(7):
+        for stamp_ns in (NOW_NS + 2 * index * MS, NOW_NS + (2 * index + 1) * MS):  # known and unknown frames
+            wrong = (*right[:index], number, *right[index + 1 :])
+            transform = build_transform(stamp_ns, *pair, numbers=wrong)
+            assert robot.receive("/tf", build_transform_message(transform), stamp_ns) == []
+            assert robot.corrections.take_problem().startswith("tf refused, it cannot be true (x ")
+    assert receive_transforms(robot, pair, stamp_ns=NOW_NS + 40 * MS)
+    assert robot.corrections.take_problem() == ""

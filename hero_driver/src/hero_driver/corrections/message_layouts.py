@@ -151,13 +151,29 @@ class OdometryWriter:
 def _is_possible(pose: Sequence[float], twist: Sequence[float]) -> bool:
     """Return whether the numbers of an odometry can be those of a robot; comparisons with NaN fail."""
     return (
-        -MAX_POSITION_M <= pose[0] <= MAX_POSITION_M
-        and -MAX_POSITION_M <= pose[1] <= MAX_POSITION_M
+        _is_possible_pose(pose)
         and -MAX_WHEEL_SPEED_M_S <= twist[0] <= MAX_WHEEL_SPEED_M_S
         and -MAX_TURN_RAD_S <= twist[5] <= MAX_TURN_RAD_S
-        # A sum is finite only if each part is.
-        and math.isfinite(sum(pose) + sum(twist))
+        and math.isfinite(sum(twist))
     )
+
+
+def _is_possible_pose(pose: Sequence[float]) -> bool:
+    return (
+        -MAX_POSITION_M <= pose[0] <= MAX_POSITION_M
+        and -MAX_POSITION_M <= pose[1] <= MAX_POSITION_M
+        # A sum is finite only if each part is.
+        and math.isfinite(sum(pose))
+    )
+
+
+def find_transform_fault(transform: bytes) -> str:
+    """Return the numbers of a geometry_msgs/TransformStamped that cannot be a robot's, for users; empty if they can."""
+    pose = _POSE.unpack(transform[TRANSFORM_TAIL])
+    x, y, z, w = pose[3:]
+    if _is_possible_pose(pose) and abs(pose[2]) <= MAX_POSITION_M and 0.5 < x * x + y * y + z * z + w * w < 2.0:
+        return ""
+    return "x %.4g m, y %.4g m, z %.4g m, rotation %.4g %.4g %.4g %.4g" % pose
 
 
 def describe_odometry(payload: bytes) -> str:

@@ -91,7 +91,7 @@ class RobotCorrections:
         self._encoder_md5 = ""
         self._declared: Set[str] = set()
         self.odometry = TickOdometry(settings.find_geometry(namespace, self.model))
-        self.transforms = TransformCorrector(namespace, self.stamps, add_transform, self._take_odom_transform)
+        self.transforms = TransformCorrector(namespace, self.stamps, self._add_possible, self._take_odom_transform)
         self._refused = 0
         self._problem = ""
         self._packed_pose = self._pack_pose()
@@ -166,9 +166,8 @@ class RobotCorrections:
         self.odometry.fault = ""
         return problem
 
-    def _refuse(self, topic: str, payload: bytes) -> None:
+    def _refuse(self, topic: str, what: str) -> None:
         self._refused += 1
-        what = message_layouts.describe_odometry(payload) if topic == "odom" else f"{len(payload)} bytes"
         self._problem = f"{topic} refused, it cannot be true ({what}): reboot the robot, or flash its firmware"
 
     def note_encoder(self, md5sum: str) -> None:
@@ -218,7 +217,7 @@ class RobotCorrections:
     def _correct_stamped(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
-            self._refuse(name[len(self._namespace) + 1 :], payload)
+            self._refuse(name[len(self._namespace) + 1 :], f"{len(payload)} bytes")
             return
         stamp_ns = self.stamps.correct(name, stamp_ns, arrival_ns)
         sink.publish(message_layouts.restamp(payload, next(self._seqs[name]), stamp_ns))
@@ -258,7 +257,7 @@ class RobotCorrections:
     def _correct_odometry(self, raw_sink: Sink, payload: bytes, arrival_ns: int) -> None:
         stamp_ns = message_layouts.read_stamp_ns(payload)
         if stamp_ns is None:
-            self._refuse("odom", payload)
+            self._refuse("odom", message_layouts.describe_odometry(payload))
             return
         self._offsets_ns.append(stamp_ns - arrival_ns)
         raw_sink.publish(payload)
@@ -280,7 +279,7 @@ class RobotCorrections:
     def _correct_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
         reading = message_layouts.read_encoder(payload)
         if reading is None:
-            self._refuse("encoder", payload)
+            self._refuse("encoder", f"{len(payload)} bytes")
             return
         stamp_ns, left_ticks, right_ticks = reading
         self.wheels.read_ticks(left_ticks, right_ticks)
@@ -314,7 +313,7 @@ class RobotCorrections:
         estimate = (self._packed_pose, odometry.linear_m_s, odometry.angular_rad_s) if self._uses_estimate else None
         written = self._writer.rewrite(payload, next(self._odom_seqs), stamp_ns, estimate)
         if written is None:
-            self._refuse("odom", payload)
+            self._refuse("odom", message_layouts.describe_odometry(payload))
         else:
             self._odom_sink.publish(written)
 
@@ -327,4 +326,14 @@ class RobotCorrections:
             self._refused += 1
 
     def _write_odom_transform(self, head: bytes, tail: bytes) -> None:
-        self._add_transform(head + (self._packed_pose if self._uses_estimate else tail))
+        if self._uses_estimate:
+            self._add_transform(head + self._packed_pose)
+        else:
+            self._add_possible(head + tail)
+
+    def _add_possible(self, transform: bytes) -> None:
+        fault = message_layouts.find_transform_fault(transform)
+        if fault:
+            self._refuse("tf", fault)
+        else:
+            self._add_transform(transform)

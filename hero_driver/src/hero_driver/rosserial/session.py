@@ -28,6 +28,9 @@ follow in the same burst (node_handle.h:301); alone it is the zero-topic handsha
 REPEAT_INTERVAL_S = 0.5
 """Time between two requests for topics when a peer proves that it runs but declared nothing."""
 
+DATA_SILENCE_S = 5.0
+"""A robot that has declared topics sends data 29 times in a second."""
+
 UNCONFIGURED_S = 3.0
 """A robot that logs but sent neither data nor a time request for this long has lost its configuration (no answer
 for 11 s, node_handle.h:193); it asks for the time every 2.55 s otherwise. Only a new request restores it."""
@@ -154,6 +157,8 @@ class Session:
         self._changes = 0
         self._requests = 0
         self._last_configured_s = now_s
+        self._last_message_s = now_s
+        self._lacks_data = False
 
     def receive_bytes(self, data: Bytes, now_s: float, time_of_day_s: float) -> List[Event]:
         """Return the events that data causes, in order. Never raises, whatever data holds."""
@@ -167,7 +172,7 @@ class Session:
             messages = [(topics[topic_id], payload) for topic_id, payload in received]
         except KeyError:
             return self._receive_mixed(received, now_s, time_of_day_s)
-        self._last_configured_s = now_s
+        self._last_configured_s = self._last_message_s = now_s
         return [MessagesReceived(messages)]
 
     def _receive_mixed(self, received: List[Tuple[int, bytes]], now_s: float, time_of_day_s: float) -> List[Event]:
@@ -180,7 +185,7 @@ class Session:
                 if messages is None:
                     messages = []
                     events.append(MessagesReceived(messages))
-                    self._last_configured_s = now_s
+                    self._last_configured_s = self._last_message_s = now_s
                 messages.append((topic, payload))
                 continue
             try:
@@ -204,6 +209,12 @@ class Session:
             self._request_due_s = now_s + REQUEST_INTERVAL_S
             self._asks_again = False
         return []
+
+    def begins_to_lack_data(self) -> bool:
+        """Return whether a robot that answers has now sent none of its topics for DATA_SILENCE_S; True once."""
+        lacked, since_s = self._lacks_data, max(self._last_message_s, self._listening_s)
+        self._lacks_data = bool(self._messages) and self.last_receive_s - since_s > DATA_SILENCE_S
+        return self._lacks_data and not lacked
 
     def forgive_silence(self, now_s: float) -> None:
         """Count silence from now on: until now nothing could be received."""

@@ -50,17 +50,18 @@ def scatter(
         x_share, y_share, turn = 2.0 * random.random_sample(3) - 1.0
         place_m = half_m * (x_share, y_share)
         apart_m2 = ((poses[:placed, :2] - place_m) ** 2).sum(axis=1).min(initial=np.inf)
-        if apart_m2 > (2.0 * BODY_RADIUS_M + gap_m) ** 2 and _is_clear(place_m, arena):
+        if apart_m2 > (2.0 * BODY_RADIUS_M + gap_m) ** 2 and is_clear(place_m, arena):
             poses[placed] = (*place_m, math.pi * turn)
             placed += 1
     raise ValueError("%d robots find no place in %g m x %g m of arena %s" % (robots, width_m, height_m, arena.name))
 
 
-def _is_clear(place_m: np.ndarray, arena: Arena) -> bool:
+def is_clear(place_m: np.ndarray, arena: Arena, overlap_m: float = _ROUNDED_M) -> bool:
+    """Return whether a robot at place_m (2,) is inside the arena's bounds and clear of all that it holds."""
     low_m, high_m = arena.bounds_m[:2] - _ROUNDED_M, arena.bounds_m[2:] + _ROUNDED_M
     inside = (place_m >= low_m).all() and (place_m <= high_m).all()
     pose = Pose(float(place_m[0]), float(place_m[1]), 0.0)
-    return bool(inside and is_free(pose, (), arena, BODY_RADIUS_M - _ROUNDED_M))
+    return bool(inside and is_free(pose, (), arena, BODY_RADIUS_M - overlap_m))
 
 
 def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedBody]:

@@ -132,6 +132,8 @@ def place_robots(experiment: Experiment, cell: Cell, seeds: Sequence[int]) -> np
     """Return where the robots of runs begin (W, N, 3). Raises: ExperimentError."""
     start = cell.start._replace(file=experiment.list_files(cell).get("file"))
     arena, robots = load_cell_arena(experiment, cell), cell.settings["robots"]
+    if cell.settings.get("objects", "arena") != "arena":
+        arena = arena._replace(objects=())  # they are placed clear of the robots
     return place_all(start, arena, robots, seeds, experiment.sources.read)
 
 

@@ -13,7 +13,7 @@ from hero_sim.world import Arena, PushedBody, place_robots
 
 from ..behavior import derive_seed
 from ..metrics.graphs import measure_distances
-from ..trial import scatter, scatter_objects
+from ..trial import is_clear, scatter, scatter_objects
 from .errors import ExperimentError
 from .experiment_file import Start
 
@@ -32,7 +32,7 @@ def place_all(
     """
     if start.kind == "file":
         assert start.file is not None
-        return np.array([_read_poses(start.file, robots, read)] * len(seeds))
+        return np.array([_read_poses(start.file, robots, arena, read)] * len(seeds))
     try:
         return np.array([_place(start, arena, robots, seed) for seed in seeds])
     except (OptionError, ValueError) as error:
@@ -61,7 +61,17 @@ def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:
         side_m = math.sqrt(robots * math.pi * BODY_RADIUS_M * BODY_RADIUS_M / start.cover)
         return scatter(robots, side_m, side_m, seed, start.gap_m, arena)
     spacing_m = _DIAMETER_M + start.gap_m
-    return _place_in_grid(robots, spacing_m, seed) if start.kind == "grid" else _place_in_circle(robots, spacing_m)
+    poses = _place_in_grid(robots, spacing_m, seed) if start.kind == "grid" else _place_in_circle(robots, spacing_m)
+    _check_clear(poses, arena, [f"robot {number} of the {start.kind}" for number in range(robots)])
+    return poses
+
+
+def _check_clear(poses: np.ndarray, arena: Arena, names: Sequence[str]) -> None:
+    """Raises: ValueError for a robot in a wall, in an object, or outside of the arena."""
+    for (x_m, y_m), name in zip(poses[:, :2], names):
+        if not is_clear(np.array((x_m, y_m)), arena, _MAX_OVERLAP_M):
+            text = "%s at (%.3g, %.3g) is in a wall or an object of arena %s, or outside of it"
+            raise ValueError(text % (name, x_m, y_m, arena.name))
 
 
 def _place_in_grid(robots: int, spacing_m: float, seed: int) -> np.ndarray:
@@ -81,7 +91,7 @@ def _place_in_circle(robots: int, spacing_m: float) -> np.ndarray:
     return np.column_stack((radius_m * np.cos(angle_rad), radius_m * np.sin(angle_rad), yaw_rad))
 
 
-def _read_poses(path: str, robots: int, read: Callable[[str], bytes]) -> np.ndarray:
+def _read_poses(path: str, robots: int, arena: Arena, read: Callable[[str], bytes]) -> np.ndarray:
     """Return the first poses of a file with a line x m, y m, yaw rad for each robot. Raises: ExperimentError."""
     poses, numbers = [], []
     number = 0
@@ -104,6 +114,10 @@ def _read_poses(path: str, robots: int, read: Callable[[str], bytes]) -> np.ndar
         text = "start.file %s: the robots of lines %d and %d overlap: %.0f mm between centers; bodies are %.0f mm wide"
         values = numbers[first], numbers[second], 1e3 * apart_m[first, second], 1e3 * _DIAMETER_M
         raise ExperimentError(text % (path, *values))
+    try:
+        _check_clear(starts, arena, ["the robot of line %d" % number for number in numbers])
+    except ValueError as error:
+        raise ExperimentError(f"start.file {path}: {error}") from error
     return starts
 
 

@@ -15,6 +15,7 @@ import pytest
 from PIL import Image
 
 from hero_client.values import BODY_RADIUS_M
+from hero_sim.world import load_arena
 from hero_swarm import metrics, show
 from hero_swarm.experiments import batch, report, runner
 from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING
@@ -387,6 +388,29 @@ def test_a_wrong_file_of_starts_is_refused_with_its_line(content, words, tmp_pat
     with pytest.raises(ExperimentError) as caught:
         place_all(Start("file", 0.0, 0.0, str(path)), OPEN, 2, [1])
     assert words in str(caught.value) and "starts.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("arena", "place", "words"),
+    [
+        ("empty", "0.97,0", "the robot of line 3 at (0.97, 0) is in a wall or an object of arena empty"),
+        ("empty", "3,0", "the robot of line 3 at (3, 0)"),
+        ("box", "-0.95,0.1", "the robot of line 3 at (-0.95, 0.1) is in a wall or an object of arena box"),
+    ],
+)
+def test_a_start_in_a_wall_or_object_or_outside_is_refused(arena, place, words, tmp_path):
+    path = tmp_path / "starts.csv"
+    path.write_text(f"#\n-0.4,0.4,0\n{place},0\n")
+    with pytest.raises(ExperimentError) as caught:
+        place_all(Start("file", 0.0, 0.0, str(path)), load_arena(arena), 2, [1])
+    assert words in str(caught.value) and "starts.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["grid", "circle"])
+def test_rows_and_circles_that_do_not_fit_into_the_arena_are_refused(kind):
+    assert place_all(Start(kind, 0.0, 0.01, None), load_arena("empty"), 9, [1]).shape == (1, 9, 3)
+    with pytest.raises(ExperimentError, match=f"start: robot [0-9]+ of the {kind} at .* is in a wall"):
+        place_all(Start(kind, 0.0, 0.5, None), load_arena("empty"), 30, [1])
 
 
 @pytest.mark.parametrize("arguments", [["--part", "4/3"], ["--part", "x"], ["--jobs", "0"], ["--executor", "slurm"]])
