@@ -26,6 +26,7 @@ from ..metrics import FALLING
 from ..metrics.own import MetricNames, is_own
 from ..sources import Sources
 from .errors import ExperimentError
+from .worlds import NOMINAL, WORLDS
 
 MAX_ROBOTS = 1000
 MAX_TIME_S = 86_400.0
@@ -52,7 +53,8 @@ TESTS = ("wilcoxon",)
 METRIC_NAMES = MetricNames()
 _REQUIRED = ("time_s", "seeds", "metrics")
 _KEYS = (
-    "behavior", "vary", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record", "compare"
+    "behavior", "vary", "world", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record",
+    "compare",
 )  # fmt: skip
 
 
@@ -269,6 +271,9 @@ def _parse_value(name: str, entry: Entry) -> _Value:
     """Return what the value of a setting, or of a parameter of the behavior, sets."""
     if name == "behavior":
         return _parse_behavior(entry)
+    if name == "world":
+        world = entry.choice(WORLDS)
+        return _Value(world, {"settings": WORLDS[world]})
     if name == "start":
         start = _parse_start(entry)
         given = {key: value.value for key, value in entry.mapping().items() if key != "kind"}
@@ -324,7 +329,8 @@ def _check_different(entry: Entry, values: Sequence[Any]) -> None:
 
 def _parse_cells(root: Dict[str, Entry], place: str, seeds: int) -> Tuple[Cell, ...]:
     given = root["parameters"].mapping() if "parameters" in root else {}
-    settings = {name: entry for name, entry in root.items() if name in (*SETTINGS, *ERROR_KEYS, "behavior", "start")}
+    kinds = (*SETTINGS, *ERROR_KEYS, "behavior", "start", "world")
+    settings = {name: entry for name, entry in root.items() if name in kinds}
     fixed = {name: _parse_value(name, entry) for name, entry in {**settings, **given}.items()}
     varied: List[Tuple[str, List[_Value]]] = []
     for name, entry in (root["vary"].mapping() if "vary" in root else {}).items():
@@ -334,6 +340,9 @@ def _parse_cells(root: Dict[str, Entry], place: str, seeds: int) -> Tuple[Cell, 
         _check_different(entry, [value.label for value in values])
         varied.append((name, values))
     names = [name for name, _ in varied]
+    for name in {*fixed, *names} if "world" in {*fixed, *names} else ():
+        if name in ERROR_KEYS or name in WORLDS[NOMINAL]:
+            raise ExperimentError(f"{place}: {name} does not go with world, which gives it; leave one out")
     for name, example in (("behavior", "behavior: milling"), ("robots", "robots: 20")):
         if name not in fixed and name not in names:
             where = root["behavior"].place if "behavior" in root else place

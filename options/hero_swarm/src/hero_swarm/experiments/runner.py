@@ -37,6 +37,9 @@ DASK = "dask:"
 FOLDER = "experiment_folder"
 """Key in about.json: folder of the experiment's file, base of its paths, relative to the results folder."""
 
+IN_WORLDS = "_phantoms"
+"""End of the names of the file and the folder of phantoms for an experiment."""
+
 Task = Tuple[Inputs, int, Tuple[int, ...], str]
 """Arguments of compute_batch()."""
 
@@ -213,4 +216,8 @@ def _run_missing(
     cells, count = len(experiment.cells), len(experiment.seeds)
     if left:
         return "%s: %d of %d runs are still to be computed, by other parts" % (folder.path, len(left), cells * count)
-    return "%s: all runs of %d cells with %d seeds each" % (folder.write_table(runs), cells, count)
+    line = "%s: all runs of %d cells with %d seeds each" % (folder.write_table(runs), cells, count)
+    in_worlds = os.path.splitext(options.file)[0] + IN_WORLDS
+    if "world" in experiment.cells[0].varied or os.path.isdir(in_worlds):
+        return line
+    return f"{line}; not tried with other assumptions: rosrun hero_swarm phantoms {options.file}"

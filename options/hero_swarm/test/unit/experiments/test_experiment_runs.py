@@ -319,7 +319,7 @@ def test_each_file_that_a_run_reads_counts_as_its_code_or_parameters(name, old, 
     [
         ("robots: 2", "robots: 2\nparameters: {rate_hz: 3000}", "e.yaml, line 3: Own: rate_hz is 3000.0, but must be"),
         ("own.errors", "/dev/zero", "line 4: errors /dev/zero cannot be read: it is a pipe, device or socket"),
-        ("own.yaml", "/dev/zero", "line 3: arena /dev/zero cannot be read: it is a pipe, device or socket"),
+        ("own.yaml", "/dev/zero", "line 3: arena /dev/zero: cannot be read: it is a pipe, device or socket"),
         ("own.csv", "/dev/zero", "/dev/zero cannot be read: it is a pipe, device or socket"),
         ("own.py", "no.py", "line 1: no.py, line 1: SyntaxError"),
     ],

@@ -1,0 +1,131 @@
+"""Program phantoms: would a result survive outside the world in which it was found?
+
+Runs an experiment, or a behavior, in the nominal world, with each assumption by itself, and with all of them
+(worlds.py), and says which one takes most. It writes an ordinary experiment file, NAME_phantoms.yaml, and its report.
+"""
+
+import argparse
+import math
+import os
+from typing import Any, Dict, Mapping, Optional, Sequence
+
+import numpy as np
+import yaml
+
+from hero_node import HeroError
+from hero_node.files import write_file
+from hero_node.parameters import within
+
+from ..behaviors import find_behavior
+from ..metrics import FALLING
+from . import runner
+from .errors import ExperimentError
+from .experiment_file import Experiment
+from .report import write_report
+from .results import load
+from .worlds import NOMINAL, USUAL, WORLDS, WORST
+
+REPLACED = {"world", *(name for settings in WORLDS.values() for name in settings)}
+"""Settings that the worlds give."""
+
+_FIRST_LINE = "# Made by `rosrun hero_swarm phantoms %s`, and made anew by it.\n"
+
+
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="phantoms", description="Score a result in worlds with other assumptions.")
+    parser.add_argument(
+        "what", metavar="EXPERIMENT.yaml|BEHAVIOR", help="an experiment's file, or a behavior as in one"
+    )
+    parser.add_argument("--seeds", type=within(2, 10_000, int), default=10, help="runs of each cell (%(default)s)")
+    parser.add_argument("--robots", type=within(1, 1000, int), default=20, help="of a behavior (%(default)s)")
+    parser.add_argument("--time", type=within(1.0, 86_400.0), default=120.0, metavar="S", help="of a run (%(default)s)")
+    parser.add_argument("--arena", help="of a behavior: empty, box, ... or a file (an open plane)")
+    parser.add_argument(
+        "--jobs", type=within(1, 1024, int), default=os.cpu_count() or 1, help="processes (%(default)s)"
+    )
+    parser.add_argument("--fresh", action="store_true", help="compute all runs anew")
+    return parser.parse_args(arguments)
+
+
+def make_file(options: argparse.Namespace) -> str:
+    """Write the experiment in all worlds, and return the file's name. Raises: ExperimentError."""
+    if options.what.endswith((".yaml", ".yml")):
+        text, _ = runner.read_experiment(options.what)
+        content, stem = yaml.safe_load(text), os.path.splitext(options.what)[0]
+    else:
+        try:
+            metric = find_behavior(options.what).metric
+        except (HeroError, TypeError, ValueError) as error:
+            raise ExperimentError(str(error)) from error
+        content = {"behavior": options.what, "robots": options.robots, "time_s": options.time, "metrics": [metric]}
+        if options.arena:
+            content["arena"] = options.arena
+        content["start"] = {"kind": "uniform", "cover": 0.02, "gap_m": 0.0}
+        stem = os.path.splitext(os.path.basename(options.what.replace(":", "_")))[0]
+    path = stem + runner.IN_WORLDS + ".yaml"
+    first = _FIRST_LINE % options.what
+    if os.path.exists(path):
+        with open(path, encoding="utf-8") as file:
+            if file.readline() != first:
+                raise ExperimentError(f"{path} is there, and was not made by this command: move it away")
+    write_file(path, (first + yaml.safe_dump(_put_in_worlds(content, options.seeds), sort_keys=False)).encode())
+    return path
+
+
+def _put_in_worlds(content: Dict[str, Any], seeds: int) -> Dict[str, Any]:
+    """Return an experiment in which the world varies, in place of all that a world gives."""
+    kept = {name: value for name, value in content.items() if name not in REPLACED and not name.startswith("errors.")}
+    varied = {name: value for name, value in kept.pop("vary", {}).items() if name not in REPLACED}
+    kept["vary"] = {"world": list(WORLDS), **{name: v for name, v in varied.items() if not name.startswith("errors.")}}
+    kept["seeds"] = {**kept.get("seeds", {}), "count": seeds}
+    kept.pop("record", None)
+    kept.pop("compare", None)
+    return kept
+
+
+def find_shares(experiment: Experiment, values: np.ndarray) -> Dict[str, float]:
+    """Return which share of the nominal score each world keeps, over all cells: medians of the first metric.
+
+    values: the first metric (cells, seeds). nan where the nominal score is zero, infinite or missing.
+    """
+    metric = experiment.metrics[0]
+    falls = metric.bound is not None or metric.source in FALLING
+    worlds = np.array([cell.varied["world"] for cell in experiment.cells])
+    scores = {world: float(np.nanmedian(values[worlds == world])) for world in WORLDS}
+    pairs = {world: (scores[NOMINAL], score) if falls else (score, scores[NOMINAL]) for world, score in scores.items()}
+    return {world: _divide(*pair) for world, pair in pairs.items()}
+
+
+def _divide(part: float, whole: float) -> float:
+    if not math.isfinite(part) or whole == 0.0:
+        return math.nan
+    return max(0.0, part / whole)
+
+
+def describe(shares: Mapping[str, float], metric: str) -> str:
+    """Return the verdict for users: a line for each world, and which assumption takes most."""
+    lines = ["share of the nominal %s that is kept" % metric]
+    lines += [
+        "  %-16s %s" % (world, "no score" if math.isnan(share) else "%.2f" % share) for world, share in shares.items()
+    ]
+    single = {world: share for world, share in shares.items() if world not in (NOMINAL, USUAL, WORST)}
+    if math.isnan(shares[USUAL]):
+        return "\n".join([*lines, "no verdict: the nominal score is zero, or never reached"])
+    weakest = min(single, key=lambda world: single[world] if math.isfinite(single[world]) else math.inf)
+    return "\n".join(
+        [*lines, f"usual robots keep {shares[USUAL]:.2f}; most is lost by {weakest} ({single[weakest]:.2f})"]
+    )
+
+
+def main(arguments: Optional[Sequence[str]] = None) -> None:
+    """Run the program."""
+    options = parse_options(arguments)
+    path = make_file(options)
+    folder = os.path.splitext(path)[0]
+    _, experiment = runner.read_experiment(path)
+    fresh = ["--fresh"] if options.fresh else []
+    print(runner.run_experiment(runner.parse_options([path, "--jobs", str(options.jobs), *fresh])))
+    write_report(folder)
+    results = load(folder)
+    print(describe(find_shares(experiment, results.metrics[experiment.metrics[0].name]), experiment.metrics[0].name))

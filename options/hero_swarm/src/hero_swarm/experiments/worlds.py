@@ -1,0 +1,32 @@
+"""Worlds that differ in what a simulation assumes: the nominal one, each assumption by itself, and all together.
+
+Figures: docs/simulator.md; lag, friction and traction are assumptions there, and these worlds ask what hangs on them.
+"""
+
+from typing import Any, Dict
+
+_NOMINAL = {"errors": "perfect", "errors.friction": 0.0, "wifi": "ideal", "delay_s": 0.0}
+
+NOMINAL, USUAL, WORST = "nominal", "usual", "worst"
+
+WORLDS: Dict[str, Dict[str, Any]] = {
+    NOMINAL: _NOMINAL,
+    "friction": {**_NOMINAL, "errors.friction": 0.3},
+    "strong friction": {**_NOMINAL, "errors.friction": 0.5},
+    "weak traction": {**_NOMINAL, "errors.friction": 0.3, "errors.wheel_friction": 0.4, "errors.wheel_load": 0.8},
+    "slow motors": {**_NOMINAL, "errors.lag_s": 0.16},
+    "unlike robots": {**_NOMINAL, "errors": 2.0},
+    "late poses": {**_NOMINAL, "delay_s": 0.2},
+    "bad radio": {**_NOMINAL, "wifi": "bad"},
+    USUAL: {"errors": "default", "wifi": "router", "delay_s": 0.05},
+    WORST: {
+        "errors": 2.0,
+        "errors.friction": 0.5,
+        "errors.wheel_friction": 0.4,
+        "errors.wheel_load": 0.8,
+        "errors.lag_s": 0.16,
+        "wifi": "bad",
+        "delay_s": 0.2,
+    },
+}
+"""Settings of an experiment by the name of the world."""
