@@ -1,13 +1,17 @@
 """Quality and cost of swarm behaviors on stepped robots with default errors. Run it with script/bench swarm.
 
-aggregation: 100 robots scattered over 4.64 m (2 % cover) without walls, poses 50 ms old, 300 s. evolved: the behaviors
-of binary_family, 20 robots (wall following: 9) in 1.71 m x 1.42 m, 200 s, medians of the last 60 s. filter: of 12
-robots at random in a fence of 2 m x 2 m for 30 s, and of ten that cross a circle of 1.2 m; which touch, and the time.
-speed: CPU seconds of 20 milling robots in 100 worlds for 120 s, and of one step of the filter for 100 dense robots.
+aggregation: 100 robots scattered over 4.64 m (2 % cover) without walls, poses 50 ms old, 300 s. genomes: published ones
+in 1.71 m x 1.42 m, with friction and without. behaviors: all built-in ones as their unit tests run them.
+chance: random genomes. filter: of 12 robots at random in a fence of 2 m x 2 m for 30 s, and of ten that cross a circle
+of 1.2 m; which touch, and the time. speed: CPU seconds of 20 milling robots in 100 worlds for 120 s, and of one step of
+the filter for 100 dense robots.
 """
 
 import argparse
+import importlib
+import sys
 import time
+from pathlib import Path
 from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
@@ -17,17 +21,27 @@ from hero_client.controllers import steer
 from hero_client.values import BODY_RADIUS_M
 from hero_sim.world.arena import build_rectangle
 from hero_swarm import Behavior
-from hero_swarm.behavior import Command, Random, Sensed
+from hero_swarm.behavior import PULSES, VELOCITY, Command, Random, Sensed
 from hero_swarm.behaviors import find_behavior
-from hero_swarm.metrics import METRICS, cluster_fraction, dispersion_ratio, time_until
+from hero_swarm.behaviors.binary_family import WheelGenome
+from hero_swarm.metrics import CHANCE, METRICS, cluster_fraction, dispersion_ratio, time_until
 from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.safety import OFF, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial
 
-PARTS = ("aggregation", "evolved", "filter", "speed")
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "options/hero_swarm/test/unit"))
+cases: Any = importlib.import_module("test_behaviors")
+
+PARTS = ("aggregation", "genomes", "behaviors", "chance", "filter", "speed")
 
 _ARENA = build_rectangle(1.71, 1.42, 1)
-_EVOLVED = ("evolved_aggregation", "cyclic_pursuit", "dispersal", "milling", "wall_following")
+_GENOMES: Dict[str, Tuple[Tuple[float, ...], int, str, str]] = {
+    "aggregation": ((-0.7, -1.0, 1.0, -1.0), 20, "cluster_fraction", PULSES),
+    "cyclic pursuit": ((-0.7, 0.3, 1.0, 1.0), 20, "rotation", PULSES),
+    "dispersal": ((0.2, 0.7, -0.5, -0.1), 20, "nearest_neighbor", PULSES),
+    "milling": ((0.8, 1.0, 0.5, 0.6), 20, "rotation", PULSES),
+    "wall following": ((1.0, 0.95, 1.0, 1.0), 9, "wall_following", VELOCITY),
+}
 _TOUCH_M = 2.0 * BODY_RADIUS_M + 1e-4
 _RING_M = 0.6
 
@@ -71,22 +85,45 @@ def measure_aggregation(seeds: Sequence[int], drive: Optional[str], robots: int)
     print(f"  deepest overlap: {1000.0 * overlap_m:.2f} mm")
 
 
-def measure_evolved(name: str, seeds: Sequence[int], drive: Optional[str]) -> None:
-    """Print the metric of one behavior over the last 60 of 200 s."""
-    options: Dict[str, Any] = {} if drive is None else {"drive": drive}
-    trial = Trial(find_behavior(name)(**options), _ARENA, 9 if name == "wall_following" else 20, seeds)
-    values = []
-    for time_s, poses in trial.run(200.0):
-        if time_s < 140.0:
-            continue
-        if name == "wall_following":
-            gaps_m = np.minimum(1.71 / 2.0 - np.abs(poses[..., 0]), 1.42 / 2.0 - np.abs(poses[..., 1]))
-            values.append((gaps_m < 0.1).mean(axis=1))
-        else:
-            values.append(METRICS[trial.behavior.metric](poses, trial.velocities))
-    # Near a wall counts over time; others by their median, which a moment does not decide.
-    found = np.mean(values, axis=0) if name == "wall_following" else np.median(values, axis=0)
-    print(f"{name}, {trial.behavior.drive}: {describe(found)}")
+def measure_genome(name: str, seeds: Sequence[int], drive: Optional[str], known: Sequence[str]) -> None:
+    """Print the metric of one published genome over the last 60 of 200 s."""
+    numbers, robots, metric, own_drive = _GENOMES[name]
+    options = dict(zip(("left0", "right0", "left1", "right1"), numbers))
+    trial = Trial(WheelGenome(drive=drive or own_drive, **options), _ARENA, robots, seeds, known_errors=known)
+    found = np.median([measure(metric, trial) for time_s, _ in trial.run(200.0) if time_s >= 140.0], axis=0)
+    print(f"{name}, {trial.behavior.drive}, {' '.join(known) or 'friction as drawn'}: {metric} {describe(found)}")
+
+
+def measure(metric: str, trial: Trial) -> np.ndarray:
+    """Return a metric of the present (W,)."""
+    return METRICS[metric](trial.poses, trial.velocities, trial.things.poses, BODY_RADIUS_M, trial.rows.world.arena)
+
+
+def measure_behavior(name: str, seeds: Sequence[int]) -> None:
+    """Print in how many seeds a built-in behavior reaches the limit of its unit test, in its place and time."""
+    metric, limit, is_above, robots, time_s, arena, size_m = cases.CASES[name]
+    starts, objects = cases.place(arena, robots, seeds)
+    known = ["friction=0"] if name in cases.FRICTIONLESS else ()
+    behavior = cases.make(name)
+    trial = Trial(behavior, arena, robots, seeds, size_m, starts=starts, objects=objects, known_errors=known)
+    begin_s = max(time_s / 2, time_s - 30)
+    sampled = [metric(poses, trial.velocities, trial) for now_s, poses in trial.run(time_s) if now_s >= begin_s]
+    values = np.median(sampled, axis=0)
+    holds = (values >= limit if is_above else values <= limit).sum()
+    text = "%s, %d robots, %g s, %s: %d of %d, %s"
+    print(text % (name, robots, time_s, arena.name, holds, len(seeds), describe(values)))
+
+
+def measure_chance(genomes: int, robots: int) -> None:
+    """Print what random genomes reach in the arena of the published ones: medians of the last 30 of 120 s."""
+    names = ("left0", "right0", "left1", "right1")
+    drawn = np.round(np.random.RandomState(0).uniform(-1.0, 1.0, (genomes, 4)), 2)
+    behavior = WheelGenome(**{name: np.repeat(column, robots) for name, column in zip(names, drawn.T)})
+    trial = Trial(behavior, _ARENA, robots, range(1000, 1000 + genomes))
+    sampled = [[measure(name, trial) for name in CHANCE] for time_s, _ in trial.run(120.0) if time_s >= 90.0]
+    for name, values in zip(CHANCE, np.median(sampled, axis=0)):
+        text = "%d random genomes, %d robots: %s median %.2f, one in twenty %.2f or more"
+        print(text % (genomes, robots, name, np.median(values), np.sort(values)[-(genomes // 20)]))
 
 
 def start_ring(seeds: Sequence[int]) -> np.ndarray:
@@ -144,7 +181,7 @@ def measure_filter(seeds: Sequence[int]) -> None:
 def measure_speed(worlds: int) -> None:
     """Print CPU seconds of many worlds, and milliseconds of a step of the filter."""
     began_s = time.process_time()
-    trial = Trial(find_behavior("milling")(), _ARENA, 20, range(worlds))
+    trial = Trial(cases.make("wheel_genome"), _ARENA, 20, range(worlds))
     for _ in trial.run(120.0, every_s=10.0):
         pass
     print("%d worlds of 20 milling robots, 120 s: %.1f s of CPU" % (worlds, time.process_time() - began_s))
@@ -172,8 +209,13 @@ def main() -> None:
     print_machine(measure_machine_us())
     if "aggregation" in options.only:
         measure_aggregation(seeds, options.drive, options.robots)
-    for name in _EVOLVED if "evolved" in options.only else ():
-        measure_evolved(name, seeds, options.drive)
+    for name in _GENOMES if "genomes" in options.only else ():
+        for known in ((), ("friction=0",)):
+            measure_genome(name, seeds, options.drive, known)
+    for name in cases.CASES if "behaviors" in options.only else ():
+        measure_behavior(name, seeds)
+    for robots in (9, 20) if "chance" in options.only else ():
+        measure_chance(100, robots)
     if "filter" in options.only:
         measure_filter(range(10 * options.seeds))
     if "speed" in options.only:

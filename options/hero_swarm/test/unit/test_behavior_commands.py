@@ -1,6 +1,7 @@
 """What behaviors command in places where that can be computed by hand: signs, gains, limits, and who counts."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,11 +32,16 @@ class Fixed:
 ROBOTS = [0]
 
 
-def act(name, *robots, memory=None, things=NO_OBJECTS, time_s=0.0, chance=None, **parameters):
-    """Return the commands of all robots [(m/s, rad/s), ...] and the memory."""
+def act(name, *robots, memory=None, things=NO_OBJECTS, time_s=0.0, chance=None, ranges_m=(), **parameters):
+    """Return the commands of all robots [(m/s, rad/s), ...] and the memory; ranges_m: {beam: m} of each robot."""
     ROBOTS[0] = len(robots)
     behavior, random = find_behavior(name)(**parameters), chance or Fixed()
-    sensed = sense(behavior, time_s, np.array([robots], dtype=float), random, things)
+    infrared_m = np.full((len(robots), 8), math.inf)
+    for row, seen in enumerate(ranges_m):
+        for beam, range_m in seen.items():
+            infrared_m[row, beam] = range_m
+    readings = SimpleNamespace(proximity_m=infrared_m, counts=np.zeros_like(infrared_m))
+    sensed = sense(behavior, time_s, np.array([robots], dtype=float), random, things, robots=readings)
     linear_m_s, angular_rad_s, memory = behavior.step(sensed, memory, random)
     return [
         tuple(map(float, command))
@@ -50,26 +56,25 @@ def close_to(*commands):
 def test_wheels_of_one_bit_behaviors_turn_as_published():
     pair = ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0))  # the first one sees the second one
     assert act("aggregation", *pair)[0] == close_to((0.0, -5.02), (-0.108, -0.75))
-    for name, nothing, robot in (
-        ("evolved_aggregation", (-0.7, -1.0), (1.0, -1.0)),
-        ("cyclic_pursuit", (-0.7, 0.3), (1.0, 1.0)),
-        ("dispersal", (0.2, 0.7), (-0.5, -0.1)),
-        ("milling", (0.8, 1.0), (0.5, 0.6)),
-        ("wall_following", (1.0, 0.95), (1.0, 1.0)),
+    milling = {"left0": 0.8, "right0": 1.0, "left1": 0.5, "right1": 0.6}
+    for name, nothing, robot, numbers in (
+        ("evolved_aggregation", (-0.7, -1.0), (1.0, -1.0), {}),
+        ("dispersal", (0.2, 0.7), (-0.5, -0.1), {}),
+        ("wheel_genome", (0.8, 1.0), (0.5, 0.6), milling),
     ):
         expected = [
             (0.12 * (left + right) / 2.0, 0.12 * (right - left) / SEPARATION_M) for left, right in (robot, nothing)
         ]
-        assert act(name, *pair)[0] == close_to(*expected), name
+        assert act(name, *pair, **numbers)[0] == close_to(*expected), name
 
 
 def test_behaviors_step_as_often_as_they_were_tuned_for():
     rates_hz = {name: find_behavior(name)().rate_hz for name in list_names()}
-    evolved = dict.fromkeys(("evolved_aggregation", "cyclic_pursuit", "dispersal", "milling"), 1e3 / 60.0)
-    slow = {"coverage": 5.0, "voter": 10.0, "majority": 10.0}
+    evolved = dict.fromkeys(("evolved_aggregation", "dispersal", "wheel_genome"), 1e3 / 60.0)
+    slow = {"coverage": 5.0, "voter": 2.0, "majority": 2.0, "wall_following": 10.0}
     assert rates_hz == {**dict.fromkeys(list_names(), 20.0), **evolved, **slow}
     pulses = {name for name in list_names() if find_behavior(name)().drive == PULSES}
-    assert pulses == {"aggregation", *evolved}, "a slight turn along a wall needs wheels of equal speed"
+    assert pulses == {"aggregation", *evolved}
 
 
 def test_a_point_before_the_axle_is_slowed_down_in_its_direction():
@@ -108,6 +113,57 @@ def test_a_formation_rests_as_a_polygon_and_pulls_towards_it():
     apart_m = 0.35
     speed_m_s = 0.6 * (apart_m**2 - 0.25**2) * apart_m
     assert act("formation", (0, 0, 0), (apart_m, 0, 0))[0] == close_to((speed_m_s, 0.0), (-speed_m_s, 0.0))
+
+
+def test_corners_of_a_formation_are_taken_in_the_order_around_its_center():
+    angles = [2.0 * math.pi * index / 5 for index in (0, 3, 1, 4, 2)]
+    radius_m = 0.25 / (2.0 * math.sin(math.pi / 5))
+    assert act("formation", *[(radius_m * math.cos(a), radius_m * math.sin(a), 1.0) for a in angles])[0] == close_to(
+        *[STILL] * 5
+    )
+
+
+def ring(*angles_rad, radius_m=0.45):
+    """Return robots on a circle, each headed along it, counter-clockwise."""
+    return [(radius_m * math.cos(a), radius_m * math.sin(a), a + math.pi / 2.0) for a in angles_rad]
+
+
+def test_robots_mill_around_their_center_and_turn_in_from_outside():
+    quarters = [0.5 * math.pi * index for index in range(4)]
+    assert act("milling", *ring(*quarters))[0] == close_to(*[(0.08, 0.0)] * 4)
+    for radius_m, inward in ((0.54, 0.2), (0.36, -0.2), (0.95, 1.0)):
+        commands, _ = act("milling", *ring(*quarters, radius_m=radius_m))
+        turn_rad_s = 0.08 * inward / 0.06
+        assert commands == close_to(*[(0.08, turn_rad_s)] * 4), radius_m
+    seen = [{2: 0.1}, {0: 0.1}, {6: 0.05}, {0: math.nan}]
+    (beside, before, away, blind), _ = act("milling", *ring(*quarters), ranges_m=seen)
+    assert beside == pytest.approx((0.08, -0.08 / 0.06)), "away from what infrared sensors see"
+    assert before == pytest.approx((0.0, 0.0), abs=1e-9) and away[1] > 0.0 and blind == pytest.approx((0.08, 0.0))
+    assert act("milling", (0, 0, 0), (math.nan,) * 3)[0][1] == pytest.approx(STILL)
+
+
+def test_a_robot_with_more_room_ahead_pursues_faster():
+    commands, _ = act("cyclic_pursuit", *ring(0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi))
+    assert commands == close_to(*[(0.08, 0.0)] * 4)
+    places = ring(0.0, 0.45 * math.pi, math.pi, 1.45 * math.pi)  # the center stays
+    speeds_m_s = [linear for linear, _ in act("cyclic_pursuit", *places)[0]]
+    assert speeds_m_s == pytest.approx([0.072, 0.08, 0.072, 0.08], abs=1e-3), "as fast as wheels may"
+
+
+def test_a_wall_is_followed_at_its_distance_and_corners_are_turned_in():
+    on_wall = {6: 0.08, 7: math.sqrt(2.0) * 0.08}
+    for seen, expected in (
+        (on_wall, (0.07, 0.0)),
+        ({6: 0.07, 7: math.sqrt(2.0) * 0.07}, (0.07, 10.0 * 0.01 * (1.0 + math.sqrt(2.0)))),
+        ({6: 0.1, 7: math.sqrt(2.0) * 0.1}, (0.07, -10.0 * 0.02 * (1.0 + math.sqrt(2.0)))),
+        ({}, (0.07, 0.0)),
+        ({6: 0.1}, (0.07, 0.0)),
+        ({**on_wall, 0: 0.1}, (0.0, 1.2)),
+        ({**on_wall, 1: 0.07}, (0.0, 1.2)),
+        (dict.fromkeys(range(8), math.nan), (0.07, 0.0)),
+    ):
+        commands, _ = act("wall_following", (0, 0, 0), ranges_m=[seen])
+        assert commands == close_to(expected), seen
 
 
 def test_a_flock_keeps_its_spacing_and_its_heading():
@@ -163,7 +219,7 @@ def test_opinions_are_taken_over_now_and_then_from_those_in_sight():
     places = [(0, 0, 0), (0.3, 0, 0), (0.3, 0.2, 0), (5.0, 0, 0)]
     _, first = act("voter", *places)
     assert first.tolist() == [0, 0, 1, 1]
-    for share, opinions in ((0.049, [0, 0, 0, 1]), (0.051, [0, 0, 1, 1])):
+    for share, opinions in ((0.249, [0, 0, 0, 1]), (0.251, [0, 0, 1, 1])):
         _, after = act("voter", *places, memory=first, chance=Fixed(share))
         assert after.tolist() == opinions, "half a time a second, the first neighbor's"
     for opinions, decided in (([0, 1, 1, 0], [1, 1, 1, 0]), ([0, 1, 0, 1], [0, 0, 0, 1]), ([1, 0, 0, 0], [0, 0, 0, 0])):
@@ -171,8 +227,12 @@ def test_opinions_are_taken_over_now_and_then_from_those_in_sight():
         assert after.tolist() == decided
     tie, _ = act("majority", (0, 0, 0), (0.3, 0, 0), memory=np.array([0, 1]), chance=Fixed(0.0))[::-1]
     assert tie.tolist() == [0, 1]
-    for ahead_m, expected in ((0.11, (0.0, 1.5)), (0.13, (0.1, 0.75)), (0.12, (0.1, 0.75)), (-0.11, (0.1, 0.75))):
-        commands, _ = act("voter", (0, 0, 0), (ahead_m, 0, 0), chance=Fixed(normal=0.5))
+    turns, drives_on = (0.0, 1.5), (0.1, 0.75)
+    for seen, expected in (
+        *(({beam: 0.15}, turns) for beam in (0, 1, 7)),
+        *((seen, drives_on) for seen in ({2: 0.1}, {0: 0.17}, {0: math.nan})),
+    ):
+        commands, _ = act("voter", (0, 0, 0), chance=Fixed(normal=0.5), ranges_m=[seen])
         assert commands[0] == pytest.approx(expected)
     assert find_behavior("voter")().colors(np.array([0, 1])).tolist() == [[1, 0, 0], [0, 0, 1]]
 
@@ -307,10 +367,11 @@ def test_streams_of_random_numbers_depend_on_the_seed_of_their_world_alone():
 
 def test_metrics_by_name_are_those_of_places_with_their_units():
     poses = np.array([[(0.0, 0.0, 0.0), (0.49, 0.0, math.pi), (0.98, 0.0, 0.0)]])
-    velocities = np.array([[(0.0, 0.1, 0.0), (0.0, 0.0009, 0.0), (0.0, -0.1, 0.0)]])
+    velocities = np.array([[(0.0, 0.1, 0.0), (0.0, 0.009, 0.0), (0.0, -0.1, 0.0)]])
     values = {name: float(metric(poses, velocities, poses)[0]) for name, metric in metrics.METRICS.items()}
+    assert math.isnan(values.pop("wall_following")), "no arena is known"
     assert values["algebraic_connectivity"] == pytest.approx(1.0), "0.5 m connect"
-    assert values["rotation"] == pytest.approx(2.0 / 3.0) and values["order"] == pytest.approx(1.0 / 3.0)
+    assert values["rotation"] == pytest.approx(2.0 / 3.0) and values["order"] == pytest.approx(2.0 / 3.0)
     assert values["object_distance"] == pytest.approx(0.49) and values["dispersion"] == pytest.approx(0.98)
     assert values["nearest_neighbor"] == pytest.approx(0.49) and values["hull_area"] == values["collisions"] == 0.0
     assert set(metrics.UNITS) < set(values)

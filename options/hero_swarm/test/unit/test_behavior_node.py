@@ -31,6 +31,9 @@ from hero_swarm.ros.behavior_markers import BehaviorMarkers
 from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode, _parse_fence
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
 
+MILLING = {"left0": 0.8, "right0": 1.0, "left1": 0.5, "right1": 0.6}
+"""Numbers of wheel_genome, which sends servo pulses."""
+
 DEAD_ZONE_US = [1470.0, 1530.0, 1480.0, 1540.0]
 
 
@@ -69,7 +72,8 @@ class Stage:
         return "hero_plus" if namespace == "/hero_5" else "hero"
 
     def start(self, behavior, commanded=None, **given):
-        given = {"behavior": behavior, "frame": "world", "calibration_folder": "", **given}
+        numbers = MILLING if behavior == "wheel_genome" else {}
+        given = {"behavior": behavior, "parameters": numbers, "frame": "world", "calibration_folder": "", **given}
         swarm = StepWorld(self.swarm.robots[:commanded], self.swarm._clock)
         self.node = BehaviorNode(swarm, check_parameters(PARAMETERS, given))
 
@@ -112,8 +116,16 @@ def test_robots_meet_and_the_metric_says_so(stage):
     assert not stage.warnings
 
 
+def test_walls_are_followed_live_by_infrared_without_a_metric(stage):
+    stage.start("wall_following")
+    stage.run(4.0)
+    assert np.abs(stage.swarm.rows.world.speeds_m_s).max(axis=1).min() > 0.02
+    assert np.isnan(stage.sent["~metric"][-1].data), "the arena is not known"
+    assert stage.sent["behavior/markers"][-1].markers == [] and not stage.warnings
+
+
 def test_a_robot_whose_pose_is_old_stops_alone_and_is_named(stage):
-    stage.start("milling")
+    stage.start("wheel_genome")
     stage.run(4.0)
     stage.silent = {2}
     stage.run(2.0)
@@ -131,7 +143,7 @@ def test_a_robot_whose_pose_is_old_stops_alone_and_is_named(stage):
 
 
 def test_a_program_that_is_late_drives_slowly_says_so_and_recovers(stage):
-    stage.start("milling")
+    stage.start("wheel_genome")
     stage.run(4.0)
     usual_m_s = np.abs(stage.swarm.rows.world.speeds_m_s).mean()
     planned_hz, stage.node.control.rate_hz = stage.node.control.rate_hz, 2.0
@@ -147,7 +159,7 @@ def test_a_program_that_is_late_drives_slowly_says_so_and_recovers(stage):
 
 def test_the_time_of_a_behavior_goes_on_when_the_clock_is_set(stage, monkeypatch):
     stage.clock_ahead_s = 7200.0
-    stage.start("milling")
+    stage.start("wheel_genome")
     stage.warnings.clear()
     times_s, step = [], stage.node.control.step
 
@@ -165,7 +177,7 @@ def test_the_time_of_a_behavior_goes_on_when_the_clock_is_set(stage, monkeypatch
 def test_calibrated_motors_get_pulses_and_zero_velocity_at_rest(stage, tmp_path):
     for number in range(6):
         write_calibration(tmp_path, number)
-    stage.start("milling", calibration_folder=str(tmp_path))
+    stage.start("wheel_genome", calibration_folder=str(tmp_path))
     stage.run(0.2)
     pulses = stage.sent["/hero_4/cmd_motor"]
     assert pulses
@@ -179,7 +191,7 @@ def test_calibrated_motors_get_pulses_and_zero_velocity_at_rest(stage, tmp_path)
 
 
 def test_the_robots_of_hero_sim_count_as_calibrated(stage):
-    stage.start("milling", simulated=6)
+    stage.start("wheel_genome", simulated=6)
     simulator = build_swarm(build_parser().parse_args(["--count", "6", "--arena", "empty"]), [""] * 6, print)
     left_us, right_us = find_pulses(0.08, 0.0, list_dead_zones(simulator.world.errors))
     stage.node._commands.send(np.full(6, 0.08), np.zeros(6), np.full(6, True))
@@ -191,7 +203,7 @@ def test_the_robots_of_hero_sim_count_as_calibrated(stage):
 
 def test_without_all_motors_calibrated_velocities_drive_and_are_explained(stage, tmp_path):
     write_calibration(tmp_path, 0)
-    stage.start("milling", calibration_folder=str(tmp_path))
+    stage.start("wheel_genome", calibration_folder=str(tmp_path))
     before_m = stage.places_m
     stage.run(2.0)
     assert "the motors of hero_1, hero_2, hero_3, hero_4, hero_5 are not calibrated" in stage.warnings[0]
@@ -204,7 +216,7 @@ def test_an_unusable_calibration_file_is_named_and_its_robot_alone_lacks(stage, 
     for number in range(6):
         write_calibration(tmp_path, number)
     (tmp_path / "hero_1.yaml").write_text("robot: hero_1\n" + content)
-    stage.start("milling", calibration_folder=str(tmp_path))
+    stage.start("wheel_genome", calibration_folder=str(tmp_path))
     assert re.search(r"hero_1\.yaml.*: .*; correct the file", stage.warnings[0])
     assert "the motors of hero_1 are not calibrated" in stage.warnings[1]
 
@@ -212,7 +224,7 @@ def test_an_unusable_calibration_file_is_named_and_its_robot_alone_lacks(stage, 
 @pytest.mark.parametrize("fence", ["1 2 3", "0 0 a 1", "1 0 0 1", "0 0 inf 1"])
 def test_a_fence_that_is_none_is_refused(stage, fence):
     with pytest.raises(ProgramError, match="~fence is .* must be"):
-        stage.start("milling", fence=fence)
+        stage.start("wheel_genome", fence=fence)
 
 
 def test_a_color_is_sent_when_it_changes_and_not_again(stage):
@@ -306,7 +318,7 @@ def test_robots_of_others_are_avoided_by_their_own_radii(stage, tmp_path, speed_
 
 def test_robots_of_others_without_a_pose_are_named_and_new_ones_added(stage):
     stage.joined, stage.silent = range(5), {4}
-    stage.start("milling", 3, safety="fence and robots")
+    stage.start("wheel_genome", 3, safety="fence and robots")
     stage.run(0.5)
     assert stage.node._filter.others_m[:, 2].tolist() == [BODY_RADIUS_M]
     stage.joined = range(6)
@@ -340,11 +352,11 @@ def test_robots_that_localize_alone_knows_are_avoided_in_its_frame(stage, monkey
 )
 def test_a_fence_that_limits_nothing_is_refused(stage, given, words):
     with pytest.raises(ProgramError, match=words):
-        stage.start("milling", **given)
+        stage.start("wheel_genome", **given)
 
 
 def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):
-    stage.start("milling")
+    stage.start("wheel_genome")
     stage.run(1.02)
     assert len(stage.sent["~metric"]) == 9, "every second step of 0.06 s"
     stage.silent = set(range(6))
@@ -360,7 +372,7 @@ def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):
 @pytest.mark.parametrize(("count", "words"), [(10, "hero_8, hero_9 are not"), (11, "hero_9 and 1 more are not")])
 def test_of_many_robots_without_calibration_ten_are_named(monkeypatch, count, words):
     stage = Stage(monkeypatch, count)
-    stage.start("milling")
+    stage.start("wheel_genome")
     assert words in stage.warnings[0] and "hero_10" not in stage.warnings[0]
 
 

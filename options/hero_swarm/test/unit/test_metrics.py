@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hero_client.values import BODY_RADIUS_M, MODELS
+from hero_sim.world.arena import build_rectangle
 from hero_swarm import metrics
 from hero_swarm.metrics.shapes import ideal_dispersion
 
@@ -44,6 +45,15 @@ def test_rotation_is_one_for_a_ring_and_none_for_robots_at_rest_or_opposed():
     assert metrics.rotation(places_m, 0.0 * circling) == pytest.approx([0.0])
     opposed = circling * np.where(np.arange(10) % 2, 1.0, -1.0)[:, None]
     assert metrics.rotation(places_m, opposed) == pytest.approx([0.0])
+
+
+def test_walls_are_followed_by_those_that_move_along_them():
+    arena = build_rectangle(2.0, 2.0, 1)
+    places_m = np.array([[(0.9, 0.0), (0.9, 0.0), (0.9, 0.0), (0.9, 0.5), (0.0, 0.0)]])
+    speeds_m_s = np.array([[(0.0, 0.05), (0.05, 0.0), (0.0, 0.005), (0.01, -0.05), (0.0, 0.05)]])
+    assert metrics.wall_following(places_m, speeds_m_s, arena) == pytest.approx([0.4]), (
+        "not at, stuck at or far from them"
+    )
 
 
 def test_order_and_fatness_have_their_extremes():
@@ -130,6 +140,7 @@ def test_a_world_with_an_unknown_pose_has_no_value_and_others_keep_theirs(name):
     lost[1] = math.nan
     velocities = np.full((2, 4, 3), 0.1)
     velocities[1, 1] = math.nan
-    alone = metrics.METRICS[name](known[None], velocities[:1])
-    values = metrics.METRICS[name](np.array((known, lost)), velocities)
+    around = (None, BODY_RADIUS_M, build_rectangle(1.0, 1.0, 1))
+    alone = metrics.METRICS[name](known[None], velocities[:1], *around)
+    values = metrics.METRICS[name](np.array((known, lost)), velocities, *around)
     assert values[0] == alone[0] and math.isnan(values[1])

@@ -10,6 +10,7 @@ from hero_node.parameters import number
 from hero_sim.world import join_wheels
 
 from ..behavior import SPEED, Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
+from .clearance import keep_apart
 
 _COORDINATE = number(0.0, -1000.0, 1000.0, "m")
 
@@ -89,11 +90,7 @@ class PushToGoal(Behavior):
 
     def _command(self, sensed: Sensed, way: _Way, wanted: np.ndarray, gap_m: float) -> np.ndarray:
         """Return speeds (2, R) for a velocity that is wanted, away from robots nearer than gap_m; zero at the goal."""
-        near = sensed.near
-        range_m = np.maximum(near.range_m, 1e-6)
-        push_m_s = 2.0 * np.maximum(2.0 * BODY_RADIUS_M + gap_m - range_m, 0.0) * near.seen / range_m
-        forward_m_s = wanted[0] - (push_m_s * near.forward_m).sum(axis=1)
-        left_m_s = wanted[1] - (push_m_s * near.left_m).sum(axis=1)
+        forward_m_s, left_m_s = wanted + keep_apart(sensed.near, 2.0 * BODY_RADIUS_M + gap_m, 2.0)
         moves = sensed.objects.seen[:, 0] & (way.length_m > self.goal_radius_m)
         return np.array(steer(forward_m_s, left_m_s, self.linear_m_s)) * moves
 

@@ -8,6 +8,7 @@ from hero_client.controllers import steer
 from hero_node.parameters import whole_number
 
 from ..behavior import GAIN, RANGE, SPEED, Behavior, Command, Neighbors, Random, Sensed
+from .clearance import keep_apart
 
 
 class Dispersion(Behavior):
@@ -21,10 +22,7 @@ class Dispersion(Behavior):
     settings = {"spacing_m": RANGE, "gain_1_s": GAIN, "max_linear_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        near = sensed.near
-        range_m = np.maximum(near.range_m, 1e-6)
-        push = self.gain_1_s * np.maximum(self.spacing_m - range_m, 0.0) * near.seen / range_m
-        forward_m_s, left_m_s = -(push * near.forward_m).sum(axis=1), -(push * near.left_m).sum(axis=1)
+        forward_m_s, left_m_s = keep_apart(sensed.near, self.spacing_m, self.gain_1_s)
         return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), memory)
 
 

@@ -6,23 +6,24 @@ import numpy as np
 
 from hero_node.parameters import number
 
-from ..behavior import SPEED, Behavior, Command, Neighbors, Random, Sensed
+from ..behavior import SPEED, Behavior, Command, Neighbors, Proximity, Random, Sensed
 
 
 class Voter(Behavior):
     """A robot takes over the opinion of a neighbor drawn by lot (G. Valentini et al., AAMAS 2014, without qualities).
 
     The memory is the opinion of each robot, 0 or 1: at first that of the first half of the robots is 0. Robots turn
-    away from neighbors in front of them.
+    away from what their infrared sensors see ahead.
     """
 
     near = Neighbors(range_m=0.5)
+    infrared = Proximity()
     metric = "nearest_neighbor"
-    rate_hz = 10.0
+    rate_hz = 2.0
     changes_hz = 0.5  # how often a robot looks at the others
     cruise_m_s = 0.1
     angular_rad_s = 1.5
-    clear_m = 0.12
+    clear_m = 0.16
     settings = {"changes_hz": number(0.5, 0.01, 10.0, "1/s"), "cruise_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
@@ -31,8 +32,8 @@ class Voter(Behavior):
         looks = (random.random() < self.changes_hz / self.rate_hz) & (near.counts > 0)
         decided = self.decide(opinions, near, random)
         opinions = np.where(looks, decided, opinions)
-        ahead = near.seen & (near.forward_m > 0.0) & (near.range_m < self.clear_m)
-        blocked = ahead.any(axis=1)
+        # Front, and 45 degrees to its left and right.
+        blocked = np.nan_to_num(sensed.infrared.ranges_m[:, (0, 1, -1)], nan=np.inf).min(axis=1) < self.clear_m
         angular_rad_s = np.where(blocked, self.angular_rad_s, self.angular_rad_s * random.normal())
         return np.where(blocked, 0.0, self.cruise_m_s), angular_rad_s, opinions
 

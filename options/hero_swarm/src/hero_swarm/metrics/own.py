@@ -71,7 +71,7 @@ def measure_metric(name: str, state: State, sources: Optional[Sources] = None) -
     Raises: ValueError for a function that is missing, or does not give one number for each world; what it raises.
     """
     if name in METRICS:
-        return METRICS[name](state.poses, state.velocities, state.objects, state.radii_m)
+        return METRICS[name](state.poses, state.velocities, state.objects, state.radii_m, state.arena)
     path, _, function = name.rpartition(":")
     metric = getattr(load_file("metric", path, sources or Sources()), function, None)
     if not callable(metric):

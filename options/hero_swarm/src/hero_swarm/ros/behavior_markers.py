@@ -52,7 +52,8 @@ class BehaviorMarkers:
         self._corner = (left_m, low_m) if self._corner is None else (self._corner[0], max(self._corner[1], low_m))
         shown = [name for name in self._behavior.sensors() if _has_places(self._behavior, name, sensed)]
         beams = [self._draw_sensor(name, poses, sensed) for name in shown]
-        return [*beams, *self._draw_plot(self._corner, sensed.time_s, value)]
+        # A metric that needs the arena is not known live.
+        return [*beams, *(self._draw_plot(self._corner, sensed.time_s, value) if np.isfinite(value) else ())]
 
     def _make_marker(self, name: str, kind: int) -> Marker:
         marker = Marker()
@@ -85,7 +86,7 @@ class BehaviorMarkers:
         """Return the metric's line over the last PLOT_S, its axes, and their scale and value as text."""
         (left_m, low_m), (width_m, height_m) = corner_m, PLOT_M
         times_s, values = np.array(self._history).T
-        least, most = float(values.min()), float(values.max())
+        least, most = float(np.nanmin(values)), float(np.nanmax(values))
         x_m = left_m + width_m * (1.0 + (times_s - now_s) / PLOT_S)
         y_m = low_m + height_m * (values - least) / max(most - least, 1e-9)
         line = self._make_marker("metric_line", Marker.LINE_STRIP)

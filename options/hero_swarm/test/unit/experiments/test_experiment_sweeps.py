@@ -22,7 +22,7 @@ class Gather(Behavior):
 """
 FILE = """\
 vary:
-  behavior: [milling, {gather.py: {gain: 0.05}}, {gather.py: {gain: 0.15}}]
+  behavior: [dispersal, {gather.py: {gain: 0.05}}, {gather.py: {gain: 0.15}}]
   near.range_m: [0.05, 5]
 robots: 3
 start: {kind: circle, gap_m: 0.3}
@@ -55,13 +55,15 @@ def test_a_baseline_is_compared_with_a_controller_over_its_sensor_range(path, ca
     for row in rows:
         values.setdefault((row["behavior"], row["near.range_m"]), []).append(float(row["dispersion"]))
     assert len(values) == 6 and all(len(runs) == 3 for runs in values.values())
-    baseline = [runs for (name, _), runs in values.items() if name == "milling"]
+    baseline = [runs for (name, _), runs in values.items() if name == "dispersal"]
     assert baseline[0] == baseline[1], "it has no sensor named near"
     near, far = (np.mean(values["gather.py gain 0.15", value]) for value in ("0.05", "5.0"))
     assert abs(near - far) > 0.05, "beyond their sensors robots rest"
     report.main([str(path.with_suffix(""))])
     told = capsys.readouterr().out
-    assert "behavior gather.py gain 0.05, near.range_m 5.0 against behavior milling, near.range_m 5.0, 3 pairs" in told
+    assert (
+        "behavior gather.py gain 0.05, near.range_m 5.0 against behavior dispersal, near.range_m 5.0, 3 pairs" in told
+    )
 
 
 def test_runs_of_a_seed_start_alike_whatever_the_behavior(path):
@@ -76,7 +78,7 @@ def test_runs_of_a_seed_start_alike_whatever_the_behavior(path):
         ("near.range_m", "naer.range_m", "line 3: .* has no parameter 'naer.range_m'; it has .*"),
         ("near.range_m", "near.reach_m", "line 3: .* has no parameter 'near.reach_m'"),
         ("{gain: 0.05}", "{gian: 0.05}", "line 2: gather.py has no parameter 'gian'; it has gain, .*near.range_m"),
-        ("milling, {g", "{milling: {gain: 1}}, {g", "line 2: milling has no parameter 'gain'"),
+        ("dispersal, {g", "{dispersal: {gain: 1}}, {g", "line 2: dispersal has no parameter 'gain'"),
         ("gather.py: {gain: 0.05}", "other.py: {}", "behavior .*other.py: no such file"),
         ("{gain: 0.05}", "{gain: far}", "line 2: .*gain is 'far', but must be a number"),
     ],
@@ -115,4 +117,4 @@ def test_starts_vary(path):
     text = text.replace("near.range_m: [0.05, 5]", "start: [{kind: grid}, {kind: circle}]")
     experiment = load(path, text)
     grid, circle = (build_trial(experiment, cell, [1]).poses for cell in experiment.cells[:2])
-    assert experiment.cells[0].label == "behavior milling, start grid" and (grid != circle).any()
+    assert experiment.cells[0].label == "behavior dispersal, start grid" and (grid != circle).any()
