@@ -30,7 +30,7 @@ OTHER_PACKAGES = {
     **{name: f"python3-{name}" for name in "matplotlib numpy pexpect rospkg scipy selenium tornado tqdm yaml".split()},
 }
 
-WITHOUT_ROSDEP_KEY = {"apriltag", "distributed", "gymnasium", "pettingzoo"}
+WITHOUT_ROSDEP_KEY = {"apriltag", "distributed", "gymnasium", "pettingzoo", "qrcode"}
 """Optional modules: no package.xml can name them."""
 
 

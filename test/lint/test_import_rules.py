@@ -15,6 +15,7 @@ SOCKET_OWNERS = (
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.serving.server",
+    "hero_monitor.serving.invitation",
     "hero_monitor.foxglove.endpoint",
     "hero_monitor.foxglove.topic_streams",
     "hero_monitor.live_view",

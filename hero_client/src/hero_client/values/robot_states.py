@@ -3,7 +3,7 @@
 A test compares the numbers. Reports stand for any object with the fields of hero_msgs/RobotArray.
 """
 
-import time
+from datetime import datetime
 from typing import Any, Dict, List
 
 STATES = {0: "JOINING", 1: "READY", 2: "AWAY", 3: "REFUSED"}
@@ -55,6 +55,6 @@ def _format_since(report: Any, stamp: Any, now_s: float) -> str:
     """
     if not stamp.to_sec():
         return ""
-    then = time.localtime(now_s - (report.header.stamp.to_sec() - stamp.to_sec()))
-    is_today = then[:3] == time.localtime(now_s)[:3]
-    return " since " + time.strftime("%H:%M" if is_today else "%Y-%m-%d %H:%M", then)
+    then = datetime.fromtimestamp(now_s - (report.header.stamp.to_sec() - stamp.to_sec()))
+    is_today = then.date() == datetime.fromtimestamp(now_s).date()
+    return " since " + then.strftime("%H:%M" if is_today else "%Y-%m-%d %H:%M")

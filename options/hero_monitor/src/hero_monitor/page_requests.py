@@ -131,7 +131,7 @@ class PageRequests:
             self.activity.note(page.who, f"{do} {request.get('program', '')}".strip(), robots)
 
     def _check(self, do: str, robots: Sequence[str]) -> None:
-        """Check whether anybody may request this now. Raises: RefusedError."""
+        """Check whether this may be requested now, by any user. Raises: RefusedError."""
         if do not in (*MOVING, "record"):
             return
         if not self._parameters.control:

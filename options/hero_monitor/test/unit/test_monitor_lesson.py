@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 import rospkg
+from test_monitor_requests import DRIVE, Desk
 
 from hero_monitor.control import activity as activity_module
 from hero_monitor.control.activity import QUIET_S, Activity
@@ -136,3 +137,32 @@ def test_without_the_library_there_is_no_qr_code_and_with_it_a_square(monkeypatc
     assert make_qr_rows("http://10.42.0.1:8088/#123456") == ["10", "10"]
     monkeypatch.setitem(__import__("sys").modules, "qrcode", None)
     assert make_qr_rows("http://10.42.0.1:8088/#123456") == []
+
+
+def test_pupils_drive_their_robot_and_stop_all_but_release_none(monkeypatch):
+    desk = Desk(monkeypatch, lesson=Lesson())
+    ada, viewer = desk.pages
+    ada.user, ada.who = User("Ada", Role("driver", frozenset({"hero_1"}))), "Ada, 10.42.0.7"
+    viewer.user, viewer.who = User("", VIEWER), "a viewer, 10.42.0.8"
+    assert desk.ask("drive", **{**DRIVE, "robots": ["hero_1"]}) == []
+    assert "driver of hero_1" in desk.ask("drive", **DRIVE)[0]
+    assert "a viewer may not" in desk.ask("drive", page=1, **{**DRIVE, "robots": ["hero_1"]})[0]
+    assert desk.ask("end", number=4) == [] and "driver of hero_1" in desk.ask("end", number=5)[0]
+    assert "driver of hero_1" in desk.ask("end", number=99)[0], "the recording, or another's report"
+    for number, page in enumerate((ada, viewer)):
+        assert desk.ask("stop", page=number) == []
+        assert page.received == ["stop"]
+        assert "may not do that" in desk.ask("release", page=number)[0]
+    assert desk.feed.stopper == "a viewer, 10.42.0.8"
+    assert ("Ada, 10.42.0.7", "drive", "hero_1") in desk.noted_users
+    assert ("a viewer, 10.42.0.8", "stop") in desk.noted_users
+    assert not [noted for noted in desk.noted_users if noted[1] == "release"]
+
+
+def test_teachers_make_and_withdraw_codes(monkeypatch):
+    desk = Desk(monkeypatch, lesson=Lesson())
+    assert desk.ask("code", robots=["hero_1", "hero_2"]) == []
+    ((code, robots),) = desk.lesson.list_drivers()
+    assert robots == ["hero_1", "hero_2"]
+    assert desk.ask("withdraw", code=code) == [] and desk.lesson.list_drivers() == []
+    assert "classroom:=true" in Desk(monkeypatch).ask("code", robots=["hero_1"])[0]

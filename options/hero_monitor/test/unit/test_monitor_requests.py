@@ -20,7 +20,7 @@ from hero_monitor.control.requests import AGE_MAX_S
 from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.foxglove.hub import Client
 from hero_monitor.page_requests import GOALS_AT_ONCE, INERT_S, PageRequests
-from hero_monitor.serving.lesson import TEACHER, VIEWER, Lesson, Role, User
+from hero_monitor.serving.lesson import TEACHER, User
 from hero_node import NodeError, Pose
 
 NOW_MS = 5000000
@@ -53,8 +53,7 @@ class Desk:
     """PageRequests with a fleet, a commander and programs that note what is asked of them."""
 
     def __init__(self, monkeypatch, control=True, lesson=None):
-        self.lesson = lesson
-        self.noted, self.now_ms, self.pages = [], NOW_MS, [Page(1), Page(2)]
+        self.lesson, self.noted, self.now_ms, self.pages = lesson, [], NOW_MS, [Page(1), Page(2)]
         self.may_drive, self.taken, self.submitted = True, set(), []
         self.drivers, self.ended_ms = {}, {}
         monkeypatch.setattr(page_requests, "read_clock_ms", lambda: self.now_ms)
@@ -499,32 +498,3 @@ def test_a_goal_is_sent_to_a_program_that_takes_it(monkeypatch):
     assert ros.now_s == pytest.approx(100.5 + LISTENER_TIMEOUT_S, abs=0.05), "one that hangs is waited for this long"
     ros.master_fails = True
     assert send(False) == ("error", "no ROS master")
-
-
-def test_pupils_drive_their_robot_and_stop_all_but_release_none(monkeypatch):
-    desk = Desk(monkeypatch, lesson=Lesson())
-    ada, viewer = desk.pages
-    ada.user, ada.who = User("Ada", Role("driver", frozenset({"hero_1"}))), "Ada, 10.42.0.7"
-    viewer.user, viewer.who = User("", VIEWER), "a viewer, 10.42.0.8"
-    assert desk.ask("drive", **{**DRIVE, "robots": ["hero_1"]}) == []
-    assert "driver of hero_1" in desk.ask("drive", **DRIVE)[0]
-    assert "a viewer may not" in desk.ask("drive", page=1, **{**DRIVE, "robots": ["hero_1"]})[0]
-    assert desk.ask("end", number=4) == [] and "driver of hero_1" in desk.ask("end", number=5)[0]
-    assert "driver of hero_1" in desk.ask("end", number=99)[0], "the recording, or another's report"
-    for number, page in enumerate((ada, viewer)):
-        assert desk.ask("stop", page=number) == []
-        assert page.received == ["stop"]
-        assert "may not do that" in desk.ask("release", page=number)[0]
-    assert desk.feed.stopper == "a viewer, 10.42.0.8"
-    assert ("Ada, 10.42.0.7", "drive", "hero_1") in desk.noted_users
-    assert ("a viewer, 10.42.0.8", "stop") in desk.noted_users
-    assert not [noted for noted in desk.noted_users if noted[1] == "release"]
-
-
-def test_teachers_make_and_withdraw_codes(monkeypatch):
-    desk = Desk(monkeypatch, lesson=Lesson())
-    assert desk.ask("code", robots=["hero_1", "hero_2"]) == []
-    ((code, robots),) = desk.lesson.list_drivers()
-    assert robots == ["hero_1", "hero_2"]
-    assert desk.ask("withdraw", code=code) == [] and desk.lesson.list_drivers() == []
-    assert "classroom:=true" in Desk(monkeypatch).ask("code", robots=["hero_1"])[0]

@@ -6,6 +6,7 @@ Those that come with the suite, those of files in the folders, and those that in
 
 import argparse
 import glob
+import inspect
 import json
 import os
 from typing import Any, Dict, List, Sequence, Type
@@ -62,4 +63,6 @@ def _describe(name: str, behavior: str, kind: Type[Behavior]) -> Dict[str, Any]:
         {"name": key, "default": getattr(kind, key), "limits": setting.limits, "unit": setting.unit}
         for key, setting in kind.settings.items()
     ]
-    return {"behavior": behavior, "title": _TITLES.get(name, name.replace("_", " ")), "fields": fields}
+    sentence = (inspect.getdoc(kind) or "").partition("\n")[0]
+    title = _TITLES.get(name, name.replace("_", " "))
+    return {"behavior": behavior, "title": title, "sentence": sentence, "fields": fields}

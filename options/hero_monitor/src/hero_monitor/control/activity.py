@@ -1,4 +1,4 @@
-"""Who drove and who stopped: lines of the log, and a CSV file per day in ROS_HOME/hero_monitor."""
+"""Notes which user drove, stopped or released: lines of the log, and a CSV file per day in ROS_HOME/hero_monitor."""
 
 import csv
 import time
@@ -35,8 +35,10 @@ class Activity:
     def note(self, user: str, request: str, robots: Sequence[str] = ()) -> None:
         """Note a request, also in the file."""
         row = (time.strftime("%Y-%m-%dT%H:%M:%S"), user, request, " ".join(robots))
-        log = self._background.warn if request in ("stop", "release") else self._background.inform
-        log(f"{user}: {request} {' '.join(robots) or 'all robots'}")
+        if request in ("stop", "release"):
+            self._background.warn(f"{user}: {request} all robots")
+        else:
+            self._background.inform(f"{user}: {request} {' '.join(robots)}".strip())
         self._background.submit(_write, row)
 
 

@@ -21,6 +21,7 @@ class ProgramDescription(NamedTuple):
     fields: Dict[str, Parameter] = {}
     has_frame: bool = False  # it needs the robots' places on the map
     drives: slice = slice(None)  # which of its robots, in their order; pages may drive the others meanwhile
+    sentence: str = ""  # on what it does
     behavior: str = ""  # what program behavior runs; fields but safety are numbers of its class
 
 
@@ -83,7 +84,9 @@ def read_behaviors(described: Sequence[Dict[str, Any]]) -> Dict[str, ProgramDesc
     return {"behavior_" + behavior["behavior"]: _read_behavior(**behavior) for behavior in described}
 
 
-def _read_behavior(behavior: str, title: str, fields: Sequence[Dict[str, Any]]) -> ProgramDescription:
+def _read_behavior(
+    behavior: str, title: str, fields: Sequence[Dict[str, Any]], sentence: str = ""
+) -> ProgramDescription:
     settings = {
         field["name"]: (whole_number if isinstance(field["default"], int) else number)(
             field["default"], *field["limits"], field["unit"]
@@ -91,7 +94,9 @@ def _read_behavior(behavior: str, title: str, fields: Sequence[Dict[str, Any]]) 
         for field in fields
     }
     settings["safety"] = _SAFETY
-    return ProgramDescription("hero_swarm", "behavior", title, settings, has_frame=True, behavior=behavior)
+    return ProgramDescription(
+        "hero_swarm", "behavior", title, settings, has_frame=True, behavior=behavior, sentence=sentence
+    )
 
 
 def check_values(program: str, values: Dict[str, Any]) -> Dict[str, Any]:
@@ -142,7 +147,7 @@ def describe_offers(names: Sequence[str]) -> List[Dict[str, Any]]:
         {
             "program": name,
             "title": OFFERS[name].title,
-            "is_behavior": OFFERS[name].behavior != "",
+            "sentence": OFFERS[name].sentence,
             "fields": [_describe_field(*field) for field in OFFERS[name].fields.items()],
         }
         for name in OFFERS

@@ -54,7 +54,7 @@ export function showLosses(state, connection, dismiss) {
     if (source !== "robots") return line;
     const button = make("button", { type: "button" }, "Dismiss");
     button.addEventListener("click", dismiss);
-    return make("span", {}, line, button);
+    return make("span", {}, button, line);
   });
   const text = lines.map((line) => line.textContent).join("");
   if (banner.textContent !== text) banner.replaceChildren(...lines);

@@ -2,7 +2,7 @@
 //
 // Names and texts come from robots, programs and the network: they are inserted as text, never as markup.
 
-import { element, make, setPressed } from "./dom.js";
+import { element, make, setPressed, setText } from "./dom.js";
 import { Connection } from "./connection.js";
 import { isDark, onTheme, showTheme } from "./theme.js";
 import { FleetTable } from "./panels/fleet.js";
@@ -61,7 +61,7 @@ const connection = new Connection({
   },
   onPause() {
     panel.endDrive();
-    notice("info", "This page was suspended.");
+    notice("info", "This page was suspended. What it shows is up to date again; press again to drive.");
   },
 });
 
@@ -140,6 +140,9 @@ function showHead() {
   const source = localized ? "localized" : "odometry drifts";
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
   document.body.classList.toggle("stale", !state.isFresh);
+  const isLocal = /^(127\.|localhost|\[?::1)/.test(listening);
+  const more = "simulated ones: roslaunch hero_sim hero_sim.launch count:=4";
+  setText(element("empty"), isLocal ? `No robots. Start ${more}` : `No robots. Switch some on: they connect to ${listening}. Or start ${more}`);
   element("empty").hidden = robots.length > 0 || !isLive || Object.keys(state.replay).length > 0;
   showLosses(state, connection, () => connection.send({ do: "dismiss" }));
 }

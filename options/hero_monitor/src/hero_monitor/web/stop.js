@@ -105,6 +105,8 @@ export class StopPanel {
     element("release_bar").hidden = !this.stopped;
     element("release").hidden = !this.mayRelease;
     setText(element("release_note"), this.mayRelease ? "Robots may move then." : "The teacher releases the robots.");
-    element("release").classList.toggle("inert", Date.now() < this.inertMs);
+    const { classList } = element("release");
+    classList.toggle("inert", Date.now() < this.inertMs);
+    setText(element("release"), classList.contains("holding") ? "Keep holding ..." : "Release: hold 1 s");
   }
 }

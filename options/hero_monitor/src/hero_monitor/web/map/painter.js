@@ -309,15 +309,29 @@ export class MapPainter {
     const isCrowded = robots.length > 12 && radius < 22;
     const size = this.isProjected ? 26 : 12;
     context.font = `600 ${size}px system-ui, sans-serif`;
+    // For an audience numbers are inside the robots; there they cover no other.
+    const inside = this.isProjected ? robots.filter((robot) => robot.id >= 0) : [];
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    for (const robot of inside) {
+      const [x, y] = this.map.toScreen(...state.poses[robot.name]);
+      context.font = `700 ${Math.round(radius * (robot.id < 100 ? 0.95 : 0.7))}px system-ui, sans-serif`;
+      context.lineWidth = 4;
+      context.strokeStyle = "#000";
+      context.strokeText(String(robot.id), x, y);
+      context.fillStyle = stateOf(robot, state) === "READY" ? "#fff" : "#ff9d9d";
+      context.fillText(String(robot.id), x, y);
+    }
+    context.font = `600 ${size}px system-ui, sans-serif`;
     context.textAlign = "left";
     context.textBaseline = "top";
     context.lineWidth = 3;
     context.strokeStyle = this.ink("--floor");
-    const labels = robots.map((robot) => {
+    const labels = robots.filter((robot) => !inside.includes(robot)).map((robot) => {
       const [x, y] = this.map.toScreen(...state.poses[robot.name]);
-      // Numbers alone where names would be too many, and for an audience.
+      // Numbers alone where names would be too many.
       const isChosen = state.chosen.has(robot.name);
-      const isShort = robot.id >= 0 && !(isChosen && state.chosen.size === 1) && (isCrowded || this.isProjected);
+      const isShort = robot.id >= 0 && !(isChosen && state.chosen.size === 1) && isCrowded;
       const text = isShort ? String(robot.id) : robot.name;
       const isNeeded = isChosen || stateOf(robot, state) !== "READY";
       return { x, y, radius: isChosen ? radius * 1.5 + 6 : radius * 1.15, width: context.measureText(text).width, height: size, isNeeded, text, robot };

@@ -26,6 +26,14 @@ function stateText(robot, state) {
   return shown === "READY" && robot.odom === 0 ? "READY, no data" : shown;
 }
 
+/** Coordinates on the map, and what they are known by unless that is odometry. */
+function poseText(robot, state) {
+  const source = sourceOf(robot, state) || "own odometry";
+  const pose = source === "unknown" ? null : state.poses[robot.name];
+  const place = pose ? `${(pose[0] / 1000).toFixed(2)} ${(pose[1] / 1000).toFixed(2)} m` : "";
+  return source === "odometry" && place ? place : `${place} ${source}`.trim();
+}
+
 const speedOf = (robot, state, history) => history.speedOf(robot.name);
 const nearestRange = (robot, state) => nearestOf(state.ranges[robot.name]);
 
@@ -40,7 +48,7 @@ const COLUMNS = [
   { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => LIGHTS[light] || light || "off", byName: true },
   { title: "Nearest", value: nearestRange, text: (mm) => nearestText(mm, 2), className: "number", byName: true },
   { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), className: "number", byName: true },
-  { title: "Pose", value: sourceOf, text: (source) => source || "own odometry", tag: "source", lasting: true, byName: true },
+  { title: "Pose", value: poseText, text: String, className: "pose", lasting: true, byName: true },
   { title: "Address", value: (robot) => robot.address, className: "details", lasting: true },
   { title: "Odom", value: (robot) => robot.odom, text: (rate) => number(rate, 1, " Hz"), className: "details number" },
   { title: "From robot", value: (robot) => robot.bytes, text: (bytes) => number(bytes / 1000, 1, " kB/s"), className: "details number" },

@@ -17,7 +17,7 @@ export function mayDrive({ user }, names) {
 /** What the user is, in words. */
 export function roleOf({ name, title, robots }) {
   const role = title === "driver" ? `driver of ${numbersOf(robots)}` : title;
-  return name ? `${name}, ${role}` : role;
+  return name ? `${role}, ${name}` : role;
 }
 
 export class LessonPanel {
@@ -42,6 +42,7 @@ export class LessonPanel {
     const isTeacher = user.title === "teacher";
     element("role").hidden = isTeacher && lesson === null;
     setText(element("role"), roleOf(user));
+    document.body.classList.toggle("in-class", !element("role").hidden);
     element("join").hidden = isTeacher;
     element("lesson").hidden = lesson === null;
     element("invite").hidden = lesson === null;

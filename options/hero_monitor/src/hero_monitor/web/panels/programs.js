@@ -1,5 +1,6 @@
 // Programs on the chosen robots, those that run, and the recording. They belong to the monitor: every page shows them.
 
+import { groupOf, makePicture, sentenceOf } from "./about.js";
 import { mayDrive } from "./lesson.js";
 import { Lines, element, make, setPressed, setText } from "../dom.js";
 
@@ -14,6 +15,8 @@ const WORDS = {
   own_m: "to own group",
   others_m: "to others",
 };
+
+const WALL_GAP_MM = 120; // of a robot on the circle from the middle of the wall
 
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(seconds % 60).padStart(2, "0")}`;
 
@@ -41,6 +44,11 @@ export class ProgramPanel {
     this.send({ do: "stop_some", robots: this.names });
   }
 
+  /** Whether a click on the map places the robots. */
+  get isPlaced() {
+    return Boolean(this.offer?.fields.some((field) => field.on_map));
+  }
+
   get offer() {
     return this.offers.find((offer) => offer.program === element("program").value);
   }
@@ -51,7 +59,7 @@ export class ProgramPanel {
     const read = (input) => (input.type === "checkbox" ? input.checked : input.type === "number" ? Number(input.value) : input.value);
     const values = Object.fromEntries(inputs.map((input) => [input.name, read(input)]));
     const request = { do: "start", program: this.offer.program, robots: this.names };
-    if (!this.offer.fields.some((field) => field.on_map)) return this.send({ ...request, values });
+    if (!this.isPlaced) return this.send({ ...request, values });
     this.map.askPlace(`Click the center of the ${this.offer.title}; drag to turn it.`, ({ x, y, yaw }) => {
       this.map.askPlace(null);
       const turn = ((yaw ?? 0) * 180) / Math.PI;
@@ -59,7 +67,22 @@ export class ProgramPanel {
     });
   }
 
+  /** The greatest spacing of a circle of so many robots that fits the arena, m; the usual one without an arena. */
+  fitSpacing(usual, least) {
+    const { boxes } = this.map.state.arena;
+    const count = this.names.length;
+    if (count < 2 || boxes.length === 0) return usual;
+    const reach = (axis) => Math.min(...[-1, 1].map((side) => Math.max(...boxes.map((box) => side * box[axis]))));
+    const radius = (Math.min(reach(0), reach(1)) - WALL_GAP_MM) / 1000;
+    const fitting = Math.floor(200 * Math.sin(Math.PI / count) * radius) / 100;
+    return Math.max(least, Math.min(usual, fitting));
+  }
+
   showFields() {
+    if (this.offer) {
+      const sentence = make("span", { className: "quiet" }, sentenceOf(this.offer));
+      element("about").replaceChildren(...[makePicture(this.offer), sentence].filter((one) => one !== null));
+    }
     const fields = this.offer ? this.offer.fields.filter((field) => !field.on_map) : [];
     element("fields").replaceChildren(
       ...fields.map(({ name, unit, default: value, choices, limits, step }) => {
@@ -68,21 +91,23 @@ export class ProgramPanel {
         if (choices.length) input = make("select", { name }, ...choices.map((choice) => new Option(choice)));
         else if (limits === null) input = make("input", { name, type: "checkbox", checked: value });
         else input = make("input", { name, type: "number", min: limits[0], max: limits[1], step, required: true });
-        if (input.type !== "checkbox") input.value = value;
+        if (input.type !== "checkbox") input.value = name === "spacing_m" && this.isPlaced ? this.fitSpacing(value, limits[0]) : value;
         return make("label", {}, unit ? `${words}, ${unit}` : words, input);
       }),
     );
   }
 
   show(state, names) {
+    const isOtherCount = names.length !== this.names.length;
     this.names = names;
+    if (isOtherCount && this.isPlaced) this.showFields();
     const { programs, record } = state.offers;
     if (this.offers !== programs) {
       const chosen = element("program").value;
       this.offers = programs;
-      const list = (areBehaviors) =>
-        programs.filter((offer) => offer.is_behavior === areBehaviors).map(({ title, program }) => new Option(title, program));
-      element("program").replaceChildren(...list(false), make("optgroup", { label: "behaviors" }, ...list(true)));
+      const groups = [...new Set(programs.map(groupOf))];
+      const list = (group) => programs.filter((offer) => groupOf(offer) === group).map(({ title, program }) => new Option(title, program));
+      element("program").replaceChildren(...groups.map((group) => make("optgroup", { label: group }, ...list(group))));
       if (programs.some(({ program }) => program === chosen)) element("program").value = chosen;
       this.showFields();
     }
