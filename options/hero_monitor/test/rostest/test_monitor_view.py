@@ -304,7 +304,7 @@ class ViewTest(unittest.TestCase):
         self.assertEqual(request["robots"], ["hero_1"])
         self.assertEqual(request["values"], {"linear_m_s": 0.05, "angular_rad_s": 1.5})
         self.monitor.requests.clear()
-        self.page.find("#program [label=behaviors] [value='behavior_segregation']").click()
+        self.page.find("#program [value='behavior_segregation']").click()
         self.page.run("document.querySelector('[name=groups]').value = 2.5")
         self.page.click("#start")  # refused by the page: no whole number
         self.page.run("document.querySelector('[name=groups]').value = 3")
