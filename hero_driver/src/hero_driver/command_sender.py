@@ -23,10 +23,9 @@ class CommandSender:
         self._call_later = call_later
         self._owner = owner
 
-    def send_commands(self, namespace: str) -> None:
+    def send_commands(self, peer: Peer) -> None:
         """Send the commands of a robot that may go out; retry later with the remainder."""
-        peer = self._owner.find_peer(namespace)
-        if peer is None:
+        if peer.link.closed:
             return
         if peer.send_due:
             # A timer is set already for commands that have to wait.

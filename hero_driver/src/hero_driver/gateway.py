@@ -316,7 +316,7 @@ class Gateway(LinkHandler):
         peer.bridge = bridge
         rebooted = peer.boot is not None
         bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED, peer.wheels)
-        bridge.attach()
+        bridge.attach(peer)
         text = f"{bridge.label} {decision.verdict.value} ({peer.link.address})"
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
         self.note_change()
@@ -409,13 +409,6 @@ class Gateway(LinkHandler):
 
     # What stops and the robots' commands ask for.
 
-    def find_peer(self, namespace: str) -> Optional[Peer]:
-        """Return the connection of a robot, None if it is away."""
-        record = self.fleet.robots.get(namespace)
-        if record is None or record.link is None or record.link.closed:
-            return None
-        return self.peers.get(record.link)
-
     def warn_robot(self, peer: Peer, text: str) -> None:
         """Log what is wrong with a robot, and keep it for reports."""
         if peer.record is not None:
@@ -441,15 +434,13 @@ class Gateway(LinkHandler):
         """A robot's state changed."""
         self._on_change()
 
-    def send_commands(self, namespace: str) -> None:
+    def send_commands(self, peer: Peer) -> None:
         """Send the commands that wait, as soon as the robot can take them."""
-        self._sender.send_commands(namespace)
+        self._sender.send_commands(peer)
 
-    def stop_robot(self, namespace: str) -> None:
-        """Stop the robot, if it is connected."""
-        peer = self.find_peer(namespace)
-        if peer is not None:
-            self._stops.begin(peer)
+    def stop_robot(self, peer: Peer) -> None:
+        """Stop the robot."""
+        self._stops.begin(peer)
 
     def _read_without_loop(self, peer: Peer) -> None:
         try:

@@ -70,9 +70,6 @@ class PeerOwner(Protocol):
     stopped: bool
     """True if all robots are stopped until they are released."""
 
-    def find_peer(self, namespace: str) -> Optional[Peer]:
-        """Return the connection of a robot, None if it is away."""
-
     def warn_robot(self, peer: Peer, text: str) -> None:
         """Log what is wrong with a robot."""
 

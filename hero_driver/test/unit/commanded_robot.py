@@ -101,7 +101,7 @@ class CommandedRobot:
         self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), context)
         self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)
         self.bridge.corrections.restart(False, self.peer.wheels)
-        self.bridge.attach()
+        self.bridge.attach(self.peer)
         self._names = {}
         self._senders = {}
         subscribed = FakeRobot(1, [entry for entry in STOCK_DECLARATIONS if entry.kind == SUB])
@@ -117,14 +117,11 @@ class CommandedRobot:
 
     # What commands and stops ask of the gateway.
 
-    def send_commands(self, namespace):
-        self.sender.send_commands(namespace)
+    def send_commands(self, peer):
+        self.sender.send_commands(peer)
 
     def stop_robot(self, _):
         self.stops.begin(self.peer)
-
-    def find_peer(self, _):
-        return self.peer
 
     def note_change(self):
         pass
@@ -237,7 +234,7 @@ class CommandedRobot:
         """Offer a motion command, as the subscriber to its topic does."""
         kind = "hero_msgs/Motor" if name == MOTORS else "geometry_msgs/Twist"
         self.bridge.commands.queue.offer_motion(name, payload, STOP_PAYLOADS[kind], self.clock.now_s)
-        self.sender.send_commands(self.bridge.identity.namespace)
+        self.sender.send_commands(self.peer)
 
     def drive(self, linear_m_s, name=VELOCITY):
         """Offer a Twist."""

@@ -48,14 +48,15 @@ class Bench:
             clear=self.clear,
         )
         self.wheels = WheelMotion()
-        self.commands.attach(self.wheels)
+        self.peer = SimpleNamespace(wheels=self.wheels)
+        self.commands.attach(self.peer)
         self.subscribers = {name: self.commands.make_subscriber(name, name, TWIST) for name in (VELOCITY, POSITION)}
 
     def make_subscriber(self, receive, loop, lose, moves):
         return SimpleNamespace(receive=receive, lose=lose, is_old=False, last_sender="/a")
 
-    def stop(self, namespace):
-        assert namespace == "/hero_1"
+    def stop(self, peer):
+        assert peer is self.peer
         self.stops += 1
 
     def offer_motion(self, name, command, stop_payload, now_s):

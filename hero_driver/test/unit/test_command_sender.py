@@ -142,7 +142,7 @@ def test_a_command_too_long_for_the_robot_is_reported_and_costs_no_other():
         robot = CommandedRobot(clock)
         for payload in (bytes(65536), LIGHT_PAYLOAD):
             robot.bridge.commands.queue.offer(LIGHT, payload)
-        robot.send_commands("/hero_1")
+        robot.send_commands(robot.peer)
         clock.run(0.1)
     assert len(robot.warnings) == 1 and "65536 bytes does not fit the robot's buffer" in robot.warnings[0]
     assert [payload for _, name, payload in robot.taken if name == LIGHT] == [LIGHT_PAYLOAD]

@@ -313,7 +313,7 @@ def test_a_robot_is_stopped_when_the_program_that_moves_it_ends(gone_s, other, s
         clock.run(0.24)
         assert stopped == []
         clock.run(0.02)
-        assert stopped == ["/hero_1"] * stops
+        assert stopped == [robot.peer] * stops
 
 
 def test_motion_counts_until_the_firmware_has_ended_it():

@@ -270,8 +270,7 @@ def test_a_robot_that_joins_while_all_are_stopped_is_stopped(driver):
     assert driver.gateway.peers[other].stop is None
     other.close("closed by the robot")
     assert driver.gateway.list_stops()[-1] == ("hero_1", None)
-    driver.gateway.stop_robot("/hero_1")
-    driver.gateway.stop_robot("/hero_0")
+    driver.gateway.stop_robot(driver.gateway.peers[link])
     assert driver.gateway.peers[link].stop is not None
 
 
@@ -289,8 +288,8 @@ def test_the_end_waits_for_robots_and_names_those_that_may_move(driver):
 
 def test_a_pause_of_the_driver_forgives_silence_and_renews_stops(driver):
     link = driver.join(declarations=STOCK_DECLARATIONS)
-    driver.gateway.stop_robot("/hero_0")
     peer, resumed = driver.gateway.peers[link], []
+    driver.gateway.stop_robot(peer)
     peer.bridge.commands.queue.discard_motion = resumed.append
     driver.now_s += 30.0
     driver.gateway.resume(driver.now_s)
@@ -333,7 +332,7 @@ def test_lines_that_differ_in_cause_address_or_robot_are_throttled_apart(driver)
 
 
 def close(driver, number):
-    driver.gateway.find_peer("/hero_%d" % number).link.close("closed by the robot")
+    driver.gateway.fleet.robots["/hero_%d" % number].link.close("closed by the robot")
 
 
 def warn_twice(driver, number):

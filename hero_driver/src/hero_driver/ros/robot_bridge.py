@@ -7,7 +7,7 @@ registrar. Endpoints stay up when the connection goes and are there again when t
 """
 
 import functools
-from typing import Callable, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from ..commands.command_settings import CommandSettings
 from ..commands.service_requests import is_success, read_set_odom_pose
@@ -77,12 +77,12 @@ class RobotBridge:
 
     # The connection's life.
 
-    def attach(self) -> None:
-        """A connection is open; its topics are declared next."""
+    def attach(self, peer: Any) -> None:
+        """A connection is open, a Peer; its topics are declared next."""
         self._connection += 1
         self._ids.clear()
         self._service_halves.clear()
-        self.commands.attach(self.corrections.wheels)
+        self.commands.attach(peer)
 
     def detach(self, reason: str) -> None:
         """The connection is closed; endpoints remain, pending calls fail now, pending commands are dropped."""

@@ -9,7 +9,7 @@ Thread of the sockets.
 import functools
 import math
 import time
-from typing import Callable, Dict, Optional, Protocol
+from typing import Any, Callable, Dict, Optional, Protocol
 
 from ..commands.command_queue import CommandQueue
 from ..commands.command_settings import CommandSettings
@@ -42,11 +42,11 @@ class CommandOwner(Protocol):
     stopped: bool
     """True if all robots are stopped."""
 
-    def send_commands(self, namespace: str) -> None:
-        """Send the commands that wait for the robot, as soon as it can take them."""
+    def send_commands(self, peer: Any) -> None:
+        """Send the commands that wait for the robot of a connection, as soon as it can take them."""
 
-    def stop_robot(self, namespace: str) -> None:
-        """Stop the robot."""
+    def stop_robot(self, peer: Any) -> None:
+        """Stop the robot of a connection."""
 
 
 class RobotCommands:
@@ -67,13 +67,12 @@ class RobotCommands:
         self.refused = 0
         self.light = NO_LIGHT
         self.was_told_to_tune = False
-        self._namespace = namespace
         self._label = namespace.lstrip("/")
         self._owner = owner
         self._loop = loop
         self._log = log
         self._settings = settings
-        self._connected = False
+        self._peer: Any = None  # the robot's connection, a Peer
         self._commanders = CommandSources(WheelMotion())
         self._subscribers: Dict[str, RawSubscriber] = {}
         self._newest_sender: object = None  # connection of the newest motion command, and the name of its node
@@ -83,15 +82,15 @@ class RobotCommands:
 
     # The robot's connection.
 
-    def attach(self, wheels: WheelMotion) -> None:
-        """The robot is connected; wheels shows whether it moves."""
-        self._commanders = CommandSources(wheels)
+    def attach(self, peer: Any) -> None:
+        """The robot is connected by peer, whose wheels show whether it moves."""
+        self._commanders = CommandSources(peer.wheels)
         self.note_tuning(False)
-        self._connected = True
+        self._peer = peer
 
     def detach(self) -> None:
         """The robot is away; what waits is dropped."""
-        self._connected = False
+        self._peer = None
         self.queue.clear()
 
     # From a program.
@@ -134,7 +133,7 @@ class RobotCommands:
             )
             if self._commanders.find(name) is not None or self.tunes(time.monotonic()):
                 # It must not continue its previous command.
-                self._owner.stop_robot(self._namespace)
+                self._stop_robot()
             return
         moves, subscriber = command != stop_payload, self._subscribers[source]
         if moves and subscriber.is_old:
@@ -145,7 +144,7 @@ class RobotCommands:
                 "%s: a command on %s was refused, because it may be from before the robot, or the driver, was there"
                 " or ran; send it again" % (self._label, source),
             )
-        elif not self._connected or (moves and self._owner.stopped):
+        elif self._peer is None or (moves and self._owner.stopped):
             self.refused += 1
         else:
             now_s = time.monotonic()
@@ -154,10 +153,10 @@ class RobotCommands:
                 self._change_sender(sender, now_s)
             commander = self._commanders.note_command(name, source, sender, self._newest_node, moves, now_s)
             if not moves and (self.tunes(now_s) or self._commanders.needs_another_stop(commander, now_s)):
-                self._owner.stop_robot(self._namespace)
+                self._stop_robot()
                 return
             self.queue.offer_motion(name, command, stop_payload, now_s)
-            self._owner.send_commands(self._namespace)
+            self._owner.send_commands(self._peer)
 
     def _change_sender(self, sender: object, now_s: float) -> None:
         """Another connection brings the newest command: warn if two programs take turns, not one follows another."""
@@ -175,13 +174,13 @@ class RobotCommands:
         self._superseded = before, now_s
 
     def _receive_command(self, name: str, payload: bytes) -> None:
-        if not self._connected:
+        if self._peer is None:
             self.refused += 1
             return
         if name.endswith(LIGHT_SUFFIX) and len(payload) == len(NO_LIGHT):
             self.light = payload
         self.queue.offer(name, payload)
-        self._owner.send_commands(self._namespace)
+        self._owner.send_commands(self._peer)
 
     def offer_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
         """Take a request of a service; return why it cannot be sent, if so."""
@@ -198,7 +197,7 @@ class RobotCommands:
                 return "it moves the robot, and all robots are stopped (~stop)"
             self.was_told_to_tune = True
         self.queue.offer(name, request)
-        self._owner.send_commands(self._namespace)
+        self._owner.send_commands(self._peer)
         return None
 
     def _lose_sender(self, name: str, source: str) -> None:
@@ -212,9 +211,13 @@ class RobotCommands:
         def stop_orphan() -> None:
             # Any newer command is another commander's.
             if self._commanders.find(name) is commander:
-                self._owner.stop_robot(self._namespace)
+                self._stop_robot()
 
         self._loop.call_later(self._settings.orphan_stop_s, stop_orphan)
+
+    def _stop_robot(self) -> None:
+        if self._peer is not None:
+            self._owner.stop_robot(self._peer)
 
     # From the driver.
 
@@ -231,7 +234,7 @@ class RobotCommands:
     def watch_commanders(self, now_s: float) -> None:
         """Stop the robot if it missed a zero, or if a program that commands it regularly has fallen silent."""
         if self._commanders.is_zero_missed(now_s):
-            self._owner.stop_robot(self._namespace)
+            self._stop_robot()
         silent = self._commanders.find_silent(self._settings.silent_stop_s, now_s)
         if silent is not None and self._settings.silent_stop_s > 0.0:
             silence_s = now_s - silent.commanded_s
@@ -239,7 +242,7 @@ class RobotCommands:
             self._log.log_throttled(
                 "warn", "silent " + self._label, text % (self._label, silent.node or "a program", silence_s)
             )
-            self._owner.stop_robot(self._namespace)
+            self._stop_robot()
 
     # Self-tuning.
 
