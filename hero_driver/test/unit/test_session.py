@@ -254,7 +254,7 @@ def test_a_declared_session_does_not_end_while_the_robot_speaks():
         assert session.poll(T0 + step) == []
 
 
-def test_a_robot_that_only_asks_for_the_time_is_noticed_once_until_data_come():
+def test_a_robot_that_only_asks_for_the_time_is_noticed_once():
     session = open_declared_session()
     noticed_s = []
 

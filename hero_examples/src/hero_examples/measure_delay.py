@@ -12,7 +12,7 @@ from hero_node.ros import read_duration_clock_s
 
 def measure(program, robot, turns):
     """Return lists in ms: arrival minus stamp of odometry, and time from a command to the first 0.03 rad."""
-    log = []  # delay (s), arrival (s, by a clock that nobody sets) and yaw (rad) of each message
+    log = []  # delay (s), arrival (s, by the monotonic clock) and yaw (rad) of each message
 
     def receive(odometry):
         delay_s = rospy.get_time() - odometry.header.stamp.to_sec()

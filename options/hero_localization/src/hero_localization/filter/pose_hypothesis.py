@@ -65,7 +65,7 @@ class StampedPose(NamedTuple):
     source: str = ""
     """Topic and node that a measured pose came from; empty if unknown."""
     is_systematic: bool = False
-    """Whether its errors stay however many are joined, as those of a camera's calibration do."""
+    """True if its errors stay however many are joined, as those of a camera's calibration do."""
 
 
 class _Step(NamedTuple):
