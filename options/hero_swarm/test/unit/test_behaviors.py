@@ -163,6 +163,12 @@ def test_standing_still_and_random_walks_fail_every_metric(name, behavior):
     assert (values < limit if is_above else values > limit).all(), values
 
 
+@pytest.mark.parametrize("name", ["cyclic_pursuit", "milling", "wall_following"])
+def test_the_limit_of_a_name_is_far_above_random_controllers(name):
+    _, limit, *_ = CASES[name]
+    assert metrics.score(find_behavior(name).metric, limit) >= 0.5
+
+
 def test_every_behavior_is_tested_and_names_its_units_and_source():
     assert sorted(CASES) == list_names()
     for name in list_names():

@@ -56,6 +56,18 @@ def test_walls_are_followed_by_those_that_move_along_them():
     )
 
 
+def test_a_flock_at_rest_has_no_order():
+    headings_rad, moves = np.zeros((1, 4)), np.array([[(0.05, 0.0), (0.0, 0.05), (0.005, 0.005), (0.0, 0.0)]])
+    assert metrics.order(headings_rad) == pytest.approx([1.0])
+    assert metrics.order(headings_rad, moves) == pytest.approx([0.5])
+
+
+def test_a_score_begins_at_what_random_controllers_reach():
+    chance = metrics.CHANCE["rotation"]
+    values = np.array([0.0, chance, (1.0 + chance) / 2.0, 1.0])
+    assert metrics.score("rotation", values) == pytest.approx([0.0, 0.0, 0.5, 1.0])
+
+
 def test_order_and_fatness_have_their_extremes():
     places_m, angles_rad = ring(10)
     assert metrics.order(np.full((1, 5), 2.0)) == pytest.approx([1.0])
