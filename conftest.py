@@ -13,6 +13,9 @@ import hypothesis.configuration
 import pytest
 
 ROOT = Path(__file__).resolve().parent
+CAPTURES = Path(os.environ.get("HERO_CAPTURES", ROOT.parent / "shared" / "captures"))
+"""Bytes of a real robot, a second opinion which is no part of this repository; simulated robots give the first."""
+
 # sources.py, which knows where packages and modules are; robots of the benchmarks. Helpers are in hero_test.
 sys.path += [str(ROOT / "test"), str(ROOT / "test" / "bench")]
 
@@ -33,8 +36,22 @@ hypothesis.configuration.set_hypothesis_home_dir(str(ROOT / ".work" / "hypothesi
 
 def pytest_configure(config):
     """Define the markers."""
-    config.addinivalue_line("markers", "slow: left out of the stage noetic; quicker tests call the same of libraries")
+    config.addinivalue_line("markers", "slow: takes 0.2 s of CPU or more; left out of the stage noetic")
     config.addinivalue_line("markers", "option(module): needs this optional package, which the stage options has")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out the tests that need captures where there are none."""
+    needing = [item for item in items if "read_capture" in item.fixturenames]
+    left_out = [] if CAPTURES.is_dir() else needing
+    items[:] = [item for item in items if item not in left_out]
+    config.hook.pytest_deselected(items=left_out)
+
+
+@pytest.fixture(scope="session")
+def read_capture():
+    """Return a function that reads a capture by its name."""
+    return lambda name: (CAPTURES / name).read_bytes()
 
 
 def pytest_runtest_setup(item):

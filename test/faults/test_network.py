@@ -16,6 +16,7 @@ from rig import Program, count_holdings, start_python
 
 from hero_msgs.msg import Encoder, Robot
 from hero_test.driver_case import Recorder
+from hero_test.nonempty import nonempty
 from hero_test.processes import find_free_port
 from hero_test.waiting import wait_for
 
@@ -183,7 +184,9 @@ def test_jitter_of_200_ms_loses_nothing(through_relay, effort, record):
     returns, marks = count_returns(driver), watch.mark()
     relay.ask("jitter 0.2")
     count = effort.choose(60, 600)
-    wait_for(lambda: all(len(r.messages) > marks[n] + count for n, r in watch.recorders.items()), "messages", 60.0)
+    wait_for(
+        lambda: all(len(r.messages) > marks[n] + count for n, r in nonempty(watch.recorders.items())), "messages", 60.0
+    )
     lost = watch.count_gaps(marks)
     bad = sum(robot.bad_packets for robot in driver.fleet.newest.robots)
     record(
@@ -304,7 +307,7 @@ def test_running_out_of_ports_does_not_affect_connected_robots(by_cable, record)
             for _ in range(3):
                 rosgraph.Master("/faults").lookupNode(driver.node)
                 count_holdings(driver)
-        wait_for(lambda: all(len(r.messages) > marks[n] + 60 for n, r in watch.recorders.items()), "messages")
+        wait_for(lambda: all(len(r.messages) > marks[n] + 60 for n, r in nonempty(watch.recorders.items())), "messages")
     finally:
         ports.write_text(usual)
     wait_for(lambda: rosgraph.Master("/faults").lookupNode(driver.node), "the master to be reached again")

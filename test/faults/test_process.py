@@ -17,6 +17,7 @@ from hero_msgs.msg import Encoder
 from hero_test import stock_messages
 from hero_test.driver_case import Recorder, make_publisher
 from hero_test.fake_robot import READ_CYCLE_S, TIME_PACKET, FakeRobot
+from hero_test.nonempty import nonempty
 from hero_test.processes import find_free_port, suspended
 from hero_test.small_disk import SmallDisk
 from hero_test.waiting import wait_for
@@ -53,7 +54,9 @@ def test_robots_stop_when_the_driver_ends_and_can_be_driven_again(field, start_d
         driver.fleet.close()
         # As roslaunch does with respawn: the same node, while the robots and the programs wait.
         driver = start_driver(parameters={"port": port}, name="ended_driver")
-        wait_for(lambda: all(ground_truth.is_moving for ground_truth in ground_truths), "all robots to move again")
+        wait_for(
+            lambda: all(ground_truth.is_moving for ground_truth in nonempty(ground_truths)), "all robots to move again"
+        )
     record(
         "%s while %d robots drive at 0.1 m/s" % (number.name, ROBOTS),
         len(distances_m),

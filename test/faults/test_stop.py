@@ -20,6 +20,7 @@ from hero_msgs.msg import Robot
 from hero_sim.srv import InjectFault
 from hero_test.driver_case import make_publisher, receives_topic
 from hero_test.fake_robot import READ_CYCLE_S, FakeRobot
+from hero_test.nonempty import nonempty
 from hero_test.processes import find_free_port, suspended
 from hero_test.waiting import wait_for
 
@@ -100,7 +101,9 @@ def test_a_stop_needs_no_master(field, master, record):
             wait_until_stopped(ground_truths)
             wait_for(lambda: is_confirmed(driver), "the driver's confirmation")
             request(False)
-            wait_for(lambda: all(ground_truth.is_moving for ground_truth in ground_truths), "all robots to move")
+            wait_for(
+                lambda: all(ground_truth.is_moving for ground_truth in nonempty(ground_truths)), "all robots to move"
+            )
         for ground_truth in ground_truths:
             ground_truth.command = Twist()
         wait_until_stopped(ground_truths)

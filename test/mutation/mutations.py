@@ -23,6 +23,17 @@ SWAPPED_ARITHMETIC = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast
 LIMITING = ("min", "max", "minimum", "maximum")
 SHAPING = ("abs", "sorted", "reversed", "round", "clip", "clamp", "wrap", "limit")
 SAYING = "print debug info warn warning error exception logdebug loginfo logwarn logerr log format".split()
+SAYING_KEYWORDS = set(
+    "alpha color desc description disable edgecolor epilog facecolor fontsize ha help label labelpad leave linestyle"
+    " linewidth loc lw marker markersize metavar name rotation showfliers title unit va widths zorder".split()
+)
+"""Of help, progress bars and drawings: only the eye judges them."""
+
+DRAWING = set(
+    "add_argument annotate axhline axvline fill_between grid legend plot set_title set_xlabel set_ylabel text".split()
+)
+"""The order of these calls is the eye's, too."""
+
 OTHER_MODEL = {
     "BODY_RADIUS_M": 0.060,
     "WHEEL_SEPARATION_M": 0.065,
@@ -113,6 +124,8 @@ def _may_matter_first(first: ast.stmt, second: ast.stmt) -> bool:
     both = (first, second)
     if not all(isinstance(node, (ast.Expr, ast.Assign, ast.AugAssign, ast.Delete)) for node in both):
         return False
+    if any(_name_called(getattr(node, "value", None)) in DRAWING for node in both):
+        return False
     if not any(isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) for node in both):
         return False
     named = {node.id for node in ast.walk(first) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
@@ -178,7 +191,7 @@ def _list_replacements(node: ast.AST, parent: ast.AST, field: str, scope: Tuple[
         if name == "suppress":
             found += [_changed(node, args=[wider]) for wider in _widen(node.args[0])]
         for index, keyword in enumerate(node.keywords):
-            if keyword.arg:
+            if keyword.arg and keyword.arg not in SAYING_KEYWORDS:
                 found.append(_changed(node, keywords=[*node.keywords[:index], *node.keywords[index + 1 :]]))
     elif isinstance(node, (ast.Name, ast.Attribute)) and isinstance(node.ctx, ast.Load):
         if _name_of(node) in OTHER_MODEL:

@@ -18,6 +18,7 @@ from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
+from hero_test.nonempty import nonempty
 from hero_test.waiting import wait_for
 
 DEADLINE_S = 60.0
@@ -188,7 +189,7 @@ class DriverDrivesTest(unittest.TestCase):
             self.call("/hero_0/velocity_controller/pid_parameters", SetPID, *[float("inf")] * 6)
 
     def test_every_robot_scans_with_eight_beams_and_sends_all_its_frames(self):
-        for watch in self.scans.values():
+        for watch in nonempty(self.scans.values()):
             scan = watch.wait_more()
             self.assertEqual(len(scan.ranges), 8)
         frames = set()
@@ -208,7 +209,7 @@ class DriverDrivesTest(unittest.TestCase):
     def test_the_aggregator_configuration_sorts_every_diagnostic_once(self):
         config = yaml.safe_load((Path(__file__).parents[2] / "config" / "diagnostics.yaml").read_text())
         groups = {name: [] for name in config["analyzers"]}
-        for status in Watch("/diagnostics", DiagnosticArray).wait_more().status:
+        for status in nonempty(Watch("/diagnostics", DiagnosticArray).wait_more().status):
             matching = [
                 name for name, group in config["analyzers"].items() if re.fullmatch(group["regex"], status.name)
             ]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import rostest
 
+from hero_test.nonempty import nonempty
 from hero_test.processes import find_program
 
 TIMEOUT_S = 600.0
@@ -90,7 +91,7 @@ class ProgramEndsTest(unittest.TestCase):
 
     def test_a_log_directory_that_is_a_file_is_named_in_one_line(self):
         started = [(node, start(node, ROS_LOG_DIR=__file__)) for node in NODES if node[0] != "record"]
-        for node, process in started:
+        for node, process in nonempty(started):
             status, lines = self.end(process)
             self.assertEqual((status, len(lines)), (1, 1), (node, lines))
             self.assertIn(__file__, lines[0])

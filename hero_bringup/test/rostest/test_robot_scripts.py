@@ -17,6 +17,7 @@ from geometry_msgs.msg import Twist
 
 from hero_client import Drivers, NodeError, Robot
 from hero_test.fleet_report import wait_until_ready
+from hero_test.nonempty import nonempty
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
 
@@ -87,11 +88,11 @@ class RobotScriptsTest(unittest.TestCase):
         for robot_id in range(len(ends)):
             connect_and_leave(COMMANDS % robot_id)
         logs = [CommandLog(robot_id) for robot_id in range(len(ends))]
-        wait_for(lambda: all(log.speeds_m_s for log in logs), "commands")
-        for script, (number, status) in zip(scripts, ends):
+        wait_for(lambda: all(log.speeds_m_s for log in nonempty(logs)), "commands")
+        for script, (number, status) in nonempty(zip(scripts, ends)):
             script.send_signal(number)
             self.assertEqual((status, ""), self.end(script))
-        wait_for(lambda: all(log.speeds_m_s[-1:] == [0.0] for log in logs), "a stop as the last command")
+        wait_for(lambda: all(log.speeds_m_s[-1:] == [0.0] for log in nonempty(logs)), "a stop as the last command")
         wait_for(lambda: self.watch.at_rest(*range(len(ends))), "rest")
 
     def test_the_first_command_of_a_script_is_not_lost(self):

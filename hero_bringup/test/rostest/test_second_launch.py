@@ -96,7 +96,7 @@ class SecondLaunchTest(unittest.TestCase):
             def all_drive(watch=watch):
                 for publisher in publishers:
                     publisher.publish(command)
-                return all(rows and rows[-1][4] > 0.02 for rows in watch.rows.values())
+                return len(watch.rows) == 2 and all(rows and rows[-1][4] > 0.02 for rows in watch.rows.values())
 
             wait_for(all_drive, "motion of both robots")
             watch.close()

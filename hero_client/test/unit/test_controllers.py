@@ -10,6 +10,7 @@ from hero_client.controllers.avoidance import WanderLaw, WanderMemory, find_in_p
 from hero_client.controllers.unicycle import FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose, wrap_angle
+from hero_test.nonempty import nonempty
 
 INF = math.inf
 FREE = [INF] * 8
@@ -58,7 +59,7 @@ def test_go_to_point_arrives_from_every_side_and_stays():
         body = Body(Pose(0.0, 0.0, heading))
         x_m, y_m = distance * math.cos(bearing), distance * math.sin(bearing)
         arrived_s = None
-        for index in range(int(longest_s / STEP_S)):
+        for index in nonempty(range(int(longest_s / STEP_S))):
             command = go_to_point(body.pose, x_m, y_m, law)
             assert abs(command.linear_m_s) <= law.max_linear_m_s + 1e-12
             assert abs(command.angular_rad_s) <= law.max_angular_rad_s + 1e-12

@@ -8,6 +8,7 @@ import pytest
 
 from hero_client.controllers.formation_drive import FormationDrive
 from hero_node import STOP, Pose, Velocity
+from hero_test.nonempty import nonempty
 
 AHEAD_M, PERIOD_S = 0.04, 0.1
 FORWARD = Velocity(0.1, 0.0)
@@ -45,7 +46,7 @@ def test_each_place_moves_with_the_body_however_its_robot_is_turned():
         poses = draw_poses(rng)
         drive = FormationDrive(poses)
         middle, heading = complex(*drive.pose[:2]), cmath.rect(1.0, drive.pose.yaw_rad)
-        for pose, each in zip(poses, drive.step(poses, command, PERIOD_S)):
+        for pose, each in nonempty(zip(poses, drive.step(poses, command, PERIOD_S))):
             turning = 1j * command.angular_rad_s * (find_point(pose) - middle)
             assert find_speed(pose, each) == pytest.approx(command.linear_m_s * heading + turning)
         moved = complex(*drive.pose[:2]) - middle
@@ -105,6 +106,6 @@ def test_robots_with_any_headings_keep_their_places_on_a_curve():
         ]
     turn = cmath.rect(1.0, drive.pose.yaw_rad - begin.yaw_rad)
     assert drive.pose.yaw_rad - begin.yaw_rad > 0.9
-    for pose, point in zip(poses, before):
+    for pose, point in nonempty(zip(poses, before)):
         place = complex(*drive.pose[:2]) + turn * (point - complex(*begin[:2]))
         assert abs(find_point(pose) - place) < 0.02

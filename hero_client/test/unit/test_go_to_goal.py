@@ -5,7 +5,7 @@ import math
 import pytest
 from test_controllers import STEP_S, Body, cast_in_box
 
-from hero_client.controllers.go_to_goal import PROGRESS_S, Goal, GoToGoalController
+from hero_client.controllers.go_to_goal import BLIND_S, PROGRESS_S, Goal, GoToGoalController
 from hero_client.controllers.lateness import HOLD_S
 from hero_client.controllers.motion import BLOCKED_S, SILENT_STEPS, STALL_S, State
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
@@ -196,3 +196,13 @@ def test_a_robot_in_a_dead_end_gives_up_when_it_comes_no_nearer():
         # It turns to and fro, so its wheels are not stuck.
         controller.step(Pose(0.0, 0.0, 0.1 * (index % 2)), [0.06] * 8, STEP_S * index)
     assert controller.state is State.FAILED and "no nearer" in controller.reason
+
+
+def test_a_robot_that_is_to_go_around_obstacles_but_sees_nothing_fails():
+    controller = GoToGoalController(Goal(1.0, 0.0), 0.0, avoid=True)
+    steps = 0
+    while controller.state is State.ACTIVE and steps < 100:
+        assert controller.step(HERE, [math.nan] * 8, 0.1 * steps) == STOP
+        steps += 1
+    assert controller.state is State.FAILED and 0.1 * steps == pytest.approx(BLIND_S, abs=0.3)
+    assert controller.reason.startswith("it cannot go around obstacles: ")

@@ -89,6 +89,12 @@ def test_only_ranges_within_reach_are_obstacles_and_touch_is_nearest():
     assert find_nearest(touching, -math.pi, EIGHTH_RAD).range_m == -INF
 
 
+def test_a_scan_whose_beams_all_point_the_same_way_has_no_ranges():
+    for increment_rad in (0.0, -EIGHTH_RAD):
+        scan = SimpleNamespace(ranges=[0.1] * 8, angle_min=-math.pi, angle_increment=increment_rad)
+        assert front_first(scan) == []
+
+
 def test_colors_have_names_or_numbers():
     assert parse_color("red") == (1.0, 0.0, 0.0)
     assert parse_color([0.1, 0.2, 0.3]) == (0.1, 0.2, 0.3)

@@ -25,6 +25,7 @@ from hero_test.driver_case import (
 from hero_test.fake_robot import (
     TIME_PACKET,
 )
+from hero_test.nonempty import nonempty
 from hero_test.processes import suspended
 from hero_test.waiting import wait_for
 
@@ -116,7 +117,7 @@ class TestDriverEndurance(OwnDriverCase):
         come_and_go(30)
         self.assertEqual(list_driver_topics("/hero_1", driver.node), topics)
         wait_for(
-            lambda: all(now <= then for now, then in zip(count_resources(driver.process.pid), before)),
+            lambda: all(now <= then for now, then in nonempty(zip(count_resources(driver.process.pid), before))),
             lambda: (
                 "no more than %s sockets and threads, there are %s" % (before, count_resources(driver.process.pid))
             ),
@@ -137,7 +138,7 @@ class TestDriverEndurance(OwnDriverCase):
         before = count_resources(driver.process.pid)
         come_and_go(range(4, 16))
         wait_for(
-            lambda: all(now <= then for now, then in zip(count_resources(driver.process.pid), before)),
+            lambda: all(now <= then for now, then in nonempty(zip(count_resources(driver.process.pid), before))),
             lambda: (
                 "no more than %s sockets and threads, there are %s" % (before, count_resources(driver.process.pid))
             ),

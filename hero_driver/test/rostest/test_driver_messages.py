@@ -16,6 +16,7 @@ from hero_msgs.srv import SetOdom
 from hero_test import stock_messages
 from hero_test.driver_case import DriverCase, DriverProcess, Recorder
 from hero_test.fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer, heartbeat_line
+from hero_test.nonempty import nonempty
 from hero_test.stock_messages import TICK_M, WHEEL_SEPARATION_M, send_burst
 from hero_test.waiting import wait_for
 
@@ -146,7 +147,7 @@ class TestDriverMessages(DriverCase):
             ]
 
         wait_for(lambda: len(list_own()) == 10, "ten transforms")
-        for transform, message in zip(list_own(), messages):
+        for transform, message in nonempty(zip(list_own(), messages)):
             self.assertEqual(transform.header.frame_id, "hero_8/odom")
             self.assertEqual(transform.header.stamp, message.header.stamp)
             self.assertEqual(transform.transform.rotation, message.pose.pose.orientation)
@@ -235,7 +236,7 @@ class TestDriverMessages(DriverCase):
     def test_ticks_that_no_wheel_can_have_run_do_not_move_the_robot(self):
         robot = self.join(14)
         readings = [(0.0, 0.0), (10.0, 10.0), (1e9, -1e9), (math.nan, 5.0), (20.0, 20.0), (30.0, 30.0)]
-        for message in self.drive(robot, readings):
+        for message in nonempty(self.drive(robot, readings)):
             x_m, y_m, yaw_rad = read_pose(message)
             self.assertLessEqual(abs(x_m), 31 * TICK_M)
             self.assertEqual((y_m, yaw_rad), (0.0, 0.0))
@@ -329,7 +330,7 @@ class TestDriverMessages(DriverCase):
             return by_child
 
         wait_for(lambda: sum(map(len, list_stamps().values())) == 30, lambda: "30 of %s" % list_stamps())
-        for child, stamps in list_stamps().items():
+        for child, stamps in nonempty(list_stamps().items()):
             self.assertEqual(stamps, sorted(set(stamps)), child)
 
     # Transforms.

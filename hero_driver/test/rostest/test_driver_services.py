@@ -15,6 +15,7 @@ from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
 from hero_test import stock_messages
 from hero_test.driver_case import DriverCase, make_publisher, wait_payloads
 from hero_test.fake_robot import encode_answer
+from hero_test.nonempty import nonempty
 from hero_test.waiting import wait_for
 
 GAINS = (100.0, 2.0, 0.5, 101.0, 2.5, 0.25)
@@ -177,7 +178,7 @@ class TestDriverServices(DriverCase):
         for robot in robots:
             wait_payloads(robot, "ir_calibration")
         self.assertFalse(any(call.is_over for call in calls))
-        for robot, call in zip(reversed(robots), reversed(calls)):
+        for robot, call in nonempty(zip(reversed(robots), reversed(calls))):
             robot.answer("ir_calibration", encode_answer(True, robot.name))
             self.assertEqual(call.wait().answer.message, robot.name)
 

@@ -25,6 +25,7 @@ from robot_messages import (
 from sensor_msgs.msg import Range
 
 from hero_driver.corrections import message_layouts
+from hero_test.nonempty import nonempty
 
 POSE_DIAGONAL = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 TWIST_DIAGONAL = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
@@ -191,7 +192,7 @@ def test_no_transforms_are_an_empty_message():
 
 def test_a_message_of_transforms_that_is_cut_or_too_long_is_refused():
     message = build_transform_message(build_transform(NOW_NS, "a", "b"), build_transform(NOW_NS, "a", "c"))
-    for length in range(len(message)):
+    for length in nonempty(range(len(message))):
         assert message_layouts.read_transforms(message[:length]) is None
     assert message_layouts.read_transforms(message + b"\x00") is None
     assert message_layouts.read_transforms(b"\xff\xff\xff\xff" + message[4:]) is None
@@ -285,7 +286,7 @@ def test_ranges_say_by_rep_117_what_is_known(stock_m, reading, expected_m, beam)
 @given(stock=st.lists(st.floats(width=32), min_size=16, max_size=16))
 def test_every_finite_range_lies_within_the_limits_that_the_message_states(stock):
     _, numbers, ranges_m, _ = read_scan(make_proximity(stock))
-    assert all(not math.isfinite(range_m) or numbers[5] <= range_m <= numbers[6] for range_m in ranges_m)
+    assert all(not math.isfinite(range_m) or numbers[5] <= range_m <= numbers[6] for range_m in nonempty(ranges_m))
 
 
 @pytest.mark.parametrize("counts", [(8, 16), (16, 8), (0, 0), (15, 17), (17, 15), (16, 15)])
@@ -297,7 +298,7 @@ def test_a_scan_with_other_numbers_of_beams_is_not_the_stock_one(counts):
 def test_a_scan_that_is_cut_or_too_long_is_refused():
     payload = build_laser(NOW_NS, [0.1] * 16, [1.0] * 16)
     assert len(payload) == 205 - 8
-    for length in range(len(payload)):
+    for length in nonempty(range(len(payload))):
         assert message_layouts.make_proximity(payload[:length], 0, NOW_NS, 0.2) is None
     assert message_layouts.make_proximity(payload + b"\x00", 0, NOW_NS, 0.2) is None
     frame_too_long = payload[:12] + b"\xff\xff\xff\xff" + payload[16:]

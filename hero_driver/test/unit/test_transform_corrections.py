@@ -6,6 +6,8 @@ import pytest
 from corrected_robot import CorrectedRobot, list_transforms
 from robot_messages import MS, NOW_NS, NS_PER_S, build_transform, build_transform_message
 
+from hero_test.nonempty import nonempty
+
 
 def receive_transforms(robot, *pairs, stamp_ns=NOW_NS):
     message = build_transform_message(*(build_transform(stamp_ns, *pair) for pair in pairs))
@@ -133,7 +135,7 @@ def test_a_broken_message_of_transforms_is_refused_whole():
     robot = CorrectedRobot()
     receive_transforms(robot, ("hero_0/base_link", "hero_0/hat_link"))
     message = build_transform_message(build_transform(NOW_NS, "hero_0/base_link", "hero_0/hat_link"))
-    for length in range(len(message)):
+    for length in nonempty(range(len(message))):
         assert robot.receive("/tf", message[:length], NOW_NS) == []
     assert robot.receive("/tf", message + b"\x00", NOW_NS) == []
     two = build_transform_message(*[build_transform(NOW_NS, "hero_0/base_link", "hero_0/hat_link")] * 2)

@@ -11,6 +11,7 @@ from hero_client.values import Obstacle
 from hero_examples import all_robots, avoid, drive_a_square, keep_distance, move, read_sensors
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
+from hero_test.nonempty import nonempty
 
 pytest.importorskip("rospy", reason="the scripts' robots are on ROS")
 
@@ -67,7 +68,7 @@ def test_the_square_is_closed_and_the_light_blinks(seed):
 def test_avoid_keeps_driving_and_touches_nothing_that_it_sees():
     with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
         paths = true_paths.run(swarm, step_all(swarm, avoid.step), 60.0)
-    for path in paths:
+    for path in nonempty(paths):
         assert true_paths.list_touches(path, load_arena("obstacles")) == []
         assert true_paths.measure_lengths(path).min() > 1.0
 
@@ -78,7 +79,7 @@ def test_avoid_turns_away_from_the_side_on_which_something_is(tmp_path, sign):
     arena.write_text(f"walls_m: [[[-2, {0.2 * sign}], [2, {0.2 * sign}]]]\nstarts_m_deg: [[0, 0, {30.0 * sign}]]\n")
     with StepSwarm(1, arena=str(arena), worlds=WORLDS) as swarm:
         paths = true_paths.run(swarm, step_all(swarm, avoid.step), 6.0)
-    for path in paths:
+    for path in nonempty(paths):
         assert (path[-1, 0, 2] - path[0, 0, 2]) * sign < -0.3
 
 
@@ -86,7 +87,7 @@ def test_avoid_turns_away_from_the_side_on_which_something_is(tmp_path, sign):
 def test_keep_distance_ends_facing_the_nearest_thing_at_its_distance():
     with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
         paths = true_paths.run(swarm, step_all(swarm, keep_distance.step), 60.0)
-        for path, robot in zip(paths, swarm):
+        for path, robot in nonempty(zip(paths, swarm)):
             assert true_paths.measure_wall_gaps(path, load_arena("obstacles")).min() > 0.05
             assert robot.nearest().bearing_rad == 0.0
             assert robot.nearest().range_m == pytest.approx(0.15, abs=0.01)
@@ -99,7 +100,7 @@ def test_all_robots_turns_every_robot_in_a_color_of_its_own():
         swarm.rows.on_cycle.append(lambda rows: seen.add(tuple(robot.light for robot in swarm)))
         all_robots.turn_all(swarm)
         swarm.sleep(0.2)
-        for robot, yaw_rad in zip(swarm, before):
+        for robot, yaw_rad in nonempty(zip(swarm, before)):
             assert robot.true_pose.yaw_rad - yaw_rad > 0.8
             assert robot.light == (0.0, 0.0, 0.0)
     assert any(len(set(lights)) == 5 for lights in seen)
@@ -112,12 +113,12 @@ def test_robots_that_are_not_calibrated_wait_and_drive_once_they_are(script):
         for row in range(4):
             swarm.rows.set_infrared_calibration(row, np.full(8, math.nan))
         swarm.sleep(0.3)  # the next scan
-        for path in true_paths.run(swarm, step_all(swarm, script.step), 10.0):
+        for path in nonempty(true_paths.run(swarm, step_all(swarm, script.step), 10.0)):
             assert np.ptp(path, axis=0).max() < 1e-6
         for row, calibration in enumerate(calibrations):
             swarm.rows.set_infrared_calibration(row, calibration)
         swarm.sleep(0.3)
-        for path in true_paths.run(swarm, step_all(swarm, script.step), 3.0):
+        for path in nonempty(true_paths.run(swarm, step_all(swarm, script.step), 3.0)):
             assert true_paths.measure_lengths(path).min() > 0.03
 
 

@@ -11,6 +11,7 @@ from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples import follow
+from hero_test.nonempty import nonempty
 
 ARENA = """
 bounds_m: [-2, -2, 2, 2]
@@ -38,7 +39,7 @@ def follow_curve(folder, perfect, leader_s):
 
 @pytest.mark.slow
 def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops(tmp_path):
-    for path in follow_curve(tmp_path, True, leader_s=30.0):
+    for path in nonempty(follow_curve(tmp_path, True, leader_s=30.0)):
         gaps_m = true_paths.measure_gaps(path)[:, [0, 1], [1, 2]] + 2.0 * BODY_RADIUS_M
         assert true_paths.measure_lengths(path).min() > 1.5
         assert gaps_m.min() > 2.0 * BODY_RADIUS_M + 0.01
@@ -49,7 +50,7 @@ def test_a_chain_follows_a_curve_keeps_its_gaps_and_stops(tmp_path):
 
 @pytest.mark.slow
 def test_a_chain_whose_odometry_drifts_follows_without_touching(tmp_path):
-    for path in follow_curve(tmp_path, False, leader_s=15.0):
+    for path in nonempty(follow_curve(tmp_path, False, leader_s=15.0)):
         assert true_paths.measure_lengths(path).min() > 0.8
         assert true_paths.measure_gaps(path).min() > 0.01
 

@@ -12,6 +12,7 @@ from hero_client.controllers import Goal
 from hero_client.values.errors import GoalError
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
+from hero_test.nonempty import nonempty
 
 WORLDS = 30
 TOLERANCE_M = 0.01
@@ -41,7 +42,7 @@ def test_random_goals_are_reached_and_no_robot_swings_there():
         )
         for motion in motions:
             motion.result()
-        for path, goal in zip(true_paths.split_worlds(log), goals):
+        for path, goal in nonempty(zip(true_paths.split_worlds(log), goals)):
             distances_m = np.hypot(*(path[:, 0, :2] - goal[:2]).T)
             assert distances_m[-1] < TRUE_TOLERANCE_M
             assert abs(math.remainder(path[-1, 0, 2] - goal[2], math.tau)) < 0.12
@@ -60,7 +61,7 @@ def test_a_post_in_the_way_is_avoided_or_named_and_never_touched(tmp_path, avoid
         log = swarm.log()
         motions, goals = start_each(swarm, lambda world: (0.4, rng.uniform(-0.05, 0.05)), avoid=avoid)
         errors = [motion.exception() for motion in motions]
-        for path, goal, error in zip(true_paths.split_worlds(log), goals, errors):
+        for path, goal, error in nonempty(zip(true_paths.split_worlds(log), goals, errors)):
             assert true_paths.measure_wall_gaps(path, load_arena(str(arena))).min() > 0.005
             if avoid:
                 assert error is None and math.dist(path[-1, 0, :2], goal) < 0.1  # odometry has drifted
@@ -173,7 +174,7 @@ def test_a_stream_of_goals_is_followed_without_a_stop(goals, monkeypatch):
     assert len(goals.queue.accepted) == 40 and goals.queue.reached and not goals.queue.busy
     assert [outcome.reason for outcome in goals.queue.outcomes] == ["another goal came"] * 39 + [""]
     assert math.dist(goals.swarm[0].pose[:2], (0.495, 0.0)) < TOLERANCE_M
-    assert all(linear_m_s > 0.0 for linear_m_s, _ in sent[:40])
+    assert all(linear_m_s > 0.0 for linear_m_s, _ in nonempty(sent[:40]))
     assert goals.swarm.now_s < 8.0
 
 

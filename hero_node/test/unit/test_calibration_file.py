@@ -182,3 +182,11 @@ def test_a_file_that_is_no_calibration_is_refused(tmp_path):
         read_calibration(str(tmp_path / "y.yaml"))
     with pytest.raises(CalibrationFileError, match="Is a directory"):
         read_calibration(str(tmp_path))
+
+
+@pytest.mark.parametrize("key", ["velocity_errors", "range_errors_before_m", "range_errors_after_m"])
+def test_errors_before_and_after_may_be_unknown(tmp_path, key):
+    path = tmp_path / "hero_7.yaml"
+    length = RESULTS[key].length
+    path.write_text(f"robot: hero_7\n{key}: [{', '.join(['.nan'] * length)}]\n")
+    assert len(read_calibration(str(path)).values[key]) == length

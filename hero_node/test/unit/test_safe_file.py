@@ -16,14 +16,19 @@ def fail_to_sync(fd):
 
 def test_a_new_file_is_on_the_disk_before_it_takes_the_name(tmp_path, monkeypatch):
     path = str(tmp_path / "a.yaml")
-    steps = []
-    monkeypatch.setattr(os, "fsync", lambda fd: steps.append(os.readlink("/proc/self/fd/%d" % fd)))
+    steps, sizes = [], []
+
+    def note_sync(fd):
+        steps.append(os.readlink("/proc/self/fd/%d" % fd))
+        sizes.append(os.fstat(fd).st_size)
+
+    monkeypatch.setattr(os, "fsync", note_sync)
     replace = os.replace
     monkeypatch.setattr(os, "replace", lambda old, new: (steps.append((old, new)), replace(old, new)))
     write_file(path, b"new")
     new = steps[0]
     assert os.path.dirname(new) == str(tmp_path) and new != path
-    assert steps == [new, (new, path), str(tmp_path)]
+    assert steps == [new, (new, path), str(tmp_path)] and sizes[0] == len(b"new")
 
 
 def test_a_full_disk_leaves_the_old_file_and_nothing_beside_it(tmp_path, monkeypatch):
@@ -159,3 +164,15 @@ def test_where_a_file_system_has_no_locks_programs_are_told(tmp_path, monkeypatc
     monkeypatch.setattr(safe_file.fcntl, "flock", fail)
     with hold_file(str(tmp_path / "lock")) as is_held:
         assert not is_held
+
+
+def test_a_file_is_held_by_one_program_or_by_those_that_share_it(tmp_path):
+    path = str(tmp_path / "lock")
+    with hold_file(path, is_shared=True), hold_file(path, is_shared=True) as is_held:
+        assert is_held
+        with pytest.raises(BlockingIOError), hold_file(path):
+            pass
+    with hold_file(path):
+        for is_shared in (False, True):
+            with pytest.raises(BlockingIOError), hold_file(path, is_shared):
+                pass

@@ -15,6 +15,7 @@ from hero_sim.world.pushing.shapes import (
     touch_circle,
     touch_walls,
 )
+from hero_test.nonempty import nonempty
 
 BOX = Polygon([(0.0, 0.0), (0.3, 0.0), (0.3, 0.2), (0.0, 0.2)])
 GRAVITY_M_S2 = 9.81
@@ -96,7 +97,7 @@ def test_a_polygon_turns_about_its_center_and_knows_its_reach_and_friction(shape
     assert shape.friction_radius_m == pytest.approx(sum(math.hypot(*point) for point in inside) / len(inside), rel=3e-3)
     assert shape.reach_m == pytest.approx(max(math.hypot(*point) for point in list_outline(body)))
     turned = put(shape, 0.5, -0.2, 0.8)
-    for (x_m, y_m), (turned_x_m, turned_y_m) in zip(body.corners_m, turned.corners_m):
+    for (x_m, y_m), (turned_x_m, turned_y_m) in nonempty(zip(body.corners_m, turned.corners_m)):
         distance_m, angle_rad = math.hypot(x_m, y_m), math.atan2(y_m, x_m) + 0.8
         expected_m = (0.5 + distance_m * math.cos(angle_rad), -0.2 + distance_m * math.sin(angle_rad))
         assert (turned_x_m, turned_y_m) == pytest.approx(expected_m)
@@ -106,7 +107,7 @@ def test_a_polygon_turns_about_its_center_and_knows_its_reach_and_friction(shape
 def test_a_circle_is_as_deep_in_a_body_as_it_is_from_the_nearest_way_out(shape):
     body = put(shape, 0.02, -0.03, 0.7)
     outline_m = list_outline(body, 500)
-    for x_m, y_m, _ in draw_places(60):
+    for x_m, y_m, _ in nonempty(draw_places(60)):
         contact = touch_circle(x_m, y_m, 0.04, body)
         away_m = min(math.hypot(x - x_m, y - y_m) for x, y in outline_m)
         is_inside = holds(body, x_m, y_m)
@@ -134,7 +135,7 @@ def measure_gap(first, second):
 @pytest.mark.parametrize(("one", "other"), [(a, b) for k, a in enumerate(SHAPES) for b in SHAPES[k:]])
 def test_bodies_touch_where_they_overlap_and_come_apart_along_the_normal(one, other):
     first, near = put(one, 0.01, 0.02, 0.4), 0
-    for x_m, y_m, yaw_rad in draw_places(12):
+    for x_m, y_m, yaw_rad in nonempty(draw_places(12)):
         second = put(other, x_m / 2.0, y_m / 2.0, yaw_rad)
         gap_m = measure_gap(first, second)
         contacts = find_contacts(first, second, 0.004)
@@ -147,7 +148,7 @@ def test_bodies_touch_where_they_overlap_and_come_apart_along_the_normal(one, ot
             shift_m = contact.depth_m + 2e-3
             apart_m = x_m / 2.0 + shift_m * contact.normal_x, y_m / 2.0 + shift_m * contact.normal_y
             assert measure_gap(first, put(other, *apart_m, yaw_rad)) == pytest.approx(2e-3, abs=4e-3)
-        assert all(contact.depth_m > -0.004 for contact in contacts)
+        assert all(contact.depth_m > -0.004 for contact in nonempty(contacts))
     assert near or not isinstance(one, Disc)
 
 
@@ -160,7 +161,7 @@ def test_two_boxes_touch_at_their_corners_with_normals_into_the_second():
             second = put(BOX, cosine * away_m - sine * 0.05, sine * away_m + cosine * 0.05, yaw_rad)
             contacts = find_contacts(put(BOX, 0.0, 0.0, yaw_rad), second, 0.004)
             assert [contact.depth_m for contact in contacts if abs(contact.depth_m + gap_m) < 1e-9]
-            for contact in contacts:
+            for contact in nonempty(contacts):
                 assert (contact.normal_x, contact.normal_y) == pytest.approx((cosine, sine))
                 assert contact.depth_m == pytest.approx(-gap_m)
         assert not find_contacts(put(BOX, 0.0, 0.0, yaw_rad), put(BOX, cosine * 0.305, sine * 0.305, yaw_rad), 0.004)
@@ -180,7 +181,7 @@ def test_a_wall_presses_bodies_to_the_side_on_which_they_are(side, yaw_rad):
             body = put(shape, *turn(0.1, side * (half_m - depth_m)), yaw_rad)
             contacts = touch_walls(body, wall, 0.004)
             assert len(contacts) == (1 if isinstance(shape, Disc) else 2)
-            for contact in contacts:
+            for contact in nonempty(contacts):
                 assert (contact.normal_x, contact.normal_y) == pytest.approx(turn(0.0, side))
                 assert contact.depth_m == pytest.approx(depth_m)
             if isinstance(shape, Disc):
@@ -224,6 +225,6 @@ def test_a_body_keeps_its_shape_however_often_it_turns(rotation_rad):
         body.move((0.001, -0.002, rotation_rad))
     assert body.pose == pytest.approx((0.5, -1.0, 500 * rotation_rad))
     expected = put(BOX, 0.5, -1.0, 500 * rotation_rad)
-    for corner_m, expected_m in zip(body.corners_m, expected.corners_m):
+    for corner_m, expected_m in nonempty(zip(body.corners_m, expected.corners_m)):
         assert corner_m == pytest.approx(expected_m, abs=0.02 if abs(rotation_rad) > 0.1 else 1e-6)
     assert max(math.hypot(x_m - 0.5, y_m + 1.0) for x_m, y_m in body.corners_m) == pytest.approx(BOX.reach_m)

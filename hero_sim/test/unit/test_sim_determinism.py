@@ -57,6 +57,7 @@ def count_meetings(world):
     return int((apart_m[apart_m > 0.0] < 2.0 * BODY_RADIUS_M + 1e-6).sum() // 2)
 
 
+@pytest.mark.slow
 def test_a_world_gives_the_same_bytes_on_every_machine():
     hashes, meetings = drive(7)
     assert hashes == [HASH]

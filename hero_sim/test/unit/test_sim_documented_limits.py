@@ -32,6 +32,7 @@ def count_lost(monkeypatch, hz):
     return count - len(taken)
 
 
+@pytest.mark.slow
 def test_the_documented_rate_of_commands_is_the_highest_that_is_taken(monkeypatch):
     most_hz = find_number("robot_interface.md", r"10 Hz is enough, (\d+) Hz the maximum")
     assert count_lost(monkeypatch, most_hz) <= 1, "the last one may wait"

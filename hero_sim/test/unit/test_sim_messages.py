@@ -1,5 +1,4 @@
 import math
-import os
 import struct
 
 import driver_side
@@ -11,9 +10,7 @@ from hero_node import Pose
 from hero_sim.robot import messages
 from hero_sim.robot.declarations import STOCK_TOPICS, encode_declarations
 from hero_sim.robot.models import MODELS
-
-ROOT = os.path.dirname(os.path.abspath(__file__)) + "/../../.."
-CAPTURES = os.environ.get("HERO_CAPTURES", os.path.join(ROOT, "..", "shared", "captures"))
+from hero_test.nonempty import nonempty
 
 
 def read_packets(data):
@@ -97,12 +94,8 @@ def test_answers_are_as_long_as_the_robots(text, length):
 
 
 @pytest.fixture(scope="module")
-def capture():
-    path = os.path.join(CAPTURES, "A.robot_to_server.bin")
-    if not os.path.exists(path):
-        pytest.skip("no captures of a stock robot here (HERO_CAPTURES names their folder)")
-    with open(path, "rb") as file:
-        return packets.PacketReader().receive_bytes(file.read())
+def capture(read_capture):
+    return packets.PacketReader().receive_bytes(read_capture("A.robot_to_server.bin"))
 
 
 def test_the_stock_cycles_are_rebuilt_byte_for_byte(capture):
@@ -121,7 +114,7 @@ def test_the_stock_cycles_are_rebuilt_byte_for_byte(capture):
         data = encoder.encode(
             stamp, Pose(pose[0], pose[1], yaw_rad), twist, ticks, driver_side.read_encoder(cycle[6].payload)
         )
-        for ours, theirs in zip(read_packets(data), cycle):
+        for ours, theirs in nonempty(zip(read_packets(data), cycle)):
             assert ours.topic_id == theirs.topic_id
             # Angles went through atan2 here, so a last bit of their sines may differ.
             different = sum(a != b for a, b in zip(ours.payload, theirs.payload))
@@ -135,7 +128,7 @@ def test_the_stock_handshake_and_laser_are_rebuilt_byte_for_byte(capture):
     burst = b"".join(packets.encode_packet(*packet) for packet in declared)
     assert burst == encode_declarations("hero_0", STOCK_TOPICS)
     lasers = [packet for packet in capture if packet.topic_id == 125]
-    for packet in lasers:
+    for packet in nonempty(lasers):
         seq, stamp_s, stamp_ns = struct.unpack_from("<III", packet.payload)
         _, ranges_m, counts = driver_side.read_laser(packet.payload)
         ours = messages.encode_laser("hero_0", seq, (stamp_s, stamp_ns), ranges_m[::2], counts[::2])
@@ -164,16 +157,16 @@ def test_transforms_place_the_parts_where_the_stock_robot_has_them():
         (base, "hero_3/hat_link", (-0.00245, -0.00216, 0.051, 0.0, 0.0, 0.0, 1.0)),
         (base, "hero_3/laser_link", (0.0, 0.0, 0.051, 0.0, 0.0, 0.0, 1.0)),
     ]
-    for (parent, child, values), (expected_parent, expected_child, expected_values) in zip(found, expected):
+    for (parent, child, values), (expected_parent, expected_child, expected_values) in nonempty(zip(found, expected)):
         assert (parent, child) == (expected_parent, expected_child)
         assert values == pytest.approx(expected_values, abs=1e-7), child
-    for packet in cycle[1:6]:
+    for packet in nonempty(cycle[1:6]):
         assert struct.unpack_from("<II", packet.payload, 8) == (7, 8), "each with the stamp of its cycle"
 
 
 def test_each_wheel_shows_its_own_ticks():
     cycle = read_packets(encode_cycle(ticks=(71, 143)))
-    for packet, ticks in zip(cycle[2:4], (71, 143)):
+    for packet, ticks in nonempty(zip(cycle[2:4], (71, 143))):
         half_rad = (ticks + 1) * math.pi / 288
         expected = (0.0, math.sin(half_rad), 0.0, math.cos(half_rad))
         assert read_transform(packet.payload)[2][3:] == pytest.approx(expected, abs=1e-7)

@@ -6,6 +6,7 @@ from hero_sim.errors import OptionError
 from hero_sim.population import build_errors, place_worlds
 from hero_sim.world.arena import build_default
 from hero_sim.world.robot_errors import describe_errors
+from hero_test.nonempty import nonempty
 
 
 def build(*arguments):
@@ -14,7 +15,7 @@ def build(*arguments):
 
 def test_the_same_seed_draws_the_same_robots_and_another_seed_others():
     first, again, other = build("--count", "3"), build("--count", "3"), build("--count", "3", "--seed", "1")
-    assert all((left == right).all() for left, right in zip(first, again))
+    assert all((left == right).all() for left, right in nonempty(zip(first, again)))
     assert (first.wheel_scale != other.wheel_scale).all()
 
 
@@ -41,7 +42,7 @@ def test_what_is_printed_can_be_set_again():
     errors = build("--count", "3", "--first-id", "2")
     arguments = ["--error=" + line for line in describe_errors(errors, 2)]
     again = build("--count", "3", "--first-id", "2", "--seed", "9", *arguments)
-    assert all(np.allclose(left, right, rtol=1e-5) for left, right in zip(errors, again))
+    assert all(np.allclose(left, right, rtol=1e-5) for left, right in nonempty(zip(errors, again)))
 
 
 @pytest.mark.parametrize(

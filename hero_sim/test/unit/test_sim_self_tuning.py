@@ -129,6 +129,7 @@ def test_a_zero_behind_30_ms_of_packets_ends_self_tuning_rarely(controller):
     assert 0 < count_ended(controller, end_with([controller], NEUTRAL_PULSES, 60), 60) <= 10
 
 
+@pytest.mark.slow
 @both_controllers
 def test_wheels_rest_and_a_zero_is_logged_once_tuning_was_ended(controller):
     driver = tune(start(), controller)
@@ -154,6 +155,7 @@ def test_the_packets_in_several_sends_do_not_end_self_tuning(controller):
     assert is_tuning(driver, controller)
 
 
+@pytest.mark.slow
 @both_controllers
 def test_a_burst_beyond_the_receive_window_ends_no_tuning(controller):
     driver = tune(start(), controller)
@@ -164,6 +166,7 @@ def test_a_burst_beyond_the_receive_window_ends_no_tuning(controller):
     assert is_tuning(driver, controller)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other, controller", [(POSITION, VELOCITY), (VELOCITY, POSITION)])
 def test_a_zero_ends_the_tuning_of_its_own_controller_only(other, controller):
     driver = tune(tune(start(), VELOCITY), POSITION)
@@ -172,6 +175,7 @@ def test_a_zero_ends_the_tuning_of_its_own_controller_only(other, controller):
     assert (is_tuning(driver, controller), is_tuning(driver, other)) == (False, True)
 
 
+@pytest.mark.slow
 def test_both_zeros_behind_the_packets_end_the_tuning_of_both():
     driver = tune(tune(start(), VELOCITY), POSITION)
     driver.send_bytes(0, end_with([VELOCITY, POSITION], NEUTRAL_PULSES, 110))
@@ -213,6 +217,7 @@ def test_after_a_failed_tuning_the_last_velocity_drives_for_a_second():
     assert driver.swarm.world.speeds_m_s[0] == pytest.approx([0.1, 0.1], abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_robot_that_was_frozen_while_tuning_drops_the_zeros_that_waited():
     driver = tune(start(), VELOCITY)
     robot = driver.swarm.robots[0]

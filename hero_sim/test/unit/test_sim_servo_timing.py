@@ -97,6 +97,7 @@ def test_core_3_waits_a_period_for_each_servo_that_is_detached():
     assert (pins.detach(), pins.write(200)) == (0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing, least_ms, most_ms", [(CORE_2, 70, 150), (CORE_3, 2700, 2950)])
 def test_140_servo_pulses_keep_a_robot_deaf_for_as_long_as_measured(timing, least_ms, most_ms):
     driver = start(timing)
@@ -182,6 +183,7 @@ def test_a_tuning_robot_without_time_answers_keeps_its_last_pulses(robot, tuning
     assert driver.swarm.world.commands_m_s[0].tolist() == pulses_m_s
 
 
+@pytest.mark.slow
 def test_drawn_timings_depend_on_seed_and_id_and_both_occur():
     def draw(robot_id, seed=0, timing="drawn"):
         return draw_servo_timing(argparse.Namespace(servo_timing=timing, seed=seed), robot_id)

@@ -10,6 +10,7 @@ import pytest
 from hero_client import FrameError, GoalError, RobotNotReadyError, StoppedError
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
+from hero_test.nonempty import nonempty
 
 CORNER_ARENA = str(Path(__file__).resolve().parents[3] / "test" / "hero_test" / "arenas" / "examples_arena.yaml")
 CORNERED = 4
@@ -83,7 +84,7 @@ def test_many_robots_reach_a_place_and_a_heading():
     swarm = StepSwarm(1, worlds=MANY)
     before = [robot.true_pose for robot in swarm]
     swarm.go_to(-0.15, 0.1, yaw_rad=1.5, frame="robot", timeout_s=40.0)
-    for robot, start in zip(swarm, before):
+    for robot, start in nonempty(zip(swarm, before)):
         ahead_m, aside_m, turn_rad = find_motion(start, robot.true_pose)
         assert math.dist((ahead_m, aside_m), (-0.15, 0.1)) < 0.03
         assert turn_rad == pytest.approx(1.5, abs=0.2)
@@ -105,7 +106,7 @@ def test_goals_may_be_in_odometry_relative_or_in_the_world():
         assert math.dist(robot.pose_in("/world")[:2], robot.true_pose[:2]) < 0.01
     there = [robot.true_pose for robot in swarm]
     swarm.go_to(0.08, 0.06, yaw_rad=1.0, frame="robot")
-    for robot, pose in zip(swarm, there):
+    for robot, pose in nonempty(zip(swarm, there)):
         ahead_m, aside_m, turn_rad = find_motion(pose, robot.true_pose)
         assert (ahead_m, aside_m) == pytest.approx((0.08, 0.06), abs=0.03)
         assert turn_rad == pytest.approx(1.0, abs=0.06)
@@ -138,7 +139,7 @@ def test_a_robot_told_to_avoid_drives_around_what_stops_it_else(tmp_path):
     swarm = StepSwarm(1, arena=str(path), worlds=MANY // 2)
     log = swarm.log()
     swarm.go_to(0.4, 0.0, frame="world", avoid=True, timeout_s=60.0)
-    for robot in swarm:
+    for robot in nonempty(swarm):
         # Wheels differ, and odometry drifts on the way.
         assert math.dist(robot.true_pose[:2], (0.4, 0.0)) < 0.06
     distances_m = np.hypot(*np.moveaxis(log.true_pose[..., :2] - (0.0, 0.01), -1, 0))
@@ -222,7 +223,7 @@ def test_a_swarm_moves_as_one_and_tells_who_did_not():
     before = [robot.true_pose for robot in swarm]
     with pytest.raises(GoalError, match=r"\Ahero_4 did not reach[^;]*in the way[^;]*\Z"):
         swarm.go_to(0.15, 0.0, frame="robot")
-    for robot, pose in zip(swarm, before):
+    for robot, pose in nonempty(zip(swarm, before)):
         assert travel_m(robot, pose) == pytest.approx(0.15, abs=0.02) or robot.robot_id == CORNERED
     with pytest.raises(GoalError, match=r"\Ahero_0 did not .*; hero_5 did not [^;]*\Z"):
         swarm.go_to(50.0, 0.0, timeout_s=0.5)
@@ -359,7 +360,7 @@ def test_a_swarm_drives_forward_and_turns_all_at_once():
         before = [robot.true_pose for robot in swarm]
         swarm.forward(0.1)
         swarm.turn(1.0)
-        for robot, pose in zip(swarm, before):
+        for robot, pose in nonempty(zip(swarm, before)):
             forward_m, _, turn_rad = find_motion(pose, robot.true_pose)
             assert (forward_m, turn_rad) == (pytest.approx(0.1, abs=0.01), pytest.approx(1.0, abs=0.1))
         assert swarm.now_s < 12.0 and is_at_rest(swarm)  # one after the other they need 30 s

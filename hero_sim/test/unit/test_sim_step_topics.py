@@ -76,6 +76,7 @@ def test_a_command_is_sent_when_it_changes():
     assert "/hero_5/cmd_vel" not in messages
 
 
+@pytest.mark.slow
 def test_distances_are_sent_for_robots_that_measure_them():
     swarm, topics, messages = drive(model=["hero_plus,robot=5"])
     assert "/hero_4/distance" not in topics.types

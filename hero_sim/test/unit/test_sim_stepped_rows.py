@@ -221,6 +221,7 @@ def act_at_random(rng, rows, scalar):
         robot.flash.ir_calibration_counts_m2 = constants  # no call takes nan, a robot that was never calibrated has it
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_robot_rows_do_what_the_scalar_robots_and_the_driver_do(seed):
     rng = np.random.RandomState(seed)

@@ -92,6 +92,7 @@ def test_a_program_keeps_running_while_another_terminal_is_used(try_page):
     try_page(text)
 
 
+@pytest.mark.slow
 def test_the_output_of_a_program_left_running_is_compared(try_page):
     waits = "$ until test -e ~/file; do sleep 0.05; done; echo seen"
     create = console("$ touch ~/file", instructions="terminal 2")
@@ -100,6 +101,7 @@ def test_the_output_of_a_program_left_running_is_compared(try_page):
         try_page(console(waits, instructions="keeps running") + create + console("heard"))
 
 
+@pytest.mark.slow
 def test_the_runner_waits_for_the_condition_of_a_block(try_page):
     create = console("$ sleep 0.5; touch ~/file; cat", instructions="keeps running")
     try_page(create + console("$ ls ~/file", instructions="terminal 2; when test -e ~/file") + console("^C"))

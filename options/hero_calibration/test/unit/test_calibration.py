@@ -413,6 +413,14 @@ def test_files_to_restore_follow_the_word_restore():
     assert calibrate.parse_options([]).parts == ["motors", "velocity", "infrared"]
 
 
+def test_a_part_alone_needs_no_question_and_folders_may_begin_with_a_tilde(monkeypatch, tmp_path):
+    assert calibrate.parse_options(["infrared", "--yes"]).parts == ["infrared"]
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert calibrate.parse_options([]).folder == str(tmp_path / "hero_calibration")
+    assert calibrate.parse_options(["--folder", "here"]).folder == str(tmp_path / "here")
+
+
 @pytest.mark.parametrize("turned_deg", [-10.0, -3.0, 0.0, 5.0, 11.0])
 @pytest.mark.parametrize("moved_m", [-0.01, 0.0, 0.02])
 def test_the_neighbors_of_a_sensor_tell_how_far_the_robot_is_turned(turned_deg, moved_m):

@@ -13,6 +13,7 @@ from hero_calibration.models.encoder_readings import TICK_M, Readings
 from hero_calibration.procedures import infrared, motors, velocity, wheels
 from hero_calibration.robots.session import SETTLE_S
 from hero_node import Pose, transform_pose
+from hero_test.nonempty import nonempty
 
 STEP_S = 0.034
 STARTS_S = [2.0, 2.45, 2.9, 3.35]
@@ -141,6 +142,14 @@ def test_a_turn_ends_when_it_is_reached_and_is_tried_three_times():
     off = TurningSession(math.inf)
     off.turn(math.radians(9.9))
     assert len(off.probe.sent) == 3 and off.probe.failure is None
+    silent = TurningSession(0.0)
+
+    def fail(now_s):
+        raise CalibrationError("no data for 1 s")
+
+    silent.probe.check_alive = fail
+    silent.turn(0.7)
+    assert silent.probe.failure == "infrared: no data for 1 s"
     wrapped = TurningSession(math.inf)
     wrapped.turn(2.0 * math.pi - 0.1)
     assert wrapped.probe.sent[0][1] == pytest.approx(-0.1)
@@ -181,7 +190,7 @@ def test_pulses_are_swept_up_and_down_at_their_times(monkeypatch):
     monkeypatch.setattr(motors, "evaluate_sweep", lambda pulses_us, speeds_m_s: result)
     monkeypatch.setattr(type(session.probes[0]), "read_wheels", lambda probe: None)
     assert motors.calibrate_motors(session) == {0: result, 1: result}
-    for probe in session.probes:
+    for probe in nonempty(session.probes):
         sent = [tuple(values) for name, *values in filter(lambda one: one[0] == "pulses", probe.sent)]
         assert sent[:2] == [(1380, 1380), (1620, 1620)]
         assert sent[2:] == [(us, us + 28) for us in dead_zone.list_pulses()]

@@ -11,6 +11,7 @@ from hero_calibration.models.encoder_readings import TICK_M
 from hero_calibration.procedures.wheels import NOMINAL_M, Leg, calibrate_wheels, fit_wheels, follow_ticks
 from hero_client.values import WHEEL_SEPARATION_M
 from hero_node import Pose, invert_pose, transform_pose, wrap_angle
+from hero_test.nonempty import nonempty
 
 HELD_OUT = [(0.12, 0.9, 2.0), (0.15, -0.5, 3.0), (0.0, 2.0, 1.5), (0.1, 0.0, 3.0), (0.12, -1.2, 2.5), (0.1, 0.6, 3.0)]
 ROOMY = {row: (2.0 * row, -1.0, 90.0) for row in range(4)}
@@ -70,7 +71,7 @@ def test_calibrated_wheels_drift_a_third_as_far_on_other_paths(session):
     before_m, after_m = np.sqrt(np.mean(np.square(drifts_m), axis=0))
     assert before_m > 0.03
     assert after_m < before_m / 3.0, drifts_m
-    assert all(result.after < 1.5 < result.before for result in results.values())
+    assert all(result.after < 1.5 < result.before for result in nonempty(results.values()))
 
 
 @pytest.mark.slow
@@ -93,6 +94,7 @@ def test_a_tape_measure_finds_the_wheels_too(session):
     assert after_m < before_m / 3.0
 
 
+@pytest.mark.slow
 def test_answers_that_are_no_numbers_are_asked_for_again(session):
     for probe in session.probes[1:]:
         probe.failure = "is not there"

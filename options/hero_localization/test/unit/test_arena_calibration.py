@@ -192,6 +192,7 @@ def test_swapped_reference_tags_are_named(count, pair):
         calibrate_arena(LENS, see_all(ids=ids), wrong)
 
 
+@pytest.mark.slow
 def test_places_that_no_mistake_explains_are_refused_or_told():
     random = np.random.RandomState(0)
     for _ in range(5):
@@ -304,6 +305,7 @@ def test_an_arena_has_room_for_its_tags_and_is_no_row():
                 calibrate_arena(LENS, seen, places)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "is_right"), [(0.9935, True), (0.9925, False), (1.0065, True), (1.0075, False)])
 def test_tags_may_measure_seven_thousandths_more_or_less(share, is_right):
     exact = [see(tag_id, pose) for tag_id, pose in REFERENCES.items()]
@@ -339,6 +341,7 @@ def test_references_a_field_of_30_m_apart_are_in_meters():
         assert ("30.1 m apart: write their places in m" in str(error.value)) == is_far
 
 
+@pytest.mark.slow
 def test_a_place_is_wrong_four_millimeters_off_if_the_others_agree():
     exact = [see(tag_id, pose) for tag_id, pose in REFERENCES.items()]
     for off_m, is_wrong in ((0.0037, False), (0.0043, True)):
@@ -419,6 +422,7 @@ def test_a_print_is_compared_with_some_white_around_it():
     assert bright.mean() > blurred[0].mean() + 3.0 and bright.min() > 19.9 and bright.max() < 220.1
 
 
+@pytest.mark.slow
 def test_a_tag_at_the_rim_of_the_image_stays_as_it_is():
     fine = np.kron(np.pad(draw_tag("36h11", 101), 4, constant_values=255), np.ones((4, 4), np.uint8))
     gray = np.rint(255.0 * cv2.GaussianBlur(fine / 255.0 * 0.8 + 0.06, (0, 0), 0.8) ** (1.0 / 2.2)).astype(np.uint8)

@@ -120,6 +120,7 @@ def test_an_image_stamped_ahead_is_named_once_and_freezes_no_robot(ahead_s):
     assert swarm.lines == []
 
 
+@pytest.mark.slow
 def test_stamps_ahead_are_named_again_after_a_while_without():
     swarm = Swarm(0).run(1.0, {0: HOME})
     counts = []

@@ -57,6 +57,7 @@ def test_missing_file_is_named(tmp_path):
         load_lens(str(tmp_path / "lens.yaml"))
 
 
+@pytest.mark.slow
 def test_no_file_breaks_the_reader(tmp_path):
     for content in (*make_bad_yaml("image_width"), *(STOCK_LENS.encode() + bad for bad in make_bad_yaml("rows"))):
         (tmp_path / "lens.yaml").write_bytes(content)

@@ -17,6 +17,7 @@ from hero_localization.prints.boards import COLUMNS, ROWS, SQUARE_M  # noqa: E40
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
 from hero_node import ProgramError  # noqa: E402
+from hero_test.nonempty import nonempty  # noqa: E402
 
 DOTS_PER_MM = 8.0
 A4_MM = print_tags.PAPERS_MM["a4"]
@@ -45,7 +46,7 @@ def test_tags_on_paper_have_their_true_size_and_place(family, cells):
     assert image.shape == pytest.approx((297 * DOTS_PER_MM, 210 * DOTS_PER_MM), abs=2)
     found = {tag.tag_id: tag for tag in create_detector("aruco", family).detect(image)}
     assert sorted(found) == [0, 7, 20]
-    for sheet, x_mm, y_mm in page:
+    for sheet, x_mm, y_mm in nonempty(page):
         tag = found[sheet.tag_id]
         assert tag.side_px / DOTS_PER_MM == pytest.approx(sheet.size_mm, abs=0.3)
         assert tag.center / DOTS_PER_MM == pytest.approx((x_mm, 297.0 - y_mm), abs=0.3)
@@ -60,12 +61,12 @@ def test_pieces_lie_on_the_page_and_apart():
             *range(20),
             *range(100, 106),
         ]
-        for page in pages:
-            for index, (sheet, x_mm, y_mm) in enumerate(page):
+        for page in nonempty(pages):
+            for index, (sheet, x_mm, y_mm) in nonempty(enumerate(page)):
                 half_mm = sheet.outer_mm / 2.0
                 assert x_mm - half_mm >= 12.0 - 1e-6 and x_mm + half_mm <= width_mm - 12.0 + 1e-6
                 assert y_mm - half_mm >= 28.0 - 1e-6 and y_mm + half_mm <= height_mm - 12.0 + 1e-6
-                for other, other_x_mm, other_y_mm in page[:index]:
+                for other, other_x_mm, other_y_mm in nonempty(page[:index]):
                     apart_mm = max(abs(x_mm - other_x_mm), abs(y_mm - other_y_mm))
                     assert apart_mm >= half_mm + other.outer_mm / 2.0 + 3.9
 
@@ -241,7 +242,7 @@ def test_white_cells_lie_on_one_black_square(family, tag_id):
     assert white.get_zorder() > black.get_zorder()
     cells = draw_tag(family, tag_id)
     cell_mm, found = 48.0 / len(cells), np.zeros(cells.shape, int)
-    for path in white.get_paths():
+    for path in nonempty(white.get_paths()):
         low, high = path.vertices[:4].min(axis=0), path.vertices[:4].max(axis=0)
         left, right = np.rint((np.array((low[0], high[0])) - 66.0) / cell_mm).astype(int)
         top, bottom = np.rint((174.0 - np.array((high[1], low[1]))) / cell_mm).astype(int)
@@ -279,7 +280,7 @@ def test_lines_and_texts_are_as_thin_and_small_as_scissors_and_eyes_need():
     for sheet in (print_tags.Sheet(101, 100.0, 150.0, False), print_tags.Sheet(7, 40.0, 73.0, True)):
         (rim, *_), marks, texts = draw(sheet)
         assert rim.get_linewidth() == 0.4 and not rim.get_fill() and rim.get_linestyle() == (0, (4, 4)), "dashed"
-        assert all(mark.get_linewidth() == 0.8 and mark.get_color() == "black" for mark in marks)
+        assert all(mark.get_linewidth() == 0.8 and mark.get_color() == "black" for mark in nonempty(marks))
         assert texts[0].get_fontsize() == 6.0 or sheet.is_robot
     _, axes = print_tags._open_page(A4_MM)
     assert {line.get_linewidth() for line in axes.lines} == {0.4} and axes.texts[0].get_fontsize() == 8.0

@@ -193,6 +193,7 @@ def test_a_full_disk_leaves_the_settings_as_they_were(path, monkeypatch):
     assert read(path) == {"decimate": 1.0} and os.listdir(os.path.dirname(path)) == ["camera.yaml"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["tag_robots", "camera", "family"])
 def test_no_file_breaks_the_reader_or_the_writer(tmp_path, key):
     path = tmp_path / "camera.yaml"

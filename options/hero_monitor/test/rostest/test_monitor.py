@@ -14,6 +14,7 @@ from rosgraph_msgs.msg import Log
 from hero_sim.srv import InjectFault
 from hero_test.browser import MISSING
 from hero_test.monitor_page import MonitorPage
+from hero_test.nonempty import nonempty
 from hero_test.processes import find_pid, suspended
 from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
@@ -86,13 +87,13 @@ class PageTest(unittest.TestCase):
             if row["Firmware"] != "v3.8":
                 # It booted, and told its versions, before the driver listened.
                 rospy.ServiceProxy("/hero_sim/fault", InjectFault)("reboot:robot=" + row["Robot"][len("hero_") :])
-        wait_for(lambda: all(row["Firmware"] == "v3.8" for row in self.page.rows()), self.page.rows)
+        wait_for(lambda: all(row["Firmware"] == "v3.8" for row in nonempty(self.page.rows())), self.page.rows)
         self.page.wait_for_text("#ready", "3 of 3 ready")
         rows = self.page.rows()
         self.assertEqual([row["Robot"] for row in rows], ["hero_0", "hero_1", "hero_2"])
         for row in rows:
             self.assertIn("127.0.1.", row["Address"])
-        wait_for(lambda: all(float(row["Odom"].split()[0]) > 0 for row in self.page.rows()), "rates")
+        wait_for(lambda: all(float(row["Odom"].split()[0]) > 0 for row in nonempty(self.page.rows())), "rates")
         self.page.save("monitor_desktop.png")
         self.page.resize(820, 1180)
         self.page.save("monitor_tablet.png")

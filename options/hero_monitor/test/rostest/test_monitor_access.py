@@ -22,6 +22,8 @@ from monitor_process import (
 )
 from nav_msgs.msg import Odometry
 
+from hero_test.nonempty import nonempty
+
 TOKEN = "correct-horse-battery-staple"
 
 FOXGLOVE = "foxglove.websocket.v1"
@@ -102,7 +104,7 @@ class AccessTest(unittest.TestCase):
                 (["_host:=a..b", "_token_file:=%s" % file], "cannot listen"),
             ):
                 started.append((start_monitor(*arguments), reason))
-            for process, reason in started:
+            for process, reason in nonempty(started):
                 output = process.communicate(timeout=TIMEOUT_S)[0].decode()
                 self.assertEqual(process.returncode, 1, output)
                 self.assertIn(reason, output)

@@ -24,6 +24,7 @@ from std_msgs.msg import Bool, String
 from hero_msgs.msg import RobotArray
 from hero_test.browser import MISSING
 from hero_test.monitor_page import MonitorPage
+from hero_test.nonempty import nonempty
 from hero_test.processes import find_pid, suspended
 from hero_test.waiting import wait_for
 
@@ -162,7 +163,7 @@ class StopTest(unittest.TestCase):
         rospy.Subscriber("/hero_2/velocity_controller/cmd_vel", Twist, commands.append)
         self.page.choose("hero_2")
         self.page.run("document.getElementById('pad').focus()")
-        for stopping in self.pages:
+        for stopping in nonempty(self.pages):
             self.page.send_key("keyDown", "ArrowUp")
             wait_for(lambda: commands and commands[-1].linear.x > 0, "a command")
             stopping.press_stop()

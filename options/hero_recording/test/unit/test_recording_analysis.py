@@ -259,6 +259,7 @@ def run_plot(capsys, *arguments):
     return capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_plot_writes_png_files_beside_the_bag_and_prints_a_table(two_robots, capsys):
     output = run_plot(capsys, two_robots)
     assert re.search(r"^hero_3 +1\.\d\d m +29\.\d Hz +2\.\d\d s +20 ms", output, re.MULTILINE)

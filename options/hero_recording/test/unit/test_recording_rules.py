@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import rospy
 import synthetic_bag
 from geometry_msgs.msg import Quaternion, Twist
 from sensor_msgs.msg import Imu, LaserScan, Range
@@ -15,7 +16,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from hero_msgs.msg import Encoder, Motor, Robot, RobotArray
 from hero_recording import disk_guard, plot, record, step_recorder
 from hero_recording.bags import plain_reader
-from hero_recording.bags.tables import BEAMS, TABLES, read_rows
+from hero_recording.bags.tables import BEAMS, TABLES, read_rows, to_seconds
 from hero_recording.bags.topics import Message
 from hero_recording.errors import RecordingError
 from hero_recording.plots import analysis
@@ -211,11 +212,16 @@ def test_every_column_holds_the_number_of_its_name():
     rows = read_rows("/hero_driver/robots", "hero_msgs/RobotArray", RobotArray(robots=[robot, Robot(id=-1)]), 9.0)
     assert rows == [(7, "status", (9.0, "away", "a:1", 1.0, 2.0, 3.0, 4, 5, 6, "e"))]
     pose = synthetic_bag.make_localized(5.0, 1.0, 2.0, 0.5)
-    pose.pose.covariance = [float(index) for index in range(36)]
+    pose.pose.covariance = [-float(index) for index in range(36)]  # by rounding they may be below zero
     row = read("pose", "geometry_msgs/PoseWithCovarianceStamped", pose)
     assert list(row.values()) == pytest.approx([5.0, 1.0, 2.0, 0.5, 0.0, math.sqrt(7.0), math.sqrt(35.0)])
     odometry = read("odom", "nav_msgs/Odometry", synthetic_bag.make_pose("odom", 5.0, 1.0, 2.0, 0.5, 0.4))
     assert list(odometry.values()) == pytest.approx([5.0, 1.0, 2.0, 0.5, 0.4, 2.0])
+
+
+def test_stamps_of_both_generations_of_ros_are_seconds():
+    assert to_seconds(SimpleNamespace(sec=5, nanosec=250_000_000)) == 5.25
+    assert to_seconds(rospy.Time(5, 250_000_000)) == 5.25
 
 
 def test_a_disk_is_full_below_its_limit(monkeypatch, tmp_path):

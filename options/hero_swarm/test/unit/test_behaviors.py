@@ -14,6 +14,7 @@ from hero_swarm.behaviors import find_behavior, list_names, make_behavior
 from hero_swarm.behaviors.consensus import Formation, LeaderFollowers
 from hero_swarm.behaviors.coverage import VoronoiCoverage
 from hero_swarm.trial import OPEN, Trial, scatter_objects
+from hero_test.nonempty import nonempty
 
 ARENA = build_rectangle(1.71, 1.42, 1)
 SQUARE = build_rectangle(2.0, 2.0, 1)
@@ -171,7 +172,7 @@ def test_the_limit_of_a_name_is_far_above_random_controllers(name):
 
 def test_every_behavior_is_tested_and_names_its_units_and_source():
     assert sorted(CASES) == list_names()
-    for name in list_names():
+    for name in nonempty(list_names()):
         found = find_behavior(name)
         assert found.__doc__
         assert found.metric in metrics.METRICS
@@ -179,6 +180,7 @@ def test_every_behavior_is_tested_and_names_its_units_and_source():
         assert any(sign in source for sign in ("et al.", "Reynolds", "Olfati", "Krick", "Galam")), name
 
 
+@pytest.mark.slow
 def test_a_world_of_a_batch_gives_the_same_bytes_as_alone():
     together = Trial(find_behavior("voter")(), SQUARE, 6, [3, 4, 5])
     alone = Trial(find_behavior("voter")(), SQUARE, 6, [4])

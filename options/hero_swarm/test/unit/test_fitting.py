@@ -34,6 +34,7 @@ from hero_swarm.fitting.recording import (
 from hero_swarm.fitting.replay import Motors, build_errors
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
 from hero_swarm.trial import OPEN
+from hero_test.nonempty import nonempty
 
 PERIOD_MS = 30
 START_MS = 1015
@@ -77,7 +78,7 @@ def record(kind, time_s=60.0, delay_ms=0, turns=True):
 @pytest.mark.slow
 def test_hidden_errors_come_back_and_predict_paths_not_seen():
     fit = fit_robot([record(PULSES, delay_ms=90)])
-    for key, hidden in (entry.split("=") for entry in HIDDEN.split(",")):
+    for key, hidden in nonempty(entry.split("=") for entry in HIDDEN.split(",")):
         assert fit.values[key] == pytest.approx(float(hidden), rel=0.005 if "center" in key else 0.1), key
     assert fit.delay_s == pytest.approx(0.09, rel=0.1)
     assert fit.after_m < fit.before_m / 3.0 and fit.after_m < 0.01
@@ -120,6 +121,7 @@ def record_scans(time_s):
     return Recording(np.empty((0, 4)), own, own, np.array(scans), (other,))
 
 
+@pytest.mark.slow
 def test_hidden_infrared_constants_come_back_from_a_known_arena():
     recording = record_scans(90.0)
     fit = fit_infrared([recording], WALLS, 2.0 / 3.0)
@@ -150,6 +152,7 @@ def test_infrared_sensors_cannot_be_fitted_where_they_saw_too_little():
             fit_infrared([own], WALLS, 2.0 / 3.0)
 
 
+@pytest.mark.slow
 def test_a_robot_that_hardly_turns_cannot_be_fitted():
     with pytest.raises(ValueError, match="turned by .* rad only"):
         fit_robot([record(VELOCITY, 20.0, turns=False)])
@@ -200,7 +203,7 @@ def test_wrong_error_files_are_refused_with_the_line(tmp_path):
 def test_a_fit_starts_from_the_drawing_within_the_limits_of_errors():
     values = {name: start for name, (start, *_) in _PARAMETERS.items() if name != DELAY}
     fitted, drawn = build_errors([Motors(values)]), build_errors([Motors({})])
-    for name in values:
+    for name in nonempty(values):
         _, step, least, most = _PARAMETERS[name]
         kind = KINDS[name]
         array = kind.array
@@ -268,6 +271,7 @@ def test_a_body_is_fitted_to_stretches_that_have_poses_throughout():
         fit_body([make_recording(32.1, turn_rad_s=0.184)])
 
 
+@pytest.mark.slow
 def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
     recording = make_recording(13.0, yaw_rad=1.0)
     for start_share, paths in ((0.5, 3), (0.0, 6), (0.9, 0)):

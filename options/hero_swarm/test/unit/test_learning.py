@@ -31,6 +31,7 @@ def test_500_steps_after_the_same_seed_are_equal_and_others_differ():
     assert (first[0][20] != other[0][20]).any(axis=1).all()
 
 
+@pytest.mark.slow
 def test_observations_are_shares_and_tell_of_walls_speed_and_neighbors():
     observed, _ = run(1, 60, side_m=0.5)
     assert observed.shape == (61, ROBOTS, count_observations(5)) and observed.dtype == np.float32

@@ -22,6 +22,7 @@ class RandomWalk(Behavior):
         return np.full(len(turn_rad_s), 0.12), turn_rad_s, turn_rad_s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", [OFF, ROBOTS])
 def test_robots_that_walk_at_random_touch_only_without_the_filter(mode):
     trial = Trial(RandomWalk(), OPEN, 10, (1, 2, 3), (1.2, 1.2), filter_commands=SafetyFilter(mode, FENCE_M))
@@ -34,6 +35,7 @@ def test_robots_that_walk_at_random_touch_only_without_the_filter(mode):
     assert (farthest_m > 0.7 - BODY_RADIUS_M) == (mode == OFF)
 
 
+@pytest.mark.slow
 def test_wider_bodies_keep_a_wider_distance_from_robots_and_fence():
     places_m, radii_m = np.array([(-0.2, 0.0, 0.0), (0.2, 0.0, math.pi)]), np.array([BODY_RADIUS_M, 0.060])
     safe = SafetyFilter(ROBOTS, np.array((-0.3, -0.3, 0.3, 0.3)))

@@ -69,6 +69,7 @@ def test_a_stale_pyc_never_runs_and_none_is_written(own):
     assert find_behavior(str(own)).v_m_s == 3.5 and not (own.parent / "__pycache__").exists()
 
 
+@pytest.mark.slow
 def test_a_module_that_is_imported_while_it_runs_is_refused(own, monkeypatch):
     sources = Sources()
     step = find_behavior(str(own), sources)().step

@@ -16,6 +16,7 @@ from hero_swarm.experiments.starts import _place_in_circle, _place_in_grid, plac
 from hero_swarm.learning.episode import MAX_LEARNED_ANGULAR_RAD_S, Episode, count_observations
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial, scatter
+from hero_test.nonempty import nonempty
 
 RADIUS_M = BODY_RADIUS_M + 0.03 + 0.012
 """Of the body around the steered point, with the margin."""
@@ -107,13 +108,13 @@ def test_a_trial_senses_poses_of_a_while_ago_and_tells_speeds():
     for delay_s, steps in ((0.0, 0), (0.2, 2), (0.25, 3)):
         trial = Trial(Note(), OPEN, 2, (1,), (1.0, 1.0), delay_s=delay_s)
         true = []
-        for time_s, poses in trial.run(1.0, every_s=0.1):
+        for time_s, poses in nonempty(trial.run(1.0, every_s=0.1)):
             true.append(poses[0].copy())
             assert time_s == pytest.approx(0.1 * (len(true) - 1))
             if len(true) > 1:
                 assert trial.velocities[0] == pytest.approx((true[-1] - true[-2]) * 10.0)
         assert len(true) == len(trial.memory) == 10
-        for number, (time_s, seen) in enumerate(trial.memory):
+        for number, (time_s, seen) in nonempty(enumerate(trial.memory)):
             assert time_s == pytest.approx(0.1 * number) and seen == pytest.approx(true[max(0, number - steps)])
     assert len(list(Trial(Note(), OPEN, 1, (1,), (1.0, 1.0)).run(2.0, every_s=0.5))) == 4
 
@@ -149,13 +150,14 @@ def test_poses_that_a_trial_yields_are_read_only_and_starts_the_callers():
     starts = np.zeros((1, 2, 3)) + ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0))
     trial = Trial(Note(), OPEN, 2, (1,), starts=starts)
     starts[...] = 9.0
-    for _, poses in trial.run(0.5, every_s=0.1):
+    for _, poses in nonempty(trial.run(0.5, every_s=0.1)):
         assert np.abs(poses).max() < 1.0
         for values in (poses, trial.velocities):
             with pytest.raises(ValueError, match="read-only"):
                 values[0, 0, 0] = 7.0
 
 
+@pytest.mark.slow
 def test_robots_are_scattered_inside_and_apart():
     poses = scatter(10, 1.0, 0.5, 3, gap_m=0.02)
     apart_m = np.hypot(*np.moveaxis(poses[:, None, :2] - poses[None, :, :2], -1, 0)) + np.eye(10)
@@ -170,10 +172,10 @@ def test_robots_are_scattered_inside_and_apart():
 def test_robots_are_never_scattered_into_what_an_arena_holds(name):
     arena = load_arena(name)
     trial = Trial(Note(), arena, 10, range(20))
-    for poses in trial.poses.reshape(-1, 3):
+    for poses in nonempty(trial.poses.reshape(-1, 3)):
         assert is_free(Pose(*poses), (), arena, BODY_RADIUS_M - 1e-6)
     uniform = place_all(Start("uniform", 0.03, 0.0, None), arena, 10, range(20))
-    assert all(is_free(Pose(*pose), (), arena, BODY_RADIUS_M - 1e-6) for pose in uniform.reshape(-1, 3))
+    assert all(is_free(Pose(*pose), (), arena, BODY_RADIUS_M - 1e-6) for pose in nonempty(uniform.reshape(-1, 3)))
     low_m, high_m = arena.bounds_m.reshape(2, 2)
     assert (uniform[..., :2] > low_m).all() and (uniform[..., :2] < high_m).all()
 
@@ -221,7 +223,7 @@ def test_an_episode_rewards_what_gets_better_and_observes_shares():
     assert observed[:, 12:14] == pytest.approx(np.column_stack((np.cos(poses[:, 2]), np.sin(poses[:, 2]))), abs=1e-6)
     for row, pose in enumerate(poses):
         others = sorted((math.dist(pose[:2], other[:2]), index) for index, other in enumerate(poses) if index != row)
-        for column, (range_m, index) in enumerate(others):
+        for column, (range_m, index) in nonempty(enumerate(others)):
             shares = observed[row, 14 + 2 * column : 16 + 2 * column]
             if range_m > 0.8:
                 assert shares.tolist() == [0.0, 0.0]

@@ -11,6 +11,7 @@ import rostest
 from geometry_msgs.msg import Twist, Vector3
 
 from hero_test.fleet_report import wait_until_ready
+from hero_test.nonempty import nonempty
 from hero_test.processes import Program, find_program
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.waiting import wait_for
@@ -29,13 +30,13 @@ class FleetTest(unittest.TestCase):
         fleet = json.loads(output)
         self.assertEqual(fleet["listening"], "127.0.0.1:21290")
         self.assertEqual([robot["id"] for robot in fleet["robots"]], [0, 1])
-        for robot in fleet["robots"]:
+        for robot in nonempty(fleet["robots"]):
             self.assertEqual(robot["state"], "READY")
             self.assertIn(":", robot["address"])
 
     def test_robots_that_stand_and_robots_that_are_not_there_are_named(self):
         program = self.start("--expect", "3", "--json")
-        for robot in self.wait_for_robots(program, "pose"):
+        for robot in nonempty(self.wait_for_robots(program, "pose")):
             self.assertGreater(robot["odom_hz"], 0.0)
             self.assertGreater(robot["bytes_per_s"], 0.0)
             self.assertIn("nearest", robot)

@@ -11,6 +11,7 @@ from test_fleet_rows import make_row
 from hero_client.values import Obstacle
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import Pose
+from hero_test.nonempty import nonempty
 from hero_tools.fleet_table import format_json, format_nearest, format_table, format_title
 
 NOW_S = 1700000140
@@ -45,7 +46,7 @@ def test_rows_that_do_not_fit_are_counted():
 
 def test_columns_are_aligned_with_their_headings():
     heading, *lines = format_table([make_row(0), make_row(100, pose=Pose(-12.0, 3.0, math.pi))], 200, 10)
-    for line in lines:
+    for line in nonempty(lines):
         assert line.index("READY") == heading.index("STATE")
         assert line.index("10.42") == heading.index("ADDRESS")
 

@@ -92,6 +92,7 @@ def run(monkeypatch, tmp_path, models):
     return np.hypot(*(log.true_pose[:, 0, 0, :2] - log.true_pose[:, 0, 1, :2]).T)
 
 
+@pytest.mark.slow
 def test_robots_of_each_model_keep_as_far_apart_from_body_to_body(monkeypatch, tmp_path):
     radius_m, plus_radius_m = (MODELS[name].body_radius_m for name in ("hero", "hero_plus"))
     stock_m = run(monkeypatch, tmp_path, []).min() - 2.0 * radius_m
