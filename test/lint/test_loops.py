@@ -8,7 +8,7 @@ import sources
 
 LINT = sources.ROOT / "test" / "lint"  # its loops are over what the repository has
 TESTS = [path for path in sources.list_python_files() if path.name.startswith("test_") and LINT not in path.parents]
-FULL = ("nonempty", "count", "cycle", "arange", "linspace", "randint", "uniform", "make_bad_yaml")
+FULL = ("nonempty", "maybe_empty", "count", "cycle", "arange", "linspace", "randint", "uniform", "make_bad_yaml")
 """Are called for a number of items."""
 
 PASSED_ON = (
@@ -59,19 +59,25 @@ def has_items(node, known):
     return name.isupper() or ast.unparse(node) in known
 
 
-def find_known(function):
-    """Return the names in a test that are not empty there: its arguments, as they are assigned, or as asserts say."""
+def find_known(function, loop):
+    """Return the names in a test that are not empty before a loop: arguments, what is assigned, what asserts say."""
     known = {argument.arg for argument in (*function.args.args, *function.args.kwonlyargs)}
-    loops = [node for node in ast.walk(function) if isinstance(node, (ast.For, ast.GeneratorExp))]
-    in_loops = {id(inner) for loop in loops for inner in ast.walk(loop)}
+    in_loop = {id(inner) for inner in ast.walk(loop)}
     for node in ast.walk(function):
-        if is_assert(node) and id(node) not in in_loops:
-            known |= {ast.unparse(found) for found in list_asserted(node) if id(found) not in in_loops}
+        if is_assert(node) and id(node) not in in_loop:
+            known |= {ast.unparse(found) for found in list_asserted(node) if id(found) not in in_loop}
         elif isinstance(node, ast.Assign) and has_items(node.value, known):
             known |= {ast.unparse(target) for target in node.targets}
         elif isinstance(node, (ast.For, ast.comprehension)) and has_items(node.iter, known):
             known |= {ast.unparse(found) for found in ast.walk(node.target) if isinstance(found, ast.Name)}
+        elif isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
+            known |= {ast.unparse(found) for found in ast.walk(node.values[0]) if id(found) not in in_loop}
     return known
+
+
+def is_property(function):
+    """Return whether hypothesis makes the examples of a test, empty ones among them."""
+    return any("given(" in ast.unparse(decorator) for decorator in function.decorator_list)
 
 
 def list_asserted(node):
@@ -84,23 +90,21 @@ def list_asserted(node):
 def find_empty(path):
     """Yield the iterables of loops with asserts, and of all(), in the tests of a file, that may be empty."""
     for function in ast.walk(sources.parse(path)):
-        if isinstance(function, ast.FunctionDef) and function.name.startswith("test_"):
-            known = find_known(function)
+        if isinstance(function, ast.FunctionDef) and function.name.startswith("test_") and not is_property(function):
             for node in ast.walk(function):
                 parts = []
                 if isinstance(node, ast.For) and any(map(is_assert, ast.walk(node))):
                     parts = [node.iter]
-                elif isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
-                    known = known | {ast.unparse(found) for found in ast.walk(node.values[0])}
                 elif isinstance(node, ast.Call) and ast.unparse(node.func) == "all":
                     parts = [part.iter for part in getattr(node.args[0], "generators", [])]
+                known = find_known(function, node) if parts else set()
                 yield from (part for part in parts if not has_items(part, known))
 
 
 @pytest.mark.parametrize("path", TESTS, ids=sources.name_of)
 def test_loops_with_asserts_are_over_something(path):
     places = [f"{found.lineno}: {ast.unparse(found)}" for found in find_empty(path)]
-    assert not places, "for ... in nonempty(...): from hero_test.nonempty: " + "; ".join(places)
+    assert not places, "for ... in nonempty(...), or in maybe_empty(...), of hero_test.nonempty: " + "; ".join(places)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,6 @@ from hero_driver.fleet.registry import (
     Verdict,
 )
 from hero_msgs.msg import Robot
-from hero_test.nonempty import nonempty
 
 HERO = Identity("/hero_0", 0)
 OTHER = Identity("/hero_1", 1)
@@ -326,10 +325,10 @@ def test_robots_and_connections_belong_to_at_most_one_of_each_other(script):
                 if record.link is not None:
                     record.last_heard_s = now_s
         else:
-            assert all(record.link is None for record in nonempty(fleet.collect_expired(now_s)))
+            assert all(record.link is None for record in fleet.collect_expired(now_s))
         held = [record.link for record in fleet.robots.values() if record.link is not None]
         assert len(held) == len(set(held))
-        for record in nonempty(fleet.robots.values()):
+        for record in fleet.robots.values():
             assert (record.link is None) == (record.state is RobotState.AWAY)
 
 

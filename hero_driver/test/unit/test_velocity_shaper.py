@@ -14,7 +14,6 @@ from hero_driver.commands.velocity_shaper import (
     VelocityShaper,
     check_twist,
 )
-from hero_test.nonempty import nonempty
 
 FIRMWARE_GATE_S = 0.05
 FIRMWARE_READ_CYCLE_S = 0.051
@@ -193,7 +192,7 @@ def run(script):
 @given(script=steps)
 def test_velocities_are_never_closer_than_the_interval(script):
     _, sent = run(script)
-    assert all(later[0] - earlier[0] >= 60 for earlier, later in nonempty(zip(sent, sent[1:])))
+    assert all(later[0] - earlier[0] >= 60 for earlier, later in zip(sent, sent[1:]))
 
 
 @given(script=steps)
@@ -205,7 +204,7 @@ def test_the_last_command_offered_is_the_last_one_sent(script):
 @given(script=steps)
 def test_every_stop_is_sent_and_sent_again_unless_a_later_command_came(script):
     offered, sent = run(script)
-    for position, (sent_before, number) in nonempty(enumerate(offered)):
+    for position, (sent_before, number) in enumerate(offered):
         if number != 0:
             continue
         # Nothing goes out between a stop being offered and being sent.
@@ -218,7 +217,7 @@ def test_every_stop_is_sent_and_sent_again_unless_a_later_command_came(script):
 @given(script=steps)
 def test_nothing_is_sent_that_was_not_offered_before(script):
     offered, sent = run(script)
-    for position, (_, number) in nonempty(enumerate(sent)):
+    for position, (_, number) in enumerate(sent):
         assert any(sent_before <= position and number == offered_number for sent_before, offered_number in offered)
 
 

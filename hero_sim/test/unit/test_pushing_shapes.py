@@ -148,7 +148,7 @@ def test_bodies_touch_where_they_overlap_and_come_apart_along_the_normal(one, ot
             shift_m = contact.depth_m + 2e-3
             apart_m = x_m / 2.0 + shift_m * contact.normal_x, y_m / 2.0 + shift_m * contact.normal_y
             assert measure_gap(first, put(other, *apart_m, yaw_rad)) == pytest.approx(2e-3, abs=4e-3)
-        assert all(contact.depth_m > -0.004 for contact in nonempty(contacts))
+        assert min((contact.depth_m for contact in contacts), default=0.0) > -0.004
     assert near or not isinstance(one, Disc)
 
 

@@ -156,6 +156,6 @@ def test_any_file_is_read_or_refused_in_one_line_and_can_be_replaced(directory, 
         for key, numbers in SETTINGS.items():
             values = found.values.get(key, [numbers.low] * numbers.length)
             assert len(values) == numbers.length
-            assert all(numbers.low <= value <= numbers.high for value in nonempty(values))
+            assert all(numbers.low <= value <= numbers.high for value in values)
     store.save(path, NEWER)
     assert read_calibration(path).values["motor_centers_us"] == NEWER.values["motor_centers_us"]

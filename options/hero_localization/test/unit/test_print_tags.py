@@ -17,7 +17,7 @@ from hero_localization.prints.boards import COLUMNS, ROWS, SQUARE_M  # noqa: E40
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
 from hero_node import ProgramError  # noqa: E402
-from hero_test.nonempty import nonempty  # noqa: E402
+from hero_test.nonempty import maybe_empty, nonempty  # noqa: E402
 
 DOTS_PER_MM = 8.0
 A4_MM = print_tags.PAPERS_MM["a4"]
@@ -66,7 +66,7 @@ def test_pieces_lie_on_the_page_and_apart():
                 half_mm = sheet.outer_mm / 2.0
                 assert x_mm - half_mm >= 12.0 - 1e-6 and x_mm + half_mm <= width_mm - 12.0 + 1e-6
                 assert y_mm - half_mm >= 28.0 - 1e-6 and y_mm + half_mm <= height_mm - 12.0 + 1e-6
-                for other, other_x_mm, other_y_mm in nonempty(page[:index]):
+                for other, other_x_mm, other_y_mm in maybe_empty(page[:index]):
                     apart_mm = max(abs(x_mm - other_x_mm), abs(y_mm - other_y_mm))
                     assert apart_mm >= half_mm + other.outer_mm / 2.0 + 3.9
 
@@ -280,7 +280,7 @@ def test_lines_and_texts_are_as_thin_and_small_as_scissors_and_eyes_need():
     for sheet in (print_tags.Sheet(101, 100.0, 150.0, False), print_tags.Sheet(7, 40.0, 73.0, True)):
         (rim, *_), marks, texts = draw(sheet)
         assert rim.get_linewidth() == 0.4 and not rim.get_fill() and rim.get_linestyle() == (0, (4, 4)), "dashed"
-        assert all(mark.get_linewidth() == 0.8 and mark.get_color() == "black" for mark in nonempty(marks))
+        assert all(mark.get_linewidth() == 0.8 and mark.get_color() == "black" for mark in maybe_empty(marks))
         assert texts[0].get_fontsize() == 6.0 or sheet.is_robot
     _, axes = print_tags._open_page(A4_MM)
     assert {line.get_linewidth() for line in axes.lines} == {0.4} and axes.texts[0].get_fontsize() == 8.0
