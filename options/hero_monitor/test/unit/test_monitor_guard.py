@@ -21,6 +21,7 @@ from hero_monitor.fleet_feed.page_state import LogRing, PageState
 from hero_monitor.fleet_feed.placement import Placement
 from hero_node import Pose
 from hero_swarm.describe import describe_behaviors
+from hero_test.nonempty import nonempty
 
 OFFERS.update(read_behaviors(describe_behaviors()))
 
@@ -69,7 +70,7 @@ def test_a_program_ends_with_the_monitor_after_five_seconds_of_silence(monkeypat
 def test_what_pages_offer_is_what_launch_files_say():
     for name, offer in OFFERS.items():
         text = (sources.PACKAGES[offer.package] / "launch" / (offer.program + ".launch")).read_text(encoding="utf-8")
-        for field, default, doc in re.findall(r'<arg name="(\w+)" default="([^"]*)" doc="([^"]*)"', text):
+        for field, default, doc in nonempty(re.findall(r'<arg name="(\w+)" default="([^"]*)" doc="([^"]*)"', text)):
             given = offer.fields.get(field)
             if given is None or not isinstance(given.default, float):
                 continue
