@@ -26,6 +26,7 @@ from hero_test.driver_case import (
     receives_topic,
 )
 from hero_test.fake_robot import READ_CYCLE_S, SUB
+from hero_test.nonempty import nonempty
 from hero_test.processes import suspended
 from hero_test.waiting import wait_for
 
@@ -145,7 +146,10 @@ class TestDriverStop(OwnDriverCase):
         robot = self.dial_stock(driver, 54)
         with suspended(driver.process.pid):
             threads = Path("/proc/%d/task" % driver.process.pid)
-            wait_for(lambda: all(" T " in path.read_text() for path in threads.glob("*/stat")), "all threads to rest")
+            wait_for(
+                lambda: all(" T " in path.read_text() for path in nonempty(threads.glob("*/stat"))),
+                "all threads to rest",
+            )
             for _ in range(45):
                 robot.log("Tunning Motor Set: [0.000000,0.000000], [0.050000,0.050000]->[-50,210]")
             for _ in range(45):  # what comes last, behind more than one read, is young again
@@ -235,7 +239,7 @@ class TestDriverStop(OwnDriverCase):
         for state in (Robot.READY, Robot.REFUSED):
             driver.fleet.wait("/hero_80", state, "at rest", lambda entry: entry.stop_state == Robot.AT_REST)
         self.assertFalse(first.motors.is_turning or second.motors.is_turning)
-        self.assertTrue(all(velocity.is_zero for velocity in second.velocities))
+        self.assertTrue(all(velocity.is_zero for velocity in nonempty(second.velocities)))
         self.assertIn("2 at rest", self.call_stop(driver, True))
 
     # Who asks for it.
@@ -271,7 +275,7 @@ class TestDriverStop(OwnDriverCase):
         publisher = make_publisher("/hero_78/velocity_controller/cmd_vel", Twist)
         publisher.publish(make_command(0.1))
         self.wait_at_rest(second, robot)
-        self.assertTrue(all(velocity.is_zero for velocity in robot.velocities))
+        self.assertTrue(all(velocity.is_zero for velocity in nonempty(robot.velocities)))
         self.call_stop(second, False)
         self.drive(robot)
 
