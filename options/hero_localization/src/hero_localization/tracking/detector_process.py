@@ -24,7 +24,7 @@ ANSWER_S = 60.0
 """Long enough for a search of the whole image on a machine that is busy with much else."""
 END_S = 5.0
 COARSE_FROM_PX = 48.0
-"""From this side on, tags are found as well, and their corners are as accurate, with decimate twice as large."""
+"""Side in pixels from which on tags are found as well, with corners as accurate, when decimated twice as much."""
 
 
 class DetectorProcess:

@@ -1,7 +1,7 @@
 """Roles of users, and the six-digit codes of a lesson that give them. Pure.
 
 Who has the token, or needs none, is a teacher and may do all. A viewer watches and stops; a driver also drives some
-robots. Stops are open to everybody: a role never takes one away.
+robots. Stops are open to all users: a role never takes one away.
 """
 
 import secrets
@@ -66,7 +66,7 @@ class Lesson:
         return code
 
     def withdraw(self, code: str) -> None:
-        """Let nobody drive by this code any more; the class code stays."""
+        """Let no user drive by this code any more; the class code stays."""
         if code != self.class_code:
             self._roles.pop(code, None)
 
