@@ -114,6 +114,15 @@ def test_one_robot_pushes_no_other_and_no_row(standing):
     assert np.abs(world.poses[:, 1:]).max() < 1e-9
 
 
+@pytest.mark.parametrize("standing", [1, 4, 8])
+def test_wheels_that_creep_without_end_let_one_robot_push_any_number(standing):
+    """As in published simulators: all slip alike, and the wheels' speed is shared."""
+    poses = [(ACROSS_M * k, 0.0, 0.0) for k in range(standing + 1)]
+    world = build_world(poses, [0.1] + [0.0] * standing, ["friction=0,creep_m_s=10"])
+    moved_m = run(world, 1.0)[:, 0] - ACROSS_M * np.arange(standing + 1)
+    assert moved_m == pytest.approx(np.full(standing + 1, 0.1 / (standing + 1)), rel=0.02, abs=1e-4)
+
+
 def test_a_robot_with_more_traction_pushes_a_standing_one():
     known = ["wheel_friction=0.4,caster_friction=0", "robot=0,wheel_friction=0.8"]
     world = build_world([(0.0, 0.0, 0.0), (ACROSS_M, 0.0, 0.0)], [0.1, 0.0], known)

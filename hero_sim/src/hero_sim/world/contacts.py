@@ -11,7 +11,7 @@ import numpy as np
 
 from .arena import Arena, list_obstacles, measure_clearance, square_length
 from .compiled import compile_loops
-from .friction import CREEP_M_S, GRAVITY_M_S2, HELD_N, IDLE, STARTS, THING_CREEP_M_S, TOUCH_M, solve_contacts
+from .friction import GRAVITY_M_S2, HELD_N, IDLE, STARTS, THING_CREEP_M_S, TOUCH_M, solve_contacts
 from .pushing.pushing import Pushing, Touch
 from .pushing.shapes import Motion
 from .robot_errors import RobotErrors
@@ -155,7 +155,7 @@ class Contacts:
         on_casters_n = errors.friction[:, 2] * weights_n * (1.0 - loads)
         on_things_n = [thing.friction_n / 2.0 for thing in things]
         none = [0.0] * (len(things) + 1)
-        creeps_m_s = [CREEP_M_S] * len(weights_n) + [THING_CREEP_M_S] * len(things) + [_STATIC_CREEP_M_S]
+        creeps_m_s = [*errors.creep_m_s[:, 0], *[THING_CREEP_M_S] * len(things), _STATIC_CREEP_M_S]
         halves_m = [thing.shape.friction_radius_m for thing in things]
         self._floors = np.array((
             np.concatenate((errors.wheel_separation_m[:, 0] / 2.0, halves_m, [1.0])),

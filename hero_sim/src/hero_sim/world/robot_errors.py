@@ -13,6 +13,7 @@ from hero_node.files import read_file
 from ..errors import OptionError
 from ..key_values import parse_values
 from ..robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
+from .friction import CREEP_M_S
 from .noise import draw_normal
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
@@ -93,6 +94,7 @@ KINDS: Dict[str, Kind] = {
     "wall_friction": Kind("friction", slice(1, 2), 0, 2),
     "caster_friction": Kind("friction", slice(2, 3), 0, 2),
     "wheel_friction": Kind("wheel_friction", _ALL, 0.05, 5),
+    "creep_m_s": Kind("creep_m_s", _ALL, 1e-4, 10),
     "wheel_load": Kind("wheel_load", _ALL, 0.1, 1),
     "mass_kg": Kind("mass_kg", _ALL, 0.02, 5),
     "alpha_counts_m2": Kind("alpha_counts_m2", _ALL, 0.01, 10),
@@ -122,6 +124,7 @@ class RobotErrors(NamedTuple):
     friction: np.ndarray
     wheel_friction: np.ndarray
     wheel_load: np.ndarray
+    creep_m_s: np.ndarray
     mass_kg: np.ndarray
 
 
@@ -151,6 +154,7 @@ def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> Ro
         ),
         wheel_friction=WHEEL_FRICTION.draw(on_floor)[:, None],
         wheel_load=WHEEL_LOAD.draw(load)[:, None],
+        creep_m_s=same * CREEP_M_S,
         mass_kg=same * MASS_KG,
     )
 
