@@ -120,7 +120,7 @@ def give_script_clock(swarm: StepSwarm) -> None:
         is_clock = name == "time" and variables is not None and variables.get("__name__") == "__main__"
         return clock if is_clock else import_module(name, variables, *arguments)
 
-    builtins.__import__ = import_for
+    builtins.__import__ = import_for  # type: ignore[assignment]
 
 
 if __name__ == "__main__":

@@ -214,10 +214,10 @@ def _read_pose(entry: Entry) -> Pose:
 def _build_lens(entry: Entry) -> Intrinsics:
     keys = ("width_px", "height_px", "matrix", "distortion")
     part = entry.mapping(keys, keys)
-    size_px = [part[key].whole(-MAX_ID, MAX_ID) for key in keys[:2]]
+    width_px, height_px = (part[key].whole(-MAX_ID, MAX_ID) for key in keys[:2])
     matrix, distortion = (part[key].plain() for key in keys[2:])
     try:
-        return Intrinsics.from_camera_info(*size_px, matrix, "plumb_bob", distortion)
+        return Intrinsics.from_camera_info(width_px, height_px, matrix, "plumb_bob", distortion)
     except (TypeError, OverflowError, ValueError) as error:
         raise EntryError(f"{entry.place}: lens: {one_line(error)}: calibrate the lens") from None
 

@@ -87,12 +87,10 @@ def read_behaviors(described: Sequence[Dict[str, Any]]) -> Dict[str, ProgramDesc
 def _read_behavior(
     behavior: str, title: str, fields: Sequence[Dict[str, Any]], sentence: str = ""
 ) -> ProgramDescription:
-    settings = {
-        field["name"]: (whole_number if isinstance(field["default"], int) else number)(
-            field["default"], *field["limits"], field["unit"]
-        )
-        for field in fields
-    }
+    settings = {}
+    for field in fields:
+        declare, (low, high) = whole_number if isinstance(field["default"], int) else number, field["limits"]
+        settings[field["name"]] = declare(field["default"], low, high, field["unit"])
     settings["safety"] = _SAFETY
     return ProgramDescription(
         "hero_swarm", "behavior", title, settings, has_frame=True, behavior=behavior, sentence=sentence
