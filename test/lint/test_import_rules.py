@@ -62,7 +62,7 @@ ROOMS = {
     "hero_recording.bags": {"errors"},
     "hero_recording.formats": {"bags", "errors"},
     "hero_recording.plots": {"bags"},
-    "hero_swarm.behaviors": {"behavior", "sensors", "sources", "user_module"},
+    "hero_swarm.behaviors": {"behavior", "learning", "sensors", "sources", "user_module"},
     "hero_swarm.experiments": {"behavior", "behaviors", "control", "metrics", "safety", "sensors", "sources", "trial"},
     "hero_swarm.fitting": {"trial"},
     "hero_swarm.learning": {"behavior", "metrics", "sensors", "sources"},

@@ -20,13 +20,19 @@ def load_file(what: str, path: str, sources: Sources) -> ModuleType:
 
     Raises: ValueError if it is missing, or with file and line for whatever it raises.
     """
+    read_content(what, path, sources)
+    module: ModuleType = sources.load(path, lambda: load_user_module(path, sources))
+    return module
+
+
+def read_content(what: str, path: str, sources: Sources) -> bytes:
+    """Return the content of a user's file. Raises: ValueError if it cannot be read; what: what it is for."""
     if not sources.find(path):
         raise ValueError(f"{what} {path}: no such file from {os.getcwd()}; give its whole path")
     try:
-        module: ModuleType = sources.load(path, lambda: load_user_module(path, sources))
+        return sources.read(path)
     except OSError as error:
         raise ValueError(f"{what} {path} cannot be read: {error.strerror}") from error
-    return module
 
 
 def load_user_module(path: str, sources: Sources) -> ModuleType:

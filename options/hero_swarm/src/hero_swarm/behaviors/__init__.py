@@ -8,10 +8,13 @@ from hero_node.files import YamlError, parse_yaml
 from hero_node.parameters import is_number
 
 from ..behavior import MAX_RATE_HZ, MIN_RATE_HZ, Behavior
+from ..learning.policy import load_policy
 from ..sources import Sources
-from ..user_module import load_file
+from ..user_module import load_file, read_content
 
 __all__ = ["find_behavior", "list_classes", "list_names", "make_behavior"]
+
+POLICY_ENDING = ".npz"
 
 MAX_NUMBER = 1e6
 """Limit of the other parameters, whatever their unit."""
@@ -45,7 +48,7 @@ def list_names() -> List[str]:
 
 
 def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior]:
-    """Return a behavior by its name, its module.Class, FILE.py or FILE.py:Class; sources: None reads it anew.
+    """Return a behavior by its name, its module.Class, FILE.py, FILE.py:Class or POLICY.npz; sources: None: read anew.
 
     Raises: ValueError that says what there is.
     """
@@ -55,8 +58,11 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
         found: Type[Behavior] = getattr(importlib.import_module(__name__ + "." + module), class_name)
         return found
     path, _, class_name = name.partition(":")
+    if name.endswith(POLICY_ENDING):
+        return load_policy(name, read_content("policy", name, sources))
     if not path.endswith(".py"):
-        raise ValueError(f"behavior {name!r}: must be FILE.py, FILE.py:Class, or one of {', '.join(list_names())}")
+        text = "behavior %r: must be FILE.py, FILE.py:Class, POLICY.npz, or one of %s"
+        raise ValueError(text % (name, ", ".join(list_names())))
     classes = list_classes(path, sources)
     if class_name in classes:
         return classes[class_name]

@@ -178,8 +178,8 @@ class Experiment(NamedTuple):
         return list(dict.fromkeys(cell.behavior for cell in self.cells))
 
     def locate(self, name: str) -> str:
-        """Return a built-in name, or FILE.py with what follows, as it is found from any folder."""
-        return os.path.join(self.folder, name) if name.partition(":")[0].endswith(".py") else name
+        """Return a built-in name, or FILE.py with what follows, or POLICY.npz, as it is found from any folder."""
+        return os.path.join(self.folder, name) if name.partition(":")[0].endswith((".py", ".npz")) else name
 
     def list_code(self) -> Dict[str, bytes]:
         """Return the contents of all files that runs read besides those of list_files(), by paths relative to folder.

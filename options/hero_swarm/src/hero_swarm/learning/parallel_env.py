@@ -17,7 +17,7 @@ from pettingzoo import ParallelEnv
 
 from hero_sim.world import build_default, load_arena
 
-from .episode import Episode, count_observations
+from .episode import Episode
 
 
 class SwarmEnv(ParallelEnv):  # type: ignore[misc]
@@ -38,7 +38,7 @@ class SwarmEnv(ParallelEnv):  # type: ignore[misc]
         self._arena = load_arena(arena) if arena else build_default(robots)
         self._time_s = time_s
         self._options = {"neighbors": neighbors, **options}
-        shape = (count_observations(neighbors),)
+        shape = Episode(robots, self._arena, 0, **self._options).observe().shape[1:]
         self._observed = {agent: Box(-1.0, 1.0, shape, np.float32) for agent in self.possible_agents}
         self._acts = {agent: Box(-1.0, 1.0, (2,), np.float32) for agent in self.possible_agents}
         self._seed = 0
