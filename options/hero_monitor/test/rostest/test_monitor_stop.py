@@ -172,8 +172,7 @@ class StopTest(unittest.TestCase):
             del commands[:]
             self.release()
             self.page.wait_for_text("#stop", "STOP ALL")
-            # Commands arrive in order: what the held key had sent would be before those of the new press. The second
-            # time the page knows a time after the release, as it is told the monitor's clock from time to time.
+            # Commands arrive in order: what the held key had sent would be before those of the new press.
             for _ in range(2):
                 self.repeat_key("ArrowUp")
                 wait_for(lambda: self.press_again("ArrowDown", commands), "a command of a new press")
@@ -181,6 +180,19 @@ class StopTest(unittest.TestCase):
                 wait_for(lambda: commands[-1].linear.x == 0, "the end of the new press")
             self.page.send_key("keyUp", "ArrowUp")
             self.assertFalse([command for command in commands if command.linear.x > 0])
+
+    def test_a_press_counts_from_when_it_is_made_not_from_the_last_clock(self):
+        script = (
+            "const done = arguments[0], nothing = () => {};"
+            "import('./connection.js').then(({ Connection }) => {"
+            "  const connection = new Connection({ onOpen: nothing, onChange: nothing });"
+            "  connection.clockMs = 5000;"
+            "  connection.clockHeardMs = performance.now() - 110;"
+            "  done(connection.nowMs);"
+            "});"
+        )
+        self.open_page(self.page)
+        self.assertGreaterEqual(self.page.browser.execute_async_script(script), 5110)
 
     def repeat_key(self, code):
         """Send what a keyboard sends while a key is held."""

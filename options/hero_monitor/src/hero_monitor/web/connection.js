@@ -18,7 +18,7 @@ export class Connection {
   constructor(handlers) {
     Object.assign(this, handlers);
     this.socket = null;
-    this.clockMs = 0;
+    this.clockMs = this.clockHeardMs = 0;
     this.served = true;
     this.heardMs = 0; // when anything arrived
     this.steppedMs = Date.now();
@@ -34,6 +34,11 @@ export class Connection {
   /** Whether requests queue up on a stalled network: commands of a held button must not. */
   get isCongested() {
     return this.socket !== null && this.socket.bufferedAmount > 0;
+  }
+
+  /** The monitor's clock now, or a little before: a press is newer than the stop or release that this page has seen. */
+  get nowMs() {
+    return Math.floor(this.clockMs + performance.now() - this.clockHeardMs);
   }
 
   /** Send a request; false without a connection. */
@@ -81,6 +86,7 @@ export class Connection {
       this.heardMs = Date.now();
       if ("clock_ms" in updates) {
         this.clockMs = updates.clock_ms;
+        this.clockHeardMs = performance.now();
         this.noteServed(updates.served);
       }
       this.updateFreshness();

@@ -104,7 +104,7 @@ export class RobotPanel {
   }
 
   /** pressedMs: the monitor's clock at the press, if it is not a new one. */
-  hold(direction, pressedMs = this.connection.clockMs) {
+  hold(direction, pressedMs = this.connection.nowMs) {
     if (!this.names.length) return;
     this.driving = { robots: this.names, direction, pressedMs };
     this.sentMs = Date.now();
