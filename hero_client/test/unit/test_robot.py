@@ -62,6 +62,20 @@ def test_what_no_calibrated_sensor_sees_is_not_known_and_never_free(unknown):
         robot.nearest()
 
 
+def test_ranges_that_are_old_or_never_came_are_told_from_a_missing_calibration():
+    robot, link = make_robot()
+    assert robot.missing_ranges() is None
+    link.silent_s["proximity"] = math.inf
+    assert robot.missing_ranges() == "it has sent no ranges yet"
+    link.silent_s["proximity"] = 3.2
+    assert robot.missing_ranges() == "its last ranges came 3.2 s ago"
+    robot.warn_if_blind()
+    robot.warn_if_blind()
+    assert link.warned == ["hero_3 drives by its pose alone: its last ranges came 3.2 s ago"]
+    link.silent_s["proximity"], link.ranges = 0.0, [math.nan] * 8
+    assert robot.missing_ranges() == NOT_CALIBRATED
+
+
 def test_a_blind_robot_stops_and_names_the_calibration_now_and_then():
     robot, link = make_robot()
     assert not robot.stop_if_blind() and not link.sent

@@ -34,6 +34,7 @@ class Formation:
             rospy.logwarn(warning)
         for robot, command, arrived in zip(self.swarm, commands, self.controller.arrived):
             robot.drive(*command)
+            robot.warn_if_blind()
             robot.led("green" if arrived else "yellow")
         late = [robot.name for robot, arrived in zip(self.swarm, self.controller.arrived) if not arrived]
         if not self.done and not late:

@@ -10,6 +10,7 @@ from hero_client import CommonFrame, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers import AvoidanceLaw
 from hero_client.values.errors import GoalError
+from hero_client.values.readings import NOT_CALIBRATED
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
 
@@ -57,6 +58,17 @@ def test_robots_whose_program_is_late_are_slow_and_do_not_touch(count, hz, monke
     assert true_paths.measure_gaps(path).min() > 0.005
     assert true_paths.measure_lengths(path).min() > 0.3
     assert hz > 5.0 or "commands are late by" in warnings[0]
+
+
+def test_a_robot_that_drives_by_its_pose_alone_is_named():
+    with StepSwarm(2, arena="empty") as swarm:
+        log, calibrated = [], swarm[1].fresh_proximity
+        swarm[0]._link.log_warning = log.append
+        swarm[0].fresh_proximity = lambda: [np.nan] * 8
+        formation = Formation(swarm, CommonFrame("world"), [(0.5, 0.5), (-0.5, -0.5)], LAW)
+        path = true_paths.run(swarm, formation.step, 4.0)[0]
+        assert true_paths.measure_lengths(path).min() > 0.03
+        assert log == ["hero_0 drives by its pose alone: " + NOT_CALIBRATED] and calibrated()
 
 
 @pytest.mark.slow

@@ -119,6 +119,12 @@ class BaseRobot(RobotReadings):
         self._warn(f"{self.name} waits: {NOT_CALIBRATED}")
         return True
 
+    def warn_if_blind(self) -> None:
+        """Log every 5 s why a robot that drives by its pose does not see what is in its way."""
+        reason = self.missing_ranges()
+        if reason and self.missing() is None:
+            self._warn(f"{self.name} drives by its pose alone: {reason}")
+
     def _warn_unseen(self) -> None:
         """Log every 5 s that sensors of the robot are not calibrated; not where the program receives no ranges."""
         if self.age_s("proximity") <= FRESH_S:

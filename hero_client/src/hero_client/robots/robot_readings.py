@@ -179,9 +179,11 @@ class RobotReadings(Group):
 
     def missing_ranges(self) -> Optional[str]:
         """Return why it is not known what is near the robot, as text for users; None if its sensors tell."""
-        if not is_blind(self.fresh_proximity()):
-            return None
-        return self.missing() or NOT_CALIBRATED
+        age_s = self.age_s("proximity")
+        if age_s > FRESH_S:
+            late = "it has sent no ranges yet" if age_s == math.inf else f"its last ranges came {age_s:.1f} s ago"
+            return self.missing() or late
+        return (self.missing() or NOT_CALIBRATED) if is_blind(self.fresh_proximity()) else None
 
     @property
     def connected(self) -> bool:

@@ -108,6 +108,7 @@ def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source:
                 robot.check_not_stopped()
                 if missing[robot.name] is None:
                     robot.drive(*speed)
+                    robot.warn_if_blind()
     except StoppedError:
         pass  # _ask() tells
     finally:
