@@ -62,7 +62,7 @@ def test_what_no_calibrated_sensor_sees_is_not_known_and_never_free(unknown):
         robot.nearest()
 
 
-def test_ranges_that_are_old_or_never_came_are_told_from_a_missing_calibration():
+def test_old_ranges_and_none_are_told_from_a_missing_calibration():
     robot, link = make_robot()
     assert robot.missing_ranges() is None
     link.silent_s["proximity"] = math.inf

@@ -13,8 +13,7 @@ HANDSHAKE = "handshake"
 """Name of threads that handle their failure themselves: the program is refused, and connects again."""
 
 HANDSHAKE_PATIENCE_S = 2.0
-"""Where none of them could start for so long, no program can connect any more: rospy's try again after 0.5 s, 1 s, 2 s
-and so on."""
+"""Time without any such thread after which no program can connect any more: programs try again after 0.5, 1, 2 s."""
 
 REMEDY = "free memory, or raise the limits of threads and memory (ulimit -u and -v, TasksMax), and start again"
 
