@@ -19,7 +19,7 @@ CELLS = 8
 
 
 class ImageQuality:
-    """What spoils the images of one camera."""
+    """Faults of the images of one camera."""
 
     def __init__(self) -> None:
         self._shade = self._noise = self._blur_px = math.nan

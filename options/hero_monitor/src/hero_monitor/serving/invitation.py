@@ -1,11 +1,11 @@
-"""How phones find the page of a lesson: its link, the class code, and both as a QR code (python3-qrcode, optional)."""
+"""Leads phones to the page of a lesson: its link, the class code, and both as a QR code (python3-qrcode, optional)."""
 
 import platform
 import socket
 from typing import Any, Dict, List
 
 HOTSPOT_ADDRESS = "10.42.0.1"
-"""Of a PC that shares its network with robots and phones; every PC has a route to it."""
+"""Address of a PC that shares its network with robots and phones; every PC has a route to it."""
 
 
 class Invitation:

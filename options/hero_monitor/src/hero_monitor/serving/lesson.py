@@ -16,7 +16,7 @@ FOR_ALL = ("show", "stop", "stop_some", "end_drive")
 
 
 class Role(NamedTuple):
-    """What a user may do."""
+    """Rights of a user."""
 
     title: str
     robots: FrozenSet[str] = frozenset()
@@ -37,7 +37,7 @@ TEACHER, VIEWER = Role("teacher"), Role("viewer")
 
 
 class User(NamedTuple):
-    """Who uses a page, as it is said at the login."""
+    """User of a page, as given at the login."""
 
     name: str
     role: Role
@@ -66,7 +66,7 @@ class Lesson:
         return code
 
     def withdraw(self, code: str) -> None:
-        """Let no user drive by this code any more; the class code stays."""
+        """End driving by this code; the class code stays."""
         if code != self.class_code:
             self._roles.pop(code, None)
 

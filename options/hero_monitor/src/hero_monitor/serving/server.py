@@ -67,7 +67,7 @@ PING_INTERVAL_S = 3.0
 PING_TIMEOUT_S = 9.0
 MAX_REQUEST_LENGTH = 16384
 NAME_LENGTH_MAX = 30
-"""Of a user."""
+"""Length limit of a user's name, characters."""
 
 LISTEN_BACKLOG = 4096
 """As many as the kernel keeps by default (net.core.somaxconn): a connection that finds the queue full may be reset."""
@@ -128,7 +128,7 @@ class BaseHandler(tornado.web.RequestHandler):
 
     @property
     def is_logged_in(self) -> bool:
-        """Whether the browser has given the token or a code, or needs none."""
+        """Return whether the browser has given the token or a code, or needs none."""
         return self.find_user() is not None
 
     @property
@@ -252,7 +252,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 
     @property
     def user(self) -> User:
-        """Who uses the page; whose code was withdrawn may watch and stop."""
+        """User of the page; whose code was withdrawn may watch and stop."""
         return self.find_user() or User("", VIEWER)
 
     @property

@@ -88,7 +88,7 @@ class Light(NamedTuple):
 
 
 class Messages(NamedTuple):
-    """What neighbors sent in the last step; columns are the robots of the same world.
+    """Messages that neighbors sent in the last step; columns are the robots of the same world.
 
     Attributes:
         seen: from which robots a message came (R, N); the other arrays are 0 where none did.
@@ -142,7 +142,7 @@ class Pheromone(NamedTuple):
     """Place of the antennas: distance from the center, and bearing to each side."""
 
     def read(self, around: Surroundings) -> Trail:
-        """Let the field evaporate, add what robots deposited since the last step, and return what they sense."""
+        """Evaporate the field, add what robots deposited since the last step, and return what they sense."""
         field, last_s = self._find_field(around), around.kept.get("time_s", around.time_s)
         around.kept["time_s"] = around.time_s
         field *= 0.5 ** ((around.time_s - last_s) / self.half_life_s)
