@@ -48,7 +48,7 @@ def test_what_costs_no_program_its_robots_is_no_failure(started, name, error):
     assert watch.failure == ""
 
 
-def test_a_lack_of_threads_that_keeps_all_programs_out_for_2_s_is_a_failure(started, monkeypatch):
+def test_a_lack_of_threads_that_keeps_programs_out_for_2_s_is_a_failure(started, monkeypatch):
     watch, now_s = ThreadWatch(), [10.0]
     monkeypatch.setattr(thread_watch, "time", SimpleNamespace(monotonic=lambda: now_s[0]))
 
