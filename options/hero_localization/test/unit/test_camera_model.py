@@ -93,8 +93,9 @@ def test_lens_is_read_from_camera_information():
     [
         ([0.0] * 9, "plumb_bob", [0.0] * 5, "not calibrated"),
         ([1.0] * 8, "plumb_bob", [0.0] * 5, "not calibrated"),
-        (MATRIX.ravel(), "equidistant", [0.1] * 4, "equidistant"),
-        (MATRIX.ravel(), "rational_polynomial", [0.1] * 8, "with 8"),
+        (MATRIX.ravel(), "equidistant", [0.1] * 5, "equidistant"),
+        (MATRIX.ravel(), "rational_polynomial", [0.1] * 12, "with 12"),
+        (MATRIX.ravel(), "omnidirectional", [0.1] * 4, "'omnidirectional' with 4 numbers; known are: plumb_bob"),
         (MATRIX.ravel(), "plumb_bob", [float("nan")] * 5, "finite"),
     ],
 )
@@ -119,3 +120,33 @@ def test_rays_of_a_skewed_sensor_are_found_again():
     flat = lens._replace(distortion=np.zeros(5)).distort(rays)
     expected = rays * (1390.0, 1385.0) + (955.0, 545.0)
     np.testing.assert_allclose(flat, expected + np.column_stack((12.0 * rays[:, 1], np.zeros(3))))
+
+
+LENSES = {
+    "plumb_bob": (-0.32, 0.11, 0.001, -0.0005, 0.0),
+    "rational_polynomial": (0.2, 0.05, 0.0005, -0.0003, 0.001, 0.45, 0.1, 0.005),
+    "equidistant": (-0.03, 0.005, -0.003, 0.0005),
+}
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_all_models_bend_as_opencv_does_and_back(model):
+    cv2 = pytest.importorskip("cv2")
+    lens = Intrinsics.from_camera_info(1920, 1080, (700.0, 0, 955.0, 0, 698.0, 545.0, 0, 0, 1.0), model, LENSES[model])
+    reach = 0.75 if model == "plumb_bob" else 1.2  # 53 degrees
+    x, y = np.meshgrid(np.linspace(-reach, reach, 15), np.linspace(-reach / 2.0, reach / 2.0, 9))
+    rays = np.column_stack((x.ravel(), y.ravel()))
+    points = np.column_stack((rays, np.ones(len(rays)))).reshape(-1, 1, 3)
+    project = cv2.fisheye.projectPoints if model == "equidistant" else cv2.projectPoints
+    none = np.zeros((3, 1))
+    bent = project(points, none, none, lens.matrix, lens.distortion)[0].reshape(-1, 2)
+    np.testing.assert_allclose(lens.distort(rays), bent, atol=1e-6)
+    np.testing.assert_allclose(lens.undistort(bent), rays, atol=1e-5)
+
+
+def test_a_fisheye_shows_nothing_beyond_its_rim():
+    lens = Intrinsics.from_camera_info(1920, 1080, (500.0, 0, 960.0, 0, 500.0, 540.0, 0, 0, 1.0), "fisheye", [0.0] * 4)
+    assert lens.model == "equidistant"
+    rays = lens.undistort(np.array(((960.0, 540.0), (1400.0, 540.0), (1900.0, 540.0))))
+    assert rays[0] == pytest.approx((0.0, 0.0), abs=1e-9) and rays[1, 0] == pytest.approx(np.tan(0.88))
+    assert np.isnan(rays[2]).all()

@@ -1,6 +1,7 @@
 """The lens from rendered images of a ChArUco board, and what too few or poor images are told."""
 
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -235,6 +236,7 @@ def judge(monkeypatch):
             return lens_calibration._Fit(None, rms_px, chosen, np.array(tilts_rad))
 
         monkeypatch.setattr(lens_calibration, "_fit", fit)
+        monkeypatch.setattr(lens_calibration, "_fit_model", Mock(side_effect=CalibrationError))
         monkeypatch.setattr(lens_calibration, "_measure_focal_error", lambda *_: focal_error)
         everywhere = {(u, v): 25 for u in (0.1, 0.5, 0.9) for v in (0.1, 0.5, 0.9)}
         views = [put_corners(everywhere)._replace(ids=np.array([index])) for index in range(len(errors_px))]
@@ -363,3 +365,36 @@ def test_a_board_is_blurred_by_pixel_and_lens():
     for blur_px, share in zip((1.0, 2.0), steepest[1:]):
         assert share == pytest.approx(math.erf(0.5 / math.sqrt(2.0) / math.hypot(blur_px, 0.29)), rel=0.06)
     assert steepest[0] > 0.85
+
+
+@pytest.mark.parametrize(
+    ("model", "distortion"),
+    [
+        ("rational_polynomial", (0.2, 0.05, 0.0005, -0.0003, 0.001, 0.45, 0.1, 0.005)),
+        ("equidistant", (-0.03, 0.005, -0.003, 0.0005)),
+    ],
+)
+def test_wide_lenses_are_calibrated_by_the_model_that_explains_them(model, distortion):
+    import cv2
+
+    matrix = (350.0, 0.0, 474.0, 0.0, 349.0, 276.0, 0.0, 0.0, 1.0)
+    lens = Intrinsics.from_camera_info(960, 540, matrix, model, distortion)
+    random, views, reach = np.random.RandomState(0), [], 2.0 if model == "equidistant" else 1.0
+    center_m = np.array((COLUMNS * SQUARE_M / 2.0, ROWS * SQUARE_M / 2.0, 0.0))
+    while len(views) < 16:
+        turn, depth_m = random.uniform(-0.6, 0.6, 3), random.uniform(0.15, 0.3)
+        at_m = depth_m * np.array((*reach * random.uniform((-1.2, -0.7), (1.2, 0.7)), 1.0))
+        points_m = (list_board_corners() - center_m) @ cv2.Rodrigues(turn)[0].T + at_m
+        if points_m[:, 2].min() < 0.05:
+            continue
+        pixels = lens.distort(points_m[:, :2] / points_m[:, 2:])
+        inside = np.flatnonzero(((pixels > 0) & (pixels < (960, 540))).all(axis=1))
+        if len(inside) > 30:
+            noisy = pixels[inside] + random.normal(0.0, 0.1, (len(inside), 2))
+            views.append(BoardView(inside, noisy.astype(np.float32)))
+    found = lens_calibration._choose_fit(views, 960, 540)
+    assert found.rms_px < 0.5 and (model != "equidistant" or found.lens.model == model)
+    rays = np.column_stack([axis.ravel() for axis in np.meshgrid(np.linspace(-1.0, 1.0, 9), np.linspace(-0.6, 0.6, 7))])
+    assert np.abs(found.lens.distort(rays) - lens.distort(rays)).max() < 2.5, (
+        "a shift of the image is one of the camera"
+    )

@@ -143,3 +143,30 @@ def test_a_clock_that_is_set_right_is_found_again():
     drive.delays_s = [0.0]
     drive.run(20.0)
     assert list_clocks(drive) == [] and drive.run(3.0) < 0.003
+
+
+def test_poses_at_the_present_are_not_behind_the_robot():
+    errors_m = {False: [], True: []}
+    drive = Drive([0.0])
+    drive.run(3.0)
+    for linear_m_s, angular_rad_s in ((0.2, 0.0), (0.2, 1.5), (-0.15, 1.0), (0.0, 2.0)):
+        drive.motion = lambda now_s, motion=(linear_m_s, angular_rad_s): motion
+        drive.run(0.5)
+        for _ in range(20):
+            drive.run(0.01)
+            for is_present, off_m in errors_m.items():
+                (robot,) = drive.localizer.list_robots(drive.now_s + 0.03, is_present)
+                pose, speed = drive.true[-1], drive.speed
+                for _ in range(3):
+                    pose = drive._move(pose, speed)
+                off_m.append(math.dist(robot.estimate.pose[:2], pose[:2]))
+                assert is_present is (robot.estimate.stamp_s == drive.now_s + 0.03)
+    behind_m, present_m = (np.sqrt(np.mean(np.square(errors_m[key]))) for key in (False, True))
+    assert behind_m > 0.003 and present_m < 0.0015
+
+
+def test_a_robot_that_is_silent_is_not_moved_on():
+    drive = Drive([0.0], motion=lambda now_s: (0.2, 0.0))
+    drive.run(3.0)
+    (robot,) = drive.localizer.list_robots(drive.now_s + 0.3, True)
+    assert robot.estimate.stamp_s < drive.now_s + 0.01

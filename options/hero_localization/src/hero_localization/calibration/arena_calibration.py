@@ -154,10 +154,11 @@ class _Image(NamedTuple):
         known = [self.references[tag.tag_id] for tag in self.tags]
         # The yaws are not known: centers first.
         points_m = np.array([(*pose[:2], 0.0) for pose in known])
+        # By rays, as solvePnP does not know all models of lenses.
         pixels = np.array([tag.center for tag in self.tags])
         for _ in range(_YAW_ROUNDS):
             try:
-                is_found, turn, shift = cv2.solvePnP(points_m, pixels, self.lens.matrix, self.lens.distortion)
+                is_found, turn, shift = cv2.solvePnP(points_m, self.lens.undistort(pixels), np.eye(3), None)
             except cv2.error:
                 return None
             if not is_found or not np.isfinite(turn).all() or not np.isfinite(shift).all():

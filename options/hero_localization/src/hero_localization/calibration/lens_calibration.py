@@ -1,6 +1,7 @@
 """Intrinsics of a camera, from images of a ChArUco board, or a file of camera_calibration. Pure but for OpenCV."""
 
 import math
+from contextlib import suppress
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
@@ -9,7 +10,7 @@ import numpy as np
 from hero_node import one_line
 from hero_node.files import EntryError, load_entries
 
-from ..camera.camera_model import Intrinsics
+from ..camera.camera_model import EQUIDISTANT, MODELS, PLUMB_BOB, RATIONAL, Intrinsics
 from ..errors import CalibrationError
 from ..prints.boards import DICTIONARY, create_board, list_board_corners
 
@@ -19,6 +20,9 @@ MIN_CORNERS = 12
 """In one image; fewer fix no board."""
 
 GOOD_RMS_PX = 0.5
+WIDE_RMS_PX, WIDE_SHARE = 0.25, 0.8
+"""Error of the model plumb_bob from which on others are tried, and share of it that a better one must reach."""
+
 OUTLIER = 3.0
 """An image whose error is this many times the median is left out: blurred, or a bent board."""
 
@@ -112,11 +116,11 @@ def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) ->
             "the board was found in %d images; it takes %d, from all sides and tilted" % (len(views), MIN_VIEWS)
         )
     used = views
-    fit = _fit(used, width_px, height_px)
+    fit = _choose_fit(used, width_px, height_px)
     left_out = np.flatnonzero(fit.errors_px > OUTLIER * np.median(fit.errors_px)).tolist()
     if left_out and len(views) - len(left_out) >= MIN_VIEWS:
         used = [view for index, view in enumerate(views) if index not in left_out]
-        fit = _fit(used, width_px, height_px)
+        fit = _choose_fit(used, width_px, height_px)
     else:
         left_out = []
     focal_error = _measure_focal_error(used, fit)
@@ -145,11 +149,32 @@ class _Fit(NamedTuple):
     tilts_rad: np.ndarray
 
 
+def _choose_fit(views: Sequence[BoardView], width_px: int, height_px: int) -> _Fit:
+    """Return the fit of plumb_bob, unless another model of a lens explains the views clearly better."""
+    plain = _fit(views, width_px, height_px)
+    fits = [plain]
+    for model in (RATIONAL, EQUIDISTANT) if plain.rms_px > WIDE_RMS_PX else ():
+        with suppress(CalibrationError):  # the views do not suffice for this model
+            fits.append(_fit_model(views, width_px, height_px, None, model))
+    best = min(fits, key=lambda fit: fit.rms_px)
+    return best if best.rms_px < WIDE_SHARE * plain.rms_px else plain
+
+
 def _fit(views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics] = None) -> _Fit:
-    """Return the intrinsics that explain the views best, sought from a guess; None: from OpenCV's own."""
+    """Return the intrinsics that explain the views best, sought from a guess; None: plumb_bob, from OpenCV's own."""
+    return _fit_model(views, width_px, height_px, guess, PLUMB_BOB if guess is None else guess.model)
+
+
+def _fit_model(
+    views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics], model: str
+) -> _Fit:
     corners_m = list_board_corners().astype(np.float32)
+    if model == EQUIDISTANT:
+        return _fit_fisheye(views, width_px, height_px, guess)
     # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
-    flags = cv2.CALIB_FIX_K3 | (0 if guess is None else cv2.CALIB_USE_INTRINSIC_GUESS)
+    flags = (cv2.CALIB_RATIONAL_MODEL if model == RATIONAL else cv2.CALIB_FIX_K3) | (
+        0 if guess is None else cv2.CALIB_USE_INTRINSIC_GUESS
+    )
     try:
         rms_px, matrix, distortion, turns, _, _, _, errors_px = cv2.calibrateCameraExtended(
             [corners_m[view.ids] for view in views],
@@ -163,9 +188,32 @@ def _fit(views: Sequence[BoardView], width_px: int, height_px: int, guess: Optio
         raise CalibrationError(f"no lens explains these images: {str(error).strip().splitlines()[-1]}") from None
     if not np.isfinite(matrix).all() or not math.isfinite(rms_px):
         raise CalibrationError("no lens explains these images: take them again")
-    lens = Intrinsics(width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[:5])
+    lens = Intrinsics(
+        width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[: MODELS[model][-1]], model
+    )
     tilts_rad = np.array([math.acos(min(abs(cv2.Rodrigues(turn)[0][2, 2]), 1.0)) for turn in turns])
     return _Fit(lens, float(rms_px), np.asarray(errors_px).ravel(), tilts_rad)
+
+
+def _fit_fisheye(views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics]) -> _Fit:
+    corners_m = list_board_corners()
+    objects = [corners_m[view.ids].reshape(-1, 1, 3).astype(float) for view in views]
+    pixels = [view.pixels.reshape(-1, 1, 2).astype(float) for view in views]
+    flags = cv2.fisheye.CALIB_RECOMPUTE_EXTRINSIC | cv2.fisheye.CALIB_FIX_SKEW
+    flags |= 0 if guess is None else cv2.fisheye.CALIB_USE_INTRINSIC_GUESS
+    matrix = np.eye(3) if guess is None else guess.matrix.copy()
+    distortion = np.zeros((4, 1)) if guess is None else guess.distortion.reshape(4, 1).copy()
+    try:
+        rms_px, matrix, distortion, turns, shifts = cv2.fisheye.calibrate(
+            objects, pixels, (width_px, height_px), matrix, distortion, flags=flags, criteria=_CRITERIA
+        )
+    except cv2.error as error:
+        raise CalibrationError(f"no fisheye lens explains these images: {one_line(error)}") from None
+    lens = Intrinsics(width_px, height_px, matrix, distortion.ravel(), EQUIDISTANT)
+    seen = [cv2.fisheye.projectPoints(*part, matrix, distortion)[0] for part in zip(objects, turns, shifts)]
+    errors_px = np.array([np.sqrt(((here - there) ** 2).sum(axis=2).mean()) for here, there in zip(seen, pixels)])
+    tilts_rad = np.array([math.acos(min(abs(cv2.Rodrigues(turn)[0][2, 2]), 1.0)) for turn in turns])
+    return _Fit(lens, float(np.sqrt((errors_px**2).mean())), errors_px, tilts_rad)
 
 
 def _measure_focal_error(views: Sequence[BoardView], fit: _Fit) -> float:

@@ -62,6 +62,7 @@ class FrameSource:
 
     Attributes:
         lens: the intrinsics in camera_info; None without it.
+        lens_problem: why they cannot be used; empty if they can, or there are none.
         problem: why there are no usable images, for users; empty if there are.
         warning: what may spoil images that come, for users; empty if nothing is known.
         arrived_s: when the newest image came; before, when the source was opened.
@@ -69,7 +70,7 @@ class FrameSource:
 
     def __init__(self) -> None:
         self.lens: Optional[Intrinsics] = None
-        self.problem = self.warning = ""
+        self.problem = self.warning = self.lens_problem = ""
         self.arrived_s = rospy.get_time()
         self._arrival = threading.Condition()
         self._newest: Any = None
@@ -111,8 +112,10 @@ class TopicSource(FrameSource):
     def _read_info(self, info: CameraInfo) -> None:
         try:
             self.lens = Intrinsics.from_camera_info(info.width, info.height, info.K, info.distortion_model, info.D)
-        except ValueError:
+            self.lens_problem = ""
+        except ValueError as error:
             self.lens = None  # the file's lens counts
+            self.lens_problem = f"camera_info: {error}" if info.K[0] > 0.0 else ""
 
     def _decode(self, received: Any) -> Optional[Frame]:
         gray = self._decode_jpeg(received) if self._is_compressed else self._decode_image(received)

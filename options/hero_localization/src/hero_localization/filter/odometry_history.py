@@ -8,10 +8,13 @@ import math
 from typing import NamedTuple, Optional
 
 from hero_client.values import StampedHistory, interpolate_pose
-from hero_node import Pose, find_frame, measure_distance, transform_pose, wrap_angle
+from hero_node import Pose, find_frame, invert_pose, measure_distance, transform_pose, wrap_angle
 
 KEPT_S = 2.0
 """Older poses than this come too late to be used: a camera with its driver delays by 0.05 to 0.3 s."""
+
+SPEED_S = 0.1
+"""Time over which the present speed is measured: three readings."""
 
 MAX_SPEED_M_S = 0.6
 MAX_TURN_RAD_S = 20.0
@@ -89,6 +92,18 @@ class OdometryHistory:
             self._counted = pose
         self.raw_pose = raw
         self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad, unobserved_s))
+
+    def find_motion(self, duration_s: float) -> Pose:
+        """Return the motion of the next duration_s in the robot's frame, if it drives on as in the last SPEED_S."""
+        newest, before = self._readings.newest, self._readings.find(self.newest_s - SPEED_S)
+        if newest is None or before is None:
+            return Pose(0.0, 0.0, 0.0)
+        moved = transform_pose(invert_pose(before.pose), newest.pose)
+        share = duration_s / SPEED_S
+        # Seen from the middle of the turn, the way is straight ahead or back.
+        way_m = share * math.copysign(math.hypot(moved.x_m, moved.y_m), moved.x_m)
+        turn_rad = share * moved.yaw_rad
+        return Pose(way_m * math.cos(turn_rad / 2.0), way_m * math.sin(turn_rad / 2.0), turn_rad)
 
     def find(self, stamp_s: float) -> Optional[Odometry]:
         """Return the odometry at stamp_s, interpolated between two readings; after the newest, that one.

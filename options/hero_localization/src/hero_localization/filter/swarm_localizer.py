@@ -10,7 +10,7 @@ from typing import Dict, Iterable, List, NamedTuple, Optional
 
 import numpy as np
 
-from hero_node import Pose, TokenBucket, list_names, measure_distance, wrap_angle
+from hero_node import Pose, TokenBucket, list_names, measure_distance, transform_pose, wrap_angle
 
 from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Outcome, PoseFilter, is_near
@@ -36,6 +36,9 @@ it would count as newer than all others. A simulated clock may go in steps of 0.
 
 BACK_S = 0.1
 """A clock that was set back by more makes all stamps older than those before: robots would stay where they are."""
+
+MAX_AHEAD_S = 0.15
+"""Time for which poses are extrapolated: speeds change, and a robot that is silent for longer may have stopped."""
 
 NAMED_S = 30.0
 """A cause is named once while it lasts; after this long without it, again."""
@@ -272,9 +275,21 @@ class SwarmLocalizer:
         """Return the clocks of sources that differ from odometry's by 10 ms or more."""
         return self._clocks.list_off()
 
-    def list_robots(self, now_s: float) -> List[LocalizedRobot]:
-        """Return what is known of all robots, in the order of their ids."""
-        return [self._describe(robot_id, robot, now_s) for robot_id, robot in sorted(self._robots.items())]
+    def list_robots(self, now_s: float, is_extrapolating: bool = False) -> List[LocalizedRobot]:
+        """Return what is known of all robots, in the order of their ids.
+
+        is_extrapolating: where they are now, if they drive on as by their newest odometry; at most MAX_AHEAD_S from it.
+        """
+        robots = [self._describe(robot_id, robot, now_s) for robot_id, robot in sorted(self._robots.items())]
+        return [self._extrapolate(robot, now_s) for robot in robots] if is_extrapolating else robots
+
+    def _extrapolate(self, robot: LocalizedRobot, now_s: float) -> LocalizedRobot:
+        estimate = robot.estimate
+        if estimate is None or not 0.0 < now_s - estimate.stamp_s <= MAX_AHEAD_S:
+            return robot
+        motion = self._robots[robot.robot_id].filter.odometry.find_motion(now_s - estimate.stamp_s)
+        pose = transform_pose(estimate.pose, motion)
+        return robot._replace(estimate=estimate._replace(stamp_s=now_s, pose=pose))
 
     def _describe(self, robot_id: int, robot: _Robot, now_s: float) -> LocalizedRobot:
         estimate, off = robot.filter.estimate(), robot.find_disagreement()

@@ -186,7 +186,8 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
         frames.append(images.find_tags(1.0, frame))
     lens = images.lens
     if lens is None:
-        raise CalibrationError(f"{options.file} holds no lens: calibrate_camera lens comes first")
+        reason = f" ({images.source.lens_problem})" if images.source.lens_problem else ""
+        raise CalibrationError(f"{options.file} holds no lens{reason}: calibrate_camera lens comes first")
     lens.check_size(*frame.gray.shape)
     layout = settings.layout
     tags = refine_corners(frame.gray, average_tags(frames), settings.family)

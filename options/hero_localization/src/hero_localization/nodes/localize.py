@@ -44,6 +44,7 @@ class LocalizationNode:
         self._lock = threading.Lock()  # inputs come on threads of rospy
         self._localizer = SwarmLocalizer(parameters["correct_clocks"])
         self._outputs = Outputs(self._frame)
+        self._is_extrapolating: bool = parameters["extrapolate"]
         self._inputs: Dict[int, PoseInput] = {}
         self._next_diagnostics_s = 0.0
         self._unknown_s: Dict[int, float] = {}
@@ -104,7 +105,8 @@ class LocalizationNode:
         now_s = rospy.get_time()
         self._call(self._localizer.find_lost)
         with self._lock:
-            robots, clocks = self._localizer.list_robots(now_s), self._localizer.list_clocks()
+            robots = self._localizer.list_robots(now_s, self._is_extrapolating)
+            clocks = self._localizer.list_clocks()
         self._outputs.publish(robots)
         if not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
@@ -141,6 +143,9 @@ PARAMETERS = {
     "position_sd_m": number(0.002, 1e-5, 1.0, "m", SD_TEXT),
     "heading_sd_rad": number(0.01, 1e-5, 10.0, "rad", "the same of their yaw"),
     "correct_clocks": flag(True, "stamps of measured poses that are 10 ms off odometry's, or more, are corrected"),
+    "extrapolate": flag(
+        False, "publish where robots are at that time, not at their newest odometry, 7 mm behind at 0.2 m/s"
+    ),
     "rate_hz": number(PUBLISH_RATE_HZ, 1.0, 100.0, "Hz", "minimum publish rate; poses of an image come at once"),
 }
 

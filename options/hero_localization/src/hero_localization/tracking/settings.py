@@ -25,7 +25,7 @@ from hero_node.files import (
 )
 from hero_node.parameters import MAX_COORDINATE_M
 
-from ..camera.camera_model import Camera, Intrinsics
+from ..camera.camera_model import MODELS, PLUMB_BOB, Camera, Intrinsics
 from ..camera.device_controls import POWER_LINES_HZ, DeviceControls
 from ..errors import SettingsError
 from ..prints.tag_images import DEFAULT_SIZE_M, FAMILIES, REFERENCE_SIZE_M
@@ -103,6 +103,7 @@ def describe_lens(lens: Intrinsics) -> Dict[str, Any]:
             "height_px": lens.height_px,
             "matrix": np.asarray(lens.matrix).ravel().tolist(),
             "distortion": np.asarray(lens.distortion).tolist(),
+            "model": lens.model,
         }
     }
 
@@ -213,11 +214,12 @@ def _read_pose(entry: Entry) -> Pose:
 
 def _build_lens(entry: Entry) -> Intrinsics:
     keys = ("width_px", "height_px", "matrix", "distortion")
-    part = entry.mapping(keys, keys)
+    part = entry.mapping((*keys, "model"), keys)
     width_px, height_px = (part[key].whole(-MAX_ID, MAX_ID) for key in keys[:2])
     matrix, distortion = (part[key].plain() for key in keys[2:])
+    model = part["model"].choice(list(MODELS)) if "model" in part else PLUMB_BOB
     try:
-        return Intrinsics.from_camera_info(width_px, height_px, matrix, "plumb_bob", distortion)
+        return Intrinsics.from_camera_info(width_px, height_px, matrix, model, distortion)
     except (TypeError, OverflowError, ValueError) as error:
         raise EntryError(f"{entry.place}: lens: {one_line(error)}: calibrate the lens") from None
 
