@@ -32,6 +32,9 @@ BATCH_ROBOT_S = 240_000.0
 _BATCHES_PER_WORKER = 2
 """At least, where there are enough runs: no worker idles long while another computes the last batch."""
 
+REPORT_S = 10.0
+"""Time between two lines on how far a run is, where there is no terminal."""
+
 DASK = "dask:"
 
 FOLDER = "experiment_folder"
@@ -157,11 +160,18 @@ def _choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor],
 
 
 def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterator[Tuple[Any, Any]]:
-    """Yield what is done, and show on a terminal how far it is and how long it will take."""
+    """Yield what is done, and show how far it is and how long it will take: as a bar on a terminal, else as lines."""
+    start_s = told_s = time.monotonic()
+    count = 0
     with tqdm(total=missing + begun, initial=begun, unit="run", disable=None, file=sys.stderr) as bar:
         for task, result in done:
             yield task, result
             bar.update(len(task[2]))
+            count += len(task[2])
+            now_s = time.monotonic()
+            if bar.disable and now_s >= told_s + REPORT_S and count < missing:
+                told_s, left_s = now_s, (now_s - start_s) * (missing - count) / count
+                print("%d of %d runs, about %.0f s left" % (begun + count, begun + missing, left_s), file=sys.stderr)
 
 
 @contextmanager

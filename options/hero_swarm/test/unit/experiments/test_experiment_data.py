@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import tarfile
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -175,3 +176,11 @@ def test_only_whole_results_of_this_code_are_packed(folder, tmp_path):
     with pytest.raises(ExperimentError, match="computed by other code"):
         pack.main([str(folder), "--out", str(tmp_path / "p.tar.gz")])
     own.write_text(OWN)
+
+
+def test_without_a_terminal_lines_say_how_far_a_run_is(capsys, monkeypatch):
+    clock = iter(range(0, 1000, 6))
+    monkeypatch.setattr(runner, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    tasks = [((None, 0, (1, 2), ""), None)] * 6
+    assert list(runner._watch(tasks, 12, 4)) == tasks
+    assert capsys.readouterr().err.splitlines() == ["8 of 16 runs, about 24 s left", "12 of 16 runs, about 12 s left"]
