@@ -12,6 +12,7 @@ BaseRobot, which robots that are stepped in process (hero_sim.stepped) share.
 """
 
 import atexit
+from typing import Any
 
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
@@ -22,6 +23,7 @@ from hero_node.ros import start_node
 
 from .robots.group import check_robot_id
 from .robots.robot_base import COMMAND_S, BaseRobot
+from .robots.robot_readings import NEXT_ODOM_S
 from .ros.ros_link import RosLink
 from .values.errors import StaleDataError
 
@@ -61,6 +63,14 @@ class Robot(BaseRobot):
                 "%s stops, as the program ends right after drive(): name a time, such as duration_s=2.0, or repeat it"
                 " in a loop" % self.name
             )
+
+    def read(self, name: str) -> Any:
+        """Return the newest value of a topic that fleet.yaml declares, such as "battery" (README of hero_tools).
+
+        The first use subscribes and waits up to 5 s. Raises: ValueError for a name that is not declared. StaleDataError
+        without a message.
+        """
+        return self._link.read_extra(name, NEXT_ODOM_S)
 
     @property
     def odometry(self) -> Odometry:

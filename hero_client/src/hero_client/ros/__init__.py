@@ -1,6 +1,7 @@
 """Robots and drivers over ROS topics and services."""
 
 from .drivers import Drivers, share_drivers
+from .extra_topics import load_fleet_file
 from .localized_poses import share_poses
 from .robot_listener import NewestMessage, RobotListener, RobotTrack, follow
 from .stop_status import StopStatus, paint

@@ -14,6 +14,7 @@ from sensor_msgs.msg import LaserScan
 from hero_node import Pose, measure_distance, wrap_angle
 
 from ..values.readings import Obstacle, find_nearest, is_free, read_pose, read_ranges
+from .extra_topics import find_class, load_fleet_file, read_field
 
 RATE_WINDOW_S = 3.0
 """Long enough that 5 Hz reads steadily, short enough to see a robot fall silent."""
@@ -96,10 +97,18 @@ class RobotTrack:
 
 
 class RobotListener:
-    """Subscriptions to one robot's odometry and proximity."""
+    """Subscriptions to one robot's odometry and proximity, and to topics that fleet.yaml declares.
+
+    Attributes:
+        values: newest values of those topics, by their names.
+    """
 
     def __init__(self, namespace: str) -> None:
         self.track = RobotTrack()
+        self.values: Dict[str, Any] = {}
+        self._extras = {
+            topic: NewestMessage(f"{namespace}/{topic.topic}", find_class(topic)) for topic in load_fleet_file().topics
+        }
         self.ranges_m: Sequence[float] = ()
         self._odometry = NewestMessage(namespace + "/odom", Odometry)
         self._proximity = NewestMessage(namespace + "/proximity", LaserScan)
@@ -111,14 +120,18 @@ class RobotListener:
         if odometry is not None:
             self.track.receive_pose(read_pose(odometry.pose.pose))
         scan = self._proximity.take()
+        for topic, newest in self._extras.items():
+            message = newest.take()
+            if message is not None:
+                self.values[topic.name] = read_field(message, topic)
         if scan is not None:
             self.ranges_m = read_ranges(scan)
             self.track.receive_proximity(self.ranges_m, scan.angle_min, scan.angle_increment)
 
     def close(self) -> None:
         """Unsubscribe."""
-        self._odometry.close()
-        self._proximity.close()
+        for subscription in (self._odometry, self._proximity, *self._extras.values()):
+            subscription.close()
 
 
 def follow(sources: Dict[str, Any], wanted: Set[str], open_source: Callable[[str], Any]) -> None:

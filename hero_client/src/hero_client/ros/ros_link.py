@@ -1,8 +1,9 @@
 """A robot over ROS: its topics and services under /hero_N, tf, and the drivers' reports."""
 
+import math
 import threading
 from concurrent.futures import wait
-from typing import List, Optional, Tuple
+from typing import Any, List, Optional, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -13,6 +14,7 @@ from std_msgs.msg import ColorRGBA, Float32
 from hero_msgs.msg import Encoder, Neighbors
 from hero_msgs.srv import SetOdom
 from hero_node import HeroError, Pose, Velocity, one_line, pose_of
+from hero_node.files import name_fleet_file
 from hero_node.ros import ROS_CLOCK
 
 from ..values.background_motion import BackgroundMotion, Steps, run_steps
@@ -22,6 +24,7 @@ from ..values.robot_constants import HERO, MODELS, RobotModel
 from ..values.robot_link import RobotLink
 from ..values.sensing import Neighbor
 from .drivers import share_drivers
+from .extra_topics import find_class, load_fleet_file, read_field
 from .frames import share_frames
 from .localized_poses import share_poses
 from .robot_topics import CommandTopic, NewestMessages
@@ -84,10 +87,26 @@ class RosLink(NewestMessages, RobotLink):
         """Advertise the commands to the robot with this number."""
         self._robot_id = robot_id
         self._name = "hero_%d" % robot_id
-        super().__init__("/" + self._name, MESSAGE_CLASSES)
+        self._extras = {topic.name: topic for topic in load_fleet_file().topics}
+        classes = {topic.topic: find_class(topic) for topic in self._extras.values()}
+        super().__init__("/" + self._name, {**classes, **MESSAGE_CLASSES})
         self._drivers = share_drivers()
         self._cmd_vel = CommandTopic(self._namespace + "/velocity_controller/cmd_vel", Twist, self._explain_absence)
         self._led = CommandTopic(self._namespace + "/led", ColorRGBA, self._explain_absence)
+
+    def read_extra(self, name: str, timeout_s: float) -> Any:
+        """Return the newest value of a topic of fleet.yaml; the first one is waited for.
+
+        Raises: ValueError for a name that is not in the file. StaleDataError without a message.
+        """
+        if name not in self._extras:
+            known = ", ".join(self._extras) or "nothing"
+            raise ValueError(f"{name!r} is not declared in {name_fleet_file()}, which names {known}")
+        topic = self._extras[name]
+        self.subscribe(topic.topic)
+        if self.age_s(topic.topic) == math.inf:
+            self.wait_for_next(topic.topic, timeout_s)
+        return read_field(self.read(topic.topic), topic)
 
     def _explain_absence(self) -> str:
         return self._drivers.explain_absence(self._namespace)

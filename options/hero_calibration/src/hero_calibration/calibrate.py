@@ -4,6 +4,7 @@ rosrun hero_calibration calibrate                        all three, with questio
 rosrun hero_calibration calibrate motors velocity --yes  without
 rosrun hero_calibration calibrate wheels                 diameters and distance of the wheels, by camera or --tape
 rosrun hero_calibration calibrate restore                write the files into the robots again
+rosrun hero_calibration calibrate status                 print when and how well robots were calibrated
 """
 
 import argparse
@@ -13,6 +14,8 @@ from typing import Sequence
 
 import rospy
 
+from hero_node import say
+from hero_node.files import read_calibrations
 from hero_node.parameters import robot_ids_option
 from hero_node.ros import Program
 
@@ -20,9 +23,10 @@ from .calibration import DEFAULT_PARTS, INFRARED, PARTS, WHEELS, Calibration
 from .errors import CalibrationError, EndedError
 from .procedures.restore import load_calibrations, restore
 from .robots.ros_session import RosSession, find_robots
+from .status import describe_status, find_missing
 from .store import make_folder
 
-RESTORE = "restore"
+RESTORE, STATUS = "restore", "status"
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -30,17 +34,19 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="calibrate", description="Calibrate robots, all at once, or restore earlier calibrations."
     )
-    parts_help = "motors, velocity, infrared (all three); wheels; or: restore [FILE ...]"
+    parts_help = "motors, velocity, infrared (all three); wheels; or: restore [FILE ...]; or: status"
     parser.add_argument("parts", nargs="*", metavar="PART", help=parts_help)
     robots_help = "ids, e.g. '0 1 2' or 0-3 (all that are connected)"
     parser.add_argument("--robots", type=robot_ids_option, default="all", help=robots_help)
     parser.add_argument("--yes", action="store_true", help="ask nothing: the robots are placed already")
     parser.add_argument("--tape", action="store_true", help="wheels: by a tape measure, without a camera")
+    parser.add_argument("--missing", action="store_true", help="only robots whose files lack one of the parts")
     parser.add_argument("--folder", default="~/hero_calibration", help="folder of files and pictures (%(default)s)")
     options = parser.parse_args(arguments)
     options.restore = options.parts[:1] == [RESTORE]
     options.files = options.parts[1:] if options.restore else []
-    options.parts = [] if options.restore else options.parts or list(DEFAULT_PARTS)
+    options.status = options.parts == [STATUS]
+    options.parts = [] if options.restore or options.status else options.parts or list(DEFAULT_PARTS)
     for part in options.parts:
         if part not in PARTS:
             parser.error(f"{part}: parts are {', '.join(PARTS)}; or: restore [FILE ...]")
@@ -55,6 +61,9 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 def main() -> int:
     """Calibrate; return the exit code. Raises: CalibrationError, CalibrationFileError, ProgramError."""
     options = parse_options(rospy.myargv(sys.argv)[1:])
+    if options.status:
+        say("\n".join(describe_status(read_calibrations(options.folder))))
+        return 0
     # Errors in files and folders are reported before waiting for robots.
     if options.restore:
         calibrations = load_calibrations(options.folder, options.files, options.robots)
@@ -63,7 +72,15 @@ def main() -> int:
         make_folder(options.folder)
         robot_ids = options.robots
     with Program("hero_calibrate", anonymous=True) as program:
-        session = RosSession(program, find_robots(program, robot_ids))
+        probes = find_robots(program, robot_ids)
+        if options.missing:
+            numbers = [probe.robot_id for probe in probes]
+            missing = find_missing(read_calibrations(options.folder).found, numbers, options.parts)
+            probes = [probe for probe in probes if probe.robot_id in missing]
+            if not probes:
+                say("every robot has these parts already")
+                return 0
+        session = RosSession(program, probes)
         if options.restore:
             return restore(session, calibrations)
 

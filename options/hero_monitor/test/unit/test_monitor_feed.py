@@ -81,7 +81,7 @@ class Fleet:
         self.page = {}
 
     def make_robot_feed(self, namespace):
-        listener = SimpleNamespace(track=RobotTrack(), ranges_m=[0.1, math.inf])
+        listener = SimpleNamespace(track=RobotTrack(), ranges_m=[0.1, math.inf], values={"battery": 3.70414})
         return SimpleNamespace(
             name=namespace.strip("/"),
             listener=listener,

@@ -8,10 +8,11 @@ import os
 import shutil
 from typing import Optional, Sequence, Set
 
+from hero_node.files import read_fleet_file
 from hero_node.parameters import robot_ids_option
 
 from .bags.bag_set import BagSet
-from .bags.tables import TABLES, is_exported, read_rows
+from .bags.tables import TABLES, declare_tables, is_exported, read_rows
 from .bags.topics import Message
 from .errors import RecordingError, explain_write_errors
 from .formats.bag_files import write_mcap, write_ros2
@@ -73,6 +74,7 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Export. Raises: RecordingError."""
+    declare_tables(read_fleet_file().topics)
     options = parse_options(arguments)
     bags = BagSet(options.bags)
     out = options.out or os.path.splitext(bags.paths[0])[0] + OUT_SUFFIXES.get(options.format, "")

@@ -21,12 +21,13 @@ import rosgraph
 import roslib.packages
 
 from hero_node import command_line, end_process
+from hero_node.files import read_fleet_file
 from hero_node.parameters import robot_ids_option, within
 from hero_node.ros import ask_master, check_master
 
 from .bags.bag_set import ACTIVE_SUFFIX
 from .bags.repair import repair_bag
-from .bags.topics import make_patterns
+from .bags.topics import declare_topics, make_patterns
 from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError
 
@@ -246,6 +247,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 def main() -> None:
     """Record, or repair recordings. Raises: RecordingError, NodeError."""
     options, ros_arguments = split_arguments(sys.argv[1:])
+    declare_topics(read_fleet_file().topics)
     parsed = parse_options(read_launch_options(ros_arguments) + options)
     for path in parsed.repair or ():
         say(repair_bag(path))

@@ -19,13 +19,15 @@ from typing import Dict, Iterator, List, Optional, Sequence, Set
 import rospy
 
 from hero_client.apps.keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard, NoTerminalError
-from hero_client.ros import Drivers, RobotListener, RobotTrack, StopStatus, follow, paint
+from hero_client.ros import Drivers, RobotListener, RobotTrack, StopStatus, follow, load_fleet_file, paint
 from hero_msgs.msg import Robot, RobotArray
+from hero_node.files import RobotNotes, read_calibrations
 from hero_node.parameters import within
 from hero_node.ros import Program
 
 from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
+from .inventory import format_inventory, list_inventory, list_warnings
 
 DRIVER_TIMEOUT_S = 10.0  # how long --once waits for a driver that is just starting
 LISTEN_S = 1.5  # how long --once counts messages
@@ -50,6 +52,7 @@ class FleetListener:
 
     def __init__(self) -> None:
         self.report: Optional[RobotArray] = None
+        self.file = load_fleet_file()
         self.drivers = Drivers()
         self._listeners: Dict[str, RobotListener] = {}
         self._asked: Set[str] = set()
@@ -85,7 +88,14 @@ class FleetListener:
         if listener is not None:
             listener.read_newest()
         track = listener.track if listener is not None else RobotTrack()
-        return RobotRow(robot, track, track.odometry.rate_hz(now_s), stopped)
+        return RobotRow(
+            robot,
+            track,
+            track.odometry.rate_hz(now_s),
+            stopped,
+            self.file.robots.get(robot.id, RobotNotes()),
+            {} if listener is None else listener.values,
+        )
 
 
 @contextlib.contextmanager
@@ -134,7 +144,10 @@ class FleetProgram:
             return [text[:width]]
         silent = self._fleet.drivers.find_silent()
         title = format_title(self._fleet.report, time.time(), silent)
-        return [*(line[:width] for line in title), *format_table(self._rows, width, max(2, height - len(title)))]
+        return [
+            *(line[:width] for line in title),
+            *format_table(self._rows, width, max(2, height - len(title)), self._fleet.file.topics),
+        ]
 
     def _press(self, key: str) -> None:
         """Execute the command of a key."""
@@ -146,7 +159,14 @@ class FleetProgram:
             self._fleet.dismiss_gone()
 
     def print_fleet(self) -> None:
-        """Print the fleet once, as lines or as JSON."""
+        """Print the fleet once, as lines or as JSON; or the inventory."""
+        if self._options.inventory is not None:
+            file = self._fleet.file
+            inventory = list_inventory(self._rows, file, read_calibrations(self._options.calibrations).found)
+            warnings = list_warnings(inventory, file.run_time_h)
+            style = "json" if self._options.json else self._options.inventory
+            print(format_inventory(inventory, style, warnings), flush=True)
+            return
         if self._options.json:
             print(format_json(self._rows, self._fleet.report or RobotArray()), flush=True)
         else:
@@ -233,7 +253,13 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         metavar="N",
         help="at the end list each of hero_0 to hero_(N-1) that did not join or move, and exit with 1",
     )
-    return parser.parse_args(arguments)
+    text = "print every robot once with versions, run time, calibration and notes of fleet.yaml: table or csv"
+    parser.add_argument("--inventory", nargs="?", choices=("table", "csv"), const="table", help=text)
+    text = "folder of calibrations (%(default)s)"
+    parser.add_argument("--calibrations", default="~/hero_calibration", metavar="FOLDER", help=text)
+    options = parser.parse_args(arguments)
+    options.once = options.once or options.inventory is not None
+    return options
 
 
 def main() -> int:

@@ -1,11 +1,12 @@
 """Rows of the fleet's table: cells of each robot, order, and classification. Pure."""
 
 import math
-from typing import Dict, List, NamedTuple, Sequence
+from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
 
 from hero_client.ros import RobotTrack
 from hero_client.values import STOP_STATES, name_state
 from hero_msgs.msg import Robot
+from hero_node.files import RobotNotes
 
 ORDERS = ("id", "state", "nearest")
 
@@ -22,6 +23,8 @@ class RobotRow(NamedTuple):
     track: RobotTrack
     odom_hz: float
     stopped: bool = False  # whether all robots are
+    notes: RobotNotes = RobotNotes()
+    values: Mapping[str, Any] = {}  # of topics that fleet.yaml declares, by their names
 
     @property
     def name(self) -> str:

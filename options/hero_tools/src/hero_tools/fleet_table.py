@@ -10,6 +10,7 @@ from typing import Any, Dict, List, Optional, Sequence
 from hero_client.values import Obstacle, describe_counts, describe_gone, describe_stop_origin, finite
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import Pose, make_printable
+from hero_node.files import ExtraTopic
 
 from .fleet_rows import RobotRow
 
@@ -35,10 +36,10 @@ def format_nearest(seen: bool, free: bool, nearest: Optional[Obstacle]) -> str:
     return f"touch {where}" if nearest.range_m == -math.inf else f"{nearest.range_m:.2f} m {where}"
 
 
-def format_cells(row: RobotRow) -> List[str]:
-    """Return one robot's cells, in the order of HEADINGS."""
+def format_cells(row: RobotRow, topics: Sequence[ExtraTopic] = ()) -> List[str]:
+    """Return one robot's cells, in the order of HEADINGS, with the values of topics before the last one."""
     robot, track = row.robot, row.track
-    notes = [robot.last_error, "reconnected %dx" % robot.reconnects if robot.reconnects else ""]
+    notes = [row.notes.text, robot.last_error, "reconnected %dx" % robot.reconnects if robot.reconnects else ""]
     is_connected = robot.state in (Robot.READY, Robot.JOINING)
     return [
         make_printable(row.name),
@@ -49,20 +50,29 @@ def format_cells(row: RobotRow) -> List[str]:
         format_pose(track.pose),
         f"{track.distance_m:.2f} m",
         format_nearest(is_connected and track.proximity_seen, track.is_free, track.nearest),
+        *(format_value(row.values.get(topic.name), topic.unit) for topic in topics),
         make_printable("; ".join(filter(None, notes))),
     ]
 
 
-def format_table(rows: Sequence[RobotRow], width: int, height: int) -> List[str]:
+def format_value(value: Any, unit: str) -> str:
+    """Return the value of a topic that fleet.yaml declares, with its unit."""
+    if value is None:
+        return "-"
+    return make_printable(f"{value:.2f} {unit}" if isinstance(value, float) else f"{value} {unit}").strip()
+
+
+def format_table(rows: Sequence[RobotRow], width: int, height: int, topics: Sequence[ExtraTopic] = ()) -> List[str]:
     """Return heading and rows in at most height lines of at most width characters."""
     shown = rows if len(rows) < height else rows[: max(0, height - 2)]
-    table = [list(HEADINGS)] + [format_cells(row) for row in shown]
-    widths = [max(len(cells[column]) for cells in table) for column in range(len(HEADINGS))]
+    headings = [*HEADINGS[:-1], *(topic.name.upper() for topic in topics), HEADINGS[-1]]
+    table = [headings] + [format_cells(row, topics) for row in shown]
+    widths = [max(len(cells[column]) for cells in table) for column in range(len(headings))]
     lines = []
     for cells in table:
         padded = [
             cell.rjust(size) if heading in RIGHT_ALIGNED else cell.ljust(size)
-            for cell, size, heading in zip(cells, widths, HEADINGS)
+            for cell, size, heading in zip(cells, widths, headings)
         ]
         lines.append("  ".join(padded).rstrip()[:width])
     if len(shown) < len(rows):
@@ -107,6 +117,10 @@ def make_row_dict(row: RobotRow) -> Dict[str, Any]:
         "clock_offset_s": finite(robot.clock_offset),
         "firmware": robot.firmware,
         "last_error": robot.last_error,
+        "notes": row.notes._asdict(),
+        "values": {
+            name: finite(value) if isinstance(value, float) else str(value) for name, value in row.values.items()
+        },
     }
 
 

@@ -61,7 +61,7 @@ class World:
 
     def listen(self, namespace):
         listener = self.listeners[namespace] = SimpleNamespace(
-            track=RobotTrack(), close=lambda: self.closed.append(namespace)
+            track=RobotTrack(), values={}, close=lambda: self.closed.append(namespace)
         )
 
         def read_newest():
@@ -77,7 +77,7 @@ class World:
         return self.running
 
     def start(self, **options):
-        given = {"seconds": None, "expect": None, "json": False, "once": False, **options}
+        given = {"seconds": None, "expect": None, "json": False, "once": False, "inventory": None, **options}
         return FleetProgram(self, argparse.Namespace(**given))
 
     def wait_readable(self, files, timeout_s):

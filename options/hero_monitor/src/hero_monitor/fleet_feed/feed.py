@@ -20,7 +20,7 @@ from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.ros import Drivers, NewestMessage, StopStatus, follow
+from hero_client.ros import Drivers, NewestMessage, StopStatus, follow, load_fleet_file
 from hero_client.values import (
     STATES,
     STOP_STATES,
@@ -103,6 +103,7 @@ class FleetFeed:
         self._tracked: Set[str] = set()
         self.master = MasterLink(background)
         self._pending_reads = 0
+        self.lab_file = load_fleet_file()
         self._report = RobotArray()
         self.stopper = ""
         """User who stopped the robots on a page."""
@@ -220,6 +221,10 @@ class FleetFeed:
             "clock": finite(round(row.clock_offset, 4)),
             "error": shorten(row.last_error),
             "source": "" if refused else self._name_pose_source(name),
+            "note": "" if refused or row.id not in self.lab_file.robots else shorten(self.lab_file.robots[row.id].text),
+            "values": {}
+            if feed is None
+            else {name: _encode_value(value) for name, value in feed.listener.values.items()},
             "health": [0, ""] if refused else self._health.get(name, [0, ""]),
         }
 
@@ -347,6 +352,11 @@ class FleetFeed:
             label = LABEL.match(line.msg) if line.name in drivers else None
             robot = label.group(1) if label and label.group(1) in self.robots else ""
             log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
+
+
+def _encode_value(value: Any) -> Any:
+    """Return the value of a topic that fleet.yaml declares for JSON."""
+    return finite(round(value, 4)) if isinstance(value, float) else shorten(str(value))
 
 
 def describe_stop_of_others(origin: Optional[str], moving: Sequence[str]) -> Optional[StopStatus]:

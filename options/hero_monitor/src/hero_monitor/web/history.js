@@ -14,6 +14,13 @@ export const QUANTITIES = {
   odometry: { title: "odometry rate", unit: "Hz", of: (from, to) => to.odom },
 };
 
+/** Keep a quantity for each topic [name, unit] of fleet.yaml. */
+export function addTopics(topics) {
+  for (const [name, unit] of topics) {
+    QUANTITIES[name] = { title: name, unit, of: (from, to) => (Number.isFinite(to.values?.[name]) ? to.values[name] : null) };
+  }
+}
+
 const distance = (from, to) => Math.hypot(to.x - from.x, to.y - from.y);
 const wrap = (mrad) => Math.atan2(Math.sin(mrad / 1000), Math.cos(mrad / 1000));
 
@@ -48,7 +55,7 @@ export class History {
       const pose = state.poses[robot.name];
       if (!pose || !robot.known || !robot.odom || robot.state !== "READY") continue;
       const [x, y, yaw] = pose;
-      samples[robot.name] = { x, y, yaw, nearest: nearestOf(state.ranges[robot.name]), odom: robot.odom };
+      samples[robot.name] = { x, y, yaw, nearest: nearestOf(state.ranges[robot.name]), odom: robot.odom, values: robot.values };
     }
     this.steps.push({ ms, samples });
     while (ms - this.steps[0].ms > KEPT_MS) this.steps.shift();

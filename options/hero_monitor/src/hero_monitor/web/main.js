@@ -7,7 +7,7 @@ import { Connection } from "./connection.js";
 import { isDark, onTheme, showTheme } from "./theme.js";
 import { FleetTable } from "./panels/fleet.js";
 import { GamepadInput } from "./gamepad.js";
-import { History } from "./history.js";
+import { History, addTopics } from "./history.js";
 import { countRobots, showLosses } from "./losses.js";
 import { FleetMap } from "./map/map.js";
 import { LogView } from "./panels/log.js";
@@ -158,11 +158,19 @@ function showAll() {
   map.draw();
 }
 
+let hasTopics = false; // those of fleet.yaml have their columns and quantities
+
 function receive(updates) {
   for (const name of RECEIVED) {
     if (name in updates) state[name] = updates[name];
   }
   if ("user" in updates) stop.mayRelease = updates.user.title === "teacher";
+  if (updates.hello?.topics?.length && !hasTopics) {
+    hasTopics = true;
+    addTopics(updates.hello.topics);
+    table.addTopics(updates.hello.topics);
+    chart.listQuantities();
+  }
   stop.receive(updates);
   history.update(state);
   if ("notice" in updates) notice(updates.notice.level, updates.notice.text);

@@ -5,13 +5,15 @@ seconds since 1970. The columns are explained in docs/recording.md.
 """
 
 import math
+import re
 from operator import attrgetter
-from typing import Any, Callable, Dict, List, Tuple
+from typing import Any, Callable, Dict, Iterable, List, Tuple
 
 from hero_client.values import STATES
 from hero_node import yaw_of
+from hero_node.files import ExtraTopic
 
-from .topics import find_robot_topic, is_fleet_topic
+from .topics import declare_topics, find_robot_topic, is_fleet_topic
 
 Row = Tuple[Any, ...]
 Columns = Dict[str, Callable[[Any], Any]]
@@ -104,6 +106,16 @@ TABLES: Dict[str, Columns] = {
 
 TEXT_COLUMNS = {"state", "address", "last_error"}
 """All other columns are numbers."""
+
+
+def declare_tables(topics: Iterable[ExtraTopic]) -> None:
+    """Add a table for each topic that fleet.yaml declares, with its value as a column."""
+    declare_topics(topics)
+    for topic in topics:
+        column = "_".join(filter(None, (topic.name, re.sub(r"\W+", "_", topic.unit))))
+        TABLES[topic.name] = {column: attrgetter(topic.field)}
+        if topic.type == "std_msgs/String":
+            TEXT_COLUMNS.add(column)
 
 
 def is_exported(topic: str, message_type: str) -> bool:

@@ -4,7 +4,9 @@ The patterns are regular expressions: robots that join later are recorded too.
 """
 
 import re
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+
+from hero_node.files import ExtraTopic
 
 ROBOT_TOPICS = {
     "odom": ("odometry", "nav_msgs/Odometry"),
@@ -21,6 +23,12 @@ ROBOT_TOPICS = {
     "imu": ("imu", "sensor_msgs/Imu"),
 }
 """Below /hero_N/: kind, which names the table, and type; a topic of another type belongs to another program."""
+
+
+def declare_topics(topics: Iterable[ExtraTopic]) -> None:
+    """Record topics that fleet.yaml declares, too, and export their messages."""
+    ROBOT_TOPICS.update((topic.topic, (topic.name, topic.type)) for topic in topics)
+
 
 RAW_ROBOT_TOPICS = ("odom_raw", "laser", "laser_enable")
 """The robot's own messages, from which the driver makes odom and proximity."""

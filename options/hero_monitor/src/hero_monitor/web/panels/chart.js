@@ -25,11 +25,16 @@ export class Chart {
     this.key = "";
     this.plot = null;
     this.select = element("quantity");
-    for (const [name, { title, unit }] of Object.entries(QUANTITIES)) {
-      this.select.add(new Option(`${title}, ${unit}`, name));
-    }
+    this.listQuantities();
     this.select.addEventListener("input", () => this.show(this.robots || []));
     setInterval(() => this.draw(), PERIOD_MS);
+  }
+
+  listQuantities() {
+    const chosen = this.select.value;
+    const options = Object.entries(QUANTITIES).map(([name, { title, unit }]) => new Option(unit ? `${title}, ${unit}` : title, name));
+    this.select.replaceChildren(...options);
+    if (chosen) this.select.value = chosen;
   }
 
   /** Show the lines of these robots. */

@@ -49,6 +49,7 @@ const COLUMNS = [
   { title: "Nearest", value: nearestRange, text: (mm) => nearestText(mm, 2), className: "number", byName: true },
   { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), className: "number", byName: true },
   { title: "Pose", value: poseText, text: String, className: "pose", lasting: true, byName: true },
+  { title: "Note", value: (robot) => robot.note ?? "", className: "details", lasting: true },
   { title: "Address", value: (robot) => robot.address, className: "details", lasting: true },
   { title: "Odom", value: (robot) => robot.odom, text: (rate) => number(rate, 1, " Hz"), className: "details number" },
   { title: "From robot", value: (robot) => robot.bytes, text: (bytes) => number(bytes / 1000, 1, " kB/s"), className: "details number" },
@@ -73,9 +74,7 @@ export class FleetTable {
     this.column = COLUMNS[0];
     this.down = false;
     this.table = /** @type {HTMLTableElement} */ (document.querySelector("#fleet table"));
-    this.rows = new Lines(this.table.tBodies[0], () => this.makeRow());
-    this.heads = COLUMNS.map((column) => this.makeHead(column));
-    this.table.tHead.rows[0].append(...this.heads);
+    this.build();
     const details = element("details");
     const show = (isShown) => {
       this.table.classList.toggle("detailed", isShown);
@@ -84,6 +83,23 @@ export class FleetTable {
     };
     details.addEventListener("click", () => show(!isPressed(details)));
     show(localStorage.getItem("details") === "true");
+  }
+
+  build() {
+    this.table.tBodies[0].replaceChildren();
+    this.rows = new Lines(this.table.tBodies[0], () => this.makeRow());
+    this.heads = COLUMNS.map((column) => this.makeHead(column));
+    this.table.tHead.rows[0].replaceChildren(...this.heads);
+  }
+
+  /** Add a column for each topic [name, unit] of fleet.yaml, behind the pose. */
+  addTopics(topics) {
+    const text = (value, unit) => (value === null ? "-" : `${typeof value === "number" ? value.toFixed(2) : value} ${unit}`.trim());
+    const columns = topics.map(([name, unit]) => ({
+      title: name, value: (robot) => robot.values?.[name] ?? null, text: (value) => text(value, unit), className: "number", byName: true,
+    }));
+    COLUMNS.splice(COLUMNS.findIndex(({ title }) => title === "Note"), 0, ...columns);
+    this.build();
   }
 
   makeHead(column) {

@@ -185,6 +185,7 @@ export class RobotPanel {
     const facts = [
       ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
       ["stop", robot.stop || "-"],
+      ...(robot.note ? [["note", robot.note]] : []),
       ["pose source", robot.source || "own odometry: position on the map unknown"],
       ["frame", robot.source ? state.fleet.frame : "-"],
       ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],

@@ -1,0 +1,51 @@
+"""fleet.yaml: notes on robots and topics to show, with file, line and remedy for each mistake."""
+
+import pytest
+
+from hero_node.files import EntryError, ExtraTopic, FleetFile, RobotNotes, name_fleet_file, read_fleet_file
+
+TEXT = """\
+robots:
+  - {id: 3, name: Ada, note: squeaks, broken: true, place: shelf 2, owner: Kim}
+  - {id: 10}
+topics:
+  - {name: battery, topic: battery, type: std_msgs/Float32, field: data, unit: V}
+run_time_h: 2.5
+"""
+
+
+def write(tmp_path, text):
+    path = tmp_path / "fleet.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_a_file_tells_of_robots_topics_and_run_time(tmp_path):
+    ada = RobotNotes("Ada", "squeaks", True, "shelf 2", "Kim")
+    battery = ExtraTopic("battery", "battery", "std_msgs/Float32", "data", "V")
+    assert read_fleet_file(write(tmp_path, TEXT)) == FleetFile({3: ada, 10: RobotNotes()}, (battery,), 2.5)
+    assert ada.text == "Ada, BROKEN, squeaks" and RobotNotes().text == ""
+
+
+def test_without_a_file_or_with_an_empty_one_there_are_no_notes(tmp_path, monkeypatch):
+    assert read_fleet_file(str(tmp_path / "none.yaml")) == read_fleet_file(write(tmp_path, "")) == FleetFile()
+    monkeypatch.setenv("ROS_HOME", str(tmp_path))
+    assert name_fleet_file() == str(tmp_path / "fleet.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("robots: [{name: Ada}]", "id"),
+        ("robots: [{id: -1}]", "id"),
+        ("robots:\n- id: 3\n  broken: perhaps", "fleet.yaml:3|line 3"),
+        ("robots: [{id: 3, colour: red}]", "colour"),
+        ("topics: [{name: battery}]", "topic"),
+        ("run_time_h: -1", "run_time_h"),
+        ("robot: []", "robot"),
+        ("- 3", "must hold names and values"),
+    ],
+)
+def test_a_mistake_is_named_with_its_place(tmp_path, text, words):
+    with pytest.raises(EntryError, match=words):
+        read_fleet_file(write(tmp_path, text))
