@@ -24,7 +24,7 @@ class RobotNotes(NamedTuple):
 
     @property
     def text(self) -> str:
-        """What tables show beside a robot."""
+        """Text that tables show beside a robot."""
         return ", ".join(filter(None, (self.name, "BROKEN" if self.broken else "", self.note)))
 
 
