@@ -1,7 +1,7 @@
 """The lab's fleet.yaml for programs over ROS: types of the topics that it declares, and fields of their messages."""
 
 from functools import lru_cache, reduce
-from typing import Any, Type
+from typing import Any, Optional, Type
 
 import roslib.message
 
@@ -23,10 +23,10 @@ def load_fleet_file() -> FleetFile:
 
 def find_class(topic: ExtraTopic) -> Type[Any]:
     """Return the class of a topic's messages. Raises: ProgramError."""
-    found: Any = roslib.message.get_message_class(topic.type)
+    found: Optional[Type[Any]] = roslib.message.get_message_class(topic.type)
     if found is None:
         raise ProgramError(f"fleet.yaml: {topic.name}: the type {topic.type} is not installed, or not built")
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def read_field(message: Any, topic: ExtraTopic) -> Any:

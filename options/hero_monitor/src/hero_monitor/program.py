@@ -69,8 +69,8 @@ class Monitor:
             self._lesson,
         )
         self._programs = self._requests.programs
-        topics = [[topic.name, topic.unit] for topic in self._feed.lab_file.topics]
-        self._feed.page_state.put("hello", {"control": parameters.control, "topics": topics})
+        declared = [[topic.name, topic.unit] for topic in self._feed.lab_file.topics]
+        self._feed.page_state.put("hello", {"control": parameters.control, "topics": declared})
         actions = Actions(
             lambda page: self._enter(page.number),
             self._requests.receive,
