@@ -39,7 +39,7 @@ class ExtraTopic(NamedTuple):
 
 
 class FleetFile(NamedTuple):
-    """What the file says; run_time_h: hours for which a battery lasts, 0 where that is not known."""
+    """Contents of the file; run_time_h: hours for which a battery lasts, 0 where that is not known."""
 
     robots: Dict[int, RobotNotes] = {}
     topics: Tuple[ExtraTopic, ...] = ()
