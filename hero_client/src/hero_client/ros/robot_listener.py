@@ -35,6 +35,11 @@ class NewestMessage:
             self._bytes = message._buff
             self.count += 1
 
+    @property
+    def has_publisher(self) -> bool:
+        """Whether a node that publishes the topic is connected."""
+        return bool(self._subscriber.get_num_connections() > 0)
+
     def take(self) -> Any:
         """Return the newest message; None if no readable one has arrived since the last call."""
         kept, self._bytes = self._bytes, None

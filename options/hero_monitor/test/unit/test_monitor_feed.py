@@ -46,7 +46,7 @@ class Newest:
     """A subscription whose newest message a test gives."""
 
     def __init__(self, *arguments):
-        self.message, self.is_closed = None, False
+        self.message, self.is_closed, self.has_publisher = None, False, True
 
     def take(self):
         taken, self.message = self.message, None
@@ -366,6 +366,17 @@ def make_marker(kind, *scale, **fields):
     marker.pose.position.x, marker.pose.orientation.w = 1.0, 1.0
     marker.scale.x, marker.scale.y, marker.scale.z = scale
     return marker
+
+
+def test_walls_and_objects_of_a_simulator_that_has_ended_are_cleared(fleet):
+    fleet.receive(make_row(0))
+    fleet.subscribe()
+    wall = MarkerArray([make_marker(Marker.CUBE, 0.5, 0.02, 0.1)])
+    for topic, part in feed_module.SCENERY.items():
+        fleet.put(topic, wall)
+        assert fleet.read()[part]["boxes"]
+        fleet.feed._scene[topic].has_publisher = False
+        assert not fleet.read()[part]["boxes"]
 
 
 def test_arena_and_ground_truth_are_drawn_in_millimeters():

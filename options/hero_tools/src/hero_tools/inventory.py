@@ -73,7 +73,8 @@ def format_inventory(inventory: Sequence[Mapping[str, Any]], style: str, warning
         return written.getvalue().rstrip("\n")
     cells = [[name.upper() for name in COLUMNS]]
     cells += [
-        ["" if row[name] in (None, False) else make_printable(str(row[name])) for name in COLUMNS] for row in inventory
+        ["" if row[name] is None or row[name] is False else make_printable(str(row[name])) for name in COLUMNS]
+        for row in inventory
     ]
     widths = [max(map(len, column)) for column in zip(*cells)]
     lines = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip() for line in cells]

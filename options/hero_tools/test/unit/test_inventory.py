@@ -52,6 +52,7 @@ def test_the_inventory_is_a_table_json_or_csv():
     inventory = make_inventory(make_row(3, firmware="v\x1b[2J"))
     table = format_inventory(inventory, "table", ["firmware differs"])
     assert table.splitlines()[0].split()[:3] == ["ID", "NAME", "STATE"] and table.endswith("firmware differs")
+    assert format_inventory(make_inventory(make_row(0)), "table", []).splitlines()[1].startswith("0 ")
     assert table.replace("\n", "").isprintable()
     assert json.loads(format_inventory(inventory, "json", ["x"]))["warnings"] == ["x"]
     first, second = csv.DictReader(io.StringIO(format_inventory(inventory, "csv", [])))

@@ -55,6 +55,9 @@ ROBOTS_MAX = 1000
 GROUND_TRUTH_TOPICS = {"/hero_sim/markers"}
 PICTURE_TOPICS = {"/track/picture/compressed", "/track/picture/outline"}
 
+SCENERY = {"/hero_sim/arena": "arena", "/hero_sim/object_markers": "objects"}
+"""Topics of a simulator, with the parts of the page state that are empty without it."""
+
 REPLAY_KEPT_S = 3.0
 """Robots of a replay disappear this long after its last message."""
 
@@ -273,6 +276,9 @@ class FleetFeed:
             message = newest and newest.take()
             if message is not None:
                 receive(message, now_s)
+        for topic, part in SCENERY.items():
+            if topic in self._scene and not self._scene[topic].has_publisher:
+                put(part, describe_arena(MarkerArray()))  # the simulator has ended
         if "/localization/poses" not in self._scene:
             self._localization.pause(now_s)
         elif not self._localization.is_expected(now_s):

@@ -32,6 +32,7 @@ export class FleetMap {
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
     this.trails = new Map();
+    this.reconnects = new Map(); // of each robot, as it was when its trail was drawn
     this.pointers = new Map();
     this.onPlace = null; // while a place is asked for
     this.aim = null;
@@ -289,6 +290,11 @@ export class FleetMap {
     const { frame } = this.state.fleet;
     if (frame !== this.trailsFrame) this.trails.clear();
     this.trailsFrame = frame;
+    for (const { name, reconnects } of this.state.fleet.robots) {
+      // It may be in another place, or another simulator: no line leads there.
+      if (this.reconnects.get(name) !== reconnects) this.trails.delete(name);
+      this.reconnects.set(name, reconnects);
+    }
     for (const [name, pose] of Object.entries(this.poses)) {
       if (pose === null) continue;
       const trail = this.trails.get(name) || [];
