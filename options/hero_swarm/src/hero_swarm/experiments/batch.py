@@ -112,9 +112,11 @@ def make_behavior(experiment: Experiment, cell: Cell) -> Behavior:
         with _at(experiment, "behavior"):
             others = [find_behavior(experiment.locate(one), experiment.sources) for one in experiment.list_behaviors()]
         # Where behaviors vary, a baseline need not have what the others have.
-        if name in cell.own or not any(name in other().numbers() for other in others):
-            text = "%s: %s has no parameter %r; it has %s"
-            raise ExperimentError(text % (experiment.places[name], cell.behavior, name, ", ".join(allowed)))
+        every = {key: None for other in others for key in other().numbers()}
+        if name in cell.own or name not in every:
+            whose, has = (cell.behavior, allowed) if name in cell.own else (experiment.behavior, every)
+            text = "%s: %s has no parameter %r; there are %s"
+            raise ExperimentError(text % (experiment.places[name], whose, name, ", ".join(has)))
     with _at(experiment, "rate_hz"):
         return kind(**{name: value for name, value in cell.parameters.items() if name in known})
 

@@ -160,7 +160,7 @@ def test_the_report_stands_alone_and_names_every_cell_and_remark(finished):
     [
         ("aggregation", "agregation", "line 1: behavior 'agregation'"),
         ("aggregation", "nowhere.py:A", "nowhere.py"),
-        ("errors: [perfect, default]", "sees: [1, 2]", "no parameter 'sees'; it has rate_hz, v0_m_s"),
+        ("errors: [perfect, default]", "sees: [1, 2]", "no parameter 'sees'; there are rate_hz, v0_m_s"),
         ("aggregation", "box_pushing", "line 1: box_pushing pushes objects"),
         ("errors: [perfect, default]", "speed_m_s: [1, 2]", "no parameter 'speed_m_s'"),
         ("cover: 0.05", "cover: 0.5, gap_m: 1", "find no place"),
