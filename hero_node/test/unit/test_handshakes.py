@@ -7,7 +7,8 @@ import threading
 
 import pytest
 
-from hero_node.ros.handshakes import HEADER_LENGTH_MAX, HandshakeReader
+from hero_node.ros import handshakes
+from hero_node.ros.handshakes import HANDSHAKE, HEADER_LENGTH_MAX, LAST_HANDSHAKE, THREAD_TRIES, HandshakeReader
 
 DEADLINE_S = 60.0
 HEADER = struct.pack("<I", 9) + b"some text"
@@ -145,3 +146,28 @@ def test_one_too_many_closes_the_oldest_of_the_address_with_the_most(server):
         client.sendall(HEADER)
     addresses = {server.take()[1] for _ in range(4)}
     assert addresses == {client.getsockname() for client in (other, many[1], many[2], newest)}
+
+
+@pytest.mark.parametrize("lacking", [3, THREAD_TRIES + 1])
+def test_a_program_without_a_thread_is_kept_for_2_s_then_refused(lacking, monkeypatch):
+    served, names, slept_s = queue.Queue(), [], []
+    start = threading.Thread.start
+
+    def lack(thread):
+        names.append(thread.name)
+        if len(names) <= lacking:
+            raise RuntimeError("can't start new thread")
+        start(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", lack)
+    monkeypatch.setattr(handshakes.time, "sleep", slept_s.append)
+    ours, theirs = socket.socketpair()
+    theirs.sendall(HEADER)
+    HandshakeReader(lambda *connection: served.put(connection)).add(ours, ("127.0.0.1", 1))
+    if lacking == 3:
+        assert served.get(timeout=DEADLINE_S)[0] is ours and names == [HANDSHAKE] * 4
+    else:
+        assert is_closed(theirs) and names[-1] == LAST_HANDSHAKE
+        assert 1.9 < sum(slept_s) < 2.2
+    ours.close()
+    theirs.close()

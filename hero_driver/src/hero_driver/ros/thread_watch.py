@@ -4,16 +4,10 @@ rospy starts a thread for each connection to a program and each call from one, a
 any of them robots would join while some program's commands and stops go unheard.
 """
 
-import math
 import threading
-import time
 from typing import Any
 
-HANDSHAKE = "handshake"
-"""Name of threads that handle their failure themselves: the program is refused, and connects again."""
-
-HANDSHAKE_PATIENCE_S = 2.0
-"""Time without any such thread after which no program can connect any more: programs try again after 0.5, 1, 2 s."""
+from hero_node.ros import HANDSHAKE
 
 REMEDY = "free memory, or raise the limits of threads and memory (ulimit -u and -v, TasksMax), and start again"
 
@@ -30,21 +24,15 @@ class ThreadWatch:
 
     def __init__(self) -> None:
         self.failure = ""
-        self._refusing_since_s = math.inf
         start, report = threading.Thread.start, threading.excepthook
 
         def start_or_tell(thread: threading.Thread) -> None:
-            is_handshake = thread.name == HANDSHAKE
             try:
                 start(thread)
             except RuntimeError as error:
-                now_s = time.monotonic()
-                self._refusing_since_s = min(self._refusing_since_s, now_s if is_handshake else math.inf)
-                if not is_handshake or now_s - self._refusing_since_s >= HANDSHAKE_PATIENCE_S:
+                if thread.name != HANDSHAKE:
                     self.note(error)
                 raise
-            if is_handshake:
-                self._refusing_since_s = math.inf
 
         def report_thread(arguments: Any) -> None:
             if not self.note(arguments.exc_value):

@@ -3,6 +3,7 @@
 from threading import Thread
 
 from .connections import limit_xmlrpc_connections, open_tcpros_server
+from .handshakes import HANDSHAKE
 from .master import (
     MASTER_TIMEOUT_S,
     SUCCESS,

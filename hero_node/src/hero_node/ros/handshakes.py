@@ -13,6 +13,12 @@ from typing import Any, Callable
 from ..connection_table import ConnectionTable
 from ..tcpros import LENGTH
 
+THREAD_TRIES, THREAD_RETRY_S = 40, 0.05
+"""Tries to get a thread, and s between two: one may end soon, and a program that is refused may never come again."""
+
+HANDSHAKE, LAST_HANDSHAKE = "handshake", "handshake, last try"
+"""Names of the threads; the second one tells who watches threads that a program is refused."""
+
 HANDSHAKE_TIMEOUT_S = 5.0
 """A program sends its header as soon as it has connected."""
 
@@ -65,12 +71,15 @@ class HandshakeReader:
     def add(self, sock: socket.socket, address: Any) -> None:
         """Take over a connection that was just accepted from address (host, port, ...)."""
         self._pending.add(sock, address)
-        try:
-            threading.Thread(target=self._run, args=(sock, address), name="handshake", daemon=True).start()
-        except RuntimeError:
-            # The system has no thread left: the next connection may get one.
-            self._pending.remove(sock)
-            sock.close()
+        for name in [HANDSHAKE] * THREAD_TRIES + [LAST_HANDSHAKE]:
+            try:
+                threading.Thread(target=self._run, args=(sock, address), name=name, daemon=True).start()
+            except RuntimeError:
+                time.sleep(THREAD_RETRY_S)
+            else:
+                return
+        self._pending.remove(sock)
+        sock.close()
 
     def _run(self, sock: socket.socket, address: Any) -> None:
         header = b""
