@@ -340,7 +340,7 @@ def main():
     if options.against:
         # Both are started in the same way.
         commands = {
-            "this driver": f"{find_environment(HERE.parent)} {DRIVER_COMMAND}",
+            "this driver": f"{find_environment(HERE.parents[1])} {DRIVER_COMMAND}",
             "the other": f"{find_environment(options.against)} {DRIVER_COMMAND}",
         }
     machine_us = measure_machine_us()
