@@ -37,7 +37,7 @@ class NewestMessage:
 
     @property
     def has_publisher(self) -> bool:
-        """Whether a node that publishes the topic is connected."""
+        """Return whether a node that publishes the topic is connected."""
         return bool(self._subscriber.get_num_connections() > 0)
 
     def take(self) -> Any:
