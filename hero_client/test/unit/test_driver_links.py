@@ -277,3 +277,12 @@ def test_a_driver_that_was_left_is_asked_nothing(ros):
         link.close()
     assert not link.is_connected and not link.request_stop(True) and ros.requests == []
     assert math.isinf(drivers._DriverLink(B, B + "/robots").arrival_s)
+
+
+def test_a_connection_that_is_being_closed_takes_no_request(monkeypatch):
+    ros = Ros(monkeypatch)
+    (link,) = ros.drivers._links.values()
+    answers = []
+    link._requests.unregister = lambda: answers.append(link.request_stop(True))
+    link.close()
+    assert answers == [False] and ros.requests == []

@@ -368,6 +368,18 @@ def test_only_a_robot_that_was_driven_is_stopped_at_the_end():
     assert link.closed == 2 and link.velocity == (0.0, 0.0)
 
 
+def test_a_motion_slows_down_for_obstacles_by_the_body_of_its_model():
+    speeds_m_s = []
+    for model in (MODELS["hero"], MODELS["hero_plus"]):
+        robot, link = make_robot()
+        link.model, link.ranges[0] = model, 0.13
+        motion = robot.start_go_to(1.0, 0.0, avoid=False)
+        robot.sleep(0.5)
+        speeds_m_s.append(link.velocity.linear_m_s)
+        motion.cancel()
+    assert speeds_m_s[0] > speeds_m_s[1] + 0.01
+
+
 def test_a_robot_tells_its_state():
     robot, link = make_robot()
     assert repr(robot) == "<hero_3: ready, Pose(x_m=0.000, y_m=0.000, yaw_rad=0.000)>"

@@ -1,6 +1,7 @@
 """Which programs pages may start, with what, and how they end: with the monitor, by a stop, or by themselves."""
 
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -261,3 +262,19 @@ def test_robots_that_a_program_does_not_drive_are_left_alone(program, driven):
     child = ChildProcess(program, ["hero_0", "hero_1"])
     child.end()
     assert child.driven == driven
+
+
+@pytest.mark.parametrize("is_gone", [True, False])
+def test_a_guard_that_is_gone_or_hangs_does_not_disturb_the_beat_of_others(is_gone):
+    child = ChildProcess("record")
+    if is_gone:
+        os.close(child._guard_end)
+    while not is_gone and select.select([], [child._monitor_end], [], 0.0)[1]:
+        os.write(child._monitor_end, bytes(4096))
+    child.beat()
+    for _ in range(2):
+        child.end()
+    child.beat()
+    assert child.is_ending
+    if not is_gone:
+        os.close(child._guard_end)

@@ -1,0 +1,54 @@
+"""The program localize: which robots it listens to, and what it takes of a report of all robots."""
+
+from unittest import mock
+
+import pytest
+
+pytest.importorskip("rospy", reason="the program needs ROS")
+from hero_localization.nodes import localize
+from hero_msgs.msg import RobotPose, RobotPoses
+
+
+@pytest.fixture(name="node")
+def make_node(monkeypatch):
+    """Return the program without topics, which knows hero_4 and hero_9."""
+    for name in ("Outputs", "PoseInput", "SwarmLocalizer"):
+        monkeypatch.setattr(localize, name, mock.create_autospec(getattr(localize, name)))
+    monkeypatch.setattr(localize, "subscribe_odometry", mock.create_autospec(localize.subscribe_odometry))
+    monkeypatch.setattr(localize.rospy, "Subscriber", mock.Mock())
+    monkeypatch.setattr(localize.rospy, "get_time", lambda: 50.0)
+    monkeypatch.setattr(localize.rospy, "logwarn_throttle", mock.Mock())
+    parameters = {name: declared.default for name, declared in localize.PARAMETERS.items()}
+    return localize.LocalizationNode({**parameters, "robots": [4, 9], "frame": "map", "pose_frame": ""})
+
+
+def list_subscribed():
+    return [call.args[0] for call in localize.subscribe_odometry.call_args_list]
+
+
+def test_robots_that_join_are_added_beside_those_that_are_known(node):
+    node._add_robots([4, 5, 9, 12])
+    assert list_subscribed() == ["/hero_4", "/hero_9", "/hero_5", "/hero_12"]
+    assert [call.args[0] for call in node._localizer.add_robots.call_args_list] == [[4], [9], [5], [12]]
+
+
+def make_report(frame, *states):
+    robots = [RobotPose(id=robot_id, state=state, x=0.1 * robot_id) for robot_id, state in states]
+    report = RobotPoses(robots=robots)
+    report.header.frame_id, report._connection_header = frame, {"callerid": "/track"}
+    return report
+
+
+def test_an_unknown_robot_in_a_report_does_not_keep_the_next_from_its_pose(node):
+    node._localizer.add_measurement.return_value = []
+    node._receive_swarm(make_report("map", (7, RobotPose.TRACKED), (4, RobotPose.LOST), (9, RobotPose.TRACKED)))
+    ((robot_id, measured, now_s),) = [call.args for call in node._localizer.add_measurement.call_args_list]
+    assert (robot_id, now_s) == (9, 50.0) and measured.pose.x_m == pytest.approx(0.9)
+    assert node._localizer.distrust.call_args.args[1] == [4]
+    assert set(node._unknown_s) == {7}
+
+
+def test_a_report_in_another_frame_is_left_alone_and_told(node):
+    node._receive_swarm(make_report("odom", (9, RobotPose.TRACKED)))
+    assert not node._localizer.add_measurement.called
+    assert "'odom', but must be in 'map'" in localize.rospy.logwarn_throttle.call_args.args[1]
