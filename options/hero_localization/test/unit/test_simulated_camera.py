@@ -455,7 +455,7 @@ def test_a_camera_hangs_as_low_as_the_last_pixel_allows(axis):
 
 def test_a_camera_file_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(SettingsError, match="camera.yaml cannot be written: "):
+    with pytest.raises(SettingsError, match="camera.yaml cannot be read or written: "):
         write_camera_file(str(tmp_path / "file" / "camera.yaml"), SMALL.geometry, [TAG], [])
 
 
