@@ -139,7 +139,7 @@ def draw_over_time(
     axes.set_xlabel("time (s)", fontsize=9)
     axes.set_ylabel("%s%s" % (metric, " (%s)" % unit if unit else ""), fontsize=9)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    axes.legend(fontsize=8, frameon=False)
+    axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))  # beside the lines
     return figure
 
 
