@@ -62,13 +62,13 @@ def test_robots_without_a_fault_are_good(calibrate, capsys):
 
 
 def test_a_robot_that_is_not_seen_does_not_keep_others_from_the_file(calibrate, capsys):
-    status, found = calibrate("0 7")
+    status, found = calibrate("7 0")
     assert status == 1 and 0 in found.layout.mounts and 7 not in found.layout.mounts
     assert "hero_7: tag 7 is not in the image" in capsys.readouterr().out
 
 
 def test_a_robot_whose_tag_is_another_ones_is_not_driven(calibrate, capsys):
-    status, found = calibrate("0 12")
+    status, found = calibrate("12 0")
     assert status == 1 and 12 not in found.layout.mounts
     assert "hero_12: tag 12 is assigned to something else: name the robot's in tag_robots" in capsys.readouterr().out
 

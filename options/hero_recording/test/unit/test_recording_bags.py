@@ -53,7 +53,7 @@ def test_files_of_a_split_are_read_in_order_of_time(tmp_path):
 def test_an_empty_file_of_a_split_is_skipped_and_only_empty_ones_refused(tmp_path):
     write_bag(tmp_path / "a.bag", seconds=1.0)
     rosbag.Bag(str(tmp_path / "empty.bag"), "w").close()
-    assert open_set(tmp_path / "a.bag", tmp_path / "empty.bag").paths == [str(tmp_path / "a.bag")]
+    assert open_set(tmp_path / "empty.bag", tmp_path / "a.bag").paths == [str(tmp_path / "a.bag")]
     with pytest.raises(RecordingError, match="no messages"):
         open_set(tmp_path / "empty.bag")
 
