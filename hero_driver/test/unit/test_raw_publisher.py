@@ -234,6 +234,17 @@ def test_what_waits_for_a_subscriber_that_left_is_forgotten(bench):
     assert not bench.publisher._backlogs
 
 
+def test_a_slow_subscriber_that_left_holds_up_no_other_slow_one(bench):
+    first, second = bench.subscribe(), bench.subscribe()
+    for number in range(QUEUE_LENGTH):
+        bench.publisher.publish(make_message(number))
+    first.leave()
+    received = second.read()
+    bench.run_timers()
+    assert len(received + second.read()) > len(received)
+    assert len(bench.timers) == 1
+
+
 def test_a_subscriber_that_breaks_while_it_is_slow_is_forgotten(bench):
     subscriber = bench.subscribe()
     for number in range(20):
