@@ -426,3 +426,21 @@ def test_the_handler_is_polled_and_every_other_link_though_it_fails(still_loop, 
     assert [(due_s, call) for due_s, _, call in loop._timers] == [(1000.05, loop._poll)]
     loop._poll()
     assert first == [1000.0, 1, 3] and polled[3:] == [1000.0, 0] and len(handler.bugs) == 2
+
+
+@pytest.mark.parametrize("error", [RuntimeError, MemoryError, SystemExit, KeyboardInterrupt])
+def test_whatever_breaks_the_loop_has_the_robots_stopped_before_connections_close(monkeypatch, error):
+    handler, steps = Handler(), []
+    loop = EventLoop("127.0.0.1", 0, (), 1.0)
+    loop.open(handler)
+    handler.stop_without_loop = lambda: steps.append("stop")
+    close_all = loop._close_all
+
+    def break_down():
+        raise error
+
+    monkeypatch.setattr(loop, "_run_once", break_down)
+    monkeypatch.setattr(loop, "_close_all", lambda: (steps.append("close"), close_all()))
+    with pytest.raises(error):
+        loop.run()
+    assert steps == ["stop", "close"]
