@@ -77,6 +77,7 @@ def run(monkeypatch, tmp_path, models):
             ("place_robots", lambda experiment, cell, seeds: swarm.rows.world.poses[None].copy()),
             ("_record", lambda *arguments: nullcontext()),
             ("time", SimpleNamespace(monotonic=lambda: swarm.now_s)),
+            ("read_duration_clock_s", lambda: swarm.now_s),
             ("rospy", SimpleNamespace(get_time=lambda: swarm.now_s, logwarn=pytest.fail)),
         ):
             monkeypatch.setattr(robot_runs, name, value)
