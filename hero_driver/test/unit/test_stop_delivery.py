@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hero_driver.commands.stop_progress import StopState
 from hero_driver.corrections.message_layouts import MD5SUMS
 from hero_driver.rosserial.errors import RosserialError
+from hero_driver.stops import delivery
 from hero_driver.stops.delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, describe_doubt, encode_stop, is_light
 from hero_test.fake_motors import LAG_S, FakeMotors
 
@@ -380,3 +381,17 @@ def test_a_stop_without_a_loop_reads_and_advances_until_all_rest():
         robot.peer.stop = None
         assert robot.stops.stop_without_loop([robot.peer], began_s + 2.0, reads.append) == [robot.peer]
         assert 2.0 <= clock.now_s - began_s < 2.03
+
+
+def test_a_robot_that_has_left_holds_up_the_stops_of_no_other(monkeypatch):
+    monkeypatch.setattr(delivery, "_is_pending", lambda peer: False)
+    stops = delivery.StopDelivery(lambda delay_s, call: None, SimpleNamespace(stopped=True, note_change=lambda: None))
+    gone, there = (
+        SimpleNamespace(stop=object(), bridge=None, link=SimpleNamespace(closed=is_closed))
+        for is_closed in (True, False)
+    )
+    advanced = []
+    monkeypatch.setattr(stops, "_advance", lambda peer, now_s: advanced.append(peer))
+    stops._peers = [gone, there]
+    stops._poll()
+    assert advanced == stops._peers == [there]
