@@ -143,7 +143,7 @@ class StopRequestTest(unittest.TestCase):
             table.wait_for(b"\x1b[1;31mNOT STOPPED: driver hero_driver_b does not answer")
             table.wait_for_next(b"hero_driver_b does not answer, driver listens")
         table.wait_for_next(b"stopped, all wheels at rest")
-        table.wait_for_next(b"READY, at rest")
+        table.wait_for_next(b"STOPPED, at rest")
         table.wait_for_next(b"ALL STOPPED")
         table.press(b"r")
         table.wait_for_next(b"released: robots may move again")
@@ -176,7 +176,8 @@ class StopRequestTest(unittest.TestCase):
         teleop.wait_for(b"stopped, all wheels at rest: r releases them")
         self.wait_for_report(True)
         teleop.press(b"w")
-        teleop.wait_for(b"all robots are stopped, so hero_0 cannot move: r releases them\r\n")
+        teleop.wait_for(b"all robots are stopped by teleop")
+        teleop.wait_for(b", so hero_0 cannot move: r releases them\r\n")
         with suspended(self.hung_pid, self.master_pid):
             teleop.press(b"\r")
             teleop.wait_for(b"\x1b[1;31mhero_0 | NOT STOPPED: driver hero_driver_b does not answer")
