@@ -429,7 +429,7 @@ def test_the_handler_is_polled_and_every_other_link_though_it_fails(still_loop, 
 
 
 @pytest.mark.parametrize("error", [RuntimeError, MemoryError, SystemExit, KeyboardInterrupt])
-def test_whatever_breaks_the_loop_has_the_robots_stopped_before_connections_close(monkeypatch, error):
+def test_whatever_breaks_the_loop_robots_stop_before_connections_close(monkeypatch, error):
     handler, steps = Handler(), []
     loop = EventLoop("127.0.0.1", 0, (), 1.0)
     loop.open(handler)
