@@ -28,6 +28,9 @@ class Drivers:
     def stop_status(self):
         return None
 
+    def read(self):
+        return None
+
 
 def record_commands(robot):
     """Return a list that grows by (ms, linear, angular) with each command that the robot is sent from now on."""

@@ -346,6 +346,8 @@ def test_goals_and_poses_that_mean_nothing_are_refused_at_once():
 
 
 def test_dropping_a_swarm_with_a_motion_on_its_way_is_no_error(recwarn):
+    gc.collect()  # what other tests left
+    recwarn.clear()
     swarm = StepSwarm(1)
     swarm[0].start_go_to(1.0, 0.0)
     swarm[0].blink("red")

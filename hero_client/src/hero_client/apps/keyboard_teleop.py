@@ -211,10 +211,10 @@ class KeyboardTeleop:
     def _find_stopped(self) -> str:
         """Return a line with the chosen robots that cannot move because all robots are stopped; empty if none."""
         stopped = [robot.name for robot in self._chosen if robot.is_stopped]
-        report = self._swarm.drivers.read() if stopped else None
-        if report is None:
+        if not stopped:
             return ""
-        origin = describe_stop_origin(report, time.time())
+        report = self._swarm.drivers.read()
+        origin = describe_stop_origin(report, time.time()) if report else ""
         return f"all robots are stopped {origin}".strip() + f", so {', '.join(stopped)} cannot move: r releases them"
 
     def _describe_stop(self) -> Tuple[str, str]:

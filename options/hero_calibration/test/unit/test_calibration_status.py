@@ -24,11 +24,19 @@ def test_robots_that_lack_a_part_are_missing():
 
 
 def test_a_robot_that_is_worse_than_the_rest_is_named():
-    found = {"hero_%d" % number: make(number, 0.02 if number < 3 else 0.05) for number in (10, 0, 1, 3)}
+    found = {"hero_%d" % number: make(number, 0.02 if number < 3 else 0.05) for number in (10, 0, 1, 2, 3)}
     lines = describe_status(Calibrations(found, {"hero_7": "hero_7.yaml: broken"}))
-    assert [line.split()[0] for line in lines] == ["ROBOT", "hero_0", "hero_1", "hero_3", "hero_10", "hero_7:"]
-    assert [line.endswith("worse than the rest") for line in lines] == [False, False, False, True, True, False]
-    assert "5.0 %" in lines[3] and "none" in lines[1]
+    assert [line.split()[0] for line in lines] == [
+        "ROBOT",
+        "hero_0",
+        "hero_1",
+        "hero_2",
+        "hero_3",
+        "hero_10",
+        "hero_7:",
+    ]
+    assert [line.endswith("worse than the rest") for line in lines] == [False, False, False, False, True, True, False]
+    assert "5.0 %" in lines[4] and "none" in lines[1]
 
 
 def test_two_robots_are_too_few_to_be_compared():
