@@ -39,8 +39,9 @@ def _make_row(number: int, row: Any, notes: RobotNotes, kept: Any) -> Dict[str, 
         known = {"state": row.state, "address": robot.address, "uptime_s": round(robot.uptime.to_sec())}
         known.update((name, getattr(robot, name)) for name in VERSIONS)
     errors = kept.values.get("velocity_errors", (None, None)) if kept else (None, None)
-    values = {"id": number, **known, **notes._asdict(), "calibrated": kept.date if kept else ""}
-    return {name: {**values, "velocity_error": errors[1]}[name] for name in COLUMNS}
+    calibration = {"calibrated": kept.date if kept else "", "velocity_error": errors[1]}
+    values = {"id": number, **known, **notes._asdict(), **calibration}
+    return {name: values[name] for name in COLUMNS}
 
 
 def list_warnings(inventory: Sequence[Mapping[str, Any]], run_time_h: float) -> List[str]:

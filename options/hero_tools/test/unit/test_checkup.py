@@ -2,6 +2,8 @@
 
 import socket
 import threading
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -146,6 +148,13 @@ def test_a_module_that_a_package_declares_and_is_missing_is_named(monkeypatch):
     assert computer.find_lacking_modules() == {"no-such": ["hero_swarm"]}
     finding = computer.check_python()
     assert finding.state == WARN and "lacks no-such (for hero_swarm)" in finding.text
+
+
+def test_modules_of_all_declared_packages_are_found_by_their_names():
+    own = Path(computer.__file__).resolve().parents[3] / "package.xml"
+    keys = [element.text for element in ElementTree.parse(str(own)).iter("exec_depend")]
+    modules = [computer.MODULES.get(key, key[len("python3-") :]) for key in keys if key.startswith("python3-")]
+    assert "catkin_pkg" in modules and all(map(str.isidentifier, nonempty(modules)))
 
 
 @pytest.mark.parametrize("free_gb, state", [(0.1, FAIL), (1.0, WARN), (50.0, OK)])

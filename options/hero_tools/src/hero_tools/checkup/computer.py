@@ -45,12 +45,13 @@ FIRMWARE_MD5 = {
     "hero_msgs.srv.SetPID": "69c16eccc66fd6b477afb5e5500b4b47",
 }
 OLDEST_PYTHON = (3, 8)
-MODULES = {"python3-opencv": "cv2", "python3-pil": "PIL"}
+MODULES = {"python3-catkin-pkg": "catkin_pkg", "python3-opencv": "cv2", "python3-pil": "PIL"}
 """Modules of rosdep keys that are not called python3- and the module's name."""
 
 AUTHOR = "HeRo suite maintainers"
 LOW_DISK_GB, FULL_DISK_GB = 2.0, 0.2
 LOW_BATTERY_PERCENT = 30
+INSTALL = "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y"
 SOURCE = "source the workspace in this terminal: source devel/setup.bash"
 
 
@@ -68,14 +69,14 @@ def check_python() -> Finding:
     if missing:
         return fail(
             f"Python {version} ({sys.executable}) lacks {', '.join(missing)}",
-            "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
+            INSTALL,
         )
     lacking = find_lacking_modules()
     if lacking:
         return warn(
             f"Python {version} ({sys.executable}) lacks "
             + ", ".join(f"{module} (for {', '.join(packages)})" for module, packages in lacking.items()),
-            "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y",
+            INSTALL,
         )
     text = f"Python {version} ({sys.executable}) has all modules"
     other = shutil.which("python3")
