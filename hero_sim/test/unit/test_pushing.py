@@ -28,7 +28,7 @@ MAX_PUSH_N = MASS_KG * 9.81 * (0.85 * 0.5 + 0.15 * 0.2)
 """Traction of a nominal robot: its wheels and its caster."""
 
 CREEP_SHARE = 0.06
-"""Of the speed of wheels that push nearly as much as they can is lost; see CREEP_M_S."""
+"""Share of their speed that wheels lose when they push nearly as much as they can; see CREEP_M_S."""
 
 STEP_M = 0.001
 """A robot at 0.1 m/s in 10 ms."""

@@ -10,7 +10,7 @@ from hero_sim.stepped.swarm import StepSwarm
 from hero_test.nonempty import nonempty
 
 BURST_LENGTH, BURSTS_PER_S = 1469, 29.27
-"""Of a stock robot's odometry, transforms and encoder."""
+"""Length, and rate in Hz, of a stock robot's messages of odometry, transforms and encoder."""
 
 
 def measure_rates_hz(count, wifi, seconds=10):

@@ -17,7 +17,7 @@ from hero_sim.world.world import World
 
 MAX_OVERLAP_M = 5e-4
 MAX_CREPT_M = 0.002
-"""In a second, of robots that press on each other in vain."""
+"""Maximum distance that robots which push each other without effect move in a second, m."""
 WIDE = build_rectangle(20.0, 20.0, 1)
 
 

@@ -170,4 +170,4 @@ def test_robots_that_crowd_at_a_door_do_not_overlap_or_shake(diameters):
         assert walls_m.max() <= 1e-6
         shakes_m.append(np.hypot(*(world.poses[:, :2] - before_m).T).max())
     assert worst_m < 2e-4
-    assert max(shakes_m) < 0.0025, "nobody is flung: a robot rolls 1 mm in a step"
+    assert max(shakes_m) < 0.0025, "no robot is flung: one rolls 1 mm in a step"

@@ -23,7 +23,7 @@ _FRAME_MS = 0.166
 
 _ATTEMPTS = 8
 _RESEND_MS = 500.0
-"""Until TCP sends again what the air lost: one tick of the ESP8266's slow TCP timer (lwIP)."""
+"""Retransmission timeout of TCP: one tick of the ESP8266's slow TCP timer (lwIP)."""
 
 _MAX_STATIONS = 101
 

@@ -60,10 +60,11 @@ def solve_contacts(
 ) -> None:  # fmt: skip
     """Solve the contacts of each world, in place. A loop for compile_loops().
 
-    Contact k presses the body first[k] off second[k], which the normal points to. arm, lever: moment arms (m) of a
-    pressure and a drag about each body's center. state: IDLE for one that does not matter in this step, STARTS for the
-    first one of n of the same two bodies, CONTINUES for those behind it; share: n. pressure, drag (N), and give (m/N)
-    also are the start. The ends of each kind of contacts are counted from the first contact of all.
+    Contact k pushes the bodies first[k] and second[k] apart; its normal points from the first to the second. arm,
+    lever: moment arms (m) of a pressure and a drag about each body's center. state: IDLE for one that does not matter
+    in this step, STARTS for the first one of n of the same two bodies, CONTINUES for those behind it; share: n.
+    pressure, drag (N), and give (m/N) also are the start. The ends of each kind of contacts are counted from the first
+    contact of all.
 
     Bodies: the first ones are robots. half: distance of a wheel from the center (m); wheel_n, caster_n: the largest
     forces (N); creep: below this slip (m) in a step they are not reached; rolled: free travel (m) in this step; left,
@@ -114,7 +115,7 @@ def solve_contacts(
                 u_x[i] = cosine[i] * ahead - sine[i] * aside
                 u_y[i] = sine[i] * ahead + cosine[i] * aside
                 moved_x[i] = moved_y[i] = turned[i] = 0.0
-            table = [
+            table = [  # empty, of types that numba knows
                 (0, False, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 for _ in range(0)
             ]
