@@ -17,7 +17,7 @@ from measuring import measure_machine_us, print_machine, read_cpu_s, write_repor
 from running_suite import RunningSuite
 from sensor_msgs.msg import Joy
 
-from hero_test.swarm_watch import SwarmWatch
+from hero_test.watches.swarm_watch import SwarmWatch
 
 SETTLE_S = 4.0
 """From the first command: subscriptions of all robots, and the first seconds of listening to /tf."""

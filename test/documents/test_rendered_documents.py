@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from hero_test.browser import MISSING, open_browser
+from hero_test.screens.browser import MISSING, open_browser
 from hero_test.waiting import wait_for
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -18,7 +18,7 @@ from hero_driver.rosserial import payloads
 from hero_msgs.msg import RobotArray
 from hero_test.driver_case import Recorder
 from hero_test.fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
-from hero_test.text_messages import STRING_MD5, make_text
+from hero_test.stock_messages import STRING_MD5, make_text
 from hero_test.waiting import wait_for
 
 EVIL_NAMES = (

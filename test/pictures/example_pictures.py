@@ -20,8 +20,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
-from hero_test.light_watch import LightWatch  # noqa: E402
-from hero_test.swarm_watch import SwarmWatch  # noqa: E402
+from hero_test.watches.light_watch import LightWatch  # noqa: E402
+from hero_test.watches.swarm_watch import SwarmWatch  # noqa: E402
 
 DOCS = ROOT / "hero_examples" / "docs"
 

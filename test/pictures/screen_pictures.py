@@ -18,10 +18,10 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
-from hero_test.browser import MISSING as NO_BROWSER  # noqa: E402
-from hero_test.monitor_page import MonitorPage  # noqa: E402
 from hero_test.processes import find_free_port  # noqa: E402
-from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
+from hero_test.screens.browser import MISSING as NO_BROWSER  # noqa: E402
+from hero_test.screens.monitor_page import MonitorPage  # noqa: E402
+from hero_test.screens.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"
 WALK_S = 25.0

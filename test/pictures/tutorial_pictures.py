@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
-from hero_test.virtual_screen import MISSING, VirtualScreen  # noqa: E402
+from hero_test.screens.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "tutorial" / "pictures"
 SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window

@@ -14,8 +14,8 @@ from nav_msgs.msg import Odometry
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.processes import Program, find_free_port, find_program, has_traceback
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.swarm_watch import SwarmWatch
 
 
 class DriverRestartTest(unittest.TestCase):

@@ -12,8 +12,8 @@ from std_msgs.msg import Float32
 from tf2_msgs.msg import TFMessage
 
 from hero_client import FrameError, StaleDataError, Swarm
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = range(3)
 

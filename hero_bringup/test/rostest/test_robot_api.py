@@ -15,9 +15,9 @@ import rostest
 from hero_client import FrameError, Robot, RobotNotReadyError, StaleDataError, Swarm
 from hero_client.values import MODELS
 from hero_sim.srv import InjectFault
-from hero_test.light_watch import LightWatch
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.light_watch import LightWatch
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = 6
 CORNERED = 4

@@ -13,8 +13,8 @@ import rostest
 
 from hero_client import GoalError, StoppedError, Swarm
 from hero_test.robot_program import go_around
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = 6
 CORNERED = 4

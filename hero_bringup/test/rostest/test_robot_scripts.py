@@ -16,10 +16,10 @@ import rostest
 from geometry_msgs.msg import Twist
 
 from hero_client import Drivers, NodeError, Robot
-from hero_test.fleet_report import wait_until_ready
 from hero_test.nonempty import nonempty
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.fleet_report import wait_until_ready
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = 4
 COMMANDS = "/hero_%d/velocity_controller/cmd_vel"

@@ -14,9 +14,9 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Twist
 from std_msgs.msg import ColorRGBA
 
 from hero_description.rviz_config import ABOVE_PIXELS_PER_M, GOAL_TOPIC, POINT_TOPIC
-from hero_test.swarm_watch import SwarmWatch
-from hero_test.virtual_screen import MISSING, VirtualScreen
+from hero_test.screens.virtual_screen import MISSING, VirtualScreen
 from hero_test.waiting import wait_for
+from hero_test.watches.swarm_watch import SwarmWatch
 
 TIMEOUT_S = 60.0
 NEAR_M = 0.015

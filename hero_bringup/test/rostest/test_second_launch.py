@@ -10,8 +10,8 @@ from geometry_msgs.msg import Twist
 
 from hero_msgs.msg import Robot, RobotArray
 from hero_test.processes import Program, find_free_port, find_pid, has_traceback
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.swarm_watch import SwarmWatch
 
 IDS = [0, 1]
 DRIVER_REFUSED = "a driver already runs as /hero_driver: end it, or start this one with another name:= and port:="

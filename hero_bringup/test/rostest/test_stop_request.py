@@ -21,8 +21,7 @@ from hero_client.swarm import Swarm
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import NodeError
 from hero_node.ros.ros_node import start_ros_node
-from hero_test.example_program import ExampleProgram
-from hero_test.processes import find_pid, find_program, suspended
+from hero_test.processes import ExampleProgram, find_pid, find_program, suspended
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.waiting import wait_for
 

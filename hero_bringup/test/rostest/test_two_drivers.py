@@ -16,8 +16,8 @@ from hero_monitor.background import Background
 from hero_monitor.control.drive_requests import DriveRequests
 from hero_test.processes import find_pid, suspended
 from hero_test.program_terminal import ProgramTerminal, run_fleet
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.swarm_watch import SwarmWatch
 
 IDS = [0, 1, 100, 101]
 TIMEOUT_S = 60.0

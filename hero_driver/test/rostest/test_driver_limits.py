@@ -19,7 +19,7 @@ from hero_test.fake_robot import (
     TIME_PACKET,
     Declaration,
 )
-from hero_test.text_messages import STRING_MD5
+from hero_test.stock_messages import STRING_MD5
 from hero_test.waiting import wait_for
 
 

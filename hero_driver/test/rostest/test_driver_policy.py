@@ -30,7 +30,7 @@ from hero_test.fake_robot import (
     Declaration,
     encode_answer,
 )
-from hero_test.text_messages import STRING_MD5, WRONG_MD5, make_text
+from hero_test.stock_messages import STRING_MD5, WRONG_MD5, make_text
 from hero_test.waiting import wait_for
 
 

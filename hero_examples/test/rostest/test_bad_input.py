@@ -7,7 +7,7 @@ import unittest
 import rospy
 import rostest
 
-from hero_test.example_program import ExampleProgram
+from hero_test.processes import ExampleProgram
 
 WRONG = {
     # program and argument: what the line must name

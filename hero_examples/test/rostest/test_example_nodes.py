@@ -18,11 +18,11 @@ import rostest
 from sensor_msgs.msg import Joy
 
 from hero_client import Robot
-from hero_test.command_watch import CommandWatch
-from hero_test.example_program import ExampleProgram
-from hero_test.light_watch import LightWatch
-from hero_test.swarm_watch import SwarmWatch
+from hero_test.processes import ExampleProgram
 from hero_test.waiting import wait_for
+from hero_test.watches.command_watch import CommandWatch
+from hero_test.watches.light_watch import LightWatch
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = range(12)
 WHITE, DARK, GREEN = (1.0, 1.0, 1.0), (0.15, 0.15, 0.15), (0.0, 1.0, 0.0)

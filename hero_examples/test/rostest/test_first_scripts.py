@@ -13,10 +13,10 @@ import rospy
 import rostest
 from nav_msgs.msg import Odometry
 
-from hero_test.command_watch import CommandWatch
-from hero_test.example_program import ExampleProgram
-from hero_test.swarm_watch import SwarmWatch
+from hero_test.processes import ExampleProgram
 from hero_test.waiting import TIMEOUT_S, wait_for
+from hero_test.watches.command_watch import CommandWatch
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = range(10)
 SCRIPTS = ["move", "read_sensors", "drive_a_square", "avoid", "keep_distance"]

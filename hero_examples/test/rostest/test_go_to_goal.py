@@ -12,9 +12,9 @@ from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
 
 from hero_msgs.msg import GoToAction, GoToGoal
-from hero_test.command_watch import CommandWatch
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import TIMEOUT_S, wait_for
+from hero_test.watches.command_watch import CommandWatch
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = range(6)
 

@@ -14,10 +14,9 @@ import rosnode
 import rospy
 import rostest
 
-from hero_test.command_watch import CommandWatch
-from hero_test.example_program import ExampleProgram
-from hero_test.processes import find_program
+from hero_test.processes import ExampleProgram, find_program
 from hero_test.waiting import wait_for
+from hero_test.watches.command_watch import CommandWatch
 
 # The shell owns the terminal, as it does for a user, and keeps it open when teleop has ended.
 FOREGROUND_SHELL = 'trap : INT TERM HUP; "$@"; echo "status=$?="; cat >/dev/null'

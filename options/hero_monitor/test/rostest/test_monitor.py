@@ -12,12 +12,12 @@ from monitor_process import HOST, OTHER_HOST, TIMEOUT_S, PageClient, end, start_
 from rosgraph_msgs.msg import Log
 
 from hero_sim.srv import InjectFault
-from hero_test.browser import MISSING
-from hero_test.monitor_page import MonitorPage
 from hero_test.nonempty import nonempty
 from hero_test.processes import find_pid, suspended
-from hero_test.swarm_watch import SwarmWatch
+from hero_test.screens.browser import MISSING
+from hero_test.screens.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
+from hero_test.watches.swarm_watch import SwarmWatch
 
 HOSTILE = "<img src=x onerror='document.title=\"broken\"'><script>document.title='broken'</script> \u202e\x1b[31m"
 

@@ -13,8 +13,8 @@ from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
 
-from hero_test.browser import MISSING
-from hero_test.monitor_page import MonitorPage
+from hero_test.screens.browser import MISSING
+from hero_test.screens.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
 
 

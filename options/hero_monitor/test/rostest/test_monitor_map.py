@@ -15,8 +15,8 @@ from PIL import Image
 from sensor_msgs.msg import CompressedImage
 
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_test.browser import MISSING
-from hero_test.monitor_page import MonitorPage
+from hero_test.screens.browser import MISSING
+from hero_test.screens.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
 
 COLORS = {"red": (255, 0, 0), "green": (0, 160, 0), "blue": (0, 0, 255), "magenta": (255, 0, 255)}

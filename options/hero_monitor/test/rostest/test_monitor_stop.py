@@ -22,10 +22,10 @@ from monitor_process import (
 from std_msgs.msg import Bool, String
 
 from hero_msgs.msg import RobotArray
-from hero_test.browser import MISSING
-from hero_test.monitor_page import MonitorPage
 from hero_test.nonempty import nonempty
 from hero_test.processes import find_pid, suspended
+from hero_test.screens.browser import MISSING
+from hero_test.screens.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
 
 DRIVERS = ("hero_driver", "hero_driver_b")

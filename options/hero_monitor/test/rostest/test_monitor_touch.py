@@ -9,8 +9,8 @@ import unittest
 import rostest
 from scripted_monitor import LONG_CAUSE, ScriptedMonitor, make_fleet, make_robot
 
-from hero_test.browser import MISSING
-from hero_test.monitor_page import MonitorPage
+from hero_test.screens.browser import MISSING
+from hero_test.screens.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
 
 PORTRAIT = [(320, 568), (360, 740), (390, 844), (820, 1180)]

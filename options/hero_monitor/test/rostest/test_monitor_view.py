@@ -9,8 +9,8 @@ from pathlib import Path
 import rostest
 from scripted_monitor import ScriptedMonitor, make_fleet, make_program, make_robot
 
-from hero_test.browser import MISSING
-from hero_test.monitor_page import MonitorPage
+from hero_test.screens.browser import MISSING
+from hero_test.screens.monitor_page import MonitorPage
 from hero_test.waiting import wait_for
 
 AXE = (Path(__file__).resolve().parents[1] / "vendor" / "axe.min.js").read_text(encoding="utf-8")

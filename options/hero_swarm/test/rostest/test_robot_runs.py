@@ -14,10 +14,10 @@ import rospy
 import rostest
 
 from hero_client import Drivers
-from hero_test.fleet_report import wait_until_ready
 from hero_test.processes import Program, find_program, has_traceback
-from hero_test.swarm_watch import SwarmWatch
 from hero_test.waiting import wait_for
+from hero_test.watches.fleet_report import wait_until_ready
+from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = 3
 EXPERIMENT = """\

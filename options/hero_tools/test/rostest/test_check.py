@@ -11,8 +11,8 @@ import rosgraph
 import rospy
 import rostest
 
-from hero_test.fleet_report import wait_until_ready
 from hero_test.processes import find_program
+from hero_test.watches.fleet_report import wait_until_ready
 
 DEADLINE_S = 60.0  # check itself ends after 3 s; a machine that is busy may take longer
 PORT = "21290"

@@ -10,11 +10,11 @@ import rospy
 import rostest
 from geometry_msgs.msg import Twist, Vector3
 
-from hero_test.fleet_report import wait_until_ready
 from hero_test.nonempty import nonempty
 from hero_test.processes import Program, find_program
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.waiting import wait_for
+from hero_test.watches.fleet_report import wait_until_ready
 
 INTERRUPTED = 130
 

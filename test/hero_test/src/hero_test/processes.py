@@ -136,3 +136,14 @@ class Program:
         if self.process.poll() is None:
             self.process.kill()
         self.wait_end()
+
+
+class ExampleProgram(Program):
+    """A node of hero_examples as a user starts it, with a new name: private parameters outlive a node."""
+
+    _count = 0
+
+    def __init__(self, name, *arguments, environment=None):
+        ExampleProgram._count += 1
+        node = "__name:=%s_%d" % (name, ExampleProgram._count)
+        super().__init__(find_program("hero_examples", name), node, *arguments, environment=environment)

@@ -1,4 +1,7 @@
-"""Payloads of the stock robot's topics, with the firmware's quirks: seq of -1, zero covariances, single transforms."""
+"""Payloads of the stock robot's topics, with the firmware's quirks: seq of -1, zero covariances, single transforms.
+
+Also texts (std_msgs/String) and their md5, for topics and services that stock robots do not have.
+"""
 
 import io
 import math
@@ -8,10 +11,13 @@ from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from rospy import Time
 from sensor_msgs.msg import Imu, LaserScan
+from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder
 
+STRING_MD5 = String._md5sum
+WRONG_MD5 = "0123456789abcdef0123456789abcdef"
 SEQ_OF_FIRMWARE = 0xFFFFFFFF
 
 TICK_M = math.pi * 0.0492 / 288.0
@@ -103,6 +109,11 @@ def make_imu(name, stamp):
     message.header.frame_id = name + "/base_link"
     message.orientation = _quaternion(0.5)
     return to_bytes(message)
+
+
+def make_text(text):
+    """Return the payload of a std_msgs/String."""
+    return to_bytes(String(text))
 
 
 def make_twist(linear_m_s, angular_rad_s):

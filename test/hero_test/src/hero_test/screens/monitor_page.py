@@ -4,7 +4,7 @@ import contextlib
 import os
 from pathlib import Path
 
-from hero_test.browser import open_browser, set_page_size
+from hero_test.screens.browser import open_browser, set_page_size
 from hero_test.waiting import wait_for
 
 KEEP_NOTICES = (

@@ -1,0 +1,1 @@
+"""What tests watch of robots: their ground truth, lights and commands, and the reports of their driver."""
