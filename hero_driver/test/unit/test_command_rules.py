@@ -15,7 +15,7 @@ from hero_driver.corrections.wheel_motion import REST_TICKS, SETTLED_TICKS, Whee
 from hero_driver.robot_constants import MAX_WATCHDOG_S, MAX_WHEEL_SPEED_M_S
 from hero_driver.ros import robot_commands
 from hero_driver.ros.robot_commands import LIGHT_SUFFIX, SUPERSEDED_S, TUNING_SILENCE_S, RobotCommands
-from hero_node import Pose
+from hero_node import Pose, encode_pose
 
 VELOCITY, POSITION = "/hero_1/velocity_controller/cmd_vel", "/hero_1/position_controller/cmd_vel"
 TWIST = "geometry_msgs/Twist"
@@ -227,7 +227,7 @@ def test_odometry_that_is_written_lies_in_the_plane_and_counts_round():
     frames = b"".join(struct.pack("<I", len(text)) + text for text in (b"odom", b"base_link"))
     payload = struct.pack("<3I", 1, 2, 3) + frames + bytes(8 * (7 + 36 + 6 + 36))
     written = writer.rewrite(
-        payload, 2**32 + 5, 1_500_000_007, (message_layouts.pack_pose(1.0, 2.0, math.pi / 2.0), 0.1, 0.5)
+        payload, 2**32 + 5, 1_500_000_007, (encode_pose(1.0, 2.0, math.pi / 2.0), 0.1, 0.5)
     )
     assert struct.unpack_from("<3I", written) == (5, 1, 500_000_007)
     numbers = struct.unpack_from("<85d", written, 12 + len(frames))

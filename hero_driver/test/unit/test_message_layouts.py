@@ -25,6 +25,7 @@ from robot_messages import (
 from sensor_msgs.msg import Range
 
 from hero_driver.corrections import message_layouts
+from hero_node import LENGTH, encode_pose, encode_text
 from hero_test.nonempty import nonempty
 
 POSE_DIAGONAL = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -55,12 +56,12 @@ def test_an_encoder_of_hero_plus_becomes_the_stock_one():
 )
 def test_a_distance_becomes_a_range_by_rep_117(distance_m, shown_m):
     message = Range()
-    message.deserialize(message_layouts.make_range(struct.pack("<f", distance_m), 3, NOW_NS + 5, b"hero_0/hat_link"))
+    message.deserialize(message_layouts.make_range(struct.pack("<f", distance_m), 3, NOW_NS + 5, "hero_0/hat_link"))
     assert (message.header.seq, message.header.stamp.to_nsec()) == (3, NOW_NS + 5)
     assert (message.header.frame_id, message.radiation_type) == ("hero_0/hat_link", Range.INFRARED)
     assert message.range == pytest.approx(shown_m, nan_ok=True)
     assert message.min_range < 0.1 < 2.0 < message.max_range and 0.1 < message.field_of_view < 0.5
-    assert message_layouts.make_range(b"12345", 0, 0, b"") is None
+    assert message_layouts.make_range(b"12345", 0, 0, "") is None
 
 
 # Headers.
@@ -112,7 +113,7 @@ def test_odometry_gets_covariances_and_keeps_the_robots_estimate():
 
 
 def test_odometry_takes_another_estimate():
-    estimate = (message_layouts.pack_pose(7.0, 8.0, -2.0), 0.2, 3.0)
+    estimate = (encode_pose(7.0, 8.0, -2.0), 0.2, 3.0)
     written = make_writer().rewrite(build_odometry(NOW_NS, 1.0, 2.0, 0.5, 0.1, -0.3), 4, NOW_NS, estimate)
     assert read_odometry(written)[2:7] == pytest.approx((7.0, 8.0, -2.0, 0.2, 3.0))
 
@@ -172,9 +173,9 @@ def test_a_transform_that_was_read_is_packed_as_the_same_bytes():
 
 
 def test_a_tail_is_the_pose():
-    frames = message_layouts.join_frames(b"hero_0/odom", b"hero_0/base_link")
+    frames = encode_text("hero_0/odom") + encode_text("hero_0/base_link")
     assert frames == build_text("hero_0/odom") + build_text("hero_0/base_link")
-    tail = message_layouts.pack_pose(1.0, -2.0, 3.0)
+    tail = encode_pose(1.0, -2.0, 3.0)
     transform = message_layouts.pack_transform_head(NOW_NS, frames) + tail
     assert read_transform(transform) == (
         NOW_NS,
@@ -207,7 +208,7 @@ def test_any_bytes_are_transforms_or_none(payload):
 
 @given(frame_id=st.binary(max_size=30), child_frame_id=st.binary(max_size=30))
 def test_frames_are_split_as_they_were_joined(frame_id, child_frame_id):
-    frames = message_layouts.join_frames(frame_id, child_frame_id)
+    frames = b"".join(LENGTH.pack(len(name)) + name for name in (frame_id, child_frame_id))
     assert message_layouts.split_frames(frames) == (frame_id, child_frame_id)
 
 
@@ -251,7 +252,7 @@ def test_odometry_of_the_robot_itself_with_absurd_numbers_is_none(number):
     for changed in ({"x_m": number}, {"linear_m_s": number}):
         payload = build_odometry(NOW_NS, y_m=1e308, **changed)
         assert make_writer().rewrite(payload, 0, NOW_NS, None) is None
-        estimate = (message_layouts.pack_pose(0.0, 0.0, 0.0), 0.0, 0.0)
+        estimate = (encode_pose(0.0, 0.0, 0.0), 0.0, 0.0)
         assert make_writer().rewrite(payload, 0, NOW_NS, estimate) is not None, "they are not used"
 
 

@@ -20,6 +20,16 @@ from .geometry import (
 )
 from .optional import import_optional
 from .processes import end_process, raise_file_limit
-from .tcpros import LENGTH, TooLongError, find_messages
+from .tcpros import (
+    HEADER,
+    LENGTH,
+    POSE_FORM,
+    TWIST_FORM,
+    TooLongError,
+    encode_header,
+    encode_pose,
+    encode_text,
+    find_messages,
+)
 from .texts import list_names, make_printable, one_line, shorten
 from .token_bucket import TokenBucket, TokenBuckets

@@ -11,6 +11,8 @@ import math
 import struct
 from typing import Optional
 
+from hero_node import TWIST_FORM
+
 from ..robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, SERVO_CENTER_US
 
 COMMAND_INTERVAL_S = 0.06
@@ -19,10 +21,7 @@ COMMAND_INTERVAL_S = 0.06
 STOP_REPEATS = 1
 """Number of repetitions of a stop."""
 
-TWIST_LENGTH = 48
-_TWIST = struct.Struct("<6d")
-
-ZERO_TWIST = bytes(TWIST_LENGTH)
+ZERO_TWIST = bytes(TWIST_FORM.size)
 
 STOPPED_MOTORS = struct.pack("<hh", SERVO_CENTER_US, SERVO_CENTER_US)
 
@@ -36,9 +35,9 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     What stops the robot becomes ZERO_TWIST: it uses only linear.x and angular.z. With clamp, these
     two are brought into the firmware's limits.
     """
-    if len(payload) != TWIST_LENGTH:
+    if len(payload) != TWIST_FORM.size:
         return None
-    components = _TWIST.unpack(payload)
+    components = TWIST_FORM.unpack(payload)
     # A sum of finite numbers may overflow; only then are the six looked at one by one.
     if not math.isfinite(sum(components)) and not all(map(math.isfinite, components)):
         return None
@@ -49,7 +48,7 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
         return payload
     clamped_m_s = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
     clamped_rad_s = max(-MAX_ANGULAR_RAD_S, min(MAX_ANGULAR_RAD_S, angular_rad_s))
-    return _TWIST.pack(clamped_m_s, *components[1:5], clamped_rad_s)
+    return TWIST_FORM.pack(clamped_m_s, *components[1:5], clamped_rad_s)
 
 
 def check_motor_pulses(payload: bytes) -> Optional[bytes]:

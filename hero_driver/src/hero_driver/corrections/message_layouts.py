@@ -8,6 +8,8 @@ import math
 import struct
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
+from hero_node import HEADER, LENGTH, POSE_FORM, TWIST_FORM, encode_header
+
 from ..robot_constants import (
     BODY_RADIUS_M,
     DISTANCE_CONE_RAD,
@@ -22,13 +24,9 @@ from ..robot_constants import (
 from .robot_models import PLUS_ENCODER_MD5
 from .stamps import NS_PER_S
 
-_HEADER = struct.Struct("<IIII")  # seq, secs, nsecs, length of frame_id
-_LENGTH = struct.Struct("<I")
 _SEQ_AND_STAMP = struct.Struct("<III")
 _STAMP = struct.Struct("<II")
 _ENCODER_TICKS = struct.Struct("<2d")
-_POSE = struct.Struct("<7d")
-_TWIST = struct.Struct("<6d")
 _COVARIANCE = struct.Struct("<36d")
 
 MD5SUMS = {
@@ -45,8 +43,8 @@ MD5SUMS = {
 """The layouts that are read or written here; another md5 is another layout, which CONVERSIONS may translate."""
 
 STAMP_OFFSET = 4  # of a message that begins with a header
-TRANSFORM_TAIL_LENGTH = _POSE.size  # translation and rotation
-ODOMETRY_TAIL_LENGTH = _POSE.size + _COVARIANCE.size + _TWIST.size + _COVARIANCE.size
+TRANSFORM_TAIL_LENGTH = POSE_FORM.size  # translation and rotation
+ODOMETRY_TAIL_LENGTH = POSE_FORM.size + _COVARIANCE.size + TWIST_FORM.size + _COVARIANCE.size
 ENCODER_TAIL_LENGTH = 11 * 8
 
 CLAMP_TOLERANCE_M = 1e-4
@@ -60,7 +58,7 @@ MAX_TURN_RAD_S = 100.0
 
 def read_stamp_ns(payload: bytes) -> Optional[int]:
     """Return the stamp of a payload that begins with a header, or None if it is too short for one."""
-    if len(payload) < _HEADER.size:
+    if len(payload) < HEADER.size:
         return None
     secs, nsecs = _STAMP.unpack_from(payload, STAMP_OFFSET)
     stamp_ns: int = secs * NS_PER_S + nsecs
@@ -76,10 +74,10 @@ def restamp(payload: bytes, seq: int, stamp_ns: int) -> bytes:
 def read_encoder(payload: bytes) -> Optional[Tuple[int, float, float]]:
     """Return (stamp_ns, left_ticks, right_ticks) of a hero_msgs/Encoder, or None if payload is not one."""
     end = len(payload) - ENCODER_TAIL_LENGTH
-    if end < _HEADER.size:
+    if end < HEADER.size:
         return None
-    _, secs, nsecs, length = _HEADER.unpack_from(payload)
-    if _HEADER.size + length != end:
+    _, secs, nsecs, length = HEADER.unpack_from(payload)
+    if HEADER.size + length != end:
         return None
     left, right = _ENCODER_TICKS.unpack_from(payload, end)
     return secs * NS_PER_S + nsecs, left, right
@@ -99,15 +97,15 @@ CONVERSIONS: Dict[Tuple[str, str], Callable[[bytes], bytes]] = {
 """By type and md5 of a layout that some robots have: what makes the known layout of it."""
 
 _ODOMETRY_FRAMES = slice(_SEQ_AND_STAMP.size, -ODOMETRY_TAIL_LENGTH)
-_ODOMETRY_POSE = slice(-ODOMETRY_TAIL_LENGTH, _POSE.size - ODOMETRY_TAIL_LENGTH)
-_ODOMETRY_TWIST = slice(-_TWIST.size - _COVARIANCE.size, -_COVARIANCE.size)
+_ODOMETRY_POSE = slice(-ODOMETRY_TAIL_LENGTH, POSE_FORM.size - ODOMETRY_TAIL_LENGTH)
+_ODOMETRY_TWIST = slice(-TWIST_FORM.size - _COVARIANCE.size, -_COVARIANCE.size)
 
 
 def read_odometry_velocity(payload: bytes) -> Optional[Tuple[float, float]]:
     """Return the linear (m/s) and angular (rad/s) speed in a nav_msgs/Odometry, or None if payload is too short."""
     if len(payload) < ODOMETRY_TAIL_LENGTH:
         return None
-    components = _TWIST.unpack(payload[_ODOMETRY_TWIST])
+    components = TWIST_FORM.unpack(payload[_ODOMETRY_TWIST])
     return math.hypot(components[0], math.hypot(*components[1:3])), math.hypot(
         components[5], math.hypot(*components[3:5])
     )
@@ -127,7 +125,7 @@ class OdometryWriter:
     ) -> Optional[bytes]:
         """Return the robot's message with stamp and covariances, and with another estimate if one is given.
 
-        estimate: pose, from pack_pose(), and velocities ahead (m/s) and around z (rad/s). None if payload is not a
+        estimate: pose, from encode_pose(), and velocities ahead (m/s) and around z (rad/s). None if payload is not a
         nav_msgs/Odometry, or the robot's own numbers, where they are used, cannot be true.
         """
         # A robot's frames never change, so they are looked at once.
@@ -138,11 +136,11 @@ class OdometryWriter:
             self._frames = frames
         if estimate is None:
             pose, twist = payload[_ODOMETRY_POSE], payload[_ODOMETRY_TWIST]
-            if not _is_possible(_POSE.unpack(pose), _TWIST.unpack(twist)):
+            if not _is_possible(POSE_FORM.unpack(pose), TWIST_FORM.unpack(twist)):
                 return None
         else:
             pose, linear_m_s, angular_rad_s = estimate
-            twist = _TWIST.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
+            twist = TWIST_FORM.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
         secs, nsecs = divmod(stamp_ns, NS_PER_S)
         head = _SEQ_AND_STAMP.pack(seq & 0xFFFFFFFF, secs, nsecs)
         return b"".join((head, frames, pose, self._pose_covariance, twist, self._twist_covariance))
@@ -162,7 +160,7 @@ def _is_possible(pose: Sequence[float], twist: Sequence[float]) -> bool:
 
 def find_transform_fault(transform: bytes) -> str:
     """Return the numbers of a geometry_msgs/TransformStamped that cannot be a robot's, for users; empty if they can."""
-    x_m, y_m, z_m, x, y, z, w = _POSE.unpack_from(transform, len(transform) - TRANSFORM_TAIL_LENGTH)
+    x_m, y_m, z_m, x, y, z, w = POSE_FORM.unpack_from(transform, len(transform) - TRANSFORM_TAIL_LENGTH)
     if (  # in one go, as it runs 147 times a second for each robot; comparisons with NaN fail
         -MAX_POSITION_M <= x_m <= MAX_POSITION_M
         and -MAX_POSITION_M <= y_m <= MAX_POSITION_M
@@ -177,7 +175,7 @@ def describe_odometry(payload: bytes) -> str:
     """Return position and velocity in a nav_msgs/Odometry, for users; its length if it is too short."""
     if len(payload) < ODOMETRY_TAIL_LENGTH:
         return f"{len(payload)} bytes"
-    pose, twist = _POSE.unpack(payload[_ODOMETRY_POSE]), _TWIST.unpack(payload[_ODOMETRY_TWIST])
+    pose, twist = POSE_FORM.unpack(payload[_ODOMETRY_POSE]), TWIST_FORM.unpack(payload[_ODOMETRY_TWIST])
     return "x %.4g m, y %.4g m, %.4g m/s, %.4g rad/s" % (*pose[:2], twist[0], twist[5])
 
 
@@ -185,9 +183,9 @@ def _holds_two_texts(data: bytes) -> bool:
     """Return whether data is two texts with their lengths in front, and nothing else."""
     position = 0
     for _ in range(2):
-        if position + _LENGTH.size > len(data):
+        if position + LENGTH.size > len(data):
             return False
-        position += _LENGTH.size + _LENGTH.unpack_from(data, position)[0]
+        position += LENGTH.size + LENGTH.unpack_from(data, position)[0]
     return position == len(data)
 
 
@@ -201,19 +199,19 @@ class Transform(NamedTuple):
 
 def read_transforms(payload: bytes) -> Optional[List[Transform]]:
     """Return the transforms of a tf2_msgs/TFMessage, or None if it is not one from first to last byte."""
-    if len(payload) < _LENGTH.size:
+    if len(payload) < LENGTH.size:
         return None
-    count = _LENGTH.unpack_from(payload)[0]
-    position = _LENGTH.size
+    count = LENGTH.unpack_from(payload)[0]
+    position = LENGTH.size
     transforms = []
     for _ in range(count):
-        if position + _HEADER.size > len(payload):
+        if position + HEADER.size > len(payload):
             return None
-        _, secs, nsecs, length = _HEADER.unpack_from(payload, position)
-        child_start = position + _HEADER.size + length
-        if child_start + _LENGTH.size > len(payload):
+        _, secs, nsecs, length = HEADER.unpack_from(payload, position)
+        child_start = position + HEADER.size + length
+        if child_start + LENGTH.size > len(payload):
             return None
-        frames_end = child_start + _LENGTH.size + _LENGTH.unpack_from(payload, child_start)[0]
+        frames_end = child_start + LENGTH.size + LENGTH.unpack_from(payload, child_start)[0]
         end = frames_end + TRANSFORM_TAIL_LENGTH
         if end > len(payload):
             return None
@@ -224,26 +222,21 @@ def read_transforms(payload: bytes) -> Optional[List[Transform]]:
 
 
 # What a TFMessage with one transform holds where. Slices that exist already cost half of those made on the way.
-TRANSFORM_START = slice(0, _LENGTH.size + _SEQ_AND_STAMP.size)  # the number of transforms, seq and stamp
-TRANSFORM = slice(_LENGTH.size, None)
+TRANSFORM_START = slice(0, LENGTH.size + _SEQ_AND_STAMP.size)  # the number of transforms, seq and stamp
+TRANSFORM = slice(LENGTH.size, None)
 TRANSFORM_HEAD = slice(TRANSFORM.start, -TRANSFORM_TAIL_LENGTH)  # of the transform: seq, stamp and frames
 TRANSFORM_FRAMES = slice(TRANSFORM_START.stop, -TRANSFORM_TAIL_LENGTH)
 TRANSFORM_TAIL = slice(-TRANSFORM_TAIL_LENGTH, None)
 
-read_transforms_start: Callable[[bytes], Tuple[int, int, int, int]] = struct.Struct("<IIII").unpack_from
+read_transforms_start: Callable[[bytes], Tuple[int, int, int, int]] = struct.Struct("<4I").unpack_from
 """Returns the number of transforms in at least 16 bytes of a TFMessage, and seq, secs and nsecs of the first."""
 
 
 def split_frames(frames: bytes) -> Tuple[bytes, bytes]:
     """Return (frame_id, child_frame_id) of Transform.frames."""
-    length = _LENGTH.unpack_from(frames)[0]
-    child = _LENGTH.size + length
-    return frames[_LENGTH.size : child], frames[child + _LENGTH.size :]
-
-
-def join_frames(frame_id: bytes, child_frame_id: bytes) -> bytes:
-    """Undo split_frames()."""
-    return b"".join(_LENGTH.pack(len(name)) + name for name in (frame_id, child_frame_id))
+    length = LENGTH.unpack_from(frames)[0]
+    child = LENGTH.size + length
+    return frames[LENGTH.size : child], frames[child + LENGTH.size :]
 
 
 def pack_transform_head(stamp_ns: int, frames: bytes) -> bytes:
@@ -254,7 +247,7 @@ def pack_transform_head(stamp_ns: int, frames: bytes) -> bytes:
 
 def pack_transform_message(transforms: Sequence[bytes]) -> bytes:
     """Return the tf2_msgs/TFMessage of transforms, each the bytes of one geometry_msgs/TransformStamped."""
-    return _LENGTH.pack(len(transforms)) + b"".join(transforms)
+    return LENGTH.pack(len(transforms)) + b"".join(transforms)
 
 
 _STOCK_SCAN_TAIL = struct.Struct("<7fI16fI16f")
@@ -270,7 +263,7 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
     None if payload is not a stock laser message.
     """
     end = len(payload) - _STOCK_SCAN_TAIL.size  # of the header
-    if end < _HEADER.size or _HEADER.size + _HEADER.unpack_from(payload)[3] != end:
+    if end < HEADER.size or HEADER.size + HEADER.unpack_from(payload)[3] != end:
         return None
     fields = _STOCK_SCAN_TAIL.unpack_from(payload, end)
     if fields[7] != STOCK_BEAMS or fields[24] != STOCK_BEAMS:
@@ -305,7 +298,7 @@ _RANGE = struct.Struct("<B4f")
 _INFRARED = 1  # sensor_msgs/Range.INFRARED
 
 
-def make_range(payload: bytes, seq: int, stamp_ns: int, frame_id: bytes) -> Optional[bytes]:
+def make_range(payload: bytes, seq: int, stamp_ns: int, frame_id: str) -> Optional[bytes]:
     """Return the sensor_msgs/Range of a distance (m) in a std_msgs/Float32, by REP 117; None if it is not one."""
     if len(payload) != _DISTANCE.size:
         return None
@@ -314,15 +307,8 @@ def make_range(payload: bytes, seq: int, stamp_ns: int, frame_id: bytes) -> Opti
         distance_m = math.inf
     elif distance_m < MIN_DISTANCE_M:
         distance_m = -math.inf
-    secs, nsecs = divmod(stamp_ns, NS_PER_S)
-    head = _HEADER.pack(seq & 0xFFFFFFFF, secs, nsecs, len(frame_id)) + frame_id
+    head = encode_header(seq, frame_id, divmod(stamp_ns, NS_PER_S))
     return head + _RANGE.pack(_INFRARED, DISTANCE_CONE_RAD, MIN_DISTANCE_M, MAX_DISTANCE_M, distance_m)
-
-
-def pack_pose(x_m: float, y_m: float, yaw_rad: float) -> bytes:
-    """Return position (or translation) and rotation of a pose in the plane."""
-    half_rad = yaw_rad / 2.0
-    return _POSE.pack(x_m, y_m, 0.0, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
 
 
 def _make_diagonal(values: Sequence[float]) -> List[float]:

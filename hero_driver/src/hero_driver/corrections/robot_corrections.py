@@ -8,7 +8,7 @@ import functools
 import itertools
 from typing import Any, Callable, DefaultDict, Deque, Iterator, List, Protocol, Set, Tuple
 
-from hero_node import Pose
+from hero_node import Pose, encode_pose
 from hero_node.files import HERO_PLUS
 
 from ..robot_constants import SCAN_TIME_S
@@ -243,7 +243,7 @@ class RobotCorrections:
         if not range_sink.is_wanted:
             return
         # The sensor is on the hat, whose place the robot sends on /tf.
-        frame_id = (self._namespace.strip("/") + "/hat_link").encode()
+        frame_id = self._namespace.strip("/") + "/hat_link"
         message = message_layouts.make_range(payload, next(self._seqs["range"]), arrival_ns, frame_id)
         if message is None:
             self._refused += 1
@@ -306,7 +306,7 @@ class RobotCorrections:
             write(start, data)
 
     def _pack_pose(self) -> bytes:
-        return message_layouts.pack_pose(self.odometry.x_m, self.odometry.y_m, self.odometry.yaw_rad)
+        return encode_pose(self.odometry.x_m, self.odometry.y_m, self.odometry.yaw_rad)
 
     def _write_odometry(self, stamp_ns: int, payload: bytes) -> None:
         odometry = self.odometry

@@ -6,6 +6,8 @@ Takes payloads of tf2_msgs/TFMessage, gives single transforms.
 import re
 from typing import Callable, Set
 
+from hero_node import encode_text
+
 from . import message_layouts
 from .message_layouts import TRANSFORM, TRANSFORM_FRAMES, TRANSFORM_HEAD, TRANSFORM_START, TRANSFORM_TAIL
 from .stamps import NS_PER_S, StampFilter
@@ -49,8 +51,9 @@ class TransformCorrector:
         self._stamps = stamps
         self._add_transform = add_transform
         self._take_odom_transform = take_odom_transform
-        self._frame_prefix = namespace.lstrip("/").encode() + b"/"
-        self._odom_frames = message_layouts.join_frames(self._frame_prefix + b"odom", self._frame_prefix + b"base_link")
+        prefix = namespace.lstrip("/") + "/"
+        self._frame_prefix = prefix.encode()
+        self._odom_frames = encode_text(prefix + "odom") + encode_text(prefix + "base_link")
         self._last_ns = stamps.last_ns
         self._passed_start = b""  # of the message whose stamp passed last
         self._passed_ns = self._passed_arrival_ns = 0

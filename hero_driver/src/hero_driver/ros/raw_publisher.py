@@ -8,16 +8,15 @@ Source of the framing: ROS TCPROS, a 32-bit length before each message.
 """
 
 import collections
-import struct
 from typing import Any, Callable, Deque, Dict, List
+
+from hero_node import LENGTH
 
 from ..transport.event_loop import CallLater
 from .rospy_internals import NO_CONNECTIONS, open_publisher, send, unregister
 
 RETRY_S = 0.01
 """Delay before a subscriber whose socket was full is tried again."""
-
-_LENGTH = struct.Struct("<I")
 
 
 class RawPublisher:
@@ -60,7 +59,7 @@ class RawPublisher:
         connections = self._impl.connections
         if not connections:
             return
-        data = _LENGTH.pack(len(payload)) + payload
+        data = LENGTH.pack(len(payload)) + payload
         for connection in connections:
             backlog = self._backlogs.get(connection) if self._backlogs else None
             if backlog is not None:

@@ -7,11 +7,12 @@ and std_msgs/Time (seconds, nanoseconds). Little endian, strings with a 32-bit l
 import struct
 from typing import NamedTuple
 
+from hero_node import LENGTH, encode_text
+
 from .errors import PayloadError
 from .packets import Bytes
 
 _UINT16 = struct.Struct("<H")
-_UINT32 = struct.Struct("<I")
 _INT32 = struct.Struct("<i")
 _TIME = struct.Struct("<II")
 
@@ -69,7 +70,7 @@ class _Cursor:
 
     def read_text(self, field: str) -> str:
         # Peers are not trusted to send UTF-8: what cannot be read stays visible as an escape.
-        return self.read_bytes(self.read_number(_UINT32, field), field).decode("utf-8", "backslashreplace")
+        return self.read_bytes(self.read_number(LENGTH, field), field).decode("utf-8", "backslashreplace")
 
     def finish(self) -> None:
         left = len(self._data) - self._position
@@ -77,19 +78,14 @@ class _Cursor:
             raise PayloadError("%s: %d bytes follow its last field" % (self._what, left))
 
 
-def _encode_text(text: str) -> bytes:
-    data = text.encode("utf-8")
-    return _UINT32.pack(len(data)) + data
-
-
 def encode_topic_info(info: TopicInfo) -> bytes:
     """Return the payload that declares info (packet ids 0..5 say in which direction)."""
     return b"".join(
         (
             _UINT16.pack(info.topic_id),
-            _encode_text(info.name),
-            _encode_text(info.message_type),
-            _encode_text(info.md5sum),
+            encode_text(info.name),
+            encode_text(info.message_type),
+            encode_text(info.md5sum),
             _INT32.pack(info.buffer_length),
         )
     )
@@ -114,7 +110,7 @@ def decode_topic_info(payload: Bytes) -> TopicInfo:
 
 def encode_log(log: Log) -> bytes:
     """Return the payload of one log line."""
-    return bytes((log.level,)) + _encode_text(log.text)
+    return bytes((log.level,)) + encode_text(log.text)
 
 
 def decode_log(payload: Bytes) -> Log:

@@ -11,7 +11,7 @@ import struct
 from typing import List, Sequence, Tuple
 
 from hero_driver.rosserial import packets
-from hero_node import Pose
+from hero_node import LENGTH, POSE_FORM, TWIST_FORM, Pose, encode_header, encode_text
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 from .models import HERO, RobotModel
@@ -20,10 +20,6 @@ SEQ_NEVER_COUNTED = 0xFFFFFFFF
 """header.seq of odom, encoder and imu: set to -1 and never counted (Odometry.ino:60, WheelEncoder.ino:62)."""
 
 _STAMP = struct.Struct("<II")
-_HEADER = struct.Struct("<III")
-LENGTH_FORM = struct.Struct("<I")
-POSE_FORM = struct.Struct("<7d")
-TWIST_FORM = struct.Struct("<6d")
 _QUATERNION = struct.Struct("<4d")
 _ENCODER = struct.Struct("<11d")
 _PLUS_ENCODER = struct.Struct("<12d")
@@ -58,17 +54,6 @@ _LINEAR_COVARIANCE = (
     -0.0007089563878253102, 0.002006256952881813, 3.710795863298699e-05,
     -0.00014545791782438755, 3.710795863298699e-05, 5.777423575636931e-05,
 )  # fmt: skip
-
-
-def encode_text(value: str) -> bytes:
-    """Return a string field of a message."""
-    data = value.encode()
-    return LENGTH_FORM.pack(len(data)) + data
-
-
-def encode_header(seq: int, frame_id: str, stamp: Tuple[int, int] = (0, 0)) -> bytes:
-    """Return a Header; stamp: s, ns."""
-    return _HEADER.pack(seq, *stamp) + encode_text(frame_id)
 
 
 @functools.lru_cache(maxsize=None)
@@ -152,7 +137,7 @@ class CycleMessages:
 def _build_transform(parent: str, child: str, place_m: Sequence[float]) -> bytes:
     """Return a tfMessage with one transform, without rotation."""
     values = round_to_float32((*place_m, 0.0, 0.0, 0.0, 1.0))
-    return LENGTH_FORM.pack(1) + encode_header(0, parent) + encode_text(child) + POSE_FORM.pack(*values)
+    return LENGTH.pack(1) + encode_header(0, parent) + encode_text(child) + POSE_FORM.pack(*values)
 
 
 def _wheel_half_angle(ticks: float) -> float:
@@ -169,7 +154,7 @@ def encode_laser(
     """
     limits = (-math.pi, math.pi, LASER_ANGLE_INCREMENT_RAD, 0.0, 0.0, LASER_RANGE_MIN_M, LASER_RANGE_MAX_M)
     values = struct.pack("<7fI16fI16f", *limits, 16, *_interpolate(ranges_m), 16, *_interpolate(counts))
-    return encode_header(seq & 0xFFFFFFFF, name + "/laser_link", stamp) + values
+    return encode_header(seq, name + "/laser_link", stamp) + values
 
 
 def _interpolate(values: Sequence[float]) -> List[float]:

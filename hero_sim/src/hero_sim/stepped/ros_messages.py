@@ -7,9 +7,8 @@ import math
 import struct
 from typing import Dict, Iterable, List, NamedTuple, Sequence, Tuple
 
-from hero_node import Pose
+from hero_node import LENGTH, TWIST_FORM, Pose, encode_header, encode_pose, encode_text
 
-from ..robot.messages import LENGTH_FORM, POSE_FORM, TWIST_FORM, encode_header, encode_text
 from ..scene import Shape
 
 
@@ -88,17 +87,12 @@ MARKER_ARRAY = _define(
     *("geometry_msgs/Vector3", "std_msgs/ColorRGBA"),
 )
 
-_MARKER = struct.Struct("<3i10d4f2i?2I")  # id to the number of colors
+_MARKER_KIND, _MARKER_SIZE = struct.Struct("<3i"), struct.Struct("<3d4f2i?2I")  # before its pose, and behind
 _NO_COVARIANCE = bytes(36 * 8)
 
 
 def _header(time_ns: int, frame: str) -> bytes:
     return encode_header(0, frame, divmod(time_ns, 10**9))
-
-
-def _place(pose: Pose, z_m: float = 0.0) -> Tuple[float, ...]:
-    half_rad = pose.yaw_rad / 2.0
-    return pose.x_m, pose.y_m, z_m, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad)
 
 
 def encode_twist(linear_m_s: float, angular_rad_s: float) -> bytes:
@@ -110,7 +104,7 @@ def encode_odometry(
     time_ns: int, frames: Tuple[str, str], pose: Pose, linear_m_s: float, angular_rad_s: float
 ) -> bytes:
     """Return an ODOMETRY; frames: of the pose, and of the robot."""
-    content = _header(time_ns, frames[0]) + encode_text(frames[1]) + POSE_FORM.pack(*_place(pose)) + _NO_COVARIANCE
+    content = _header(time_ns, frames[0]) + encode_text(frames[1]) + encode_pose(*pose) + _NO_COVARIANCE
     return content + encode_twist(linear_m_s, angular_rad_s) + _NO_COVARIANCE
 
 
@@ -124,19 +118,16 @@ def encode_scan(time_ns: int, frame: str, ranges_m: Sequence[float], limits_m: T
 
 def encode_transforms(time_ns: int, transforms: Iterable[Tuple[str, str, Pose]]) -> bytes:
     """Return a TF_MESSAGE; each transform: parent, child, pose of the child in the parent."""
-    encoded = [
-        _header(time_ns, parent) + encode_text(child) + POSE_FORM.pack(*_place(pose))
-        for parent, child, pose in transforms
-    ]
-    return LENGTH_FORM.pack(len(encoded)) + b"".join(encoded)
+    encoded = [_header(time_ns, parent) + encode_text(child) + encode_pose(*pose) for parent, child, pose in transforms]
+    return LENGTH.pack(len(encoded)) + b"".join(encoded)
 
 
 def encode_markers(time_ns: int, frame: str, shapes: Iterable[Shape]) -> bytes:
     """Return a MARKER_ARRAY that adds or moves shapes."""
     encoded: List[bytes] = []
     for shape in shapes:
-        values = (shape.number, shape.kind, 0, *_place(shape.pose, shape.z_m), *shape.size_m, *shape.color)
-        body = _MARKER.pack(*values, 0, 0, False, 0, 0)
+        body = _MARKER_KIND.pack(shape.number, shape.kind, 0) + encode_pose(*shape.pose, shape.z_m)
+        body += _MARKER_SIZE.pack(*shape.size_m, *shape.color, 0, 0, False, 0, 0)
         head = _header(time_ns, frame) + encode_text(shape.namespace)
         encoded.append(head + body + encode_text(shape.text) + encode_text("") + b"\0")
-    return LENGTH_FORM.pack(len(encoded)) + b"".join(encoded)
+    return LENGTH.pack(len(encoded)) + b"".join(encoded)
