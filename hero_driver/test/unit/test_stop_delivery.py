@@ -263,6 +263,26 @@ def test_a_tuning_that_begins_right_after_a_release_goes_on():
         assert robot.motors.is_turning
 
 
+def test_a_tuning_asked_for_while_a_stop_is_not_confirmed_goes_on():
+    with Clock().is_the_drivers() as clock:
+        robot = make_moving(clock, "pulses")
+        stop(robot)
+        clock.run(0.1)
+        assert robot.peer.stop.state is not StopState.AT_REST
+        robot.stopped = False
+        robot.stops.release()
+        service = "/hero_1/velocity_controller/pid_calibration"
+        assert robot.bridge.commands.offer_request(service, "std_srvs/Trigger", b"") is None
+        robot.motors.start_tuning("velocity_controller")
+        clock.run(2.0)
+        assert robot.motors.is_turning
+        assert robot.bridge.commands.was_told_to_tune
+        robot.stops.begin(robot.peer)
+        clock.run(TUNED_S)
+        assert not robot.motors.is_turning
+        assert not robot.bridge.commands.was_told_to_tune
+
+
 def test_a_motion_after_the_release_ends_the_zeros_of_the_stop():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "both controllers")

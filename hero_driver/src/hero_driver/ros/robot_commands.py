@@ -67,6 +67,7 @@ class RobotCommands:
         self.refused = 0
         self.light = NO_LIGHT
         self.was_told_to_tune = False
+        self._may_tune = False  # since the last stop a program has called that service
         self._label = namespace.lstrip("/")
         self._owner = owner
         self._loop = loop
@@ -195,7 +196,7 @@ class RobotCommands:
                 )
             if self._owner.stopped:
                 return "it moves the robot, and all robots are stopped (~stop)"
-            self.was_told_to_tune = True
+            self.was_told_to_tune = self._may_tune = True
         self.queue.offer(name, request)
         self._owner.send_commands(self._peer)
         return None
@@ -224,12 +225,13 @@ class RobotCommands:
     def stop(self) -> None:
         """Drop the motion commands that wait: the robot is being stopped."""
         self._commanders.stop()
+        self._may_tune = False
         self.queue.discard_motion(time.monotonic())
 
     @property
     def is_commanded(self) -> bool:
         """Return whether a program has asked for motion, and not for a stop, since the last stop()."""
-        return self._commanders.are_moving
+        return self._commanders.are_moving or self._may_tune
 
     def watch_commanders(self, now_s: float) -> None:
         """Stop the robot if it missed a zero, or if a program that commands it regularly has fallen silent."""
@@ -250,6 +252,7 @@ class RobotCommands:
         """The robot said that it tunes itself, or it is known that it has ended that."""
         self._tuning_heard_s = time.monotonic() if tunes else -math.inf
         self.was_told_to_tune = self.was_told_to_tune and tunes
+        self._may_tune = self._may_tune and tunes
 
     def tunes(self, now_s: float) -> bool:
         """Return whether the robot tunes itself, as far as its log and the calls to its services tell."""
