@@ -13,5 +13,5 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         return
     from .ros.robot_runs import run_on_robots  # the simulator needs no ROS
 
-    with open_folder(options) as (_, experiment, folder, runs):
+    with open_folder(options) as (experiment, folder, runs):
         print(run_on_robots(experiment, folder, runs, options))

@@ -11,11 +11,11 @@ from typing import Optional, Sequence
 from hero_node import import_optional
 from hero_node.parameters import within
 
-from .experiments.batch import build_trial
-from .experiments.code_version import hash_code
+from .experiments.computing import set_up
+from .experiments.computing.code_version import hash_code
 from .experiments.errors import ExperimentError
 from .experiments.experiment_file import Cell, Experiment
-from .experiments.runner import read_results
+from .experiments.results_folder import read_results
 
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
@@ -50,14 +50,14 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         raise ExperimentError(
             "--seed %d: the experiment has seeds %d to %d" % (seed, experiment.seeds[0], experiment.seeds[-1])
         )
-    trial = build_trial(experiment, cell, [seed])
+    trial = set_up(experiment, cell).build_trial([seed])
     if about["code"] != hash_code(experiment.list_code()):
         text = "note: the results are of other code (%s), so this run may differ from theirs"
         print(text % about["code"], file=sys.stderr)
     robot_ids = range(trial.poses.shape[1])
     print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
     if options.video:
-        from .experiments.video import write_video
+        from .video import write_video
 
         write_video(trial, experiment.time_s, options.speed, options.video)
         print(options.video)

@@ -14,7 +14,8 @@ from hero_sim.world import KINDS, World, draw_errors, read_known
 from hero_sim.world.arena import build_rectangle
 from hero_sim.world.robot_errors import set_known
 from hero_swarm import fit as fit_program
-from hero_swarm.experiments.batch import build_trial, load_checked
+from hero_swarm.experiments.computing import set_up
+from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
@@ -174,7 +175,7 @@ def test_an_experiment_takes_the_errors_of_a_file_for_its_robots(tmp_path):
     file.write_text("# found\nslip=0.01\nrobot=1,lag_s=0.11\nrobot=7,lag_s=0.3\n", encoding="utf-8")
     experiment = parse_experiment(EXPERIMENT % file, "e.yaml")
     load_checked(experiment)
-    errors = build_trial(experiment, experiment.cells[0], [1, 2]).rows.world.errors
+    errors = set_up(experiment, experiment.cells[0]).build_trial([1, 2]).rows.world.errors
     assert errors.servo_lag_s.ravel().tolist() == [0.08, 0.11, 0.08, 0.11]
     assert set(errors.slip.ravel().tolist()) == {0.01}
     assert len(set(errors.servo_gain.ravel().tolist())) == 8  # the rest is drawn

@@ -11,8 +11,8 @@ from hero_sim.world.arena import build_rectangle, is_free
 from hero_sim.world.arena_file import load_arena
 from hero_swarm import metrics
 from hero_swarm.behavior import Behavior, Neighbors
+from hero_swarm.experiments.computing.starts import _place_in_circle, _place_in_grid, place_all
 from hero_swarm.experiments.experiment_file import Start
-from hero_swarm.experiments.starts import _place_in_circle, _place_in_grid, place_all
 from hero_swarm.learning.episode import MAX_LEARNED_ANGULAR_RAD_S, Episode, count_observations
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial, scatter

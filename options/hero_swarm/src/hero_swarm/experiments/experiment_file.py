@@ -17,7 +17,7 @@ import math
 import os
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from hero_node.files import Entry, EntryError, read_entries
+from hero_node.files import Entry, EntryError, YamlError, read_entries, read_text
 from hero_sim.errors import OptionError
 from hero_sim.link import parse_wifi
 from hero_sim.world import KINDS, SHIPPED
@@ -209,6 +209,18 @@ class Experiment(NamedTuple):
             "record_hz": self.record_hz,
         }
         return json.dumps(description, sort_keys=True)
+
+
+def read_experiment(path: str, folder: Optional[str] = None) -> Tuple[str, Experiment]:
+    """Return the text of an experiment's file, and what it describes; folder: as of parse_experiment().
+
+    Raises: ExperimentError.
+    """
+    try:
+        text = read_text(path)
+    except (OSError, YamlError) as error:
+        raise ExperimentError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    return text, parse_experiment(text, path, folder)
 
 
 def parse_experiment(

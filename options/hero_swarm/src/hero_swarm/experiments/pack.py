@@ -15,11 +15,10 @@ from typing import Dict, Optional, Sequence
 
 from hero_node.files import name_file, read_file
 
-from .batch import load_checked
-from .code_version import hash_code, list_suite
+from .computing.batch import load_checked
+from .computing.code_version import hash_code, list_suite
 from .errors import ExperimentError
-from .results_folder import ABOUT, SIMULATED, ResultsFolder, format_table
-from .runner import read_results
+from .results_folder import ABOUT, SIMULATED, ResultsFolder, format_table, read_results
 
 EXPERIMENT, RUNS, FILES, SUITE = "experiment", "runs.csv", "files", "suite"
 

@@ -20,7 +20,7 @@ from ..behaviors import find_behavior
 from ..metrics import FALLING
 from . import runner
 from .errors import ExperimentError
-from .experiment_file import Experiment
+from .experiment_file import Experiment, read_experiment
 from .report import write_report
 from .results import load
 from .worlds import NOMINAL, USUAL, WORLDS, WORST
@@ -51,7 +51,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
 def make_file(options: argparse.Namespace) -> str:
     """Write the experiment in all worlds, and return the file's name. Raises: ExperimentError."""
     if options.what.endswith((".yaml", ".yml")):
-        text, _ = runner.read_experiment(options.what)
+        text, _ = read_experiment(options.what)
         content, stem = yaml.safe_load(text), os.path.splitext(options.what)[0]
     else:
         try:
@@ -123,7 +123,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     options = parse_options(arguments)
     path = make_file(options)
     folder = os.path.splitext(path)[0]
-    _, experiment = runner.read_experiment(path)
+    _, experiment = read_experiment(path)
     fresh = ["--fresh"] if options.fresh else []
     print(runner.run_experiment(runner.parse_options([path, "--jobs", str(options.jobs), *fresh])))
     write_report(folder)

@@ -13,8 +13,7 @@ from .reporting.figures import draw_all, to_svg
 from .reporting.report_page import draw_page
 from .reporting.summary import build_report, describe, describe_method, format_summaries
 from .results import load
-from .results_folder import REAL, SIMULATED, ResultsFolder
-from .runner import read_results
+from .results_folder import REAL, SIMULATED, ResultsFolder, read_results
 
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:

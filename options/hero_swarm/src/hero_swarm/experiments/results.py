@@ -15,10 +15,9 @@ import numpy as np
 
 from hero_node import import_optional
 
-from .batch import SAMPLE_S, list_sources
+from .computing.batch import SAMPLE_S, list_sources
 from .errors import ExperimentError
-from .results_folder import METRICS_ENDING, POSES_ENDING, SIMULATED, ResultsFolder
-from .runner import read_results
+from .results_folder import METRICS_ENDING, POSES_ENDING, SIMULATED, ResultsFolder, read_results
 
 
 class Results:

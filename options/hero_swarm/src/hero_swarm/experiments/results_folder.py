@@ -6,7 +6,6 @@
     series/*.npy       metrics over time of each batch, and poses if they are recorded
     set_aside/N/       batches that --fresh does not delete: damaged ones, and trials on robots
     *.lock             held while a program adds runs of this kind
-    times.csv          wall time of each batch: the only file that depends on the machine
     runs.csv           all runs, sorted; the same bytes however they were computed
     series.csv         where the series of each run are: files, and the place of the run in them
 
@@ -29,10 +28,10 @@ from typing import Any, Callable, Dict, Iterable, Iterator, List, NamedTuple, Se
 import numpy as np
 
 from hero_node import one_line
-from hero_node.files import hold_file, name_file, read_file, write_file
+from hero_node.files import hold_file, read_file, write_file
 
 from .errors import ExperimentError
-from .experiment_file import Cell, Experiment
+from .experiment_file import Cell, Experiment, read_experiment
 
 SIMULATED = "simulated"
 """Kind of a run that was computed."""
@@ -48,6 +47,9 @@ METRICS_ENDING, POSES_ENDING = ".metrics.npy", ".poses.npy"
 after a run's end."""
 
 ABOUT, EXPERIMENT, LOCK_ENDING = "about.json", "experiment.yaml", ".lock"
+
+FOLDER = "experiment_folder"
+"""Key in about.json: folder of the experiment's file, base of its paths, relative to the results folder."""
 
 _BATCH_NAME = re.compile(r"[0-9a-f]{24}\.jsonl")
 _SERIES_NAME = re.compile(r"[0-9a-f]{24}\.(metrics|poses)\.npy(\.part|\.[0-9a-f]{8}\.new)?")
@@ -154,7 +156,7 @@ class ResultsFolder:
                 aside.append(name)
         if kind == SIMULATED:
             self._remove_series(lambda name: True)
-        for name in ("runs.csv", "series.csv", "times.csv"):
+        for name in ("runs.csv", "series.csv"):
             with suppress(FileNotFoundError):
                 os.remove(os.path.join(self.path, name))
         return self._set_aside(aside)
@@ -251,14 +253,6 @@ class ResultsFolder:
                 series.update({seed: recorded[:, place] for place, seed in own})
         return series
 
-    def note_time(self, cell: int, seeds: Sequence[int], wall_s: float) -> None:
-        """Append how long a batch took."""
-        path = os.path.join(self.path, "times.csv")
-        with name_file(path), open(path, "a", encoding="utf-8") as file:
-            if file.tell() == 0:
-                file.write("cell,first_seed,runs,wall_s\n")
-            file.write("%d,%d,%d,%.3f\n" % (cell, seeds[0], len(seeds), wall_s))
-
     def list_missing(self, runs: Iterable[Run], kind: str = SIMULATED) -> List[RunKey]:
         """Return cell and seed of the runs of this kind that are still to be done, or do not count, cell by cell."""
         done: Set[RunKey] = {(run.cell, run.seed) for run in runs if run.kind == kind and not run.remark}
@@ -302,6 +296,18 @@ def read_about(path: str) -> Dict[str, str]:
     if not is_ours:
         raise ExperimentError(f"{path}: no folder with results of run: {ABOUT} is not written by run")
     return about
+
+
+def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
+    """Return the text of the experiment whose results a folder holds, what it describes, and on what it ran.
+
+    Raises: ExperimentError.
+    """
+    file = os.path.join(path, EXPERIMENT)
+    if not os.path.isfile(file):
+        raise ExperimentError(f"{path}: no {EXPERIMENT} in it, so not a folder of run")
+    about = read_about(path)
+    return (*read_experiment(file, os.path.join(path, about.get(FOLDER, ""))), about)
 
 
 def _digest_cell(experiment: Experiment, cell: Cell) -> str:

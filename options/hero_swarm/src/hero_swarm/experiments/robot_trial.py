@@ -14,40 +14,31 @@ from ..behavior import Random, derive_seed
 from ..control import Control
 from ..metrics.own import State
 from ..safety import SafetyFilter
-from .batch import SAMPLE_S, load_cell_arena, make_behavior, measure, take_values
+from .computing.batch import SAMPLE_S, measure, take_values
+from .computing.cell_setup import CellSetup
 from .errors import report_place
-from .experiment_file import Cell, Experiment
 
 
 class RobotTrial:
     """A behavior with its metrics and the end of the trial.
 
     Attributes:
-        behavior: with the parameters of the cell.
         safety: the filter of its commands.
         lateness: of its steps and poses.
         remark: why the trial does not count; empty while it does.
     """
 
     def __init__(
-        self,
-        experiment: Experiment,
-        cell: Cell,
-        seed: int,
-        names: Sequence[str],
-        safety: SafetyFilter,
-        readings: Any = None,
+        self, setup: CellSetup, seed: int, names: Sequence[str], safety: SafetyFilter, readings: Any = None
     ) -> None:
         """Begin; names: of the robots, in the order of their poses; readings: their own, as Surroundings.robots."""
         self.remark = ""
-        self._experiment = experiment
-        self._label = "%s, seed %d" % (cell.label, seed)
-        self.behavior = make_behavior(experiment, cell)
-        self._arena = load_cell_arena(experiment, cell)
+        self._experiment, self._arena = setup.experiment, setup.arena
+        self._label = "%s, seed %d" % (setup.cell.label, seed)
         self._names = names
         self.safety = safety
         random = Random([derive_seed(seed, "behavior")], len(names))
-        self._control = Control(self.behavior, random, safety, arena=self._arena, robots=readings)
+        self._control = Control(setup.behavior, random, safety, arena=self._arena, robots=readings)
         self.lateness = self._control.lateness
         self._samples: List[np.ndarray] = []
         self._last: Optional[Tuple[float, np.ndarray]] = None

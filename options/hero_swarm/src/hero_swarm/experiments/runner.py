@@ -10,19 +10,17 @@ import time
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from operator import itemgetter
-from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Iterable, Iterator, List, Optional, Sequence, Tuple
 
 from tqdm import tqdm
 
-from hero_node.files import YamlError, read_text
 from hero_node.parameters import explicit_ids_option, within
 
-from . import engines
-from .batch import Inputs, compute_batch, load_checked
-from .code_version import describe_machine, hash_code, hash_suite
-from .errors import ExperimentError
-from .experiment_file import MAX_ROBOTS, Experiment, parse_experiment
-from .results_folder import REAL, SIMULATED, ResultsFolder, Run, RunKey, read_about
+from .computing import engines
+from .computing.batch import Batch, compute_batch, load_checked
+from .computing.code_version import describe_machine, hash_code, hash_suite
+from .experiment_file import MAX_ROBOTS, Experiment, read_experiment
+from .results_folder import FOLDER, REAL, SIMULATED, ResultsFolder, Run, RunKey
 
 MAX_BATCH = 1000
 
@@ -37,14 +35,8 @@ REPORT_S = 10.0
 
 DASK = "dask:"
 
-FOLDER = "experiment_folder"
-"""Key in about.json: folder of the experiment's file, base of its paths, relative to the results folder."""
-
 IN_WORLDS = "_phantoms"
 """End of the names of the file and the folder of phantoms for an experiment."""
-
-Task = Tuple[Inputs, int, Tuple[int, ...], str]
-"""Arguments of compute_batch()."""
 
 
 def _parse_part(text: str) -> Tuple[int, int]:
@@ -97,31 +89,6 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def read_experiment(path: str, folder: Optional[str] = None) -> Tuple[str, Experiment]:
-    """Return the text of an experiment's file, and what it describes; folder: as of parse_experiment().
-
-    Raises: ExperimentError.
-    """
-    try:
-        text = read_text(path)
-    except (OSError, YamlError) as error:
-        raise ExperimentError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    return text, parse_experiment(text, path, folder)
-
-
-def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
-    """Return the text of the experiment whose results a folder holds, what it describes, and on what it ran.
-
-    Raises: ExperimentError.
-    """
-    file = os.path.join(path, "experiment.yaml")
-    if not os.path.isfile(file):
-        raise ExperimentError(f"{path}: no experiment.yaml in it, so not a folder of run")
-    about = read_about(path)
-    # Results of older versions have paths relative to the working directory.
-    return (*read_experiment(file, os.path.join(path, about[FOLDER]) if FOLDER in about else ""), about)
-
-
 def choose_batch(experiment: Experiment, cell: int) -> int:
     """Return how many runs of a cell are computed together."""
     robots = int(experiment.cells[cell].settings["robots"])
@@ -129,26 +96,21 @@ def choose_batch(experiment: Experiment, cell: int) -> int:
     return max(1, min(MAX_BATCH, math.ceil(BATCH_ROBOT_S / (robots * experiment.time_s))))
 
 
-def list_tasks(
-    inputs: Inputs,
-    experiment: Experiment,
-    missing: Sequence[RunKey],
-    batch: Optional[int],
-    workers: int,
-    folder: ResultsFolder,
-) -> Iterator[Task]:
-    """Yield the arguments of compute_batch() for the missing runs, which are sorted by cell.
+def list_batches(
+    experiment: Experiment, missing: Sequence[RunKey], size: Optional[int], workers: int, folder: ResultsFolder
+) -> Iterator[Batch]:
+    """Yield batches of the missing runs, which are sorted by cell.
 
-    batch: runs that are computed together; None: as many as is fast, but something to do for each of the workers.
+    size: runs that are computed together; None: as many as is fast, but something to do for each of the workers.
     """
     share = math.ceil(len(missing) / (_BATCHES_PER_WORKER * workers))
+    experiment = experiment._replace(folder=os.path.abspath(experiment.folder))  # workers may be in another one
     for cell, keys in itertools.groupby(missing, key=itemgetter(0)):
-        seeds = [seed for _, seed in keys]
-        size = batch or min(share, choose_batch(experiment, cell))
-        for start in range(0, len(seeds), size):
-            chosen = tuple(seeds[start : start + size])
-            # Workers may have another working directory.
-            yield inputs, cell, chosen, os.path.abspath(folder.name_series(cell, chosen))
+        seeds, own = [seed for _, seed in keys], experiment._replace(cells=(experiment.cells[cell],))
+        length = size or min(share, choose_batch(experiment, cell))
+        for start in range(0, len(seeds), length):
+            chosen = tuple(seeds[start : start + length])
+            yield Batch(own, hash_suite(), cell, chosen, os.path.abspath(folder.name_series(cell, chosen)))
 
 
 def _choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor], int]:
@@ -159,15 +121,15 @@ def _choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor],
     return lambda: executor, workers
 
 
-def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterator[Tuple[Any, Any]]:
+def _watch(done: Iterable[Tuple[Any, List[Run]]], missing: int, begun: int) -> Iterator[List[Run]]:
     """Yield what is done, and show how far it is and how long it will take: as a bar on a terminal, else as lines."""
     start_s = told_s = time.monotonic()
     count = 0
     with tqdm(total=missing + begun, initial=begun, unit="run", disable=None, file=sys.stderr) as bar:
-        for task, result in done:
-            yield task, result
-            bar.update(len(task[2]))
-            count += len(task[2])
+        for _, runs in done:
+            yield runs
+            bar.update(len(runs))
+            count += len(runs)
             now_s = time.monotonic()
             if bar.disable and now_s >= told_s + REPORT_S and count < missing:
                 told_s, left_s = now_s, (now_s - start_s) * (missing - count) / count
@@ -175,8 +137,8 @@ def _watch(done: Iterable[Tuple[Any, Any]], missing: int, begun: int) -> Iterato
 
 
 @contextmanager
-def open_folder(options: argparse.Namespace) -> Iterator[Tuple[str, Experiment, ResultsFolder, List[Run]]]:
-    """Give text and content of the experiment's file, the folder of its results, created if missing, and its runs.
+def open_folder(options: argparse.Namespace) -> Iterator[Tuple[Experiment, ResultsFolder, List[Run]]]:
+    """Give the experiment of a file, the folder of its results, created if missing, and its runs.
 
     Other programs cannot add runs of the same kind meanwhile, unless both compute parts. Raises: ExperimentError.
     """
@@ -192,7 +154,7 @@ def open_folder(options: argparse.Namespace) -> Iterator[Tuple[str, Experiment, 
         if aside:
             print(f"{aside}: set aside: damaged batches, and trials on robots that do not count now", file=sys.stderr)
     with folder.hold(kind, is_shared=options.part[1] > 1):
-        yield text, experiment, folder, folder.begin(text, about)
+        yield experiment, folder, folder.begin(text, about)
 
 
 def run_experiment(options: argparse.Namespace) -> str:
@@ -200,26 +162,21 @@ def run_experiment(options: argparse.Namespace) -> str:
 
     Raises: ExperimentError.
     """
-    with open_folder(options) as (text, experiment, folder, runs):
-        return _run_missing(options, text, experiment, folder, runs)
+    with open_folder(options) as (experiment, folder, runs):
+        return _run_missing(options, experiment, folder, runs)
 
 
-def _run_missing(
-    options: argparse.Namespace, text: str, experiment: Experiment, folder: ResultsFolder, runs: List[Run]
-) -> str:
+def _run_missing(options: argparse.Namespace, experiment: Experiment, folder: ResultsFolder, runs: List[Run]) -> str:
     part, parts = options.part
     # Whatever is there already, the parts share out all runs in the same way.
     own = set(folder.list_missing(())[part - 1 :: parts])
     missing = [key for key in folder.list_missing(runs) if key in own]
     if missing:
         opener, workers = _choose_engine(options)
-        inputs = Inputs(text, os.path.abspath(experiment.folder), experiment.sources, hash_suite())
-        tasks = list_tasks(inputs, experiment, missing, options.batch, workers, folder)
+        batches = list_batches(experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()
-        done = engines.compute(opener, workers, compute_batch, tasks)
-        for (_, cell, seeds, _), (computed, wall_s) in _watch(done, len(missing), len(runs)):
+        for computed in _watch(engines.compute(opener, workers, compute_batch, batches), len(missing), len(runs)):
             folder.write_batch(computed)
-            folder.note_time(cell, seeds, wall_s)
         print(f"{len(missing)} runs in {time.monotonic() - began_s:.1f} s", file=sys.stderr)
     runs = folder.read_runs()
     left = folder.list_missing(runs)

@@ -17,7 +17,7 @@ from hero_client import Program, StoppedError, Swarm
 from hero_node import end_process
 from hero_node.ros import read_duration_clock_s
 
-from ..experiments.batch import make_behavior, place_robots
+from ..experiments.computing import set_up
 from ..experiments.errors import ExperimentError
 from ..experiments.experiment_file import Experiment
 from ..experiments.results_folder import REAL, ResultsFolder, Run
@@ -62,7 +62,8 @@ def run_on_robots(
         others = OtherRobots(ids, frame)
         for cell_index, seed in missing:
             cell = experiment.cells[cell_index]
-            (starts,) = place_robots(experiment, cell, [seed])
+            setup = set_up(experiment, cell)
+            (starts,) = setup.place_robots([seed])
             label = "%s, seed %d" % (cell.label, seed)
             answer = DRIVE
             while answer == DRIVE:
@@ -72,9 +73,9 @@ def run_on_robots(
                 break
             safety = SafetyFilter(ROBOTS)
             safety.set_models([robot.model for robot in swarm])
-            readings = OwnReadings(swarm, make_behavior(experiment, cell).sensors())
-            trial = RobotTrial(experiment, cell, seed, [robot.name for robot in swarm], safety, readings)
-            commands = WheelCommands(swarm, trial.behavior.drive, options.calibration)
+            readings = OwnReadings(swarm, setup.behavior.sensors())
+            trial = RobotTrial(setup, seed, [robot.name for robot in swarm], safety, readings)
+            commands = WheelCommands(swarm, setup.behavior.drive, options.calibration)
             name = "cell_%d_seed_%d" % (cell_index + 1, seed)
             with _record(program, folder.path, name, ids, experiment.time_s):
                 finished = _drive(program, swarm, trial, commands, source, objects, others)

@@ -9,7 +9,7 @@ import pytest
 
 from hero_sim.world import load_arena
 from hero_swarm.behaviors import find_behavior
-from hero_swarm.experiments.batch import load_checked
+from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.learning.observation import Observation
 from hero_swarm.learning.policy import save_policy

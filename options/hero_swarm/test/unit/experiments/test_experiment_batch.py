@@ -8,11 +8,11 @@ import pytest
 
 from hero_swarm import metrics
 from hero_swarm.experiments import runner
-from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING, Inputs, compute_batch, take_values
-from hero_swarm.experiments.code_version import hash_suite
+from hero_swarm.experiments.computing.batch import METRICS_ENDING, POSES_ENDING, compute_batch, take_values
+from hero_swarm.experiments.computing.code_version import hash_suite
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
-from hero_swarm.sources import Sources
+from hero_test.nonempty import nonempty
 from hero_test.small_disk import SmallDisk
 
 FILE = """\
@@ -27,7 +27,7 @@ record: {hz: 2}
 
 
 def compute(text, seeds, stem):
-    return compute_batch(Inputs(text, "", Sources(), hash_suite()), 0, seeds, stem)
+    return compute_batch(parse_experiment(text, "e.yaml"), hash_suite(), 0, seeds, stem)
 
 
 def take(text, series):
@@ -46,7 +46,7 @@ def test_columns_are_a_last_sample_a_mean_or_the_first_time_below_a_bound():
 
 
 def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
-    whole = compute(FILE, [11, 12, 13], str(tmp_path / "a"))[0]
+    whole = compute(FILE, [11, 12, 13], str(tmp_path / "a"))
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))
     assert series.shape == (5, 3, 3) and poses.shape == (9, 3, 3, 3) and np.isfinite(poses).all()
     assert [run.seed for run in whole] == [11, 12, 13] and {run.cell for run in whole} == {0}
@@ -56,7 +56,7 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
 
     bound = float(np.sort(series[2, :, 0])[0]) * 1.0001  # one run is below it after 2 s
     text = FILE.replace("time_s: 4", "time_s: 4\nuntil: {dispersion: %r}" % bound).replace("record: {hz: 2}\n", "")
-    runs = compute(text, [11, 12, 13], str(tmp_path / "b"))[0]
+    runs = compute(text, [11, 12, 13], str(tmp_path / "b"))
     ended = np.load(str(tmp_path / ("b" + METRICS_ENDING)))
     for world in range(3):
         below = np.flatnonzero(series[:, world, 0] <= bound)
@@ -70,7 +70,7 @@ def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
     recorded = np.load(str(tmp_path / ("d" + POSES_ENDING)))
     assert recorded.dtype == np.float32 and recorded.shape == (9, 1, 3, 3)
     assert (recorded[:5, 0] == poses[:5, first - 11]).all() and np.isnan(recorded[5:]).all(), "it ended after 2 s"
-    alone = compute(FILE, [12], str(tmp_path / "c"))[0]
+    alone = compute(FILE, [12], str(tmp_path / "c"))
     assert alone == whole[1:2], "a run has the same values alone"
 
 
@@ -105,11 +105,12 @@ def test_a_batch_is_some_seconds_of_work_and_something_for_each_worker():
     experiment = make_experiment()
     missing = [(0, seed) for seed in range(11, 111)] + [(1, seed) for seed in (12, 14)]
     cases = ((None, 1, [40, 40, 20, 1, 1]), (None, 4, [13] * 7 + [9, 1, 1]), (30, 4, [30] * 3 + [10, 2]))
-    for batch, workers, sizes in cases:
-        tasks = list(runner.list_tasks("text", experiment, missing, batch, workers, Folder()))
-        assert [len(task[2]) for task in tasks] == sizes
-        assert [(task[1], seed) for task in tasks for seed in task[2]] == missing
-        assert tasks[-1][0] == "text" and tasks[0][3] == os.getcwd() + "/" + "0:11-%d" % (10 + sizes[0])
+    for size, workers, sizes in cases:
+        batches = list(runner.list_batches(experiment, missing, size, workers, Folder()))
+        assert [len(batch.seeds) for batch in batches] == sizes
+        assert [(batch.cell, seed) for batch in batches for seed in batch.seeds] == missing
+        assert all(batch.experiment.cells == (experiment.cells[batch.cell],) for batch in nonempty(batches))
+        assert batches[0].stem == os.getcwd() + "/" + "0:11-%d" % (10 + sizes[0])
 
 
 def test_options_of_run_have_their_limits(capsys):

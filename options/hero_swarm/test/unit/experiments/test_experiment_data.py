@@ -181,6 +181,6 @@ def test_only_whole_results_of_this_code_are_packed(folder, tmp_path):
 def test_without_a_terminal_lines_say_how_far_a_run_is(capsys, monkeypatch):
     clock = iter(range(0, 1000, 6))
     monkeypatch.setattr(runner, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
-    tasks = [((None, 0, (1, 2), ""), None)] * 6
-    assert list(runner._watch(tasks, 12, 4)) == tasks
+    runs = ["run"] * 2
+    assert list(runner._watch([(None, runs)] * 6, 12, 4)) == [runs] * 6
     assert capsys.readouterr().err.splitlines() == ["8 of 16 runs, about 24 s left", "12 of 16 runs, about 12 s left"]

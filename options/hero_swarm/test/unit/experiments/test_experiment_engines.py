@@ -10,7 +10,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 import pytest
 
 from hero_node import ProgramError
-from hero_swarm.experiments import engines
+from hero_swarm.experiments.computing import engines
 from hero_swarm.experiments.errors import ExperimentError
 
 open_two = functools.partial(engines.open_pool, 2)

@@ -10,13 +10,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hero_swarm.experiments import code_version, report
-from hero_swarm.experiments.batch import METRICS_ENDING
+from hero_swarm.experiments import report
+from hero_swarm.experiments.computing import code_version
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.statistics import correct_by_holm
 from hero_swarm.experiments.reporting.summary import build_report
-from hero_swarm.experiments.results_folder import REAL, SIMULATED, ResultsFolder, Run
+from hero_swarm.experiments.results_folder import METRICS_ENDING, REAL, SIMULATED, ResultsFolder, Run
 
 FILE = """\
 behavior: a.B
@@ -329,13 +329,6 @@ def test_what_runs_record_is_found_by_cell_and_seed(tmp_path):
             seed: [[10.0 * cell + seed]] * 2 for seed in seeds
         }
     assert folder.read_series(0, ".poses.npy") == {}
-
-
-def test_times_of_batches_are_appended_below_one_heading(tmp_path):
-    folder, _ = open_folder(tmp_path)
-    folder.note_time(1, [5, 6], 1.23456)
-    folder.note_time(0, [7], 0.5)
-    assert (tmp_path / "times.csv").read_text() == "cell,first_seed,runs,wall_s\n1,5,2,1.235\n0,7,1,0.500\n"
 
 
 def test_code_is_the_files_of_all_packages_and_the_users_modules(tmp_path, monkeypatch):

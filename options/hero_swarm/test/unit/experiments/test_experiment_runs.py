@@ -1,7 +1,6 @@
 """Whole experiments: the same table however they are computed, resumed and killed, and errors that name their place."""
 
 import csv
-import json
 import math
 import os
 import re
@@ -17,12 +16,12 @@ from PIL import Image
 from hero_client.values import BODY_RADIUS_M
 from hero_sim.world import load_arena
 from hero_swarm import metrics, show
-from hero_swarm.experiments import batch, report, runner
-from hero_swarm.experiments.batch import METRICS_ENDING, POSES_ENDING
+from hero_swarm.experiments import report, runner
+from hero_swarm.experiments.computing import set_up
+from hero_swarm.experiments.computing.starts import place_all
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Start
-from hero_swarm.experiments.results_folder import Run
-from hero_swarm.experiments.starts import place_all
+from hero_swarm.experiments.results_folder import METRICS_ENDING, POSES_ENDING, Run, read_results
 from hero_swarm.trial import OPEN
 from hero_test.nonempty import nonempty
 
@@ -247,14 +246,6 @@ def test_paths_are_relative_to_the_file_wherever_programs_run(tmp_path, monkeypa
     moved = tmp_path / "moved" / "e"
     replay(moved, "--video", tmp_path / "run.gif")
     assert capsys.readouterr().err.count("may differ") == 0 and absolute == home / "e"
-    # Results of the version before, whose paths are relative to the working directory.
-    about = json.loads((moved / "about.json").read_text())
-    assert about.pop("experiment_folder") == ".."
-    (moved / "about.json").write_text(json.dumps(about))
-    with pytest.raises(OSError, match="own"):
-        report.write_report(str(moved))
-    monkeypatch.chdir(str(tmp_path / "moved"))
-    report.write_report(str(moved))
 
 
 OWN_FILES = {
@@ -303,7 +294,7 @@ def test_files_that_are_edited_during_a_run_change_none_of_its_rows(tmp_path, mo
     ],
 )
 def test_each_file_that_a_run_reads_counts_as_its_code_or_parameters(name, old, new, words, tmp_path, monkeypatch):
-    monkeypatch.setattr(runner, "_run_missing", lambda options, text, experiment, folder, runs: folder.write_batch(
+    monkeypatch.setattr(runner, "_run_missing", lambda options, experiment, folder, runs: folder.write_batch(
         [Run(0, 1, (1.0,))]
     ))  # fmt: skip
     path = write_own(tmp_path / "a")
@@ -431,8 +422,8 @@ def test_a_run_is_replayed_as_a_video_that_ends_as_the_run_did(finished, tmp_pat
     replay(finished, "--seed", 13, "--cell", 4, "--video", tmp_path / "run.gif")
     assert "robots 5, errors default, seed 13" in capsys.readouterr().out
     assert Image.open(str(tmp_path / "run.gif")).n_frames == 30
-    experiment = runner.read_experiment(str(finished / "experiment.yaml"))[1]
-    trial = batch.build_trial(experiment, experiment.cells[3], [13])
+    _, experiment, _ = read_results(str(finished))
+    trial = set_up(experiment, experiment.cells[3]).build_trial([13])
     for _ in trial.run(3.0):
         pass
     rows = {(row["robots"], row["errors"], row["seed"]): row for row in read_table(finished)}
@@ -462,6 +453,6 @@ def test_a_run_is_shown_at_speeds_that_its_options_name(capsys):
 
 def test_a_run_of_other_code_is_shown_with_a_note(finished, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(show, "hash_code", lambda behavior: "0ther")
-    monkeypatch.setattr("hero_swarm.experiments.video.write_video", lambda *arguments: None)
+    monkeypatch.setattr("hero_swarm.video.write_video", lambda *arguments: None)
     replay(finished, "--video", tmp_path / "run.gif")
     assert "may differ" in capsys.readouterr().err

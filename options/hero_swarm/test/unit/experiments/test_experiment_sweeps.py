@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hero_swarm.experiments import report, runner
-from hero_swarm.experiments.batch import build_trial, load_checked
+from hero_swarm.experiments.computing import set_up
+from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_test.nonempty import nonempty
@@ -69,7 +70,7 @@ def test_a_baseline_is_compared_with_a_controller_over_its_sensor_range(path, ca
 
 def test_runs_of_a_seed_start_alike_whatever_the_behavior(path):
     experiment = load(path)
-    starts = [build_trial(experiment, cell, [1]).poses for cell in experiment.cells]
+    starts = [set_up(experiment, cell).build_trial([1]).poses for cell in experiment.cells]
     assert all((start == starts[0]).all() for start in nonempty(starts))
 
 
@@ -97,7 +98,7 @@ def test_errors_of_all_robots_and_wifi_reach_the_robots(path):
     built = {}
     for cell in experiment.cells:
         if cell.behavior == "gather.py" and cell.parameters["gain"] == 0.15:
-            trial = build_trial(experiment, cell, [1, 2])
+            trial = set_up(experiment, cell).build_trial([1, 2])
             for _ in range(30):
                 trial.step()
             built[cell.settings["errors.slip"], cell.settings["errors"], cell.settings["wifi"]] = trial
@@ -107,7 +108,7 @@ def test_errors_of_all_robots_and_wifi_reach_the_robots(path):
         assert (of_robots.slip == slip).all() and (errors == "perfect") == (np.ptp(of_robots.servo_gain) == 0.0)
     late, prompt = built[0.0, "perfect", "bad"], built[0.0, "perfect", "ideal"]
     assert (late.poses != prompt.poses).any()
-    again = build_trial(experiment, experiment.cells[-1], [2])
+    again = set_up(experiment, experiment.cells[-1]).build_trial([2])
     for _ in range(30):
         again.step()
     assert (again.poses[0] == built[0.3, 2.0, "bad"].poses[1]).all(), "a world has its own channel and seeds"
@@ -117,5 +118,5 @@ def test_starts_vary(path):
     text = FILE.replace("start: {kind: circle, gap_m: 0.3}\n", "")
     text = text.replace("near.range_m: [0.05, 5]", "start: [{kind: grid}, {kind: circle}]")
     experiment = load(path, text)
-    grid, circle = (build_trial(experiment, cell, [1]).poses for cell in experiment.cells[:2])
+    grid, circle = (set_up(experiment, cell).build_trial([1]).poses for cell in experiment.cells[:2])
     assert experiment.cells[0].label == "behavior dispersal, start grid" and (grid != circle).any()

@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from hero_client.values import BODY_RADIUS_M
 from hero_sim.world import list_outlines, load_arena
+from hero_swarm import video
 from hero_swarm.behavior import Behavior
-from hero_swarm.experiments import video
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.trial import OPEN, Trial
 

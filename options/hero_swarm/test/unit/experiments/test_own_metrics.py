@@ -9,6 +9,7 @@ from hero_client.values import BODY_RADIUS_M
 from hero_sim.world.arena import build_default
 from hero_swarm.behavior import Behavior, Neighbors
 from hero_swarm.experiments import report, runner
+from hero_swarm.experiments.computing import set_up
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.robot_trial import RobotTrial
@@ -124,7 +125,7 @@ def test_a_metric_that_is_missing_or_unclear_is_refused(path, old, new, words):
 
 def test_a_trial_on_robots_measures_the_same_state(path):
     experiment = parse_experiment(FILE, str(path))
-    trial = RobotTrial(experiment, experiment.cells[0], 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
+    trial = RobotTrial(set_up(experiment, experiment.cells[0]), 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
     poses = np.array([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
     trial.safety.radii_m = np.full(3, BODY_RADIUS_M)
     for step in range(61):

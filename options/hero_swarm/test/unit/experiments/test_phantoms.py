@@ -8,7 +8,7 @@ import yaml
 
 from hero_swarm.experiments import phantoms, runner
 from hero_swarm.experiments.errors import ExperimentError
-from hero_swarm.experiments.experiment_file import parse_experiment
+from hero_swarm.experiments.experiment_file import parse_experiment, read_experiment
 from hero_swarm.experiments.worlds import WORLDS
 
 PUSH = """\
@@ -61,7 +61,7 @@ def test_an_experiment_is_run_in_all_worlds_in_place_of_its_own(path, capsys):
 def test_a_behavior_is_run_by_its_own_metric(path):
     options = phantoms.parse_options(["ahead.py", "--robots", "4", "--time", "3", "--seeds", "2", "--arena", "empty"])
     made = phantoms.make_file(options)
-    _, experiment = runner.read_experiment(made)
+    _, experiment = read_experiment(made)
     assert made == "ahead_phantoms.yaml"
     assert [metric.source for metric in experiment.metrics] == ["dispersion"]
     assert {cell.settings["robots"] for cell in experiment.cells} == {4} and experiment.time_s == 3.0

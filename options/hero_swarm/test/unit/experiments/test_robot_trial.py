@@ -7,6 +7,7 @@ import pytest
 
 from hero_sim.population import place_worlds
 from hero_sim.stepped import RobotRows
+from hero_swarm.experiments.computing import set_up
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.robot_trial import RobotTrial
@@ -29,7 +30,7 @@ def drive(text=FILE, lost_s=math.inf):
     """Return the trial, when it ended, and the poses then; robot 1 has no pose from lost_s on."""
     experiment = parse_experiment(text, "e.yaml")
     names = ["hero_%d" % number for number in range(3)]
-    trial = RobotTrial(experiment, experiment.cells[0], 1, names, SafetyFilter(ROBOTS))
+    trial = RobotTrial(set_up(experiment, experiment.cells[0]), 1, names, SafetyFilter(ROBOTS))
     rows = RobotRows(place_worlds(OPEN, STARTS[None], [1], 1.0))
     while True:
         time_s, poses = rows.now_ms / 1000.0, rows.world.poses.copy()
@@ -55,7 +56,7 @@ def test_collisions_are_counted_by_the_radii_of_the_robots(radii_m, touching):
     experiment = parse_experiment(FILE.split("metrics")[0] + "metrics: [collisions]\n", "e.yaml")
     safety = SafetyFilter(ROBOTS)
     safety.radii_m = radii_m
-    trial = RobotTrial(experiment, experiment.cells[0], 1, ["hero_0", "hero_1", "hero_2"], safety)
+    trial = RobotTrial(set_up(experiment, experiment.cells[0]), 1, ["hero_0", "hero_1", "hero_2"], safety)
     poses = np.array([(0.0, 0.0, 0.0), (0.11, 0.0, 0.0), (0.0, 0.11, 0.0)])
     trial.step(0.0, poses, np.zeros(3))
     assert trial.list_values() == (touching,)
@@ -136,11 +137,11 @@ def test_robots_drive_to_their_starts_slower_while_poses_are_old():
 def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
     monkeypatch.setitem(METRICS, "consensus_error", lambda poses, velocities, *rest: velocities[:, 0, 0])
     experiment = parse_experiment(FILE, "e.yaml")
-    trial = RobotTrial(experiment, experiment.cells[0], 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
+    trial = RobotTrial(set_up(experiment, experiment.cells[0]), 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
     for time_s in (0.0, 0.9, 1.05, 2.1, 2.1, 2.9):
         trial.step(time_s, STARTS + (0.2 * time_s, 0.0, 0.0), np.zeros(3))
     assert [values[0] for values in trial._samples] == pytest.approx([0.0, 0.2, 0.2])
-    late = RobotTrial(experiment, experiment.cells[0], 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
+    late = RobotTrial(set_up(experiment, experiment.cells[0]), 1, ["a", "b", "c"], SafetyFilter(ROBOTS))
     for _ in range(2):
         late.step(5.0, STARTS, np.zeros(3))
     assert [values[0] for values in late._samples] == [0.0, 0.0], "also where no time has passed"

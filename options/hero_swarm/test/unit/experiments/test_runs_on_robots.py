@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("rospy", reason="the program needs ROS")
 from hero_client.values import MODELS, NO_OBJECTS
 from hero_sim.stepped import StepSwarm
+from hero_swarm.experiments.computing import CellSetup
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
 from hero_swarm.ros import robot_runs
@@ -74,13 +75,13 @@ def run(monkeypatch, tmp_path, models):
             ("ObjectSource", lambda *arguments, **options: SimpleNamespace(read=lambda: NO_OBJECTS)),
             ("OtherRobots", lambda own, frame: others if (own, frame) == (ids, "world") else pytest.fail()),
             ("_drive_to_starts", lambda *arguments: None),
-            ("place_robots", lambda experiment, cell, seeds: swarm.rows.world.poses[None].copy()),
             ("_record", lambda *arguments: nullcontext()),
             ("time", SimpleNamespace(monotonic=lambda: swarm.now_s)),
             ("read_duration_clock_s", lambda: swarm.now_s),
             ("rospy", SimpleNamespace(get_time=lambda: swarm.now_s, logwarn=pytest.fail)),
         ):
             monkeypatch.setattr(robot_runs, name, value)
+        monkeypatch.setattr(CellSetup, "place_robots", lambda setup, seeds: swarm.rows.world.poses[None].copy())
         folder = mock.create_autospec(ResultsFolder, instance=True)
         folder.list_missing.return_value, folder.path = [(0, 1)], str(tmp_path)
         options = argparse.Namespace(robots=ids, frame="world", calibration="")

@@ -19,8 +19,8 @@ from PIL import Image
 from hero_client.values import BODY_RADIUS_M
 from hero_sim.world import list_outlines
 
-from ..trial import OPEN, Trial
-from .errors import ExperimentError
+from .experiments.errors import ExperimentError
+from .trial import OPEN, Trial
 
 FRAMES_PER_S = 10
 

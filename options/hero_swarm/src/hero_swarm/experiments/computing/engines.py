@@ -21,7 +21,7 @@ from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
 
 from hero_node import import_optional, is_loopback, one_line
 
-from .errors import ExperimentError
+from ..errors import ExperimentError
 
 MAX_NEW_POOLS = 3
 """Worker pools that are started in place of broken ones; a batch that kills its worker would do so for ever."""

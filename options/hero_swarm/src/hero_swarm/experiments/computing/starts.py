@@ -11,11 +11,11 @@ from hero_node.files import decode_text, read_file
 from hero_sim.errors import OptionError
 from hero_sim.world import Arena, PushedBody, place_robots
 
-from ..behavior import derive_seed
-from ..metrics.graphs import measure_distances
-from ..trial import is_clear, scatter, scatter_objects
-from .errors import ExperimentError
-from .experiment_file import Start
+from ...behavior import derive_seed
+from ...metrics.graphs import measure_distances
+from ...trial import is_clear, scatter, scatter_objects
+from ..errors import ExperimentError
+from ..experiment_file import Start
 
 _DIAMETER_M = 2.0 * BODY_RADIUS_M
 

@@ -12,7 +12,7 @@ from typing import Any, Dict, Mapping
 
 import numpy as np
 
-from .errors import ExperimentError
+from ..errors import ExperimentError
 
 PACKAGES = ("hero_client", "hero_driver", "hero_node", "hero_sim", "hero_swarm")
 """All whose modules a simulated run may use."""
