@@ -5,7 +5,7 @@ from commanded_robot import MOTORS, POSITION, VELOCITY, Clock, CommandedRobot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.commands.command_sources import CommandSource, CommandSources
+from hero_driver.commands.command_sources import RATE_MAX_HZ, STUCK_READINGS, CommandSource, CommandSources
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
 from hero_driver.robot_constants import MAX_WATCHDOG_S
@@ -428,3 +428,36 @@ def test_a_rival_keeps_its_robot_for_half_a_second_of_silence():
         now_s = 0.875 + silence_s
         stopper = commanders.note_command(VELOCITY, "b", "another", "/program", False, now_s)
         assert commanders.needs_another_stop(stopper, now_s) == has_more, (silence_s, node)
+
+
+def test_wheels_that_do_not_turn_for_five_seconds_of_commands_are_told():
+    wheels = WheelMotion()
+    sources = CommandSources(wheels)
+
+    def command(moves, now_s, ticks=0.0):
+        sources.note_command(VELOCITY, VELOCITY, None, "/mine", moves, now_s)
+        wheels.read_ticks(ticks, ticks)
+        return sources.find_fault(now_s)
+
+    for reading in range(2 * STUCK_READINGS):
+        assert command(False, reading / 29.0) == "", "at rest"
+    now_s = 2 * STUCK_READINGS / 29.0
+    told = [command(True, now_s + reading / 29.0) for reading in range(STUCK_READINGS)]
+    assert not any(told[:-1])
+    assert "have not turned for 5 s, although /mine commands it" in told[-1]
+    assert command(True, now_s + 6.0, ticks=9.0) == ""
+
+
+def test_a_loop_that_does_not_sleep_is_told_while_it_runs():
+    sources = CommandSources(WheelMotion())
+
+    def command(rate_hz, start_s):
+        for count in range(2 * int(rate_hz)):
+            now_s = start_s + count / rate_hz
+            sources.note_command(VELOCITY, VELOCITY, None, "/mine", True, now_s)
+            fault = sources.find_fault(now_s)
+        return fault
+
+    assert command(RATE_MAX_HZ, 0.0) == ""
+    assert "/mine sends 500 commands per second" in command(500.0, 10.0)
+    assert command(10.0, 20.0) == ""

@@ -26,6 +26,13 @@ ZERO_SHOWS_S = 0.5
 
 STILL_READINGS = 2
 
+COUNT_PERIOD_S = 1.0
+RATE_MAX_HZ = 150.0
+"""Programs command at 10 to 50 Hz; a loop that does not sleep, thousands of times per second."""
+
+STUCK_READINGS = 145
+"""Readings (29 per second) without a turn of the wheels, after which a commanded robot counts as stuck: 5 s."""
+
 
 class _Zero(NamedTuple):
     """A zero that ended all motion, and how many readings of its wheels the robot had sent."""
@@ -97,12 +104,15 @@ class CommandSources:
         self._zero: Optional[_Zero] = None  # until its effect shows
         self._looked_s = math.inf
         self._silent_from_s = -math.inf  # until then none can have been silent for long enough
+        self._commands, self._counted_s, self._rate_hz = 0, math.inf, 0.0
+        self._resting_readings = 0  # number of readings when motion was last not commanded
 
     def note_command(
         self, name: str, source: str, sender: object, node: str, moves: bool, now_s: float
     ) -> CommandSource:
         """A command came on the motion topic called name; return its commander. The others are its attributes."""
         self._forgive_pause(now_s)
+        self._commands += 1
         commander = self._by_topic.get(name)
         ends_motion = not moves and self.are_moving
         if commander is None or commander.sender is not sender or commander.source != source:
@@ -172,6 +182,21 @@ class CommandSources:
                 first_s = min(first_s, commander.commanded_s)
         self._silent_from_s = first_s + silence_s
         return None
+
+    def find_fault(self, now_s: float) -> str:
+        """Return what is wrong with how the robot is commanded, empty if nothing is; to be called regularly."""
+        if not 0.0 <= now_s - self._counted_s < COUNT_PERIOD_S:
+            self._rate_hz = self._commands / max(now_s - self._counted_s, COUNT_PERIOD_S)
+            self._commands, self._counted_s = 0, now_s
+        if not self.are_moving:
+            self._resting_readings = self._wheels.readings
+        still_readings = min(self._wheels.still_readings, self._wheels.readings - self._resting_readings)
+        if self._rate_hz <= RATE_MAX_HZ and still_readings < STUCK_READINGS:
+            return ""
+        nodes = ", ".join(sorted({source.node or "a program" for source in self._by_topic.values()}))
+        if self._rate_hz > RATE_MAX_HZ:
+            return f"{nodes} sends {self._rate_hz:.0f} commands per second: let its loop sleep, as by rospy.Rate(10)"
+        return f"its wheels have not turned for 5 s, although {nodes} commands it: are its battery and motors good?"
 
     def needs_another_stop(self, commander: CommandSource, now_s: float) -> bool:
         """Return whether a stop of commander has to end motion of other topics than its own.

@@ -175,6 +175,6 @@ def _assess(robot: RobotStatus) -> Tuple[int, str]:
         return DiagnosticStatus.WARN, f"sends transforms that are not its own: {', '.join(robot.foreign_frames)}"
     if abs(row.clock_offset) > LARGE_CLOCK_OFFSET_S:
         return DiagnosticStatus.WARN, f"its clock is off by {row.clock_offset:.2f} s"
-    if robot.calibration_problem:
-        return DiagnosticStatus.WARN, robot.calibration_problem
+    if robot.command_fault or robot.calibration_problem:
+        return DiagnosticStatus.WARN, robot.command_fault or robot.calibration_problem
     return DiagnosticStatus.OK, "ready"

@@ -31,6 +31,7 @@ class RobotStatus:
     foreign_frames: List[str]
     duplicates: List[Tuple[str, str, StopState]]  # address, reason and stop of each refused one that waits
     calibration_problem: str  # empty: its calibration file is used, or there is none
+    command_fault: str  # empty: nothing is wrong with how it is commanded
 
     @property
     def name(self) -> str:
@@ -52,11 +53,12 @@ def describe_robot(
     """
     corrections = None if bridge is None else bridge.corrections
     dropped = record.dropped_messages
-    problem = calibration_problem = ""
+    problem = calibration_problem = command_fault = ""
     if bridge is not None:
         dropped += bridge.commands.refused + bridge.commands.queue.dropped + bridge.corrections.refused
         problem = bridge.last_error
         calibration_problem = bridge.corrections.calibration_problem
+        command_fault = bridge.commands.fault if peer is not None else ""
     packets, bad_packets, received_length = record.packets, record.bad_packets, record.received_length
     if peer is not None:
         packets += peer.session.reader.packets
@@ -78,7 +80,7 @@ def describe_robot(
         dropped_messages=dropped,
         bad_packets=bad_packets,
         clock_offset=0.0 if corrections is None else corrections.clock_offset_s,
-        last_error="; ".join(filter(None, (problem or record.last_error, calibration_problem))),
+        last_error="; ".join(filter(None, (problem or record.last_error, calibration_problem, command_fault))),
     )
     return RobotStatus(
         message,
@@ -95,4 +97,5 @@ def describe_robot(
             for address, reason in sorted(record.refused.items())[:DUPLICATES_SHOWN]
         ],
         calibration_problem,
+        command_fault,
     )

@@ -55,6 +55,7 @@ class RobotCommands:
     Attributes:
         queue: those that wait to be sent.
         refused: how many the robot was not given.
+        fault: what is wrong with how the robot is commanded now; empty if nothing is.
         light: the color (std_msgs/ColorRGBA) that its light was given last.
         was_told_to_tune: whether a program called the service that starts its self-tuning.
     """
@@ -65,6 +66,7 @@ class RobotCommands:
         """Take the commands for the robot in namespace."""
         self.queue = CommandQueue(settings.command_max_age_s)
         self.refused = 0
+        self.fault = ""
         self.light = NO_LIGHT
         self.was_told_to_tune = False
         self._may_tune = False  # since the last stop a program has called that service
@@ -245,6 +247,9 @@ class RobotCommands:
                 "warn", "silent " + self._label, text % (self._label, silent.node or "a program", silence_s)
             )
             self._stop_robot()
+        self.fault = self._commanders.find_fault(now_s)
+        if self.fault:
+            self._log.log_throttled("warn", "fault " + self._label, f"{self._label}: {self.fault}")
 
     # Self-tuning.
 

@@ -50,7 +50,8 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
     later: Dict[str, Point] = {
         "return_path": node.check_return_path,
         "robots": node.check_robots,
-        "localization": localization.check_nodes,
+        "commands": graph.check_commands,
+        "diagnostics": localization.check_nodes,
     }
     findings = run_points(points, TIMEOUT_S)
     for needed, more in (("master", {"node": node.start}), ("node", later)):

@@ -10,6 +10,7 @@ import unittest
 import rosgraph
 import rospy
 import rostest
+from geometry_msgs.msg import Twist
 
 from hero_test.processes import find_program
 from hero_test.watches.fleet_report import wait_until_ready
@@ -54,7 +55,17 @@ class CheckTest(unittest.TestCase):
         self.assert_point(points, "addresses", "WARN", "open on 127.0.0.1 only")
         self.assert_point(points, "packages", "OK", "all of version")
         self.assert_point(points, "messages", "OK", "match")
-        self.assert_point(points, "localization", "OK", "not running; roslaunch hero_localization")
+        self.assert_point(points, "diagnostics", "OK", "hero_driver: 2 of 2 robots without a problem")
+
+    def test_commands_that_no_robot_hears_are_named(self):
+        mine = [rospy.Publisher(topic, Twist, queue_size=1) for topic in ("/hero_0/led", "/hero_1/velocity")]
+        _, points = run_check()
+        self.assert_point(points, "commands", "WARN", "commands are lost")
+        led, twist = points["commands"]["remedy"]
+        self.assertIn("/hero_0/led as geometry_msgs/Twist, but robots take std_msgs/ColorRGBA", led)
+        self.assertIn("did you mean /hero_1/velocity_controller/cmd_vel?", twist)
+        for publisher in mine:
+            publisher.unregister()
 
     def test_a_name_that_others_cannot_resolve_closes_the_return_path(self):
         code, points = run_check(ROS_HOSTNAME=NO_SUCH_NAME)

@@ -14,7 +14,7 @@ import rosgraph.roslogging
 import rospy
 from rosgraph_msgs.msg import Log
 
-from hero_client.ros import Drivers
+from hero_client.ros import Drivers, find_lost_commands
 from hero_client.values import STATES, describe_counts, describe_gone, describe_stop_origin
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import NodeError, is_loopback
@@ -99,6 +99,12 @@ def check_master(own: Sequence[Address]) -> Finding:
         away = f"is that PC on, is a master running there, is its port open? ping {host}"
         return fail(str(error), start if any(is_own(address, own) for address in addresses) else away)
     return ok("answers at " + uri)
+
+
+def check_commands() -> Finding:
+    """Check whether a program sends commands that no robot hears."""
+    lost = find_lost_commands(ask_master("getSystemState"), ask_master("getTopicTypes"))
+    return warn("commands are lost", *lost[:LINES_MAX]) if lost else ok("no program commands a robot in vain")
 
 
 class OwnNode:

@@ -1,4 +1,4 @@
-"""Points on localization: a camera device, a detector of tags, reports of its nodes."""
+"""A camera device, a detector of tags, and what drivers and the nodes of hero_localization report of themselves."""
 
 import glob
 import importlib.util
@@ -47,13 +47,14 @@ def check_detectors() -> Finding:
 
 
 def check_nodes() -> Finding:
-    """Print what tracker and filter report, such as the rate of images and robots that are lost."""
-    publishers = dict(ask_master("getSystemState")[0]).get(DIAGNOSTICS_TOPIC, [])
-    names = sorted(name.lstrip("/") for name in publishers)
-    running = [name for name in names if name.partition("_")[0] == TRACKER]
+    """Print what drivers, tracker and filter report, such as the rate of images and robots with a problem."""
+    published = dict(ask_master("getSystemState")[0])
+    names = sorted(name.lstrip("/") for name in published.get(DIAGNOSTICS_TOPIC, []))
+    running = [name for name in names if f"/{name}" in published.get(f"/{name}/robots", ())]
+    running += [name for name in names if name.partition("_")[0] == TRACKER]
     running += [name for name in names if name == LOCALIZER]
     if not running:
-        return ok("not running; roslaunch hero_localization camera.launch starts it")
+        return ok("no driver, tracker or localization runs")
     statuses: Dict[str, DiagnosticStatus] = {}
 
     def keep(report: DiagnosticArray) -> None:
@@ -71,18 +72,19 @@ def list_statuses(name: str, statuses: Sequence[DiagnosticStatus]) -> List[Diagn
 
 
 def describe_nodes(running: Sequence[str], statuses: Sequence[DiagnosticStatus]) -> Finding:
-    """Return one line on tracker and filter, and a line for each problem that they report."""
+    """Return one line on all of them, and a line for each problem that they report."""
     texts, remedies = [], []
     for name in running:
         own = list_statuses(name, statuses)
         good = [status for status in own if status.level == DiagnosticStatus.OK]
-        if name == LOCALIZER:
-            robots = [status for status in own if status.name.startswith(f"{name}: hero_")]
-            texts.append(f"{name}: {len(good)} of {len(robots)} robots without a problem")
-        else:
+        if name.partition("_")[0] == TRACKER:
             camera = [status for status in own if status.name == name + ": camera"]
             is_usable = camera and camera[0].level < DiagnosticStatus.ERROR
             texts.append(f"{name}: {camera[0].message if is_usable else 'no usable images'}")
+        else:
+            robots = [status for status in own if status.name.startswith(f"{name}: hero_")]
+            well = [robot for robot in robots if robot in good]
+            texts.append(f"{name}: {len(well)} of {len(robots)} robots without a problem")
         if not own:
             remedies.append(f"{name} sends no diagnostics: rosnode ping {name} tells whether it hangs")
         remedies += [f"{status.name}: {status.message}" for status in own if status not in good]
