@@ -38,12 +38,11 @@ class Client:
         self.frames = self.length = 0
         self.ready = 0
 
-    async def open(self, ground_truth=False):
+    async def open(self):
         """Connect as a page does."""
         request = HTTPRequest(f"ws://{self.url}/live", headers={"Origin": "http://" + self.url})
         self.socket = await websocket_connect(request)
-        shown = {"ground_truth": ground_truth, "picture": False, "visible": True}
-        await self.socket.write_message(json.dumps({"do": "show", **shown}))
+        await self.socket.write_message(json.dumps({"do": "show", "picture": False, "visible": True}))
         self.reader = asyncio.ensure_future(self.read())
 
     async def read(self):
@@ -90,9 +89,6 @@ async def measure_all(monitor, port, options):
         await asyncio.sleep(0.1)
     print("robots that are ready and send odometry: %d" % clients[0].ready)
     rows.append(await measure("one page", monitor, clients[:1], options.seconds))
-    await clients[1].open(ground_truth=True)
-    rows.append(await measure("two pages, one with true poses", monitor, clients[:2], options.seconds))
-    clients[1].close()
     for client in clients[1:]:
         await client.open()
     rows.append(await measure("five pages", monitor, clients, options.seconds))

@@ -150,8 +150,7 @@ class PageRequests:
     # ---------------------------------------------------------------- view and stops
 
     def _do_show(self, page: "PageSocket", request: Request) -> None:
-        page.ground_truth, page.picture = request["ground_truth"], request["picture"]
-        page.visible = request["visible"]
+        page.picture, page.visible = request["picture"], request["visible"]
 
     def _do_stop(self, page: "PageSocket", request: Request) -> None:
         """Stop all robots, or release them."""

@@ -171,12 +171,11 @@ class Monitor:
             return
         for repeated in self._repeated:
             repeated.stop()
-        self._feed.update_subscriptions(has_pages=False, ground_truth=False, picture=False)
+        self._feed.update_subscriptions(has_pages=False, picture=False)
 
     def _update_pages(self) -> None:
         pages = self._server.served_pages()
-        ground_truth, picture = (any(getattr(page, name) for page in pages) for name in ("ground_truth", "picture"))
-        self._feed.update_subscriptions(True, ground_truth, picture)
+        self._feed.update_subscriptions(True, any(page.picture for page in pages))
         self._feed.read()
         self._feed.page_state.put("programs", self._programs.describe())
         if self._lesson is not None:

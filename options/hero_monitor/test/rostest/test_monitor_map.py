@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The map while robots are localized: one frame for all of them, and on request the camera's picture."""
 
+import colorsys
 import io
 import math
 import unittest
@@ -13,6 +14,7 @@ from monitor_process import HOST, end, start_scripted_driver, wait_until_it_answ
 from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
 from PIL import Image
 from sensor_msgs.msg import CompressedImage
+from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_test.screens.browser import MISSING
@@ -24,6 +26,8 @@ COLORS = {"red": (255, 0, 0), "green": (0, 160, 0), "blue": (0, 0, 255), "magent
 
 WALL = (123, 134, 150)
 """The page's color of what is occupied, in light."""
+
+HERO_0 = [255.0 * part for part in colorsys.hls_to_rgb(24 / 360, 0.42, 0.7)]
 
 MIN_WALL_SHARE = 0.15
 """Of the map; names have pixels of that color, too."""
@@ -212,6 +216,23 @@ class MapTest(unittest.TestCase):
     def measure_wall(self):
         """Return the share of the map in the color of walls, and their mean place by its width and height."""
         return self.page.browser.execute_script(MEASURE_COLOR, WALL, STEP_PX)
+
+    def test_simulated_robots_are_drawn_where_they_are(self):
+        self.page.click("#ghosts")
+        place = PoseMessage(Point(2.0, 0.0, 0.0), Quaternion(w=1.0))
+        markers = [Marker(ns=name, text="hero_0", pose=place) for name in ("headings", "names")]
+        simulator = Repeater("/hero_sim/markers", MarkerArray(markers))
+        # The view fits the robot and, to its left, its ghost.
+        wait_for(lambda: self.measure_robot() > 0.6, self.measure_robot)
+        self.page.save("monitor_ghost.png")
+        self.assertEqual(self.page.facts()["odometry error"], "2250 mm")
+        simulator.close()
+        wait_for(lambda: 0.4 < self.measure_robot() < 0.6, self.measure_robot)
+        self.page.click("#ghosts")
+
+    def measure_robot(self):
+        """Return where hero_0 is, by the map's width; 0 if it is not drawn."""
+        return self.page.browser.execute_script(MEASURE_COLOR, HERO_0, 1)[1]
 
 
 if __name__ == "__main__":

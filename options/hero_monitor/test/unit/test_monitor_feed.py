@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PoseStamped, TransformStamped
+from geometry_msgs.msg import Point, PoseStamped, TransformStamped
 from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import ColorRGBA
@@ -22,6 +22,7 @@ from hero_monitor.fleet_feed import feed as feed_module
 from hero_monitor.fleet_feed import robot_feed as robot_feed_module
 from hero_monitor.fleet_feed.feed import (
     LOG_LINES_PER_READ,
+    LOOK_PERIOD_S,
     MARKERS_MAX,
     REPLAY_KEPT_S,
     ROBOTS_MAX,
@@ -36,7 +37,7 @@ from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH, 
 from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.fleet_feed.robot_feed import LIGHT_S, REACHED_M, RobotFeed
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
-from hero_node import Pose
+from hero_node import NodeError, Pose
 from hero_test.nonempty import nonempty
 
 NOW_S = 100.0
@@ -77,8 +78,10 @@ class Fleet:
         monkeypatch.setattr(feed_module.rospy, "Subscriber", lambda *arguments, **options: None)
         monkeypatch.setattr(feed_module, "time", SimpleNamespace(monotonic=lambda: self.now_s, time=lambda: 1.7e9))
         monkeypatch.setattr(feed_module.rospy, "get_name", lambda: "/hero_monitor")
+        monkeypatch.setattr(
+            feed_module, "ask_master", lambda method: ([], [], []) if method == "getSystemState" else []
+        )
         self.feed = FleetFeed("world", SimpleNamespace(submit=self.submit, warn=lambda *said: None))
-        self.page = {}
 
     def make_robot_feed(self, namespace):
         listener = SimpleNamespace(track=RobotTrack(), ranges_m=[0.1, math.inf], values={"battery": 3.70414})
@@ -104,7 +107,7 @@ class Fleet:
 
     def subscribe(self):
         self.feed.read()
-        self.feed.update_subscriptions(True, True, True)
+        self.feed.update_subscriptions(True, True)
 
     def put(self, topic, message):
         self.feed._scene[topic].message = message
@@ -196,26 +199,25 @@ def test_all_is_stopped_only_while_every_driver_says_so(fleet):
 def test_topics_are_subscribed_to_while_pages_show_them(fleet):
     fleet.receive(make_row(0), make_row(1), make_row(2, Robot.REFUSED), Robot(state=Robot.JOINING))
     fleet.feed.read()
-    for ground_truth, picture in ((False, False), (True, True)):
-        fleet.feed.update_subscriptions(True, ground_truth, picture)
+    for picture in (False, True):
+        fleet.feed.update_subscriptions(True, picture)
         assert set(fleet.feed._feeds) == {"/hero_0", "/hero_1"}
-        assert ("/hero_sim/markers" in fleet.feed._scene) == ground_truth
         assert (
             ("/track/picture/outline" in fleet.feed._scene)
             == ("/track/picture/compressed" in fleet.feed._scene)
             == picture
         )
-        assert "/localization/poses" in fleet.feed._scene
+        assert {"/localization/poses", "/hero_sim/markers"} <= set(fleet.feed._scene)
     fleet.receive(make_row(1))
     fleet.feed.read()
-    fleet.feed.update_subscriptions(True, True, True)
+    fleet.feed.update_subscriptions(True, True)
     assert set(fleet.feed._feeds) == {"/hero_1"}
     pending, scene = Future(), dict(fleet.feed._scene)
     fleet.feed._change = pending
-    fleet.feed.update_subscriptions(False, False, False)
+    fleet.feed.update_subscriptions(False, False)
     assert fleet.feed._feeds and not any(newest.is_closed for newest in scene.values()), "one change at a time"
     pending.set_result(None)
-    fleet.feed.update_subscriptions(False, False, False)
+    fleet.feed.update_subscriptions(False, False)
     assert fleet.feed._feeds == fleet.feed._scene == {} and all(newest.is_closed for newest in nonempty(scene.values()))
 
 
@@ -354,10 +356,10 @@ def test_localization_that_no_page_listened_to_is_not_lost(fleet):
     fleet.subscribe()
     fleet.put("/localization/poses", RobotPoses())
     fleet.read()
-    fleet.feed.update_subscriptions(False, False, False)
+    fleet.feed.update_subscriptions(False, False)
     fleet.now_s += SILENT_S + 0.1
     fleet.read()
-    fleet.feed.update_subscriptions(True, False, False)
+    fleet.feed.update_subscriptions(True, False)
     assert fleet.read()["losses"] == []
 
 
@@ -368,15 +370,50 @@ def make_marker(kind, *scale, **fields):
     return marker
 
 
-def test_walls_and_objects_of_a_simulator_that_has_ended_are_cleared(fleet):
+def test_walls_objects_and_places_go_when_the_simulator_has_ended(fleet):
     fleet.receive(make_row(0))
     fleet.subscribe()
-    wall = MarkerArray([make_marker(Marker.CUBE, 0.5, 0.02, 0.1)])
-    for topic, part in feed_module.SCENERY.items():
-        fleet.put(topic, wall)
-        assert fleet.read()[part]["boxes"]
+    robot = [make_marker(Marker.ARROW, 1, 1, 1, ns=name, text="hero_0") for name in ("headings", "names")]
+    message = MarkerArray([make_marker(Marker.CUBE, 0.5, 0.02, 0.1), *robot])
+    nothing = {"boxes": [], "circles": [], "areas": []}
+    for part, topic, empty in (
+        ("arena", "/hero_sim/arena", nothing),
+        ("objects", "/hero_sim/object_markers", nothing),
+        ("ground_truth", "/hero_sim/markers", {}),
+    ):
+        fleet.put(topic, message)
+        assert fleet.read()[part] != empty
         fleet.feed._scene[topic].has_publisher = False
-        assert not fleet.read()[part]["boxes"]
+        assert fleet.read()[part] == empty
+
+
+def test_commands_that_no_robot_hears_and_goals_outside_the_walls_are_told(fleet, monkeypatch):
+    asked = []
+
+    def ask_master(method):
+        asked.append(method)
+        if fleet.now_s > NOW_S + 1.5 * LOOK_PERIOD_S:
+            raise NodeError("no ROS master")
+        published, types = [["/hero_0/cmd_vle", ["/mine"]]], [["/hero_0/cmd_vle", "geometry_msgs/Twist"]]
+        return (published, [], []) if method == "getSystemState" else types
+
+    monkeypatch.setattr(feed_module, "ask_master", ask_master)
+    fleet.receive(make_row(0))
+    fleet.subscribe()
+    (loss,) = fleet.read()["losses"]
+    assert loss["source"] == "commands" and "/mine publishes /hero_0/cmd_vle, which no robot reads" in loss["remedy"]
+    assert len(asked) == 2, "once in LOOK_PERIOD_S"
+    walls = [make_marker(Marker.CUBE, 2.0, 0.02, 0.1) for _ in range(2)]
+    for marker, y_m in zip(walls, (-1.0, 1.0)):
+        marker.pose.position = Point(0.0, y_m, 0.0)
+    fleet.put("/hero_sim/arena", MarkerArray(walls))
+    feed = fleet.feed._feeds["/hero_0"]
+    feed.listener.track.receive_pose(Pose(0.5, 0.5, 0.0))
+    for goal, is_told in ((Pose(0.9, 0.9, 0.0), False), (Pose(0.9, 1.1, 0.0), True), (Pose(-1.1, 0.9, 0.0), True)):
+        feed.find_goal = lambda placement, goal=goal: goal
+        assert ("the goal of hero_0 lies outside the walls" in fleet.read()["losses"][0]["remedy"]) == is_told
+    fleet.now_s += 2.0 * LOOK_PERIOD_S
+    assert "/mine publishes" in fleet.read()["losses"][0]["remedy"], "a master that is gone tells nothing new"
 
 
 def test_arena_and_ground_truth_are_drawn_in_millimeters():

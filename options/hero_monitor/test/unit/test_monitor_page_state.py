@@ -233,7 +233,7 @@ def read(**fields):
         {"do": "goal", "robots": ["hero_1"], "x": 1, "y": 2, "heard_ms": 5},
         {"do": "goal", "robots": ["hero_1"], "x": 1, "y": 2, "yaw": 3, "heard_ms": 5},
         {"do": "goal", "robots": ["hero_1"], "x": 1, "y": 2, "yaw": None, "heard_ms": 5},
-        {"do": "show", "ground_truth": False, "picture": True, "visible": True},
+        {"do": "show", "picture": True, "visible": True},
     ],
 )
 def test_requests_of_the_page_are_parsed(request_fields):
@@ -270,7 +270,7 @@ def test_requests_of_the_page_are_parsed(request_fields):
         '{"do":"start","program":"led_show","robots":["hero_0"],"values":[],"heard_ms":5}',
         '{"do":"record","on":true}',
         '{"do":"show"}',
-        '{"do":"show","ground_truth":true,"picture":false}',
+        '{"do":"show","picture":false}',
         '{"do":"reboot"}',
         '{"do":["stop"],"stop":true}',
     ],

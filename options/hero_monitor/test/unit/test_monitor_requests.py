@@ -31,7 +31,7 @@ class Page:
 
     def __init__(self, number=1):
         self.number, self.told, self.received = number, [], []
-        self.ground_truth = self.picture = self.visible = None
+        self.picture = self.visible = None
         self.is_served, self.ended = True, []
         self.user, self.who = User("", TEACHER), "a teacher, page %d" % number
 
@@ -232,7 +232,7 @@ def test_a_page_that_is_not_served_can_stop_robots_and_move_none(desk):
         assert desk.ask(do, **fields) == ["too many pages are open: only STOP ALL works on this one"]
     assert desk.noted == [] and desk.started == [] and desk.pages[0].received == []
     assert desk.ask("stop") == [] and desk.pages[0].received == ["stop"]
-    assert desk.ask("show", ground_truth=False, picture=False, visible=True) == []
+    assert desk.ask("show", picture=False, visible=True) == []
 
 
 def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
@@ -303,8 +303,8 @@ def test_a_recording_begins_once_and_ends_on_request(desk, monkeypatch):
 
 
 def test_a_page_says_what_it_shows(desk):
-    assert desk.ask("show", page=1, ground_truth=True, picture=False, visible=False) == []
-    assert (desk.pages[1].ground_truth, desk.pages[1].picture, desk.pages[1].visible) == (True, False, False)
+    assert desk.ask("show", page=1, picture=True, visible=False) == []
+    assert (desk.pages[1].picture, desk.pages[1].visible) == (True, False)
 
 
 def test_foxglove_clients_drive_and_stop_by_the_rules_of_pages(desk, monkeypatch):

@@ -73,7 +73,7 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
     "dismiss": {},
     "code": {"robots": _is_names},
     "withdraw": {"code": _is_name},
-    "show": {"ground_truth": _is_flag, "picture": _is_flag, "visible": _is_flag},
+    "show": {"picture": _is_flag, "visible": _is_flag},
 }
 """Requests of a page by its field "do", with the fields that it needs and their checks.
 
@@ -81,8 +81,7 @@ stop: stop all robots. release: release them. drive: a button is held; velocity 
 when it was pressed. end_drive: it is let go. stop_some: end what drives these robots, and stop them. goal: a pose on
 the map in m; yaw (rad) may be added. start: a program of offers.OFFERS, with values for its fields. end: a program, by
 its number. record: begin or end the recording. dismiss: list robots that are gone no longer. code: make a code for
-the drivers of these robots. withdraw: such a code. show: whether the page is visible, and what it shows in addition to
-the fleet.
+the drivers of these robots. withdraw: such a code. show: whether the page is visible, and shows the camera's picture.
 """
 
 

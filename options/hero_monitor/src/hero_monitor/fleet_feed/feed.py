@@ -4,6 +4,8 @@ While no page is open, only the drivers' reports and the log are subscribed to, 
 are subscribed to in the background, because the ROS master may block.
 """
 
+import contextlib
+import math
 import re
 import time
 from collections import deque
@@ -20,7 +22,7 @@ from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.ros import Drivers, NewestMessage, StopStatus, follow, load_fleet_file
+from hero_client.ros import Drivers, NewestMessage, StopStatus, find_lost_commands, follow, load_fleet_file
 from hero_client.values import (
     STATES,
     STOP_STATES,
@@ -31,7 +33,8 @@ from hero_client.values import (
     read_pose,
 )
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
-from hero_node import Pose, make_printable, pose_of
+from hero_node import NodeError, Pose, make_printable, pose_of
+from hero_node.ros import ask_master
 
 from ..background import Background
 from .camera_picture import CameraPicture
@@ -46,17 +49,22 @@ from .robot_feed import RobotFeed
 ROW_PERIOD_S = 0.5
 """Time between two updates of the table without a report: rates."""
 
+LOOK_PERIOD_S = 3.0
+"""Time between two looks at the ROS master's list of topics: that of 100 robots takes it some 20 ms."""
+
+LOST_SHOWN = 3
+"""Commands in vain that are named at once."""
+
 LOG_LINES_PER_READ = 40
 """Decoding a line takes about 0.05 ms; a swarm that tunes its motors logs thousands a second."""
 
 ROBOTS_MAX = 1000
 """Rows of the table."""
 
-GROUND_TRUTH_TOPICS = {"/hero_sim/markers"}
 PICTURE_TOPICS = {"/track/picture/compressed", "/track/picture/outline"}
 
-SCENERY = {"/hero_sim/arena": "arena", "/hero_sim/object_markers": "objects"}
-"""Topics of a simulator, with the parts of the page state that are empty without it."""
+SIMULATOR_TOPICS = ("/hero_sim/arena", "/hero_sim/object_markers", "/hero_sim/markers")
+"""When the simulator ends, an empty message takes the place of what it published last."""
 
 REPLAY_KEPT_S = 3.0
 """Robots of a replay disappear this long after its last message."""
@@ -88,7 +96,7 @@ class FleetFeed:
             "/localization/poses": (RobotPoses, self._localize),
             "/diagnostics": (DiagnosticArray, self._receive_diagnostics),
             "/map": (OccupancyGrid, self._receive_grid),
-            "/hero_sim/arena": (MarkerArray, lambda message, now_s: put("arena", describe_arena(message))),
+            "/hero_sim/arena": (MarkerArray, self._receive_arena),
             "/hero_sim/object_markers": (MarkerArray, lambda message, now_s: put("objects", describe_arena(message))),
             "/hero_sim/markers": (MarkerArray, lambda message, now_s: put("ground_truth", find_true_poses(message))),
             "/hero_sim/replay": (MarkerArray, self._receive_replay),
@@ -108,6 +116,10 @@ class FleetFeed:
         self._pending_reads = 0
         self.lab_file = load_fleet_file()
         self._report = RobotArray()
+        self._looked_s = 0.0
+        self._lost_commands: List[str] = []
+        self._walls: List[float] = []  # left, right, low and high of the arena's, mm; empty without one
+        self._vain_goals: List[str] = []
         self.stopper = ""
         """User who stopped the robots on a page."""
         self._rows: Sequence[Robot] = ()
@@ -127,8 +139,8 @@ class FleetFeed:
 
     # ---------------------------------------------------------------- subscriptions
 
-    def update_subscriptions(self, has_pages: bool, ground_truth: bool, picture: bool) -> None:
-        """Subscribe to robots only while a page is open, to ground truth and picture on request; returns at once."""
+    def update_subscriptions(self, has_pages: bool, picture: bool) -> None:
+        """Subscribe to robots only while a page is open, to the camera's picture on request; returns at once."""
         if self._change is not None and not self._change.done():
             return
         if self._change is not None:
@@ -136,7 +148,6 @@ class FleetFeed:
         robots = {row.namespace for row in self._rows if row.namespace and row.state != Robot.REFUSED}
         namespaces = robots if has_pages else set()
         scene = set(self._receivers) if has_pages else set()
-        scene -= set() if ground_truth else GROUND_TRUTH_TOPICS
         scene -= set() if picture else PICTURE_TOPICS
         if namespaces != set(self._feeds) or scene != set(self._scene):
             self._change = self._background.submit(self._change_subscriptions, namespaces, scene)
@@ -156,6 +167,9 @@ class FleetFeed:
         self._read_scene()
         self.placement.set_robots(self.robots)
         self._put_robots()
+        if time.monotonic() - self._looked_s >= LOOK_PERIOD_S:
+            self._looked_s = time.monotonic()
+            self._background.submit(self._look_for_lost_commands)
         self._list_losses()
         self._read_log()
 
@@ -191,7 +205,16 @@ class FleetFeed:
         gone = describe_gone(self._report, time.time()) if any(self._answering.values()) else ""
         if gone:
             losses.append(Loss("robots", shorten(gone), "Switch them on, or dismiss this"))
+        lost = [*self._lost_commands, *self._vain_goals][:LOST_SHOWN]
+        if lost:
+            losses.append(Loss("commands", "Commands may be in vain", shorten("; ".join(lost))))
         self.page_state.put("losses", [loss._asdict() for loss in losses])
+
+    def _look_for_lost_commands(self) -> None:
+        """Ask the ROS master, which may take seconds."""
+        with contextlib.suppress(NodeError):
+            state, types = ask_master("getSystemState"), ask_master("getTopicTypes")
+            self._lost_commands = find_lost_commands(state, types, rospy.get_name())
 
     def _make_row(self, row: Robot) -> Dict[str, Any]:
         name = make_printable(row.namespace.strip("/"))
@@ -276,9 +299,9 @@ class FleetFeed:
             message = newest and newest.take()
             if message is not None:
                 receive(message, now_s)
-        for topic, part in SCENERY.items():
+        for topic in SIMULATOR_TOPICS:
             if topic in self._scene and not self._scene[topic].has_publisher:
-                put(part, describe_arena(MarkerArray()))  # the simulator has ended
+                self._receivers[topic][1](MarkerArray(), now_s)
         if "/localization/poses" not in self._scene:
             self._localization.pause(now_s)
         elif not self._localization.is_expected(now_s):
@@ -290,8 +313,6 @@ class FleetFeed:
             put("grid", self._grid and encode_grid(self._grid, frame))
         put("picture", self.picture.describe(frame, now_s))
         put("drawings", self._drawings.describe(frame, now_s))
-        if "/hero_sim/markers" not in self._scene:
-            put("ground_truth", {})
         if now_s - self._replay_s > REPLAY_KEPT_S:
             put("replay", {})
 
@@ -306,6 +327,16 @@ class FleetFeed:
             name = status.name.rpartition(": ")[2]
             if name in self.robots:
                 self._health[name] = [status.level, shorten(status.message)]
+
+    def _receive_arena(self, message: MarkerArray, now_s: float) -> None:
+        arena = describe_arena(message)
+        self.page_state.put("arena", arena)
+        ends = [
+            (x + side * length * math.cos(yaw / 1e3), y + side * length * math.sin(yaw / 1e3))
+            for x, y, yaw, length, _ in arena["boxes"]
+            for side in (-0.5, 0.5)
+        ]
+        self._walls = [edge(values) for values in zip(*ends) for edge in (min, max)]
 
     def _receive_replay(self, message: MarkerArray, now_s: float) -> None:
         self._replay_s = now_s
@@ -329,6 +360,7 @@ class FleetFeed:
 
     def _put_robots(self) -> None:
         poses, ranges, lights, goals = {}, {}, {}, {}
+        self._vain_goals = []
         for feed in list(self._feeds.values()):
             track = feed.listener.track
             if track.pose is not None:
@@ -339,8 +371,16 @@ class FleetFeed:
             goal = feed.find_goal(self.placement)
             if goal is not None:
                 goals[feed.name] = encode_pose(goal)
+                if self._is_within_walls(poses.get(feed.name)) and not self._is_within_walls(goals[feed.name]):
+                    self._vain_goals.append(f"the goal of {feed.name} lies outside the walls")
         for name, value in (("poses", poses), ("ranges", ranges), ("lights", lights), ("goals", goals)):
             self.page_state.put(name, value)
+
+    def _is_within_walls(self, pose: Optional[List[int]]) -> bool:
+        if pose is None or not self._walls:
+            return False
+        left, right, low, high = self._walls
+        return left <= pose[0] <= right and low <= pose[1] <= high
 
     def _read_log(self) -> None:
         log, drivers = self.page_state.log, self.drivers.names()

@@ -227,8 +227,7 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Register a page."""
         self.number = next(PageSocket.numbers)
         self.seen: Dict[str, Any] = {}
-        self.ground_truth = self.picture = False
-        self.visible, self.is_served = True, False
+        self.visible, self.picture, self.is_served = True, False, False
         self.shown_user: Optional[User] = None
         self._sent_s = time.monotonic()
         self._sending: Optional[Awaitable[None]] = None

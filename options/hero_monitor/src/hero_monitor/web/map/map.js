@@ -26,8 +26,8 @@ export class FleetMap {
     Object.assign(this, { state, choose, connection });
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
-    const ground_truth = localStorage.getItem("ground_truth") === "true";
-    this.shows = { trails: true, beams: true, names: true, ground_truth, picture: false };
+    const ghosts = localStorage.getItem("ghosts") === "true";
+    this.shows = { trails: true, beams: true, names: true, ghosts, picture: false };
     this.picture = new CameraPicture(() => this.update({}));
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
@@ -60,16 +60,16 @@ export class FleetMap {
   toggle(name) {
     this.shows[name] = !this.shows[name];
     setPressed(element(name), this.shows[name]);
-    if (name === "ground_truth") localStorage.setItem("ground_truth", String(this.shows.ground_truth));
+    if (name === "ghosts") localStorage.setItem("ghosts", String(this.shows.ghosts));
     this.requestShown();
     this.picture.show(this.shows.picture, this.state.picture);
+    if (name === "ghosts" && !this.pinned) this.fit();
     this.draw();
   }
 
   /** Tell what is to be seen here; to be repeated on each connection. */
   requestShown() {
-    const { ground_truth, picture } = this.shows;
-    this.connection.send({ do: "show", ground_truth, picture, visible: !document.hidden });
+    this.connection.send({ do: "show", picture: this.shows.picture, visible: !document.hidden });
   }
 
   /** Ask for places, with a hint, until a hint of null: onPlace({x, y, yaw}) in m and rad, yaw after a drag alone. */
@@ -82,9 +82,12 @@ export class FleetMap {
     this.draw();
   }
 
-  /** Poses as drawn: on a picture, those of the moment when it was taken. */
+  /** Poses as drawn: simulated robots where they are; on a picture, those of the moment when it was taken. */
   get poses() {
-    return this.picture.box ? { ...this.state.poses, ...this.picture.poses } : this.state.poses;
+    const { poses, ground_truth } = this.state;
+    const drawn = { ...poses };
+    for (const name in poses) if (ground_truth[name]) drawn[name] = ground_truth[name];
+    return this.picture.box ? { ...drawn, ...this.picture.poses } : drawn;
   }
 
   // ------------------------------------------------------------ pointer
@@ -181,7 +184,7 @@ export class FleetMap {
     for (const place of this.lasso) loop.lineTo(place[0], place[1]);
     const context = make("canvas").getContext("2d"); // without the map's transformation
     const isInside = (pose) => pose && context.isPointInPath(loop, pose[0], pose[1], "evenodd");
-    return Object.keys(this.state.poses).filter((name) => isInside(this.state.poses[name]));
+    return Object.entries(this.poses).filter(([, pose]) => isInside(pose)).map(([name]) => name);
   }
 
   takePlace() {
@@ -227,7 +230,9 @@ export class FleetMap {
     const places = []; // that are to be seen
     const add = (pose, box) => places.push(...listCorners(pose, box));
     const surround = ([x, y], reach) => places.push([x - reach, y - reach], [x + reach, y + reach]);
-    for (const pose of Object.values({ ...replay, ...poses })) if (pose) surround(pose, 150);
+    for (const drawn of [replay, this.poses, this.shows.ghosts ? poses : {}]) {
+      for (const pose of Object.values(drawn)) if (pose) surround(pose, 150);
+    }
     for (const [x, y, yaw, length, width] of arena.boxes) add([x, y, yaw], [-length / 2, -width / 2, length / 2, width / 2]);
     for (const [x, y, radius] of arena.circles) surround([x, y], radius);
     for (const { lines = [], isBeam } of drawings) if (!isBeam) for (const place of lines.flat()) surround(place, 60);
@@ -274,10 +279,10 @@ export class FleetMap {
   // ------------------------------------------------------------ updates
 
   update(updates) {
-    if ("poses" in updates) this.keepTrails();
+    if ("poses" in updates || "ground_truth" in updates) this.keepTrails();
     if ("picture" in updates) this.picture.show(this.shows.picture, this.state.picture);
-    const { poses, replay, fleet, grid, arena, drawings } = this.state;
-    const count = Object.keys(poses).length + Object.keys(replay).length;
+    const { poses, ground_truth, replay, fleet, grid, arena, drawings } = this.state;
+    const count = Object.keys({ ...poses, ...replay }).length + Object.keys(ground_truth).length;
     const placed = fleet.robots.filter((robot) => robot.source).length;
     // When there is something else to see, the view fits it again.
     const scene = String([count, fleet.frame, this.picture.box, grid?.columns, arena.boxes.length, drawings.length > 0, placed]);

@@ -49,7 +49,7 @@ export class MapPainter {
     this.paintShapes(state.objects, "--object");
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
     if (shows.trails) for (const robot of robots) this.paintTrail(robot);
-    if (shows.ground_truth) for (const robot of robots) this.paintGroundTruth(robot);
+    if (shows.ghosts) for (const robot of robots) this.paintGhost(robot);
     this.paintPlaces();
     for (const robot of robots) this.paintGoal(robot);
     for (const drawing of state.drawings) if (shows.beams || !drawing.isBeam) this.paintDrawing(drawing);
@@ -177,11 +177,12 @@ export class MapPainter {
     });
   }
 
-  paintGroundTruth(robot) {
-    const pose = this.state.ground_truth[robot.name];
-    if (!pose) return;
+  /** Where odometry or localization has a robot that is drawn where it is. */
+  paintGhost(robot) {
+    const pose = this.map.state.poses[robot.name];
+    if (!this.state.ground_truth[robot.name]) return;
     const { scale } = this.view;
-    this.pen(this.ink("--ink"), 1.2);
+    this.pen(colorOf(robot.id), 1.5);
     this.at(pose, () =>
       this.dashed([4 / scale, 3 / scale], () => {
         this.circle(0, 0, BODY_MM).stroke();
