@@ -209,7 +209,9 @@ def find_forwarded(path):
 
 
 def read_arguments(path):
-    return [argument.attrib for argument in ElementTree.parse(path).getroot().findall("arg")]
+    """Return the attributes of each argument that users may set: those with a value are fixed."""
+    arguments = [argument.attrib for argument in ElementTree.parse(path).getroot().findall("arg")]
+    return [argument for argument in arguments if "value" not in argument]
 
 
 def test_launch_arguments_are_documented_there_and_in_the_readme():

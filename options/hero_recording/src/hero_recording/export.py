@@ -1,4 +1,4 @@
-"""Program export: writes recordings as tables, a folder per robot and a file per message type, or as other bags.
+"""Program export: writes recordings as tables, a folder per robot and a file per message type, or as a ROS 2 bag.
 
 What is written is in OUT.part until it is complete.
 """
@@ -15,31 +15,28 @@ from .bags.bag_set import BagSet
 from .bags.tables import TABLES, declare_tables, is_exported, read_rows
 from .bags.topics import Message
 from .errors import RecordingError, explain_write_errors
-from .formats.bag_files import write_mcap, write_ros2
+from .formats.bag_files import write_ros2
 from .formats.table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
 from .options import list_of
 
 PART_SUFFIX = ".part"
 
-BAG_WRITERS = {"mcap": write_mcap, "ros2": write_ros2}
-OUT_SUFFIXES = {"mcap": ".mcap", "ros2": "_ros2"}
-"""Added to the first bag's name; tables have no suffix."""
+ROS2 = "ros2"
 
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(prog="export", description="Export recordings to tables or other bags.")
+    parser = argparse.ArgumentParser(prog="export", description="Export recordings to tables or ROS 2 bags.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
     parser.add_argument("--out", metavar="PATH", help="output path (the first bag's name); must not exist")
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
     parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)
-    text = "csv, npz, parquet: tables; mcap, ros2: bags with every message (%(default)s)"
-    parser.add_argument("--format", choices=[*TABLE_FORMATS, *BAG_WRITERS], default=CSV, help=text)
-    parser.add_argument("--ros2", dest="format", action="store_const", const="ros2", help="short for --format ros2")
+    text = "csv, npz, parquet: tables; ros2: a bag with every message (%(default)s)"
+    parser.add_argument("--format", choices=[*TABLE_FORMATS, ROS2], default=CSV, help=text)
     options = parser.parse_args(arguments)
-    if options.format in BAG_WRITERS and (options.robots is not None or options.tables != list(TABLES)):
-        parser.error(f"--robots and --tables choose tables, but --format {options.format} copies every message")
+    if options.format == ROS2 and (options.robots is not None or options.tables != list(TABLES)):
+        parser.error("--robots and --tables choose tables, but --format ros2 copies every message")
     return options
 
 
@@ -77,8 +74,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     declare_tables(read_fleet_file().topics)
     options = parse_options(arguments)
     bags = BagSet(options.bags)
-    out = options.out or os.path.splitext(bags.paths[0])[0] + OUT_SUFFIXES.get(options.format, "")
-    out = os.path.abspath(out)
+    suffix = "_ros2" if options.format == ROS2 else ""
+    out = os.path.abspath(options.out or os.path.splitext(bags.paths[0])[0] + suffix)
     if os.path.exists(out):
         raise RecordingError(f"{out} exists already; move it away or choose another --out")
     part = out + PART_SUFFIX
@@ -86,8 +83,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         os.makedirs(part)
     incomplete = os.path.join(part, os.path.basename(out))
     try:
-        if options.format in BAG_WRITERS:
-            written = "%d messages" % BAG_WRITERS[options.format](bags, incomplete)
+        if options.format == ROS2:
+            written = "%d messages" % write_ros2(bags, incomplete)
         else:
             written = export_tables(bags, options, incomplete)
         os.rename(incomplete, out)

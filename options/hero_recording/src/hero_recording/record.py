@@ -15,15 +15,14 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from typing import Dict, List, Optional, Sequence, Set, Tuple
+from typing import Dict, List, Optional, Sequence, Set
 
-import rosgraph
 import roslib.packages
 
 from hero_node import command_line, end_process
 from hero_node.files import read_fleet_file
 from hero_node.parameters import robot_ids_option, within
-from hero_node.ros import ask_master, check_master
+from hero_node.ros import check_master
 
 from .bags.bag_set import ACTIVE_SUFFIX
 from .bags.repair import repair_bag
@@ -42,6 +41,9 @@ CLOSING_S = 10.0
 
 PR_SET_PDEATHSIG = 1
 """Option of prctl(2)."""
+
+REMAPPING = re.compile(r"(__|[^_-]).*:=")
+"""An argument for ROS, such as __name:=my_record; private parameters are refused: the options take their place."""
 
 EMPTY_BAG_BYTES = 10000
 """A bag without messages is a header of 4 kB and at most the names of topics."""
@@ -180,55 +182,21 @@ def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str])
     return [*command, *make_patterns(options.robots, options.raw, options.topics), *recorder_arguments]
 
 
-def read_launch_options(ros_arguments: Sequence[str]) -> List[str]:
-    """Return the private parameters of the node that a launch file starts, as command line options.
-
-    Raises: NodeError if the ROS master does not answer.
-    """
-    name = rosgraph.names.load_mappings(ros_arguments).get("__name")
-    if name is None:
-        return []
-    namespace = rosgraph.names.make_caller_id(name)
-    parameters = ask_master("getParam", namespace) if ask_master("hasParam", namespace) else {}
-    return [option for key, value in sorted(parameters.items()) for option in _make_option(key, value)]
-
-
-def split_arguments(arguments: Sequence[str]) -> Tuple[List[str], List[str]]:
-    """Return options, which private parameters (_name:=value) become as well, and ROS's own arguments."""
-    options, ros_arguments = [], []
-    for word in arguments:
-        name, mark, value = word.partition(rosgraph.names.REMAP)
-        if not mark:
-            options.append(word)
-        elif name.startswith("_") and not name.startswith("__"):
-            options += _make_option(name[1:], {"true": True, "false": False}.get(value, value))
-        else:
-            ros_arguments.append(word)
-    return options, ros_arguments
-
-
-def _make_option(name: str, value: object) -> List[str]:
-    """Return a parameter as an option; a flag is given or left out."""
-    if value is False:
-        return []
-    return ["--" + name.replace("_", "-") + ("" if value is True else f"={value}")]
-
-
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="record", description="Record all robots into bags.", allow_abbrev=False)
-    parser.add_argument("--folder", default=".", help="folder of the bags (here); created if missing")
-    parser.add_argument("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
-    parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
-    parser.add_argument("--topics", default="", help="more topics: regular expressions separated by spaces")
-    parser.add_argument("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
     add = parser.add_argument
+    add("--folder", default=".", help="folder of the bags (here); created if missing")
+    add("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
+    add("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
+    add("--topics", default="", help="more topics: regular expressions separated by spaces")
+    add("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
     add("--split-mb", type=within(1, 100_000, int), default=256, metavar="MB", help="size of a file (256)")
     add("--max-files", type=within(0, 10_000, int), default=0, metavar="N", help="keep only the newest N (0: all)")
     add("--min-free-mb", type=within(0.0, 1e9), default=1000.0, metavar="MB", help="stop below this (1000)")
-    parser.add_argument("--compression", choices=("lz4", "bz2", "none"), default="lz4", help="bag compression (lz4)")
-    parser.add_argument("--seconds", type=float, metavar="S", help="stop after S seconds")
-    parser.add_argument("--repair", nargs="+", metavar="FILE", help="repair recordings that were cut off, and exit")
+    add("--compression", choices=("lz4", "bz2", "none"), default="lz4", help="bag compression (lz4)")
+    add("--seconds", type=float, metavar="S", help="stop after S seconds")
+    add("--repair", nargs="+", metavar="FILE", help="repair recordings that were cut off, and exit")
     options = parser.parse_args(arguments)
     if options.seconds is not None and not 0.0 < options.seconds < math.inf:
         parser.error(f"--seconds {options.seconds:g}: must be more than 0, and finite")
@@ -246,11 +214,11 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 def main() -> None:
     """Record, or repair recordings. Raises: RecordingError, NodeError."""
-    options, ros_arguments = split_arguments(sys.argv[1:])
+    ros_arguments = [word for word in sys.argv[1:] if REMAPPING.match(word)]
+    options = parse_options([word for word in sys.argv[1:] if not REMAPPING.match(word)])
     declare_topics(read_fleet_file().topics)
-    parsed = parse_options(read_launch_options(ros_arguments) + options)
-    for path in parsed.repair or ():
+    for path in options.repair or ():
         say(repair_bag(path))
-    if not parsed.repair:
+    if not options.repair:
         check_master()
-        Recording(parsed, ros_arguments).run()
+        Recording(options, ros_arguments).run()

@@ -133,49 +133,22 @@ def test_parquet_tables_hold_all_rows_and_columns(bag, tmp_path, capsys):
     assert table.column_names[:3] == ["time_s", "stamp_s", "x_m"]
 
 
-@pytest.mark.option("mcap.reader")
-def test_mcap_holds_every_message_as_recorded(bag, tmp_path, capsys):
-    from mcap import reader
-
-    output = run_export(capsys, bag, "--out", tmp_path / "out.mcap", "--format", "mcap")
-    with rosbag.Bag(str(bag)) as recorded:
-        expected = [(topic, raw[0], raw[1], time.to_nsec()) for topic, raw, time in recorded.read_messages(raw=True)]
-    with open(str(tmp_path / "out.mcap"), "rb") as file:
-        messages = reader.make_reader(file).iter_messages()
-        copied = [(channel.topic, schema.name, message.data, message.log_time) for schema, channel, message in messages]
-    assert sorted(copied) == sorted(expected)
-    assert "%d messages" % len(expected) in output
-
-
 @pytest.mark.option("rosbags.rosbag2")
 def test_a_ros_2_bag_holds_as_many_messages_of_each_topic(bag, tmp_path, capsys):
     from rosbags import rosbag2
 
     if not hasattr(rosbag2, "StoragePlugin"):
         pytest.skip("rosbags is older than 0.10")
-    run_export(capsys, bag, "--out", tmp_path / "out", "--ros2")
+    run_export(capsys, bag, "--out", tmp_path / "out", "--format", "ros2")
     with rosbag.Bag(str(bag)) as recorded:
         counts = {topic: info.message_count for topic, info in recorded.get_type_and_topic_info().topics.items()}
     with rosbag2.Reader(tmp_path / "out") as reader:
         assert {topic: info.msgcount for topic, info in reader.topics.items()} == counts
 
 
-@pytest.mark.option("mcap.stream_reader")
-def test_mcap_has_no_offsets_of_groups_that_it_does_not_have(bag, tmp_path, capsys):
-    from mcap import stream_reader as streams
-
-    run_export(capsys, bag, "--out", tmp_path / "out.mcap", "--format", "mcap")
-    with open(str(tmp_path / "out.mcap"), "rb") as file:
-        records = list(streams.StreamReader(file, emit_chunks=True).records)
-    kinds = {type(record).__name__ for record in records}
-    offsets = [record for record in records if type(record).__name__ == "SummaryOffset"]
-    assert "ChunkIndex" in kinds and "MessageIndex" in kinds and offsets
-    assert all(offset.group_length > 0 for offset in offsets)
-
-
-@pytest.mark.parametrize(("kind", "package"), [("parquet", "pyarrow"), ("mcap", "mcap"), ("ros2", "rosbags")])
+@pytest.mark.parametrize(("kind", "package"), [("parquet", "pyarrow"), ("ros2", "rosbags")])
 def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, monkeypatch, kind, package):
-    for module in ("pyarrow", "mcap.writer", "rosbags.rosbag2"):
+    for module in ("pyarrow", "rosbags.rosbag2"):
         monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(ProgramError, match="pip install '%s" % package):
         run_export(capsys, bag, "--out", tmp_path / "out", "--format", kind)
@@ -184,5 +157,5 @@ def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, m
 
 def test_a_choice_of_robots_is_refused_where_every_message_is_copied(bag, capsys):
     with pytest.raises(SystemExit):
-        export.parse_options([str(bag), "--format", "mcap", "--robots", "3"])
+        export.parse_options([str(bag), "--format", "ros2", "--robots", "3"])
     assert "--robots and --tables choose tables" in capsys.readouterr().err

@@ -32,14 +32,16 @@ def test_a_wrong_option_is_refused_with_its_name_and_value(option, value, words,
     assert option in line and value in line and words in line
 
 
-def test_private_parameters_are_options_and_other_remappings_rosbags():
-    words = ["_split_mb:=7", "--raw", "__name:=my_record", "_name:=a", "_raw:=false", "/tf:=/other"]
-    options, ros_arguments = record.split_arguments(words)
-    assert ros_arguments == ["__name:=my_record", "/tf:=/other"]
-    parsed = record.parse_options(options)
-    assert (parsed.split_mb, parsed.name, parsed.raw) == (7, "a", True)
-    for value, is_raw in (("true", True), ("false", False)):
-        assert record.parse_options(record.split_arguments(["_raw:=" + value])[0]).raw == is_raw
+def test_remappings_are_the_recorders(monkeypatch, tmp_path):
+    words = ["--raw", "__name:=my_record", "--name=a", "/tf:=/other", f"--folder={tmp_path}"]
+    monkeypatch.setattr(sys, "argv", ["record", *words])
+    monkeypatch.setattr(record, "check_master", lambda: None)
+    ran = []
+    monkeypatch.setattr(record.Recording, "run", lambda recording: ran.append(recording))
+    monkeypatch.setattr(record.roslib.packages, "find_node", lambda package, name: ["/opt/record"])
+    record.main()
+    assert ran[0]._options.raw and ran[0]._options.name == "a"
+    assert ran[0]._command[-2:] == ["__name:=my_record", "/tf:=/other"]
 
 
 def test_the_ends_of_what_options_may_be_are_allowed():
@@ -52,9 +54,9 @@ def test_the_ends_of_what_options_may_be_are_allowed():
             assert getattr(parsed, name.replace("-", "_")) == float(value)
 
 
-def test_an_unknown_private_parameter_is_refused_by_name(capsys, monkeypatch):
+def test_a_private_parameter_is_refused_by_name(capsys, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["record", "_foldr:=/tmp"])
     with pytest.raises(SystemExit) as caught:
         record.main()
     assert caught.value.code == 2
-    assert "unrecognized arguments: --foldr=/tmp" in capsys.readouterr().err
+    assert "unrecognized arguments: _foldr:=/tmp" in capsys.readouterr().err

@@ -1,12 +1,12 @@
 """Reads the messages of bag files in order of time; a file that cannot be read is refused in one line."""
 
 import os
-from typing import Any, Callable, Dict, Iterable, List, Sequence, Tuple
+from typing import Callable, Dict, List, Sequence, Tuple
 
 from tqdm import tqdm
 
 from ..errors import RecordingError, explain_bag_errors
-from .topics import Message, RawMessage
+from .topics import Message
 
 try:
     from .ros_reader import Reader
@@ -48,24 +48,13 @@ class BagSet:
     def read(self, is_wanted: Callable[[str, str], bool], receive: Callable[[Message], None]) -> None:
         """Pass every message whose topic and type is_wanted() accepts to receive. Raises: RecordingError."""
         wanted = [topic for topic, message_type in self.topics.items() if is_wanted(topic, message_type)]
-        if wanted:
-            self._read(wanted, lambda bag: bag.read(wanted), receive)
-
-    def read_raw(self, receive: Callable[[RawMessage], None]) -> None:
-        """Pass every message of every topic to receive, without decoding it. Raises: RecordingError."""
-        topics = list(self.topics)
-        self._read(topics, lambda bag: bag.read_raw(topics), receive)
-
-    def _read(
-        self, topics: Sequence[str], read: Callable[[Reader], Iterable[Any]], receive: Callable[[Any], None]
-    ) -> None:
-        for path in self.paths:
-            total = sum(self._counts[path].get(topic, 0) for topic in topics)
+        for path in self.paths if wanted else ():
+            total = sum(self._counts[path].get(topic, 0) for topic in wanted)
             # receive() fails as well where a message definition in the bag is damaged.
             with open_bag(path) as bag, explain_bag_errors(f"{path} cannot be read"):
                 # disable=None: no bar in a log.
                 for message in tqdm(
-                    read(bag), os.path.basename(path), total, unit=" messages", leave=False, disable=None
+                    bag.read(wanted), os.path.basename(path), total, unit=" messages", leave=False, disable=None
                 ):
                     receive(message)
 

@@ -2,11 +2,11 @@
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Sequence, Tuple
+from typing import Any, Dict, Iterator, Sequence, Tuple
 
 from hero_node import import_optional
 
-from .topics import Message, RawMessage
+from .topics import Message
 
 
 class Reader(ExitStack):
@@ -37,29 +37,11 @@ class Reader(ExitStack):
 
     def read(self, topics: Sequence[str]) -> Iterator[Message]:
         """Yield messages in order of time."""
-        for connection, time_ns, content in self._bag.messages(self._choose(topics)):
+        chosen = [connection for connection in self._bag.connections if connection.topic in topics]
+        for connection, time_ns, content in self._bag.messages(chosen):
             message = self._bag.deserialize(content, connection.msgtype)
             yield Message(connection.topic, _name_in_ros1(connection.msgtype), message, time_ns / 1e9)
-
-    def read_raw(self, topics: Sequence[str]) -> Iterator[RawMessage]:
-        """Yield messages in order of time, without decoding them."""
-        headers = {connection.id: _make_header(connection) for connection in self._bag.connections}
-        for connection, time_ns, content in self._bag.messages(self._choose(topics)):
-            yield RawMessage(connection.topic, headers[connection.id], bytes(content), time_ns)
-
-    def _choose(self, topics: Sequence[str]) -> List[Any]:
-        return [connection for connection in self._bag.connections if connection.topic in topics]
 
 
 def _name_in_ros1(message_type: str) -> str:
     return message_type.replace("/msg/", "/")
-
-
-def _make_header(connection: Any) -> Dict[str, str]:
-    definition = getattr(connection.msgdef, "data", connection.msgdef)  # a text in its versions for Python 3.8 and 3.9
-    header = {"type": _name_in_ros1(connection.msgtype), "md5sum": connection.digest, "message_definition": definition}
-    if connection.ext.callerid:
-        header["callerid"] = connection.ext.callerid
-    if connection.ext.latching:
-        header["latching"] = "1"
-    return header

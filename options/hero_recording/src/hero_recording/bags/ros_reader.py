@@ -5,7 +5,7 @@ from typing import Dict, Iterator, Sequence, Tuple
 
 import rosbag
 
-from .topics import Message, RawMessage
+from .topics import Message
 
 
 class Reader(ExitStack):
@@ -35,9 +35,3 @@ class Reader(ExitStack):
         """Yield messages in order of time."""
         for topic, content, time in self._bag.read_messages(topics):
             yield Message(topic, content._type, content, time.to_sec())
-
-    def read_raw(self, topics: Sequence[str]) -> Iterator[RawMessage]:
-        """Yield messages in order of time, without decoding them."""
-        for topic, raw, time, header in self._bag.read_messages(topics, raw=True, return_connection_header=True):
-            texts = {name: value.decode() if isinstance(value, bytes) else value for name, value in header.items()}
-            yield RawMessage(topic, texts, raw[1], time.to_nsec())

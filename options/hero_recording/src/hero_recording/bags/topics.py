@@ -4,7 +4,7 @@ The patterns are regular expressions: robots that join later are recorded too.
 """
 
 import re
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 from hero_node.files import ExtraTopic
 
@@ -63,17 +63,6 @@ class Message(NamedTuple):
     type: str
     content: Any
     time_s: float
-    """When the recorder received it, since 1970."""
-
-
-class RawMessage(NamedTuple):
-    """A message as bytes, as it was recorded."""
-
-    topic: str
-    header: Dict[str, str]
-    """Header of the connection: type, md5sum, message_definition; callerid and latching, if the publisher sent them."""
-    content: bytes
-    time_ns: int
     """When the recorder received it, since 1970."""
 
 

@@ -1,1 +1,1 @@
-"""The files that export writes: tables per robot, or bags of other tools."""
+"""The files that export writes: tables per robot, or a ROS 2 bag."""
