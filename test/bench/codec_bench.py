@@ -66,7 +66,8 @@ def main():
             if isinstance(event, Topic) and event.kind.is_from_robot:
                 info = event.info
                 ros_type = apply_aliases(info.message_type)
-                event.receive = corrections.handler_for(info.name, ros_type, lambda *_: sink)
+                outputs = corrections.list_outputs(info.name, ros_type)
+                event.receive = corrections.handler_for(info.name, ros_type, [sink for _ in outputs])
         for index, of_burst in enumerate(messages):
             for topic, payload in of_burst:
                 topic.receive(payload, start_ns + index * BURST_NS)

@@ -42,7 +42,8 @@ def try_bytes(data):
             if isinstance(event, MessagesReceived):
                 for topic, payload in event.messages:
                     message_type = TYPES.get(topic.info.message_type, topic.info.message_type)
-                    receive = corrections.handler_for(topic.info.name, message_type, lambda *_: sink)
+                    outputs = corrections.list_outputs(topic.info.name, message_type)
+                    receive = corrections.handler_for(topic.info.name, message_type, [sink for _ in outputs])
                     receive(payload, ARRIVAL_NS)
             elif type(event) is Log:
                 log_lines.read_log_line(event.text)

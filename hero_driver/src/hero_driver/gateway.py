@@ -65,7 +65,7 @@ class Gateway(LinkHandler):
         self._sender = CommandSender(loop.call_later, self)
         self._stops = StopDelivery(loop.call_later, self)
         self._robot_log = RobotLog(log, self._stops.begin, self.warn_late)
-        self._transforms = TransformPublisher(config.transform_period_s, loop.call_later)
+        self._transforms = TransformPublisher(loop.call_later)
         self._context = BridgeContext(
             self, loop, log, self._transforms, registrar, config, config, 2 * config.max_topics
         )

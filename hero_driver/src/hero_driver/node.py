@@ -33,7 +33,7 @@ from hero_node.ros import (
     read_master_uri,
 )
 
-from .config import FORMER_STOP, DriverConfig, read_config
+from .config import DriverConfig, read_config
 from .gateway import NS_PER_S, STOP_LIMIT_S, Gateway
 from .reports.reporter import FleetStatus, Reporter
 from .ros.log_relay import LogRelay, report_dropped_log_lines
@@ -97,7 +97,7 @@ class DriverNode:
                 "error", f"a topic or service could not be set up: {type(error).__name__}: {error}"
             ),
         )
-        self._loop = EventLoop(config.host, config.port, config.robots, config.silence_timeout_s)
+        self._loop = EventLoop(config.host, config.port, config.silence_timeout_s)
         self._gateway = Gateway(
             config, self._loop, log, self._registrar, rospy.get_name(), make_ros_clock(), self._changed.set
         )
@@ -108,7 +108,7 @@ class DriverNode:
         self._is_closed = threading.Event()
 
     def open(self) -> None:
-        """Listen, dial and serve. Raises: ProgramError if the port cannot be had."""
+        """Listen and serve. Raises: ProgramError if the port cannot be had."""
         try:
             self._loop.open(self._gateway)
         except OSError as error:
@@ -119,12 +119,11 @@ class DriverNode:
         self._thread.start()
         rospy.Service("~dismiss_gone", Trigger, self._serve_dismissal)
         threading.Thread(target=self._watch_master, name="master watch", daemon=True).start()
-        self._log.log("info", self._describe_start())
+        self._log.log("info", f"hero_driver: listening on {self._loop.listening}")
         for problem in self._config.calibration_problems.values():
             self._log.log("warn", f"a calibration is not used: {problem}, then restart the driver")
         # Whatever ~host calls it: "0" is every address too.
-        listening = self._loop.listening
-        if listening is not None and listening.host in ("0.0.0.0", "::") and not self._config.allow:
+        if self._loop.listening.host in ("0.0.0.0", "::") and not self._config.allow:
             self._log.log(
                 "warn",
                 "any host in the networks of this PC can pose as a robot: ~host or ~allow limits them to the robots'",
@@ -206,14 +205,6 @@ class DriverNode:
             return TriggerResponse(False, "the driver hangs")
         return TriggerResponse(True, f"no longer listed as gone: {', '.join(names) or 'no robot'}")
 
-    def _describe_start(self) -> str:
-        parts = []
-        if self._loop.listening is not None:
-            parts.append(f"listening on {self._loop.listening}")
-        if self._config.robots:
-            parts.append(f"dialling {', '.join(str(address) for address in self._config.robots)}")
-        return f"hero_driver: {'; '.join(parts)}"
-
     def _report(self, reporter: Reporter, is_periodic: bool) -> None:
         try:
             status = self._loop.ask(self._take_status, 1.0)
@@ -236,10 +227,9 @@ class DriverNode:
     def _take_status(self, answer: Callable[[FleetStatus], None]) -> None:
         """Runs on the thread of the sockets."""
         now_s = time.monotonic()
-        listening = self._loop.listening
         status = FleetStatus(
             now_s,
-            "" if listening is None else str(listening),
+            str(self._loop.listening),
             self._gateway.stopped,
             self._stop_interface.stopped_by,
             self._stop_interface.stopped_s,
@@ -334,9 +324,6 @@ def _read_private_parameters() -> Any:
         raise ProgramError(f"the ROS master cannot be asked for parameters: {error}") from error
     if not isinstance(parameters, dict):
         return {}
-    if FORMER_STOP in parameters:
-        text = "~%s, which an earlier version kept on the ROS master, is ignored: if it is true, stop the robots again"
-        rospy.logwarn(text, FORMER_STOP)
     return parameters
 
 

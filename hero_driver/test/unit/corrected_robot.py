@@ -39,14 +39,13 @@ def make_corrections(namespace, outputs, **settings):
 
 def make_handler(corrections, name, message_type, outputs, is_wanted=lambda name: True):
     """Return the handler of a topic whose messages, and those derived from them, come to the list outputs, too."""
-    return corrections.handler_for(name, message_type, lambda topic, _: ListSink(topic, outputs, is_wanted(topic)))
+    topics = list_topics(corrections, name, message_type)
+    return corrections.handler_for(name, message_type, [ListSink(topic, outputs, is_wanted(topic)) for topic in topics])
 
 
 def list_topics(corrections, name, message_type):
     """Return the topics that the messages of a topic become, with their types."""
-    topics = {}
-    corrections.handler_for(name, message_type, topics.setdefault)
-    return topics
+    return dict(corrections.list_outputs(name, message_type))
 
 
 class CorrectedRobot:

@@ -12,12 +12,12 @@ from hero_driver.config import PARAMETERS
 from hero_test.parameter_list import make_list, write_default
 
 GROUPS = {
-    "Connections": ("host", "port", "robots", "allow"),
+    "Connections": ("host", "port", "allow"),
     "Limits": ("max_*",),
     "Timeouts": ("*_timeout_s", "grace_s", "command_max_age_s"),
     "Commands": ("clamp", "orphan_stop_s", "silent_stop_s", "start_stopped", "allow_self_tuning"),
-    "Odometry": ("odometry", "hero_plus", "wheel_*", "ticks_per_turn", "calibration_folder", "*_covariance"),
-    "Stamps, transforms, reports": ("stamps", "max_future_s", "max_age_s", "*_period_s"),
+    "Odometry": ("wheel_*", "ticks_per_turn", "calibration_folder", "*_covariance"),
+    "Reports": ("report_period_s",),
     "Others": ("*",),
 }
 PAGE_HEAD = """# Driver parameters

@@ -226,9 +226,7 @@ def test_odometry_that_is_written_lies_in_the_plane_and_counts_round():
     writer = message_layouts.OdometryWriter((1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (7.0,) * 6)
     frames = b"".join(struct.pack("<I", len(text)) + text for text in (b"odom", b"base_link"))
     payload = struct.pack("<3I", 1, 2, 3) + frames + bytes(8 * (7 + 36 + 6 + 36))
-    written = writer.rewrite(
-        payload, 2**32 + 5, 1_500_000_007, (encode_pose(1.0, 2.0, math.pi / 2.0), 0.1, 0.5)
-    )
+    written = writer.rewrite(payload, 2**32 + 5, 1_500_000_007, (encode_pose(1.0, 2.0, math.pi / 2.0), 0.1, 0.5))
     assert struct.unpack_from("<3I", written) == (5, 1, 500_000_007)
     numbers = struct.unpack_from("<85d", written, 12 + len(frames))
     root = math.sqrt(0.5)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from hero_driver.config import PARAMETERS, DriverConfig, read_config
 from hero_driver.corrections.tick_odometry import WheelGeometry
-from hero_driver.transport.link import Address
 from hero_node import ProgramError
 from hero_test.nonempty import nonempty
 
@@ -32,7 +31,7 @@ def refuse(name, value):
 def test_no_parameters_are_the_defaults():
     config = read_config({})
     assert config == DriverConfig()
-    assert (config.host, config.port, config.robots) == ("0.0.0.0", 11411, ())
+    assert (config.host, config.port) == ("0.0.0.0", 11411)
 
 
 def test_a_configuration_cannot_be_changed():
@@ -44,7 +43,7 @@ def test_a_configuration_cannot_be_changed():
 def test_every_parameter_has_a_text_and_a_default_that_is_allowed(name):
     default = PARAMETERS[name].default
     assert PARAMETERS[name].text
-    if name in ("robots", "allow"):
+    if name == "allow":
         default = list(default)
     assert getattr(read_config({name: default}), name) == PARAMETERS[name].default
 
@@ -57,13 +56,12 @@ def test_values_come_where_they_belong():
             "max_topics": 10,
             "silence_timeout_s": 8,
             "clamp": True,
-            "odometry": "robot",
             "wheel_separation_m": 0.0635,
             "allow": ["10.42.0.0/24", "fe80::/10"],
             "max_unidentified": 7,
         }
     )
-    assert (config.host, config.port, config.clamp, config.odometry) == ("10.42.0.1", 0, True, "robot")
+    assert (config.host, config.port, config.clamp) == ("10.42.0.1", 0, True)
     assert type(config.silence_timeout_s) is float
     assert config.max_topics == 10
     assert config.silence_timeout_s == 8.0
@@ -81,10 +79,6 @@ def test_an_unknown_parameter_is_refused_with_the_name_that_was_meant():
     assert "did you mean ~silence_timeout_s?" in refuse("silence_timeout", 5.0)
     assert "known are: allow, allow_self_tuning, calibration_folder, clamp," in refuse("xyzzy", 1)
     assert "did you mean" not in refuse("xyzzy", 1)
-
-
-def test_a_stop_that_an_earlier_version_kept_on_the_master_is_no_error():
-    assert read_config({"stopped": True}) == DriverConfig()
 
 
 # Numbers.
@@ -136,46 +130,7 @@ def test_the_host_is_a_text(value):
     assert "a text" in refuse("host", value)
 
 
-def test_a_driver_that_neither_listens_nor_dials_is_refused():
-    assert "neither listen nor dial" in refuse("host", "")
-    config = read_config({"host": "", "robots": [{"host": "10.0.0.7"}]})
-    assert config.host == ""
-
-
 # Lists.
-
-
-def test_robots_are_addresses_with_the_usual_port_unless_another_is_given():
-    config = read_config({"robots": [{"host": "a", "port": 1}, {"host": "a", "port": 65535}]})
-    assert [robot.port for robot in config.robots] == [1, 65535]
-    config = read_config({"robots": [{"host": "10.0.0.7"}, {"host": "hero-3.local", "port": 4000}]})
-    assert config.robots == (Address("10.0.0.7", 11411), Address("hero-3.local", 4000))
-
-
-@pytest.mark.parametrize(
-    "value",
-    [
-        "10.0.0.7",
-        {"host": "10.0.0.7"},
-        ["10.0.0.7"],
-        [{}],
-        [{"port": 11411}],
-        [{"host": ""}],
-        [{"host": 7}],
-        [{"host": "a", "port": 0}],
-        [{"host": "a", "port": 65536}],
-        [{"host": "a", "port": "11411"}],
-        [{"host": "a", "port": True}],
-        [{"host": "a", "prot": 1}],
-        [None],
-    ],
-)
-def test_other_lists_of_robots_are_refused(value):
-    assert "{host" in refuse("robots", value)
-
-
-def test_a_robot_named_twice_is_refused():
-    assert "names no robot twice" in refuse("robots", [{"host": "a"}, {"host": "a", "port": 11411}])
 
 
 @pytest.mark.parametrize("value", ["10.0.0.0/8", [10], ["10.0.0.0/33"], ["10.42.0.1/24"], ["robots"], [None], {}])
@@ -228,9 +183,8 @@ def test_wheels_of_calibrated_robots_are_read_from_their_files(tmp_path):
 def test_hero_plus_has_its_own_wheels_and_keeps_its_ticks_when_calibrated(tmp_path):
     (tmp_path / "hero_7.yaml").write_text("robot: hero_7\nwheels_m: [0.0501, 0.0499, 0.0652]\n")
     (tmp_path / "hero_8.yaml").write_text("robot: hero_8\nwheels_m: [0.05, 0.05, 0.065]\nticks_per_turn: 100\n")
-    given = {"calibration_folder": str(tmp_path), "hero_plus": "4 7-8", "ticks_per_turn": 300.0}
+    given = {"calibration_folder": str(tmp_path), "ticks_per_turn": 300.0}
     settings = read_config(given)
-    assert settings.hero_plus == ("hero_4", "hero_7", "hero_8")
     assert settings.find_geometry("hero_4", "hero_plus").ticks_per_turn == 96.0
     assert settings.find_geometry("hero_5", "hero").ticks_per_turn == 300.0
     assert settings.find_geometry("hero_7", "hero_plus").wheel_separation_m == 0.0652

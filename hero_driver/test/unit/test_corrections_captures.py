@@ -92,13 +92,6 @@ def test_recorded_odometry_and_transforms_agree_in_stamp_and_pose(read_capture):
     }
 
 
-def test_the_robots_own_odometry_can_be_kept(read_capture):
-    _, outputs = clean(read_capture("A.robot_to_server.bin"), "/hero_0", START_NS, odometry="robot")
-    own = [read_odometry(payload)[2:7] for name, payload in outputs if name == "/hero_0/odom"]
-    raw = [read_odometry(payload)[2:7] for name, payload in outputs if name == "/hero_0/odom_raw"]
-    assert own == raw
-
-
 def test_a_robot_with_the_imu_hat_gets_imu_messages_with_growing_stamps(read_capture):
     _, outputs = clean(read_capture("E_imu_hat.robot_to_server.bin"), "/hero_12", NOW_NS)
     imu = [payload for name, payload in outputs if name == "/hero_12/imu"]

@@ -187,7 +187,7 @@ def test_reports_add_what_connections_and_topics_have_dropped(driver):
     link.received_length = 70
     peer = driver.gateway.peers[link]
     peer.bridge.commands.refused, peer.bridge.commands.queue.dropped = 3, 4
-    peer.bridge.corrections._refused, peer.session.undeclared_messages = 5, 6
+    peer.bridge.corrections.refused, peer.session.undeclared_messages = 5, 6
     driver.gateway.warn_robot(peer, "broken")
     (status,) = driver.gateway.list_robots(driver.now_s)
     assert status.message.dropped_messages == 19 and status.message.last_error == "broken"

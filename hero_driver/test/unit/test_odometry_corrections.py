@@ -19,7 +19,7 @@ from robot_messages import (
     read_stamp_ns,
 )
 
-from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5
+from hero_driver.corrections.message_layouts import PLUS_ENCODER_MD5
 from hero_node import Pose
 
 PERIOD_NS = 34 * MS
@@ -41,7 +41,7 @@ def test_odometry_and_its_transform_wait_for_their_bursts_reading():
     before = [output for name, _, payload in first for output in robot.receive(name, payload, NOW_NS + PERIOD_NS)]
     assert [name for name, _ in before] == ["/hero_0/odom_raw"] + ["/tf"] * 4
     after = robot.receive(encoder_name, encoder, NOW_NS + PERIOD_NS)
-    assert [name for name, _ in after] == ["/hero_0/encoder", "/hero_0/odom", "/tf"]
+    assert [name for name, _ in after] == ["/hero_0/odom", "/tf", "/hero_0/encoder"]
     assert list_odometry(after)[0][2:5] == pytest.approx((10.0 * TICK_M, 0.0, 0.0))
     assert list_transforms(after) == [
         (NOW_NS + PERIOD_NS, "hero_0/odom", "hero_0/base_link", pytest.approx(10.0 * TICK_M), 0.0, 0.0)
@@ -155,17 +155,6 @@ def test_without_an_encoder_the_robots_estimate_passes_at_once():
     assert list_transforms(outputs) == [(NOW_NS, "hero_0/odom", "hero_0/base_link", 3.0, 4.0, 0.0)]
 
 
-def test_the_robots_own_odometry_is_taken_where_that_is_asked_for():
-    robot = CorrectedRobot(odometry="robot")
-    outputs = robot.receive("/hero_0/odom", build_odometry(NOW_NS, 1.0, 2.0, 0.5), NOW_NS)
-    assert list_odometry(outputs)[0][2:5] == pytest.approx((1.0, 2.0, 0.5))
-    outputs = robot.receive("/hero_0/encoder", build_encoder(NOW_NS, 500.0, 500.0), NOW_NS)
-    assert [name for name, _ in outputs] == ["/hero_0/encoder"]
-    robot.receive("/hero_0/encoder", build_encoder(NOW_NS + PERIOD_NS, 900.0, 900.0), NOW_NS + PERIOD_NS)
-    outputs = robot.receive("/hero_0/odom", build_odometry(NOW_NS + 2 * PERIOD_NS, 1.1, 2.0, 0.5), NOW_NS)
-    assert list_odometry(outputs)[0][2:5] == pytest.approx((1.1, 2.0, 0.5)), "whatever the encoders have counted"
-
-
 def test_a_reading_without_subscribers_moves_the_odometry():
     robot = CorrectedRobot(is_wanted=lambda name: name != "/hero_0/encoder")
     robot.receive_burst(NOW_NS, (0.0, 0.0))
@@ -209,7 +198,7 @@ def test_the_pose_stays_where_it_was_when_the_robot_reboots():
 def test_a_reboot_noticed_after_the_declarations_keeps_the_encoder():
     robot = CorrectedRobot()
     robot.receive_burst(NOW_NS, (100.0, 100.0))
-    robot.corrections.note_reboot()
+    robot.corrections.odometry.note_reboot()
     robot.receive_burst(NOW_NS + PERIOD_NS, (0.0, 0.0))
     outputs = robot.receive_burst(NOW_NS + 2 * PERIOD_NS, (10.0, 10.0))
     assert list_odometry(outputs)[0][2] == pytest.approx(10.0 * TICK_M)
@@ -225,9 +214,9 @@ def test_pending_messages_are_not_sent_on_the_next_connection():
 
 def test_odometry_of_another_world_begins_at_zero_at_any_count():
     robot = CorrectedRobot()
-    robot.corrections.set_pose(Pose(1.0, 2.0, 1.0))
-    robot.corrections.restart_odometry()
-    odometry = robot.corrections.odometry
+    robot.corrections.odometry.set_pose(Pose(1.0, 2.0, 1.0))
+    robot.corrections.odometry.start_at_zero()
+    odometry = robot.corrections.odometry.ticks
     odometry.integrate(7000.0, 7000.0, 100.0)
     assert (odometry.x_m, odometry.y_m, odometry.yaw_rad, odometry.resets) == (0.0, 0.0, 0.0, 0)
 
@@ -235,7 +224,7 @@ def test_odometry_of_another_world_begins_at_zero_at_any_count():
 def test_a_set_pose_is_where_the_odometry_goes_on_from():
     robot = CorrectedRobot()
     robot.receive_burst(NOW_NS, (100.0, 100.0))
-    robot.corrections.set_pose(Pose(1.0, 2.0, math.pi / 2.0))
+    robot.corrections.odometry.set_pose(Pose(1.0, 2.0, math.pi / 2.0))
     outputs = robot.receive_burst(NOW_NS + PERIOD_NS, (10.0, 10.0))
     assert list_odometry(outputs)[0][2:5] == pytest.approx((1.0, 2.0 + 10.0 * TICK_M, math.pi / 2.0))
 
@@ -282,20 +271,15 @@ def test_arbitrary_bytes_never_raise_and_are_counted(name, payload):
 
 
 @pytest.mark.parametrize(
-    "md5sum, given_plus, model",
-    [
-        (PLUS_ENCODER_MD5, (), "hero_plus"),
-        ("b5586cdbae9b740afc6a1f403a2d7dde", ("hero_0",), "hero_plus"),
-        ("b5586cdbae9b740afc6a1f403a2d7dde", (), "hero"),
-    ],
+    "md5sum, model", [(PLUS_ENCODER_MD5, "hero_plus"), ("b5586cdbae9b740afc6a1f403a2d7dde", "hero")]
 )
-def test_ticks_are_those_of_the_model_that_the_robot_is(md5sum, given_plus, model):
-    robot = CorrectedRobot(hero_plus=tuple(given_plus))
+def test_ticks_are_those_of_the_model_that_the_robot_is(md5sum, model):
+    robot = CorrectedRobot()
     robot.corrections.note_encoder(md5sum)
     robot.receive_burst(NOW_NS, (0.0, 0.0))
     (odometry,) = list_odometry(robot.receive_burst(NOW_NS + 34 * MS, (20.0, 20.0)))
     tick_m = {"hero": math.pi * 0.0492 / 288, "hero_plus": math.pi * 0.050 / 96}[model]
-    assert robot.corrections.model == model
+    assert robot.corrections.models.model == model
     assert odometry[2] == pytest.approx(20 * tick_m)
 
 
@@ -343,9 +327,9 @@ def test_stamps_too_close_together_give_no_impossible_velocity():
     robot = CorrectedRobot()
     for number in range(3):
         robot.receive_burst(NOW_NS + number * PERIOD_NS, (10.0 * number, 10.0 * number))
-    before = robot.corrections.odometry.linear_m_s
-    robot.corrections.odometry.expect_reset()
-    robot.corrections.odometry.integrate(0.0, 0.0, 1.0)
-    robot.corrections.odometry.integrate(300.0, 300.0, 1.0 + 1e-6)
+    before = robot.corrections.odometry.ticks.linear_m_s
+    robot.corrections.odometry.ticks.expect_reset()
+    robot.corrections.odometry.ticks.integrate(0.0, 0.0, 1.0)
+    robot.corrections.odometry.ticks.integrate(300.0, 300.0, 1.0 + 1e-6)
     assert 0.1 < before < 1.0
-    assert robot.corrections.odometry.linear_m_s == 0.0
+    assert robot.corrections.odometry.ticks.linear_m_s == 0.0

@@ -48,7 +48,7 @@ class Bench:
 
     def __init__(self, monkeypatch):
         self.handler = Handler()
-        self.loop = EventLoop("", 0, (), 1.0)
+        self.loop = EventLoop("127.0.0.1", 0, 1.0)
         self.loop.open(self.handler)
         self.loop_thread = threading.Thread(target=self.loop.run, daemon=True)
         self.loop_thread.start()

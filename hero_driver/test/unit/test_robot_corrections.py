@@ -48,13 +48,6 @@ def test_odometry_and_its_transform_share_one_stamp_from_boot_on():
         assert stamps_ns == {arrival_ns if number < 4 else stamp_ns}
 
 
-def test_the_time_of_arrival_is_taken_where_that_is_asked_for():
-    robot = CorrectedRobot(stamps="arrival")
-    outputs = robot.receive_burst(NOW_NS - 20 * MS, (0.0, 0.0), arrival_ns=NOW_NS)
-    assert read_stamp_ns(list_payloads(outputs, "/hero_0/odom")[0]) == NOW_NS
-    assert {stamp_ns for stamp_ns, *_ in list_transforms(outputs)} == {NOW_NS}
-
-
 def test_the_clock_offset_is_the_median_of_stamp_minus_arrival():
     robot = CorrectedRobot()
     assert robot.corrections.clock_offset_s == 0.0
@@ -122,7 +115,7 @@ def test_topics_that_nothing_is_known_of_pass_untouched():
     assert topics == {"/hero_0/battery": "std_msgs/Float32"}
 
 
-@pytest.mark.parametrize("name", TYPES)
+@pytest.mark.parametrize("name", sorted(set(TYPES) - {"/tf"}))
 def test_a_known_name_with_another_type_passes_untouched(name):
     robot = CorrectedRobot({name: "std_msgs/String"})
     assert robot.receive(name, b"\x00\x00\x00\x00", NOW_NS) == [(name, b"\x00\x00\x00\x00")]
@@ -194,12 +187,15 @@ def test_eight_messages_wait_for_a_reading_and_more_are_refused():
 
 def test_counters_that_begin_anew_are_no_turn_of_a_wheel():
     robot = CorrectedRobot()
-    for begin_anew in (robot.corrections.note_reboot, lambda: robot.corrections.set_pose(Pose(0.0, 0.0, 0.0))):
+    for begin_anew in (
+        robot.corrections.odometry.note_reboot,
+        lambda: robot.corrections.odometry.set_pose(Pose(0.0, 0.0, 0.0)),
+    ):
         robot.receive_burst(NOW_NS, (500.0, 500.0))
         robot.receive_burst(NOW_NS + 34 * MS, (500.0, 500.0))
-        still = robot.corrections.wheels.still_readings
+        still = robot.corrections.odometry.wheels.still_readings
         begin_anew()
         for number in (2, 3):
             robot.receive_burst(NOW_NS + number * 34 * MS, (0.0, 0.0))
-        assert robot.corrections.wheels.still_readings == still + 1 > 1
+        assert robot.corrections.odometry.wheels.still_readings == still + 1 > 1
         begin_anew()

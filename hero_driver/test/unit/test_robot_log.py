@@ -20,10 +20,11 @@ def make_lines(monkeypatch):
 
 
 def make_peer():
+    odometry = SimpleNamespace(note_reboot=lambda: None)
     return SimpleNamespace(
         label="hero_1",
         link=SimpleNamespace(address=SimpleNamespace(host="10.0.0.1")),
-        bridge=SimpleNamespace(corrections=SimpleNamespace(note_reboot=lambda: None), commands=SimpleNamespace()),
+        bridge=SimpleNamespace(corrections=SimpleNamespace(odometry=odometry), commands=SimpleNamespace()),
         record=SimpleNamespace(booted_s=None, heard_uptime_s=0.0, dropped_messages=0, world=""),
         wheels=SimpleNamespace(is_late=False),
         refused=False,
@@ -86,7 +87,7 @@ def test_a_line_about_a_tuning_that_is_read_late_accuses_no_robot(lines):
 def test_a_line_that_is_late_is_no_reboot_and_changes_no_boot_time(lines, late_s):
     robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     reboots = []
-    peer.bridge.corrections.note_reboot = lambda: reboots.append(peer.record.booted_s)
+    peer.bridge.corrections.odometry.note_reboot = lambda: reboots.append(peer.record.booted_s)
     for second in range(0, 200, 2):
         uptime_ms, now_s = 60000 + 1000 * second, NOW_S + second
         say_uptime(robot_log, peer, uptime_ms, now_s)
@@ -98,7 +99,7 @@ def test_a_line_that_is_late_is_no_reboot_and_changes_no_boot_time(lines, late_s
 def test_a_reboot_counts_once_however_late_the_lines_after_it_are(lines):
     robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     reboots = []
-    peer.bridge.corrections.note_reboot = lambda: reboots.append(peer.record.booted_s)
+    peer.bridge.corrections.odometry.note_reboot = lambda: reboots.append(peer.record.booted_s)
     say_uptime(robot_log, peer, 60000)
     for uptime_ms, late_s in ((2000, 0.5), (3000, 4.0), (4000, 3.0), (5000, 0.0)):
         say_uptime(robot_log, peer, uptime_ms, NOW_S + 10.0 + uptime_ms / 1000.0 + late_s)
@@ -110,7 +111,7 @@ def test_a_reboot_counts_once_however_late_the_lines_after_it_are(lines):
 @pytest.mark.parametrize("boots", [1, 3])
 def test_a_boot_line_tells_of_a_reboot_after_which_the_uptime_is_longer(lines, boots):
     robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
-    peer.bridge.corrections.note_reboot = lambda: pytest.fail("a new connection has told the corrections")
+    peer.bridge.corrections.odometry.note_reboot = lambda: pytest.fail("a new connection has told the corrections")
     for first_s in range(0, 100 * boots, 100):
         robot_log.receive(peer, Log(LOG_INFO, "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 1"), NOW_S)
         for uptime_s in (2 + first_s // 100, 3 + first_s // 100):
@@ -122,7 +123,7 @@ def test_a_boot_line_tells_of_a_reboot_after_which_the_uptime_is_longer(lines, b
 def test_odometry_begins_anew_only_where_a_robot_boots_in_another_world(lines):
     robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     restarts = []
-    peer.bridge.corrections.restart_odometry = lambda: restarts.append(peer.record.world)
+    peer.bridge.corrections.odometry.start_at_zero = lambda: restarts.append(peer.record.world)
     for world in ("", " | World: a1", " | World: a1", "", " | World: b2"):
         text = "Firmware: v3.8 | Hardware: v2.5 | Config: v2.3 | IP: 1%s " % world
         robot_log.receive(peer, Log(LOG_INFO, text), NOW_S)

@@ -8,51 +8,36 @@ from corrected_robot import CorrectedRobot
 from robot_messages import MS, NOW_NS
 
 from hero_driver.corrections.correction_settings import OwnWheels
-from hero_driver.corrections.robot_models import PLUS_ENCODER_MD5
+from hero_driver.corrections.message_layouts import PLUS_ENCODER_MD5
 
 STOCK_ENCODER_MD5 = "b5586cdbae9b740afc6a1f403a2d7dde"
 
 
 def declare(robot, md5sum, *topics):
     """Let the robot declare topics and, between them, its encoder; return the conflicts that are found."""
-    found = [robot.corrections.find_conflict("/hero_0" + topic) for topic in topics]
+    found = [robot.corrections.models.find_conflict("/hero_0" + topic) for topic in topics]
     robot.corrections.note_encoder(md5sum)
-    found += [robot.corrections.find_conflict("/hero_0" + topic) for topic in ("/encoder", "/odom")]
+    found += [robot.corrections.models.find_conflict("/hero_0" + topic) for topic in ("/encoder", "/odom")]
     return sorted(set(found) - {""})
 
 
 def drive(robot):
     """Let both wheels count 20 ticks; return how far that is by odometry."""
-    before_m = robot.corrections.odometry.x_m
+    before_m = robot.corrections.odometry.ticks.x_m
     robot.receive_burst(NOW_NS, (0.0, 0.0))
     robot.receive_burst(NOW_NS + 34 * MS, (20.0, 20.0))
-    return robot.corrections.odometry.x_m - before_m
+    return robot.corrections.odometry.ticks.x_m - before_m
 
 
-@pytest.mark.parametrize(
-    "md5sum, given_plus, topic",
-    [
-        (STOCK_ENCODER_MD5, "", "/imu"),
-        (PLUS_ENCODER_MD5, "", "/distance"),
-        (PLUS_ENCODER_MD5, "hero_0", "/distance"),
-        (STOCK_ENCODER_MD5, "hero_0", "/distance"),
-    ],
-)
-def test_of_a_robot_that_looks_like_its_model_nothing_is_said(md5sum, given_plus, topic):
-    assert declare(CorrectedRobot(hero_plus={given_plus}), md5sum, topic) == []
+@pytest.mark.parametrize("md5sum, topic", [(STOCK_ENCODER_MD5, "/imu"), (PLUS_ENCODER_MD5, "/distance")])
+def test_of_a_robot_that_looks_like_its_model_nothing_is_said(md5sum, topic):
+    assert declare(CorrectedRobot(), md5sum, topic) == []
 
 
-@pytest.mark.parametrize(
-    "given_plus, topic, conflict",
-    [
-        ("hero_0", "/imu", "~hero_plus lists it, but it declares an IMU.* take it off the list"),
-        ("", "/distance", "the distance sensor of HeRo.* list it in ~hero_plus"),
-    ],
-)
-def test_a_wrongly_listed_robot_is_told_of_with_the_remedy(given_plus, topic, conflict):
-    robot = CorrectedRobot(hero_plus={given_plus})
-    (found,) = declare(robot, STOCK_ENCODER_MD5, topic)
-    assert re.search(conflict, found)
+def test_a_distance_sensor_with_the_encoder_of_stock_robots_is_told_of():
+    robot = CorrectedRobot()
+    (found,) = declare(robot, STOCK_ENCODER_MD5, "/distance")
+    assert re.search("the distance sensor of HeRo.* flash the firmware of HeRo", found)
     robot.reconnect(rebooted=True)
     assert declare(robot, STOCK_ENCODER_MD5) == [], "a new connection declares anew"
 

@@ -21,7 +21,6 @@ from ..robot_constants import (
     PROXIMITY_BEAMS,
     STOCK_BEAMS,
 )
-from .robot_models import PLUS_ENCODER_MD5
 from .stamps import NS_PER_S
 
 _SEQ_AND_STAMP = struct.Struct("<III")
@@ -41,6 +40,9 @@ MD5SUMS = {
     "sensor_msgs/Range": "c005c34273dc426c67a020a87bc24148",
 }
 """The layouts that are read or written here; another md5 is another layout, which CONVERSIONS may translate."""
+
+PLUS_ENCODER_MD5 = "ec5c02e99365233af779a0f9f54cb0df"
+"""HeRo+'s hero_msgs/Encoder, which has one field more."""
 
 STAMP_OFFSET = 4  # of a message that begins with a header
 TRANSFORM_TAIL_LENGTH = POSE_FORM.size  # translation and rotation
@@ -158,9 +160,9 @@ def _is_possible(pose: Sequence[float], twist: Sequence[float]) -> bool:
     )
 
 
-def find_transform_fault(transform: bytes) -> str:
-    """Return the numbers of a geometry_msgs/TransformStamped that cannot be a robot's, for users; empty if they can."""
-    x_m, y_m, z_m, x, y, z, w = POSE_FORM.unpack_from(transform, len(transform) - TRANSFORM_TAIL_LENGTH)
+def find_transform_fault(tail: bytes) -> str:
+    """Return translation and rotation of a transform that cannot be a robot's, for users; empty if they can."""
+    x_m, y_m, z_m, x, y, z, w = POSE_FORM.unpack(tail)
     if (  # in one go, as it runs 147 times a second for each robot; comparisons with NaN fail
         -MAX_POSITION_M <= x_m <= MAX_POSITION_M
         and -MAX_POSITION_M <= y_m <= MAX_POSITION_M

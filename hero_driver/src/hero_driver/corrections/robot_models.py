@@ -1,48 +1,65 @@
-"""Models of the robot: what their wheels measure, and by what the driver tells them apart. Pure.
+"""Tells the models of a robot apart: by its Encoder message, and by what contradicts that. Pure.
 
 HeRo+ (github.com/varunraveendra/hero_plus) has encoders on the wheels instead of the gears, an Encoder message with
 one field more, a distance sensor on the hat, and a bump shield. Its firmware logs the version of the stock one.
 """
 
-from typing import AbstractSet
+from typing import List
 
-from hero_node.files import STOCK
+from hero_node.files import HERO_PLUS, STOCK
 
-from ..robot_constants import TICKS_PER_TURN
+from .correction_settings import CorrectionSettings
+from .message_layouts import PLUS_ENCODER_MD5
 from .tick_odometry import WheelGeometry
 
-PLUS_WHEELS = WheelGeometry(wheel_diameter_m=0.050, wheel_separation_m=0.065, ticks_per_turn=TICKS_PER_TURN / 3.0)
-"""The firmware's config.h divides the circumference by 96."""
-
-PLUS_ENCODER_MD5 = "ec5c02e99365233af779a0f9f54cb0df"
-"""Checksum of HeRo+'s Encoder message."""
-
-IMU, DISTANCE = "/imu", "/distance"
-"""Topics below a robot's namespace that only one of the models declares."""
+DISTANCE = "/distance"
+"""Topic below a robot's namespace that only HeRo+ declares."""
 
 
-def describe_conflict(
-    model: str, former_model: str, calibrated_model: str, is_listed: bool, topics: AbstractSet[str]
-) -> str:
-    """Return what contradicts that a robot is of this model, with a remedy, for users; empty if nothing does.
+class ModelWatch:
+    """The model of one robot, kept over its reconnects.
 
-    former_model: before it declared its Encoder message anew. calibrated_model: in its calibration file; empty if
-    there is none. is_listed: HeRo+ by ~hero_plus, not by its Encoder message. topics: IMU, DISTANCE, as declared.
+    Attributes:
+        model: STOCK or HERO_PLUS, by the newest declaration of its Encoder message; STOCK before that.
     """
-    if former_model != model:
-        text = "it was a %s and is a %s now, by whose wheels its odometry goes on: two robots need two ids"
-        return text % (former_model, model)
-    if calibrated_model not in ("", model):
-        text = "it is a %s, but its calibration file says %s, whose wheels are not used: calibrate it again"
-        return text % (model, calibrated_model)
-    if is_listed and IMU in topics:
-        return (
-            "~hero_plus lists it, but it declares an IMU, as stock robots do, whose odometry would be three times too"
-            " long: take it off the list unless its encoders are those of HeRo+"
-        )
-    if model == STOCK and DISTANCE in topics:
-        return (
-            "it declares the distance sensor of HeRo+ but the Encoder message of stock robots: if its encoders are"
-            " those of HeRo+, its odometry is too short by two thirds; list it in ~hero_plus"
-        )
-    return ""
+
+    def __init__(self, namespace: str, settings: CorrectionSettings) -> None:
+        self.model = STOCK
+        self._name = namespace.strip("/")
+        self._settings = settings
+        self._former: List[str] = []  # the models of its last two declarations, the older one first
+        self.restart()
+
+    def restart(self) -> None:
+        """A new connection begins."""
+        self._is_declared = self._has_distance = False
+
+    def note_encoder(self, md5sum: str) -> bool:
+        """The robot declares an Encoder message of this md5; return whether its model is another one now."""
+        before, self.model = self.model, HERO_PLUS if md5sum == PLUS_ENCODER_MD5 else STOCK
+        self._former = [*self._former[-1:], self.model]
+        self._is_declared = True
+        return self.model != before
+
+    def find_geometry(self) -> WheelGeometry:
+        """Return the robot's wheels."""
+        return self._settings.find_geometry(self._name, self.model)
+
+    def find_conflict(self, name: str) -> str:
+        """The robot declares the topic called name; return what contradicts its model, for users; empty: nothing."""
+        self._has_distance |= name.endswith(DISTANCE)
+        if not self._is_declared:
+            return ""
+        if self._former[0] != self.model:
+            text = "it was a %s and is a %s now, by whose wheels its odometry goes on: two robots need two ids"
+            return text % (self._former[0], self.model)
+        own = self._settings.own_wheels.get(self._name)
+        if own is not None and own.model not in ("", self.model):
+            text = "it is a %s, but its calibration file says %s, whose wheels are not used: calibrate it again"
+            return text % (self.model, own.model)
+        if self.model == STOCK and self._has_distance:
+            return (
+                "it declares the distance sensor of HeRo+ but the Encoder message of stock robots: if its encoders are"
+                " those of HeRo+, its odometry is too short by two thirds; flash the firmware of HeRo+"
+            )
+        return ""

@@ -4,9 +4,15 @@ The robot's clock is set anew every 2.5 s and jumps then (node_handle.h:361); be
 counts from boot. Pure: stamps are integers in nanoseconds since the epoch, time of arrival comes in.
 """
 
-from typing import Dict, Union
+import collections
+import itertools
+from typing import DefaultDict, Dict, Iterator, Union
 
 NS_PER_S = 10**9
+
+MAX_FUTURE_NS = NS_PER_S // 20
+MAX_AGE_NS = 5 * NS_PER_S
+"""Stamps further in the future, or in the past, are replaced by the time of arrival."""
 
 STEP_NS = 1000
 """Distance of a stamp from the one before it while the robot's clock has gone back: 1 us keeps them distinct."""
@@ -21,7 +27,7 @@ Topic = Union[str, bytes]
 
 
 class StampFilter:
-    """Corrects the stamps of all topics of one robot.
+    """Corrects the stamps of all topics of one robot, and counts their messages.
 
     Attributes:
         corrected: stamps that were replaced so far.
@@ -29,28 +35,24 @@ class StampFilter:
             may be written here for other topics with older ones, without asking again.
     """
 
-    def __init__(self, use_arrival: bool, max_future_s: float, max_age_s: float) -> None:
-        """Take the time of arrival instead of the robot's with use_arrival, or outside the two limits.
-
-        max_future_s: how far a stamp may lie after its arrival; max_age_s: how far before.
-        """
-        self._use_arrival = use_arrival
-        self._max_future_ns = int(max_future_s * NS_PER_S)
-        # Where the arrival is taken, no stamp is in the limits.
-        self._lowest_ns = self._max_future_ns + 1 if use_arrival else -int(max_age_s * NS_PER_S)
+    def __init__(self) -> None:
         self.last_ns: Dict[Topic, int] = {}
         self.corrected = 0
+        self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
+
+    def count(self, topic: str) -> int:
+        """Return the sequence number of the next message on topic."""
+        return next(self._seqs[topic])
 
     def correct(self, topic: Topic, stamp_ns: int, arrival_ns: int) -> int:
         """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
         last_ns = self.last_ns.get(topic)
         result_ns = stamp_ns
-        if not self._lowest_ns <= stamp_ns - arrival_ns <= self._max_future_ns:
+        if not -MAX_AGE_NS <= stamp_ns - arrival_ns <= MAX_FUTURE_NS:
             result_ns = arrival_ns
-            if not self._use_arrival:
-                self.corrected += 1
+            self.corrected += 1
         if last_ns is not None and result_ns <= last_ns:
-            if last_ns - arrival_ns > self._max_future_ns + STEP_SLACK_NS:
+            if last_ns - arrival_ns > MAX_FUTURE_NS + STEP_SLACK_NS:
                 # No stamp that was let through lies this far ahead of its arrival: ROS time itself went back
                 # (the clock was set, or a bag or simulation began anew).
                 self.last_ns.clear()

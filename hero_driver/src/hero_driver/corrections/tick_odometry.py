@@ -49,6 +49,10 @@ class WheelGeometry:
         return left_m, left_m * self.diameter_ratio
 
 
+PLUS_WHEELS = WheelGeometry(wheel_diameter_m=0.050, wheel_separation_m=0.065, ticks_per_turn=TICKS_PER_TURN / 3.0)
+"""HeRo+'s; the firmware's config.h divides the circumference by 96."""
+
+
 class TickOdometry:
     """The odometry of one robot; one per robot, kept over its reconnects.
 

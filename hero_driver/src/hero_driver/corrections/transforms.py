@@ -4,7 +4,7 @@ Takes payloads of tf2_msgs/TFMessage, gives single transforms.
 """
 
 import re
-from typing import Callable, Set
+from typing import Callable, Dict, Set
 
 from hero_node import encode_text
 
@@ -26,6 +26,9 @@ _FRAME_NAME = re.compile(rb"[A-Za-z0-9_/.-]+")
 AddTransform = Callable[[bytes], None]
 """Takes the bytes of one geometry_msgs/TransformStamped."""
 
+Refuse = Callable[[str, str], None]
+"""Takes a topic whose message cannot be used, and what cannot be true of it, for users; empty: nothing to be said."""
+
 TakeOdomTransform = Callable[[bytes, bytes], None]
 """Takes the transform from odom to base_link in two parts: seq, stamp and frames; translation and rotation."""
 
@@ -34,7 +37,6 @@ class TransformCorrector:
     """The transforms of one robot; one per robot, kept over its reconnects.
 
     Attributes:
-        refused: transforms and messages that could not be used.
         foreign_frames: frames of transforms that are not the robot's own, by name, for the report.
     """
 
@@ -44,13 +46,14 @@ class TransformCorrector:
         stamps: StampFilter,
         add_transform: AddTransform,
         take_odom_transform: TakeOdomTransform,
+        refuse: Refuse,
     ) -> None:
         """Correct the transforms of the robot in namespace; take_odom_transform() takes the one of its odometry."""
-        self.refused = 0
         self.foreign_frames: Set[str] = set()
         self._stamps = stamps
         self._add_transform = add_transform
         self._take_odom_transform = take_odom_transform
+        self._refuse = refuse
         prefix = namespace.lstrip("/") + "/"
         self._frame_prefix = prefix.encode()
         self._odom_frames = encode_text(prefix + "odom") + encode_text(prefix + "base_link")
@@ -58,6 +61,7 @@ class TransformCorrector:
         self._passed_start = b""  # of the message whose stamp passed last
         self._passed_ns = self._passed_arrival_ns = 0
         self._own_frames: Set[bytes] = set()
+        self._possible: Dict[bytes, bytes] = {}  # the newest tail that can be true, by frames
         self._known_foreign: Set[bytes] = set()
 
     def correct(self, payload: bytes, arrival_ns: int) -> None:
@@ -86,13 +90,16 @@ class TransformCorrector:
             self._passed_start, self._passed_ns, self._passed_arrival_ns = start, stamp_ns, arrival_ns
         if frames == self._odom_frames:
             self._take_odom_transform(payload[TRANSFORM_HEAD], payload[TRANSFORM_TAIL])
-        else:
+        elif self._possible.get(frames) == payload[TRANSFORM_TAIL]:
+            # Most links of a robot never move, nor do its wheels at rest.
             self._add_transform(payload[TRANSFORM])
+        else:
+            self._add_possible(frames, payload[TRANSFORM], payload[TRANSFORM_TAIL])
 
     def _correct_unknown(self, payload: bytes, arrival_ns: int) -> None:
         transforms = message_layouts.read_transforms(payload)
         if transforms is None:
-            self.refused += 1
+            self._refuse("tf", "")
             return
         for stamp_ns, frames, tail in transforms:
             if frames in self._own_frames or self._admit_frames(frames):
@@ -103,16 +110,24 @@ class TransformCorrector:
         if frames == self._odom_frames:
             self._take_odom_transform(head, tail)
         else:
-            self._add_transform(head + tail)
+            self._add_possible(frames, head + tail, tail)
+
+    def _add_possible(self, frames: bytes, transform: bytes, tail: bytes) -> None:
+        fault = message_layouts.find_transform_fault(tail)
+        if fault:
+            self._refuse("tf", fault)
+        else:
+            self._possible[frames] = tail
+            self._add_transform(transform)
 
     def _admit_frames(self, frames: bytes) -> bool:
         """Return whether the robot may send a pair of frames that is not known as its own."""
         if frames in self._known_foreign:
-            self.refused += 1
+            self._refuse("tf", "")
             return False
         parent, child = message_layouts.split_frames(frames)
         if not self._is_own(parent) or not self._is_own(child) or len(self._own_frames) >= FRAMES_MAX:
-            self.refused += 1
+            self._refuse("tf", "")
             if len(self._known_foreign) < FRAMES_MAX:
                 self._known_foreign.add(frames)
                 self.foreign_frames.add(f"{_show_name(parent)} -> {_show_name(child)}")

@@ -43,7 +43,7 @@ class RobotLog:
                 record.heard_uptime_s = math.inf
         if line.world and line.world != record.world:
             record.world = line.world
-            peer.bridge.corrections.restart_odometry()
+            peer.bridge.corrections.odometry.start_at_zero()
         if line.tunes is not None:
             peer.bridge.commands.note_tuning(line.tunes)
             if line.tunes and not peer.bridge.commands.was_told_to_tune and peer.stop is None:
@@ -76,7 +76,7 @@ class RobotLog:
             text = f"{peer.label} rebooted {uptime_s:.1f} s ago"
             self._log.log_throttled("warn", "rebooted " + peer.label, text, host=peer.link.address.host)
             if peer.bridge is not None and peer.boot is None:
-                peer.bridge.corrections.note_reboot()
+                peer.bridge.corrections.odometry.note_reboot()
         # Delays only make a boot look later, so the earliest is the best.
         booted_s = now_s - uptime_s
         if has_rebooted or record.booted_s is None or booted_s < record.booted_s:

@@ -74,7 +74,7 @@ def describe_robot(
         firmware=record.firmware,
         hardware=record.hardware,
         config=record.config,
-        model="" if corrections is None else corrections.model,
+        model="" if corrections is None else corrections.models.model,
         uptime=rospy.Duration.from_sec(0.0 if record.booted_s is None or peer is None else now_s - record.booted_s),
         reconnects=record.reconnects,
         dropped_messages=dropped,
@@ -90,7 +90,7 @@ def describe_robot(
         bridge is not None and bridge.commands.tunes(now_s),
         problem,
         0 if corrections is None else corrections.stamps.corrected,
-        0 if corrections is None else corrections.odometry.resets,
+        0 if corrections is None else corrections.odometry.ticks.resets,
         [] if corrections is None else sorted(corrections.transforms.foreign_frames),
         [
             (address, reason, duplicate_stops.get(address, StopState.NOT_STOPPED))

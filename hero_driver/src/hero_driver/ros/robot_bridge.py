@@ -128,7 +128,7 @@ class RobotBridge:
         if kind is TopicKind.PUBLISHER:
             if ros_type == ENCODER_TYPE:
                 self.corrections.note_encoder(info.md5sum)
-            conflict = self.corrections.find_conflict(name)
+            conflict = self.corrections.models.find_conflict(name)
             if conflict:
                 self._endpoints.report_error("model", conflict)
             replaced = self._replace_publisher(name, layout)
@@ -200,14 +200,11 @@ class RobotBridge:
             text = f"topic /tf refused: its type is {ros_type}, not {TRANSFORM_TYPE}"
             self._endpoints.report_error(name, text)
             return []
-        publishers: List[Tuple[str, str, RawPublisher]] = []
-
-        def choose(name: str, message_type: str) -> RawPublisher:
-            publisher = self._publishers.setdefault(name, RawPublisher(QUEUE_LENGTH, self._loop.call_later))
-            publishers.append((name, message_type, publisher))
-            return publisher
-
-        topic.receive = self.corrections.handler_for(name, ros_type, choose)
+        publishers = [
+            (output, its_type, self._publishers.setdefault(output, RawPublisher(QUEUE_LENGTH, self._loop.call_later)))
+            for output, its_type in self.corrections.list_outputs(name, ros_type)
+        ]
+        topic.receive = self.corrections.handler_for(name, ros_type, [publisher for _, _, publisher in publishers])
         return publishers
 
     def _declare_service_half(self, topic: Topic, name: str) -> None:
@@ -245,7 +242,7 @@ class RobotBridge:
         request = service.receive_answer(payload)
         if request is not None and service.service_type == SET_ODOM_TYPE and is_success(payload):
             # The answer comes before the first reading of the counters that the robot has just zeroed.
-            self.corrections.set_pose(read_set_odom_pose(request))
+            self.corrections.odometry.set_pose(read_set_odom_pose(request))
 
     def find_id(self, name: str) -> Optional[int]:
         """Return the id under which the robot receives the topic or service called name."""

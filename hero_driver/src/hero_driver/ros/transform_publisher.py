@@ -1,4 +1,4 @@
-"""Publishes the transforms of all robots: those that arrive within a period as one message.
+"""Publishes the transforms of all robots: those that arrive within PERIOD_S as one message.
 
 One message for each transform, as robots send them, would make every listener of /tf handle 150 messages
 per robot and second, and a small queue would lose most of them. Runs on the thread of the sockets.
@@ -13,6 +13,7 @@ from ..transport.event_loop import CallLater
 from .message_types import make_raw_class
 from .raw_publisher import RawPublisher
 
+PERIOD_S = 0.01
 QUEUE_LENGTH = 200
 """Two seconds of messages for a listener that is slow."""
 
@@ -29,9 +30,8 @@ class TransformPublisher:
         is_scheduled: whether what was added is going to be published already.
     """
 
-    def __init__(self, period_s: float, call_later: CallLater) -> None:
-        """Collect for period_s; call_later(delay_s, call) runs call on the same thread."""
-        self._period_s = period_s
+    def __init__(self, call_later: CallLater) -> None:
+        """call_later(delay_s, call) runs call on the same thread."""
         self._call_later = call_later
         self._publisher = RawPublisher(QUEUE_LENGTH, call_later)
         self._transforms: List[bytes] = []
@@ -46,7 +46,7 @@ class TransformPublisher:
         """Publish what was added within the period; for after each read, unless is_scheduled."""
         if self._transforms:
             self.is_scheduled = True
-            self._call_later(self._period_s, self._publish)
+            self._call_later(PERIOD_S, self._publish)
 
     def _publish(self) -> None:
         self.is_scheduled = False

@@ -12,12 +12,11 @@ import select
 import socket
 import threading
 import time
-from typing import Callable, Dict, List, Optional, Protocol, Sequence, Set, Tuple, TypeVar
+from typing import Callable, Dict, List, Optional, Protocol, Set, Tuple, TypeVar
 
 from hero_node import raise_file_limit
 
 from .call_queue import CallQueue
-from .dialer import start_dialer
 from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_socket_address
 
 T = TypeVar("T")
@@ -82,13 +81,12 @@ class Reader(Protocol):
 class EventLoop(LinkOwner):
     """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
 
-    def __init__(self, host: str, port: int, dial: Sequence[Address], user_timeout_s: float) -> None:
-        """Listen on host (empty: do not) and port (0: any free one), and connect to the addresses of dial.
+    def __init__(self, host: str, port: int, user_timeout_s: float) -> None:
+        """Listen on host and port (0: any free one).
 
         user_timeout_s: without acknowledgement the kernel gives a connection up after this time (TCP_USER_TIMEOUT).
         """
         self._host, self._port = host, port
-        self._dial = dial
         self._user_timeout_ms = int(user_timeout_s * 1000)
         self._handler = LinkHandler()
         # selectors does the same, but what it adds in Python is a twentieth of all that the driver does.
@@ -110,23 +108,19 @@ class EventLoop(LinkOwner):
         self._wake_receiver.setblocking(False)
         self._wake_sender.setblocking(False)
         self._is_running = True
-        self._ended = threading.Event()  # for the dialers
         self._file_limit = raise_file_limit()
-        self.listening: Optional[Address] = None
+        self.listening = Address(host, port)
 
     def open(self, handler: LinkHandler) -> None:
-        """Bind the listening socket and begin to dial; handler receives the events of all links.
+        """Bind the listening socket; handler receives the events of all links.
 
         Raises: OSError if the address cannot be bound.
         """
         self._handler = handler
-        if self._host:
-            self._listener = _listen(self._host, self._port)
-            self.listening = Address(*self._listener.getsockname()[:2])
-            self._listen_on(self._listener)
+        self._listener = _listen(self._host, self._port)
+        self.listening = Address(*self._listener.getsockname()[:2])
+        self._listen_on(self._listener)
         self._register(self._wake_receiver.fileno(), READ, self._take_wake)
-        for address in self._dial:
-            start_dialer(address, self._hand_over, self._warn_network, self._ended)
         self.call_later(POLL_INTERVAL_S, self._poll)
 
     def run(self) -> None:
@@ -238,18 +232,16 @@ class EventLoop(LinkOwner):
         self._unregister(link.fileno())
         link.discard()
         self._handler.close_link(link, reason)
-        link.on_close()
 
-    def _add_link(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
-        """Take over a connected socket; on_close() is called when it is closed again, which may be at once."""
-        link = Link(self, sock, address, on_close)
+    def _add_link(self, sock: socket.socket, address: Address) -> None:
+        """Take over a connected socket, which may be closed again at once."""
+        link = Link(self, sock, address)
         try:
             self._set_options(sock)
         except OSError as error:
             # The peer may be gone already.
             link.discard()
             self._handler.warn_network(f"connection of {address} broke at once: {describe_error(error)}")
-            on_close()
             return
         self._links[sock.fileno()] = link
         self._register(sock.fileno(), READ, functools.partial(self._serve_link, link))
@@ -342,7 +334,7 @@ class EventLoop(LinkOwner):
             sock.close()
             self._pause_accept(listener, OSError(errno.EMFILE, os.strerror(errno.EMFILE)))
             return
-        self._add_link(sock, Address(*address[:2]), lambda: None)
+        self._add_link(sock, Address(*address[:2]))
 
     def _pause_accept(self, listener: socket.socket, error: OSError) -> None:
         remedy = ""
@@ -372,7 +364,6 @@ class EventLoop(LinkOwner):
         self._is_running = False
 
     def _close_all(self) -> None:
-        self._ended.set()
         if self._listener is not None:
             self._listener.close()
             self._listener = None
@@ -383,14 +374,6 @@ class EventLoop(LinkOwner):
         self._epoll.close()
         self._wake_receiver.close()
         self._wake_sender.close()
-
-    # What dialers call, on their threads.
-
-    def _hand_over(self, sock: socket.socket, address: Address, on_close: Callable[[], None]) -> None:
-        self.call_soon(lambda: self._add_link(sock, address, on_close))
-
-    def _warn_network(self, text: str) -> None:
-        self.call_soon(lambda: self._handler.warn_network(text))
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -99,19 +99,11 @@ class LinkOwner(Protocol):
 class Link:
     """One TCP connection to one robot."""
 
-    def __init__(
-        self,
-        loop: LinkOwner,
-        sock: socket.socket,
-        address: Address,
-        on_close: Callable[[], None] = lambda: None,
-    ) -> None:
-        """on_close() is called once, after the end."""
+    def __init__(self, loop: LinkOwner, sock: socket.socket, address: Address) -> None:
         self.address = address
         self.closed = False
         self.handed_length = 0  # bytes of all packets given to send_packet()
         self.received_length = 0  # bytes of all that read() has returned
-        self.on_close = on_close
         self._loop = loop
         self._socket = sock
         # Acknowledged at once, odometry of robots whose TCP delays small writes has a p50 of 0.3 instead of 8.9 ms.

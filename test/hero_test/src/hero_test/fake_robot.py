@@ -200,12 +200,6 @@ class FakeRobot:
         self._begin(sock)
         return self
 
-    def accept(self, listener: socket.socket) -> "FakeRobot":
-        """Wait until the driver dials listener."""
-        sock, _ = listener.accept()
-        self._begin(sock)
-        return self
-
     def close(self) -> None:
         """Leave with a FIN; safe to call twice."""
         self._closing.set()
