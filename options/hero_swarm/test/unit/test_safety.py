@@ -122,17 +122,20 @@ def test_speeds_beyond_the_limits_count_as_the_fastest_of_their_curve():
 
 
 class LeaveTogether(Behavior):
-    """All robots drive to one place outside of the fence as fast as they can."""
+    """All robots drive to one place outside of the fence as fast as they can, or back away to there, turning on."""
+
+    direction = 1.0
 
     def step(self, sensed, memory, random):
         x_m, y_m, yaw_rad = sensed.poses.T
         bearing_rad = np.arctan2(-y_m, 3.0 - x_m) - yaw_rad
-        return 0.2, 6.0 * (bearing_rad - 2.0 * np.pi * np.rint(bearing_rad / (2.0 * np.pi))), memory
+        turn_rad = bearing_rad - 2.0 * np.pi * np.rint(bearing_rad / (2.0 * np.pi))
+        return self.direction * 0.2, self.direction * 6.0 * turn_rad, memory
 
 
-def leave_together(rate_hz, delay_s):
+def leave_together(rate_hz, delay_s, direction=1.0):
     """Return the least distance between two robots, and how far the farthest was outside of the fence, m."""
-    behavior, safe = LeaveTogether(rate_hz=rate_hz), SafetyFilter(ROBOTS, FENCE_M)
+    behavior, safe = LeaveTogether(rate_hz=rate_hz, direction=direction), SafetyFilter(ROBOTS, FENCE_M)
     trial = Trial(behavior, OPEN, 8, (1, 2, 3), (1.2, 1.2), delay_s=delay_s, filter_commands=safe)
     nearest_m, farthest_m = [], []
 
@@ -151,6 +154,12 @@ def leave_together(rate_hz, delay_s):
 def test_behaviors_that_decide_seldom_are_filtered_as_often_as_others(rate_hz):
     gap_m, outside_m = leave_together(rate_hz, 0.0)
     assert gap_m > 0.0 and outside_m < 0.0
+
+
+@pytest.mark.slow
+def test_robots_that_spin_and_back_away_do_not_drift_through_the_fence():
+    gap_m, outside_m = leave_together(20.0, 0.0, direction=-1.0)
+    assert gap_m > 0.0 and outside_m < -0.005
 
 
 @pytest.mark.slow
