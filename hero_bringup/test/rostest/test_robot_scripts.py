@@ -21,7 +21,8 @@ from hero_test.waiting import wait_for
 from hero_test.watches.fleet_report import wait_until_ready
 from hero_test.watches.swarm_watch import SwarmWatch
 
-ROBOTS = 4
+IDS = range(40, 44)
+LAST = IDS[-1]
 COMMANDS = "/hero_%d/velocity_controller/cmd_vel"
 
 DEADLINE_S = 60.0
@@ -36,7 +37,7 @@ with Robot(%d) as robot:
 
 TURN_AND_END = """
 from hero_client import Robot, rate
-with Robot(3) as robot:
+with Robot(%d) as robot:
     robot.drive(0.0, 1.5)
     next(time_s for time_s in rate(50) if time_s > 0.6)
 """
@@ -63,9 +64,9 @@ def connect_and_leave(topic):
 class RobotScriptsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.watch = SwarmWatch(range(ROBOTS))
+        cls.watch = SwarmWatch(IDS)
         cls.watch.wait_until_complete(60.0)
-        wait_until_ready(*range(ROBOTS))
+        wait_until_ready(*IDS)
 
     def start(self, code, **environment):
         script = subprocess.Popen(
@@ -82,29 +83,29 @@ class RobotScriptsTest(unittest.TestCase):
 
     def test_scripts_that_are_ended_by_signals_leave_their_robots_stopped(self):
         ends = ((signal.SIGINT, -signal.SIGINT), (signal.SIGTERM, 143), (signal.SIGHUP, 129))
-        scripts = [self.start(DRIVE_FOR_EVER % robot_id) for robot_id in range(len(ends))]
+        scripts = [self.start(DRIVE_FOR_EVER % robot_id) for robot_id in IDS[: len(ends)]]
         rows = self.watch.rows.values()
         wait_for(lambda: sum(row[-1][4] > 0.03 for row in rows) == len(ends), "motion of all")
-        for robot_id in range(len(ends)):
+        for robot_id in IDS[: len(ends)]:
             connect_and_leave(COMMANDS % robot_id)
-        logs = [CommandLog(robot_id) for robot_id in range(len(ends))]
+        logs = [CommandLog(robot_id) for robot_id in IDS[: len(ends)]]
         wait_for(lambda: all(log.speeds_m_s for log in nonempty(logs)), "commands")
         for script, (number, status) in nonempty(zip(scripts, ends)):
             script.send_signal(number)
             self.assertEqual((status, ""), self.end(script))
         wait_for(lambda: all(log.speeds_m_s[-1:] == [0.0] for log in nonempty(logs)), "a stop as the last command")
-        wait_for(lambda: self.watch.at_rest(*range(len(ends))), "rest")
+        wait_for(lambda: self.watch.at_rest(*IDS[: len(ends)]), "rest")
 
     def test_the_first_command_of_a_script_is_not_lost(self):
-        before_rad = self.watch.pose(3)[2]
-        self.assertEqual((0, ""), self.end(self.start(TURN_AND_END)))
-        wait_for(lambda: self.watch.pose(3)[2] - before_rad > 0.2, "the turn")
-        wait_for(lambda: self.watch.at_rest(3), "rest")
+        before_rad = self.watch.pose(LAST)[2]
+        self.assertEqual((0, ""), self.end(self.start(TURN_AND_END % LAST)))
+        wait_for(lambda: self.watch.pose(LAST)[2] - before_rad > 0.2, "the turn")
+        wait_for(lambda: self.watch.at_rest(LAST), "rest")
 
     def test_a_script_that_has_just_started_knows_that_robots_are_stopped(self):
         drivers = Drivers()
         self.addCleanup(drivers.request_stop, False)
-        code = "import hero_client, sys; sys.exit(hero_client.Robot(3).wait_until_ready().is_stopped)"
+        code = "import hero_client, sys; sys.exit(hero_client.Robot(%d).wait_until_ready().is_stopped)" % LAST
         self.assertEqual((0, ""), self.end(self.start(code)))
         for is_stopped in (True, False):
             drivers.request_stop(is_stopped)

@@ -16,7 +16,7 @@ from hero_test.waiting import TIMEOUT_S, wait_for
 from hero_test.watches.command_watch import CommandWatch
 from hero_test.watches.swarm_watch import SwarmWatch
 
-ROBOTS = range(6)
+ROBOTS = (20, 21, 22, 24, 25, 26)
 
 NEAR_M = 0.05
 """Half of the longest way to a goal. A robot of a starved machine overshoots; its accuracy is tried in virtual time."""
@@ -59,7 +59,7 @@ class GoToGoalTest(unittest.TestCase):
         wait_for(is_there, lambda: "hero_%d, at %s, to be at %s" % (robot_id, self.watch.pose(robot_id), place))
 
     def test_an_action_moves_the_robot_tells_of_its_way_and_succeeds(self):
-        client, place, feedback = self.connect(0), self.choose_place(0, 0.1), []
+        client, place, feedback = self.connect(20), self.choose_place(20, 0.1), []
         client.send_goal(make_goal(*place), feedback_cb=feedback.append)
         result = self.wait_for_result(client)
         self.assertEqual((GoalStatus.SUCCEEDED, True, ""), (client.get_state(), result.reached, result.reason))
@@ -67,14 +67,14 @@ class GoToGoalTest(unittest.TestCase):
         wait_for(lambda: len(feedback) > 1, "feedback")  # it may come after the result
         self.assertLess(feedback[-1].distance, feedback[0].distance)
         self.assertGreater(feedback[-1].elapsed, feedback[0].elapsed)
-        self.commands.wait_for_stops(0)
-        self.watch.wait_until_stopped(0)
-        self.wait_until_at(0, place)
+        self.commands.wait_for_stops(20)
+        self.watch.wait_until_stopped(20)
+        self.wait_until_at(20, place)
 
     def test_a_new_goal_takes_the_place_of_the_old_one(self):
-        first, second, feedback = self.connect(1), self.connect(1), []
-        place = self.choose_place(1)
-        first.send_goal(make_goal(*self.choose_place(1, 0.6)), feedback_cb=feedback.append)
+        first, second, feedback = self.connect(21), self.connect(21), []
+        place = self.choose_place(21)
+        first.send_goal(make_goal(*self.choose_place(21, 0.6)), feedback_cb=feedback.append)
         wait_for(lambda: feedback, "feedback")
         second.send_goal(make_goal(*place))
         self.assertEqual("another goal came", self.wait_for_result(first).reason)
@@ -82,33 +82,33 @@ class GoToGoalTest(unittest.TestCase):
         self.assertTrue(self.wait_for_result(second).reached)
 
     def test_a_cancelled_robot_stops(self):
-        client = self.connect(2)
-        client.send_goal(make_goal(*self.choose_place(2, 0.6)))
-        wait_for(lambda: self.watch.rows[2][-1][4] > 0.03, "motion")
+        client = self.connect(22)
+        client.send_goal(make_goal(*self.choose_place(22, 0.6)))
+        wait_for(lambda: self.watch.rows[22][-1][4] > 0.03, "motion")
         client.cancel_goal()
         self.assertEqual("cancelled", self.wait_for_result(client).reason)
-        self.commands.wait_for_stops(2)
-        self.watch.wait_until_stopped(2)
+        self.commands.wait_for_stops(22)
+        self.watch.wait_until_stopped(22)
 
     def test_a_goal_in_an_unknown_frame_fails_with_the_frames_name(self):
-        client = self.connect(3)
+        client = self.connect(24)
         client.send_goal(make_goal(0.0, 0.0, 0.0, frame="nowhere"))
         result = self.wait_for_result(client)
         self.assertEqual((GoalStatus.ABORTED, False), (client.get_state(), result.reached))
         self.assertIn("nowhere", result.reason)
 
     def test_a_goal_that_is_no_place_is_rejected_with_the_reason(self):
-        client = self.connect(4)
+        client = self.connect(25)
         client.send_goal(make_goal(math.nan, 0.0, 0.0))
         self.assertIn("must be finite", self.wait_for_result(client).reason)
         self.assertEqual(GoalStatus.REJECTED, client.get_state())
 
     def test_a_goal_on_the_topic_moves_the_robot_there(self):
-        publisher, place = rospy.Publisher("/hero_5/goal", PoseStamped, queue_size=1), self.choose_place(5, 0.1)
+        publisher, place = rospy.Publisher("/hero_26/goal", PoseStamped, queue_size=1), self.choose_place(26, 0.1)
         wait_for(lambda: publisher.get_num_connections() > 0, "go_to_goal's subscriber")
         publisher.publish(make_goal(*place).target)
-        wait_for(lambda: math.dist(self.watch.pose(5)[:2], place[:2]) < NEAR_M, "the robot at its goal")
-        self.commands.wait_for_stops(5)
+        wait_for(lambda: math.dist(self.watch.pose(26)[:2], place[:2]) < NEAR_M, "the robot at its goal")
+        self.commands.wait_for_stops(26)
 
 
 if __name__ == "__main__":

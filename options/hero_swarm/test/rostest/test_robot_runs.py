@@ -19,7 +19,7 @@ from hero_test.waiting import wait_for
 from hero_test.watches.fleet_report import wait_until_ready
 from hero_test.watches.swarm_watch import SwarmWatch
 
-ROBOTS = 3
+IDS = range(5, 8)
 EXPERIMENT = """\
 behavior: rendezvous
 robots: 3
@@ -37,8 +37,8 @@ class RobotRunsTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         rospy.init_node("test_robot_runs")
-        wait_until_ready(*range(ROBOTS))
-        cls.watch = SwarmWatch(range(ROBOTS))
+        wait_until_ready(*IDS)
+        cls.watch = SwarmWatch(IDS)
         cls.watch.wait_until_complete()
 
     def setUp(self):
@@ -47,14 +47,14 @@ class RobotRunsTest(unittest.TestCase):
 
     def start(self, time_s, trials):
         """Start an experiment of so many trials, whose start places are where the robots are now."""
-        places = [self.watch.pose(robot_id) for robot_id in range(ROBOTS)]
+        places = [self.watch.pose(robot_id) for robot_id in IDS]
         starts = os.path.join(self.folder, "starts.csv")
         with open(starts, "w") as file:
             csv.writer(file).writerows(places)
         path = os.path.join(self.folder, "e.yaml")
         with open(path, "w") as file:
             file.write(EXPERIMENT % (time_s, trials, starts))
-        command = (find_program("hero_swarm", "run"), path, "--robots", "0-2", "--frame", "world")
+        command = (find_program("hero_swarm", "run"), path, "--robots", "5-7", "--frame", "world")
         program = Program(*command, stdin=subprocess.PIPE)
         self.addCleanup(program.close)
         self.addCleanup(program.process.stdin.close)
@@ -82,8 +82,8 @@ class RobotRunsTest(unittest.TestCase):
         self.assertGreater(float(rows[1]["consensus_error"]), 0.0)
         (name,) = glob.glob(os.path.join(self.folder, "e", "bags", "*.bag"))
         with rosbag.Bag(name) as bag:
-            self.assertLess({"/hero_%d/odom" % robot for robot in range(ROBOTS)}, set(bag.get_type_and_topic_info()[1]))
-        self.assertTrue(self.watch.at_rest(*range(ROBOTS)))
+            self.assertLess({"/hero_%d/odom" % robot for robot in IDS}, set(bag.get_type_and_topic_info()[1]))
+        self.assertTrue(self.watch.at_rest(*IDS))
 
     def test_a_stopped_trial_does_not_count_and_none_starts_before_release(self):
         drivers = Drivers()
@@ -91,11 +91,11 @@ class RobotRunsTest(unittest.TestCase):
         self.addCleanup(drivers.request_stop, False)
         program = self.start(ENDLESS_S, 2)
         self.answer(program, "")
-        before = {robot: self.watch.pose(robot) for robot in range(ROBOTS)}
+        before = {robot: self.watch.pose(robot) for robot in IDS}
         wait_for(lambda: self.has_moved(before), "a robot that moves")
         drivers.request_stop(True)
         program.wait_line("seed 1: does not count: stopped at")
-        self.watch.wait_until_stopped(*range(ROBOTS))
+        self.watch.wait_until_stopped(*IDS)
         self.answer(program, "")
         program.wait_line("seed 2: cannot start: ")
         drivers.request_stop(False)
@@ -106,7 +106,7 @@ class RobotRunsTest(unittest.TestCase):
         self.assertRegex(rows[1]["remark"], "^stopped at ")
 
     def has_moved(self, before):
-        poses = [(self.watch.pose(robot), before[robot]) for robot in range(ROBOTS)]
+        poses = [(self.watch.pose(robot), before[robot]) for robot in IDS]
         return any(abs(now[0] - then[0]) + abs(now[1] - then[1]) > MOVED_M for now, then in poses)
 
 
