@@ -129,6 +129,20 @@ def test_drivers_are_found_and_forgotten_when_they_have_gone(ros):
     assert ros.unregistered == [B + "/stop_request", B + "/robots"] and ros.drivers.names() == [A]
 
 
+def test_robots_that_are_gone_are_dismissed_by_each_driver_that_answers(ros, monkeypatch):
+    ros.known, asked = [A, B], []
+    ros.look()
+
+    def call(name):
+        asked.append(name)
+        if name.startswith(A):
+            raise drivers.rospy.ServiceException("it has just ended")
+
+    monkeypatch.setattr(drivers.rospy, "ServiceProxy", lambda name, kind: lambda: call(name))
+    ros.drivers.dismiss_gone()
+    assert asked == [A + "/dismiss_gone", B + "/dismiss_gone"]
+
+
 def test_all_drivers_are_settled_when_each_has_reported_or_had_the_time(ros):
     ros.known = [A, B]
     assert not ros.drivers.is_settled

@@ -95,7 +95,7 @@ def test_errors_of_all_robots_are_told():
         swarm.go_to(0.1, 0.0)
     assert swarm.links[0].pose.x_m == pytest.approx(0.1, abs=0.01), "the others reach their goals"
     swarm.links[2].ready_s = 0.0
-    with pytest.raises(RobotNotReadyError, match="^hero_1 is not ready"):
+    with pytest.raises(RobotNotReadyError, match="^hero_1 is not ready after 2 s: nothing subscribes"):
         swarm.turn(0.2)
     broken = SimpleNamespace(exception=lambda: KeyError("ours"))
     with pytest.raises(KeyError):

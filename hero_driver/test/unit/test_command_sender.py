@@ -137,6 +137,17 @@ def test_a_command_that_may_go_does_not_wait_for_the_timer_of_another():
         assert len(robot.writes) == written + 1
 
 
+def test_a_command_for_what_the_robot_has_not_declared_costs_no_other():
+    with Clock().is_the_drivers() as clock:
+        robot = CommandedRobot(clock)
+        for name in ("/hero_1/gone", LIGHT):
+            robot.bridge.commands.queue.offer(name, LIGHT_PAYLOAD)
+        robot.send_commands(robot.peer)
+        clock.run(0.1)
+    assert robot.bridge.commands.refused == 1
+    assert [payload for _, name, payload in robot.taken if name == LIGHT] == [LIGHT_PAYLOAD]
+
+
 def test_a_command_too_long_for_the_robot_is_reported_and_costs_no_other():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock)
