@@ -62,11 +62,11 @@ ROOMS = {
     "hero_recording.bags": {"errors"},
     "hero_recording.formats": {"bags", "errors"},
     "hero_recording.plots": {"bags"},
-    "hero_swarm.behaviors": {"behavior", "learning", "sensors", "sources", "user_module"},
+    "hero_swarm.behaviors": {"behavior", "learning", "sensors", "sources"},
     "hero_swarm.experiments": {"behavior", "behaviors", "control", "metrics", "safety", "sensors", "sources", "trial"},
     "hero_swarm.fitting": {"trial"},
     "hero_swarm.learning": {"behavior", "metrics", "sensors", "sources"},
-    "hero_swarm.metrics": {"sources", "user_module"},
+    "hero_swarm.metrics": {"sources"},
     "hero_swarm.sensors": set(),
 }
 PURE_ROOMS = (

@@ -19,7 +19,7 @@ for name in ("rospy", "rosgraph", "genpy", "roslib", "std_msgs", "geometry_msgs"
     sys.modules[name] = None  # as if it were not installed
 import hero_client, hero_driver, hero_node
 from hero_sim.stepped.swarm import StepSwarm
-from hero_swarm import recording_reader
+from hero_swarm import fit
 from hero_swarm.experiments import runner
 from hero_monitor.live_view import LiveView
 from hero_recording import export, plot

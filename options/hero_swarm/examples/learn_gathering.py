@@ -36,7 +36,7 @@ def main(path):
         best = candidates[np.argsort(-gained)[:ELITE]]
         mean, spread = best.mean(axis=0), best.std(axis=0) + 0.02
         print("generation %d: %.2f" % (generation + 1, np.median(gained)), flush=True)
-    save_policy(path, split(mean), env.episode.observation)
+    save_policy(path, split(mean), env.observation)
 
 
 if __name__ == "__main__":

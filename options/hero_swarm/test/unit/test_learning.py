@@ -7,31 +7,30 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from hero_sim.world import build_default
 from hero_sim.world.arena import build_rectangle
-from hero_swarm.learning.episode import Episode, count_observations
+from hero_swarm.learning.observation import count_observations
+from hero_swarm.learning.vector_env import SwarmVectorEnv
 
 ROBOTS = 3
 
 
 def run(seed, steps, side_m=1.5):
-    episode = Episode(ROBOTS, build_rectangle(side_m, side_m, ROBOTS), seed)
+    env = SwarmVectorEnv(1, ROBOTS, build_rectangle(side_m, side_m, ROBOTS))
     random = np.random.RandomState(7)
-    observed, rewards = [episode.observe()], []
+    observed, rewards = [env.reset(seed)], []
     for _ in range(steps):
-        rewards.append(episode.step(2.0 * random.random_sample((ROBOTS, 2)) - 1.0))
-        observed.append(episode.observe())
+        seen, gained = env.step(2.0 * random.random_sample((ROBOTS, 2)) - 1.0)
+        observed.append(seen)
+        rewards.append(gained)
     return np.array(observed), np.array(rewards)
 
 
-@pytest.mark.slow
-def test_500_steps_after_the_same_seed_are_equal_and_others_differ():
-    first, again, other = run(3, 500), run(3, 500), run(4, 20)
+def test_steps_after_the_same_seed_are_equal_and_others_differ():
+    first, again, other = run(3, 100), run(3, 100), run(4, 20)
     assert first[0].tobytes() == again[0].tobytes() and first[1].tobytes() == again[1].tobytes()
     assert (first[0][20] != other[0][20]).any(axis=1).all()
 
 
-@pytest.mark.slow
 def test_observations_are_shares_and_tell_of_walls_speed_and_neighbors():
     observed, _ = run(1, 60, side_m=0.5)
     assert observed.shape == (61, ROBOTS, count_observations(5)) and observed.dtype == np.float32
@@ -42,10 +41,11 @@ def test_observations_are_shares_and_tell_of_walls_speed_and_neighbors():
 
 
 def test_rewards_add_up_to_what_the_metric_gained():
-    episode = Episode(2, build_default(2), 1, metric="nearest_neighbor")
-    start_m = np.hypot(*np.diff(episode._rows.world.poses[:, :2], axis=0)[0])
-    total = sum(episode.step(np.array([(0.5, 0.1), (0.0, 0.0)])) for _ in range(30))
-    end_m = np.hypot(*np.diff(episode._rows.world.poses[:, :2], axis=0)[0])
+    env = SwarmVectorEnv(1, 2, metric="nearest_neighbor")
+    env.reset(1)
+    start_m = np.hypot(*np.diff(env._rows.world.poses[:, :2], axis=0)[0])
+    total = sum(env.step(np.array([(0.5, 0.1), (0.0, 0.0)]))[1] for _ in range(30))
+    end_m = np.hypot(*np.diff(env._rows.world.poses[:, :2], axis=0)[0])
     np.testing.assert_allclose(total, end_m - start_m, atol=1e-9)
     assert abs(end_m - start_m) > 0.05
 

@@ -11,7 +11,6 @@ from hero_swarm.behavior import Floor, Light, Neighbors, RangeAndBearing
 from hero_swarm.behaviors import find_behavior
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.runner import parse_options, run_experiment
-from hero_swarm.learning.episode import Episode
 from hero_swarm.learning.observation import Observation, count_observations
 from hero_swarm.learning.policy import load_policy, run_network, save_policy
 from hero_swarm.learning.vector_env import SwarmVectorEnv
@@ -38,20 +37,20 @@ def test_worlds_of_a_batch_are_those_of_single_episodes(arena):
     env = SwarmVectorEnv(worlds=3, robots=2, arena=arena, time_s=0.5, sensors={"floor": Floor()})
     observed = env.reset(seed=7)
     assert observed.shape == (6, count_observations(5) + 4) and not env.ended
-    single = Episode(2, load_arena(arena), 8, sensors={"floor": Floor()})
-    assert (single.observe() == observed[2:4]).all()
+    single = SwarmVectorEnv(1, 2, arena, sensors={"floor": Floor()})
+    assert (single.reset(8) == observed[2:4]).all()
     actions = np.random.RandomState(1).uniform(-1.0, 1.0, (6, 2))
     for _ in range(5):
         observed, rewards = env.step(actions)
-        alone = single.step(actions[2:4])
-        assert (single.observe() == observed[2:4]).all() and (alone == rewards[2:4]).all()
+        alone, gained = single.step(actions[2:4])
+        assert (alone == observed[2:4]).all() and (gained == rewards[2:4]).all()
     assert env.ended and (env.reset() != observed).any()
     assert (env.reset(seed=7) == SwarmVectorEnv(3, 2, arena, sensors={"floor": Floor()}).reset(seed=7)).all()
 
 
 def test_sensors_of_behaviors_are_observed_by_the_same_names(arena):
     options = {"neighbors": 1, "sensors": {"lamp": Light(), "floor": Floor()}}
-    observed = Episode(3, load_arena(arena), 1, **options).observe()
+    observed = SwarmVectorEnv(1, 3, arena, **options).reset(1)
     (x_m, y_m), floor, lamp = observed[0, 10:12], observed[0, 16:20], observed[0, 20:]
     assert floor.tolist() == [1.0 if y_m <= 0 else 0.5] * 4
     assert lamp[0] == pytest.approx(1.0 / (1.0 + x_m**2 + (1.0 - y_m) ** 2), rel=1e-5) and len(lamp) == 2
@@ -59,16 +58,17 @@ def test_sensors_of_behaviors_are_observed_by_the_same_names(arena):
 
 def test_a_saved_policy_drives_as_it_did_in_its_environment(arena, tmp_path):
     path = str(tmp_path / "p.npz")
-    episode = Episode(3, load_arena(arena), 4, errors=1.0, neighbors=2, range_m=0.7, sensors={"floor": Floor()})
-    layers = make_layers(episode.observe().shape[1])
-    save_policy(path, layers, episode.observation)
+    env = SwarmVectorEnv(1, 3, arena, neighbors=2, range_m=0.7, sensors={"floor": Floor()})
+    observed = env.reset(4)
+    layers = make_layers(observed.shape[1])
+    save_policy(path, layers, env.observation)
     behavior = find_behavior(path)()
     assert behavior.rate_hz == 10.0 and set(behavior.sensors()) == {"near", "eyes", "wheels", "floor"}
-    trial = Trial(behavior, load_arena(arena), robots=3, seeds=[4], starts=episode._poses.copy())
+    trial = Trial(behavior, load_arena(arena), robots=3, seeds=[4], starts=env._poses.copy())
     for _ in range(30):
-        episode.step(run_network(layers, episode.observe()))
+        observed, _ = env.step(run_network(layers, observed))
         trial.step()
-    np.testing.assert_allclose(trial.poses, episode._poses, atol=1e-9)
+    np.testing.assert_allclose(trial.poses, env._poses, atol=1e-9)
     assert np.abs(trial.rows.commands[:, 0]).max() <= MAX_LINEAR_M_S
 
 

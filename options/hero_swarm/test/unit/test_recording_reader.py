@@ -8,13 +8,12 @@ import rosbag
 import rospy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import LaserScan
 
 from hero_msgs.msg import Motor, RobotPose, RobotPoses
 from hero_recording.errors import RecordingError
 from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.fit import read_recordings
 from hero_swarm.fitting.recording import PULSES, VELOCITY
-from hero_swarm.recording_reader import read_recordings
 
 START_S = 1000.0
 
@@ -40,22 +39,19 @@ def write(path, *messages):
 def make_messages(robot_id, jump_m=0.0):
     name, twist = "/hero_%d/" % robot_id, Twist()
     twist.linear.x, twist.angular.z = 0.1, -0.5
-    scan = LaserScan(intensities=[float(beam) for beam in range(16)])
-    scan.header.stamp = stamp(0.1)
     tracked = RobotPose(id=robot_id, stamp=stamp(0.1), x=1.0, y=2.0, yaw=0.3, state=RobotPose.TRACKED)
     lost = RobotPose(id=robot_id, stamp=stamp(0.2), x=9.0, state=RobotPose.UNKNOWN)
     return [
         (name + "odom", make_odometry(0.0, 0.0), 0.01),
         (name + "velocity_controller/cmd_vel", twist, 0.05),
         (name + "cmd_motor", Motor(1510, 1490), 0.08),
-        (name + "laser", scan, 0.11),
         (name + "odom", make_odometry(0.1, 0.01 + jump_m), 0.12),
         (name + "ground_truth", make_odometry(0.1, 5.0), 0.12),
         ("/localization/poses", RobotPoses(robots=[tracked, lost]), 0.2),
     ]
 
 
-def test_each_robot_has_its_own_rows_and_the_poses_of_the_others(tmp_path):
+def test_each_robot_has_its_own_rows(tmp_path):
     paths = write(tmp_path / "a.bag", *make_messages(0), *make_messages(7))
     found = read_recordings(paths)
     assert sorted(found) == [0, 7]
@@ -63,8 +59,6 @@ def test_each_robot_has_its_own_rows_and_the_poses_of_the_others(tmp_path):
     assert recording.commands == pytest.approx(np.array([(0.05, VELOCITY, 0.1, -0.5), (0.08, PULSES, 1510, 1490)]))
     assert recording.odometry == pytest.approx(np.array([(0.0, 0.0, 0.0, 0.2), (0.1, 0.01, 0.0, 0.2)]))
     assert recording.poses == pytest.approx(np.array([(0.1, 1.0, 2.0, 0.3)])), "a lost robot's pose is none"
-    assert recording.scans == pytest.approx(np.array([(0.1, *range(0, 16, 2))]))
-    assert [others.shape for others in recording.others] == [(1, 4)]
     assert len(read_recordings(paths * 2)[0]) == 2
 
 

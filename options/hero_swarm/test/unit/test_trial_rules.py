@@ -13,7 +13,8 @@ from hero_swarm import metrics
 from hero_swarm.behavior import Behavior, Neighbors
 from hero_swarm.experiments.computing.starts import _place_in_circle, _place_in_grid, place_all
 from hero_swarm.experiments.experiment_file import Start
-from hero_swarm.learning.episode import MAX_LEARNED_ANGULAR_RAD_S, Episode, count_observations
+from hero_swarm.learning.observation import MAX_LEARNED_ANGULAR_RAD_S, count_observations
+from hero_swarm.learning.vector_env import SwarmVectorEnv
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial, scatter
 from hero_test.nonempty import nonempty
@@ -202,20 +203,21 @@ def test_starts_in_rows_and_circles_have_their_spacing():
 
 def test_an_episode_rewards_what_gets_better_and_observes_shares():
     arena = build_rectangle(2.0, 1.0, 3)
-    episode = Episode(3, arena, 7, errors=0.0, metric="dispersion_ratio", neighbors=2, range_m=0.8)
-    rising = Episode(3, arena, 7, errors=0.0, metric="cluster_fraction")
-    plain = Episode(3, arena, 7, errors=0.0, metric=None)
+    episode = SwarmVectorEnv(1, 3, arena, errors=0.0, neighbors=2, range_m=0.8)
+    rising = SwarmVectorEnv(1, 3, arena, errors=0.0, metric="cluster_fraction")
+    plain = SwarmVectorEnv(1, 3, arena, errors=0.0, metric=None)
+    for env in (episode, rising, plain):
+        env.reset(7)
     values = [metrics.dispersion_ratio(episode._poses[..., :2])[0]]
     for _ in range(5):
-        rewards = episode.step(np.array([(5.0, 0.0), (0.5, -1.0), (-1.0, 0.0)]))
+        observed, rewards = episode.step(np.array([(5.0, 0.0), (0.5, -1.0), (-1.0, 0.0)]))
         values.append(metrics.dispersion_ratio(episode._rows.world.poses[None, :, :2])[0])
         assert rewards == pytest.approx(np.full(3, values[-2] - values[-1])), "a falling metric"
-        assert plain.step(np.zeros((3, 2))).tolist() == [0.0] * 3
+        assert plain.step(np.zeros((3, 2)))[1].tolist() == [0.0] * 3
         before = metrics.cluster_fraction(rising._poses[..., :2])[0]
-        gain = rising.step(np.array([(1.0, 0.0), (0.5, -1.0), (-1.0, 0.0)]))[0]
+        gain = rising.step(np.array([(1.0, 0.0), (0.5, -1.0), (-1.0, 0.0)]))[1][0]
         assert gain == pytest.approx(metrics.cluster_fraction(rising._poses[..., :2])[0] - before)
     assert episode.time_s == pytest.approx(0.5)
-    observed = episode.observe()
     assert observed.shape == (3, count_observations(2)) == (3, 18)
     poses, rows = episode._poses[0], episode._rows
     assert observed[:, 8:10] == pytest.approx(rows.velocities / (MAX_LINEAR_M_S, MAX_LEARNED_ANGULAR_RAD_S), abs=1e-6)

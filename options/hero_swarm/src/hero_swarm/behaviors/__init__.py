@@ -9,8 +9,7 @@ from hero_node.parameters import is_number
 
 from ..behavior import MAX_RATE_HZ, MIN_RATE_HZ, Behavior
 from ..learning.policy import load_policy
-from ..sources import Sources
-from ..user_module import load_file, read_content
+from ..sources import Sources, load_file, read_content
 
 __all__ = ["find_behavior", "list_classes", "list_names", "make_behavior"]
 

@@ -1,7 +1,7 @@
 """Fits servos and delay: replays recorded commands on simulated robots until their wheels roll as recorded. Pure.
 
-Only servo pulses tell them: after the same velocities, the firmware's controller makes wheels of any servos roll alike,
-but for small swings that no two drives share.
+After the same velocities, the firmware's controller makes wheels of any servos roll alike, but for small swings that no
+two drives share: only servo pulses tell motors.
 """
 
 from typing import List, Sequence, Tuple
@@ -11,7 +11,7 @@ import numpy as np
 from hero_sim.robot import SPIN_MS
 
 from .body_fit import follow_body
-from .recording import PULSES, SAMPLE_S, Recording, find_slips, interpolate_poses, measure_wheels, sample_times
+from .recording import SAMPLE_S, Recording, find_slips, interpolate_poses, measure_wheels, sample_times
 from .replay import Motors, replay_commands
 
 DELAY = "delay_s"
@@ -39,7 +39,7 @@ _PHASES_S = np.arange(0.0, SPIN_MS, 8.0) / 1000.0
 
 def fit_motors(recordings: List[Recording]) -> List[Motors]:
     """Return the motors of one robot in each of its recordings; nominal ones without servo pulses."""
-    if not any((recording.commands[:, 1] == PULSES).any() for recording in recordings):
+    if not any(recording.has_pulses for recording in recordings):
         return [Motors({}) for _ in recordings]
     values, steps, least, most = np.array(list(_PARAMETERS.values())).T
     phases_s = np.zeros(len(recordings))
@@ -86,9 +86,13 @@ def predict_ends(
     """Return how far off (m) the ends of paths of path_s are that start after a share of the recording (R, paths).
 
     Paths on which it touched a wall are left out.
-    Each path begins where the robot was; the simulated robots, motors and body (3,), know the commands alone.
+    Each path begins where the robot was; the simulated robots, motors and body (3,), know the commands alone, or
+    without servo pulses the ticks.
     """
-    wheels_m = replay_commands(recording, [motors for motors, _ in robots])
+    if recording.has_pulses:
+        wheels_m = replay_commands(recording, [motors for motors, _ in robots])
+    else:
+        wheels_m = np.repeat(measure_wheels(recording, sample_times(recording))[:, None], len(robots), axis=1)
     poses = np.stack([follow_body(wheels_m[:, row], body) for row, (_, body) in enumerate(robots)], axis=1)
     times_s = sample_times(recording)
     measured = interpolate_poses(recording.poses, times_s)

@@ -1,6 +1,6 @@
 """The recording of one robot. Pure."""
 
-from typing import NamedTuple, Tuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,6 @@ _SLIP_WINDOW = 20
 _MIN_ROLLED_M, _MAX_MOVED_SHARE = 0.02, 0.5
 """Wheels that roll farther than this, and poses that move by less than this share of it, are of a robot at a wall."""
 
-NO_SCANS = np.empty((0, 9))
-
 
 class Recording(NamedTuple):
     """One robot; times in s from the start.
@@ -26,23 +24,24 @@ class Recording(NamedTuple):
         commands: time, kind, linear m/s and angular rad/s or left and right servo pulse us (C, 4).
         odometry: time, x m, y m, yaw rad, by the ticks of nominal wheels (T, 4).
         poses: time, x m, y m, yaw rad in a fixed frame (P, 4).
-        scans: time, and the signals of the eight infrared sensors in counts, rear first (S, 9).
-        others: poses of the other robots.
     """
 
     commands: np.ndarray
     odometry: np.ndarray
     poses: np.ndarray
-    scans: np.ndarray = NO_SCANS
-    others: Tuple[np.ndarray, ...] = ()
 
     @property
     def time_s(self) -> float:
         """Time of the last odometry."""
         return float(self.odometry[-1, 0])
 
+    @property
+    def has_pulses(self) -> bool:
+        """Presence of servo pulses among its commands: only these tell motors."""
+        return bool((self.commands[:, 1] == PULSES).any())
+
     def cut(self, share: float) -> "Recording":
-        """Return its first share, with all commands and scans."""
+        """Return its first share, with all commands."""
         odometry = self.odometry[self.odometry[:, 0] <= share * self.time_s]
         return self._replace(odometry=odometry, poses=self.poses[self.poses[:, 0] <= odometry[-1, 0]])
 

@@ -1,14 +1,12 @@
 """Fits the simulator to one robot, and tells how much better it predicts paths that the fit has not seen. Pure."""
 
-from typing import Dict, List, NamedTuple, Optional
+from typing import Dict, List, NamedTuple
 
 import numpy as np
 
 from hero_client.values import WHEEL_SEPARATION_M
-from hero_sim.world import BEAMS, Arena
 
 from .body_fit import fit_body
-from .infrared_fit import InfraredFit, fit_infrared
 from .motor_fit import fit_motors, predict_ends
 from .recording import Recording
 from .replay import Motors
@@ -17,6 +15,9 @@ HELD_OUT_SHARE = 1.0 / 3.0
 """The end of each recording, which the fit does not see."""
 
 PATH_S = 5.0
+
+NOISE_M = 0.005
+"""Error at the ends of paths that noise makes: if a nominal robot is nearer, and a fit not better, it is one."""
 
 MAX_DEVIATION = 0.15
 """Deviation of wheels and their distance from nominal ones beyond which a fit is refused; published odometry is off by
@@ -37,20 +38,18 @@ class Fit(NamedTuple):
         values: by key, as --error takes them.
         delay_s: how much later than in the simulator commands work.
         before_m, after_m: median error at the ends of held-out paths, of a nominal robot and of this one.
-        infrared: None without an arena.
     """
 
     values: Dict[str, float]
     delay_s: float
     before_m: float
     after_m: float
-    infrared: Optional[InfraredFit]
 
 
-def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit:
-    """Return the differences of the robot of these recordings, its infrared sensors in the arena that it saw only.
+def fit_robot(recordings: List[Recording]) -> Fit:
+    """Return the differences of the robot of these recordings; a nominal one if that predicts them as well.
 
-    Raises: ValueError if they tell too little, the fit predicts no better than a nominal robot, or is implausible.
+    Raises: ValueError if they tell too little, the fit predicts no better than a bad nominal one, or is implausible.
     """
     share = 1.0 - HELD_OUT_SHARE
     seen = [recording.cut(share) for recording in recordings]
@@ -62,16 +61,16 @@ def fit_robot(recordings: List[Recording], arena: Optional[Arena] = None) -> Fit
     if not ends_m.size:
         raise ValueError(f"too short: {recordings[0].time_s:.0f} s hold no path that the fit has not seen")
     before_m, after_m = np.median(ends_m, axis=1).tolist()
-    if after_m >= before_m:
+    if after_m >= before_m > NOISE_M:
         text = "held-out paths of %g s end %.1f mm off after the fit, %.1f mm before: nothing is told; drive longer"
         raise ValueError(text % (PATH_S, 1e3 * after_m, 1e3 * before_m))
+    if after_m >= before_m:
+        motors, body = [Motors({})], np.ones(3)
     _check_plausible(body)
     left_wheel, right_wheel = (body[:2] / (1.0 - SLIP * _SLIP_MEAN)).tolist()
     rolled = {"left_wheel": left_wheel, "right_wheel": right_wheel, "slip": SLIP}
     separation = {"wheel_separation_m": float(body[2]) * WHEEL_SEPARATION_M}
-    infrared = None if arena is None else fit_infrared(recordings, arena, share)
-    values = {**motors[0].values, **rolled, **separation, **(infrared.values if infrared else {})}
-    return Fit(values, motors[0].delay_s, before_m, after_m, infrared)
+    return Fit({**motors[0].values, **rolled, **separation}, motors[0].delay_s, before_m, after_m)
 
 
 def _check_plausible(body: np.ndarray) -> None:
@@ -93,10 +92,6 @@ def describe_fit(fit: Fit, robot_id: int) -> List[str]:
     if "lag_s" in fit.values:
         motors = f"commands work {1000.0 * fit.delay_s:.0f} ms later than in the simulator"
     remarks = [ends % (PATH_S, 1e3 * fit.after_m, 1e3 * fit.before_m), motors]
-    if fit.infrared is not None:
-        errors_counts = fit.infrared.after_counts, fit.infrared.before_counts
-        remarks.append("held-out infrared signals are %.1f counts off, before the fit %.1f" % errors_counts)
-        unseen = [str(beam) for beam in range(BEAMS) if "alpha%d_counts_m2" % beam not in fit.values]
-        if unseen:
-            remarks.append(f"infrared sensors that saw too little are nominal: {', '.join(unseen)}")
+    if fit.after_m >= fit.before_m:
+        remarks.insert(0, "nothing to correct: it drives as a nominal robot")
     return ["# hero_%d: %s" % (robot_id, remark) for remark in remarks] + ["robot=%d,%s" % (robot_id, values)]

@@ -11,8 +11,7 @@ import numpy as np
 
 from hero_node import shorten
 
-from ..sources import Sources
-from ..user_module import load_file
+from ..sources import Sources, load_file
 from . import METRICS
 
 

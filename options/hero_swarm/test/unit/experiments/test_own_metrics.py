@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 
 from hero_client.values import BODY_RADIUS_M
-from hero_sim.world.arena import build_default
 from hero_swarm.behavior import Behavior, Neighbors
 from hero_swarm.experiments import report, runner
 from hero_swarm.experiments.computing import set_up
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.robot_trial import RobotTrial
-from hero_swarm.learning.episode import Episode
+from hero_swarm.learning.vector_env import SwarmVectorEnv
 from hero_swarm.safety import ROBOTS, SafetyFilter
 from hero_swarm.trial import Trial
 
@@ -136,10 +135,11 @@ def test_a_trial_on_robots_measures_the_same_state(path):
 def test_rewards_are_the_gain_of_an_own_metric(tmp_path):
     path = tmp_path / "own.py"
     path.write_text("def x(state):\n    return state.poses[..., 0].mean(axis=1)\n")
-    episode = Episode(2, build_default(2), 1, metric=f"{path}:x")
-    start_m = episode._rows.world.poses[:, 0].mean()
-    total = sum(episode.step(np.array([(0.5, 0.0), (0.2, 0.0)])) for _ in range(10))
-    np.testing.assert_allclose(total, episode._rows.world.poses[:, 0].mean() - start_m, atol=1e-9)
+    env = SwarmVectorEnv(1, 2, metric=f"{path}:x")
+    env.reset(1)
+    start_m = env._poses[..., 0].mean()
+    total = sum(env.step(np.array([(0.5, 0.0), (0.2, 0.0)]))[1] for _ in range(10))
+    np.testing.assert_allclose(total, env._poses[..., 0].mean() - start_m, atol=1e-9)
 
 
 class Still(Behavior):
