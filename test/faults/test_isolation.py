@@ -125,7 +125,7 @@ def join_and_leave(driver):
 
 @pytest.mark.parametrize("kind", BAD_PEERS)
 def test_a_misbehaving_peer_costs_other_robots_no_message(scene, effort, record, kind):
-    seconds = effort.choose(1.5, 10.0)
+    seconds = effort.choose(0.5, 10.0)
     if effort.is_long:
         # What these robots' delays are by themselves.
         scene.end_window()

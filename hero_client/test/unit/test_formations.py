@@ -67,6 +67,7 @@ def test_a_wrong_formation_is_told_in_one_line(formation, says):
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["shape", "center", "points", "columns", "spacing_m"])
 def test_no_formation_breaks_its_reader(key):
     for content in make_bad_yaml(key):

@@ -158,6 +158,7 @@ def test_a_robot_without_a_pose_senses_nothing_and_is_not_sensed():
     assert sense_neighbors(poses, Neighbors(occlusion=True)).counts.tolist() == [1, 1, 0]
 
 
+@pytest.mark.slow
 def test_errors_drop_outs_and_noise_are_as_often_as_they_should_be():
     rng = np.random.RandomState(0)
 

@@ -102,6 +102,7 @@ def test_errors_of_all_robots_are_told():
         swarm._wait_for([broken, broken])
 
 
+@pytest.mark.slow
 def test_robots_cross_without_touching_and_those_without_a_goal_stay():
     swarm = FakeSwarm(0, 1, 2)
     swarm.go_to({0: (0.0, 0.5), 1: (0.0, 0.0)}, frame="world", tolerance_m=0.02)

@@ -114,7 +114,7 @@ class TestDriverEndurance(OwnDriverCase):
         come_and_go(3)
         topics = list_driver_topics("/hero_1", driver.node)
         before = count_resources(driver.process.pid)
-        come_and_go(30)
+        come_and_go(10)
         self.assertEqual(list_driver_topics("/hero_1", driver.node), topics)
         wait_for(
             lambda: all(now <= then for now, then in nonempty(zip(count_resources(driver.process.pid), before))),
@@ -136,7 +136,7 @@ class TestDriverEndurance(OwnDriverCase):
 
         come_and_go(range(1, 4))
         before = count_resources(driver.process.pid)
-        come_and_go(range(4, 16))
+        come_and_go(range(4, 9))
         wait_for(
             lambda: all(now <= then for now, then in nonempty(zip(count_resources(driver.process.pid), before))),
             lambda: (

@@ -86,6 +86,7 @@ def test_a_robot_without_ranges_stops_and_goes_on_when_they_come(swarm, monkeypa
     assert driven[0] == (0.0, 0.0) and driven[1] != (0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_robots_that_explore_late_drive_slowly_and_say_so_once(swarm, monkeypatch):
     said = []
     monkeypatch.setattr(explore_program.rospy, "logwarn", said.append)

@@ -106,6 +106,7 @@ def test_all_robots_turns_every_robot_in_a_color_of_its_own():
     assert any(len(set(lights)) == 5 for lights in seen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("script", [avoid, keep_distance])
 def test_robots_that_are_not_calibrated_wait_and_drive_once_they_are(script):
     with StepSwarm(1, seed=1, arena="obstacles", worlds=4) as swarm:

@@ -111,6 +111,7 @@ def test_a_robot_whose_pose_is_frozen_ends_go_to_each_with_the_reason():
         assert true_paths.stop_within(swarm)
 
 
+@pytest.mark.slow
 def test_all_robots_stop_and_one_whose_pose_is_frozen_is_named():
     with StepSwarm(2, seed=1, arena="empty") as swarm:
         freeze_first(swarm)

@@ -226,6 +226,7 @@ def measure_body(swarm):
     return np.abs(points[:, None] - points)
 
 
+@pytest.mark.slow
 def test_chosen_robots_drive_as_one_body_until_the_button_is_pressed_again():
     with StepSwarm(4, perfect=True, arena="empty") as swarm:
         swarm.drivers = Drivers()

@@ -169,6 +169,7 @@ def test_a_pushed_body_pushes_others_and_their_friction_adds_up():
     assert push_row(3) == pytest.approx([0.0, 0.1, 0.2], abs=1e-4)  # 1.05 times its traction
 
 
+@pytest.mark.slow
 def test_two_boxes_in_a_row_neither_overlap_nor_turn():
     row = [place(BOX, push_n=0.1), place(BOX, 0.0, 0.2, push_n=0.1)]
     bench = Bench(row, robots=[(0.0, BELOW_M)])

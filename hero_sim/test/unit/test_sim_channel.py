@@ -56,6 +56,7 @@ def test_a_segment_that_collides_eight_times_arrives_a_tick_of_tcp_later():
     assert 0.002 < np.mean(np.array(late) > 0.0) < 0.05
 
 
+@pytest.mark.slow
 def test_forty_robots_on_a_channel_are_heard_at_half_their_rate():
     assert measure_rates_hz(10, "router") == pytest.approx(29.0, abs=0.5)
     rates_hz = measure_rates_hz(40, "router")
@@ -63,6 +64,7 @@ def test_forty_robots_on_a_channel_are_heard_at_half_their_rate():
     assert rates_hz.min() > 10.0
 
 
+@pytest.mark.slow
 def test_channels_share_the_robots_between_them():
     assert measure_rates_hz(20, "router,channels=2") == pytest.approx(29.0, abs=0.5)
     network = build_network(*parse_wifi("router,channels=2"), range(5))
@@ -70,6 +72,7 @@ def test_channels_share_the_robots_between_them():
     assert network[1].channel is network[3].channel is not network[0].channel
 
 
+@pytest.mark.slow
 def test_without_channels_robots_do_not_delay_each_other():
     assert measure_rates_hz(40, "router,channels=0") == pytest.approx(29.0, abs=0.5)
     assert all(radio.channel is None for radio in nonempty(build_network(*parse_wifi("router,channels=0"), range(3))))

@@ -109,6 +109,7 @@ def test_a_robot_survives_whatever_a_server_sends(sent, noise):
         assert any(12 <= topic_id <= 99 or topic_id in (2, 3, 4, 5, 7, 8, 9, 1) for topic_id, _ in sent)
 
 
+@pytest.mark.slow
 def test_a_service_is_answered_in_its_time_and_later_if_it_is_slow():
     driver = DriverSide("--count", "12")
     driver.start_streaming()

@@ -126,6 +126,7 @@ def press(robots, towards_rad, steps):
     return world
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robots, towards_rad", [(16, math.pi / 4), (40, 0.0)])
 def test_robots_that_press_into_a_corner_or_wall_stay_apart(robots, towards_rad):
     poses = press(robots, towards_rad, 300).poses
@@ -186,6 +187,7 @@ def test_a_turn_on_the_spot_moves_no_neighbor():
     assert world.poses[:, :2] == pytest.approx(np.array([(0.0, 0.0), (2.0 * BODY_RADIUS_M, 0.0)]), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_it_is_known_from_how_far_away_robots_have_to_be_looked_at(monkeypatch):
     """Bodies are compared only when they could touch: rarely while they are far apart."""
     world, calls = build_world([(-0.9, 0.0, 0.0), (0.9, 0.0, math.pi)]), []

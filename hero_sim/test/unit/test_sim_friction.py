@@ -61,6 +61,7 @@ def test_without_friction_a_robot_slides_along_a_wall(degrees):
     assert x_m == pytest.approx(EDGE_M, abs=1e-9) and yaw_rad == pytest.approx(math.radians(degrees), abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [10, 30, 60, 80])
 @pytest.mark.parametrize("friction", [0.1, 0.3, 0.5])
 def test_with_friction_a_robot_turns_in_and_stays(degrees, friction):

@@ -129,6 +129,7 @@ def test_all_robots_at_once_read_what_each_reads_alone():
         assert alone[0].tolist() == together[index].tolist()
 
 
+@pytest.mark.slow
 def test_readings_are_whole_counts_with_the_published_noise():
     arena = build_default(1)
     arena = arena._replace(segments_m=wall_at(0.10))

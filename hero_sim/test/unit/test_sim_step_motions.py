@@ -119,6 +119,7 @@ def test_goals_may_be_in_odometry_relative_or_in_the_world():
     assert is_at_rest(swarm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_goal_behind_a_wall_is_an_error_that_tells_of_the_wall(seed):
     robot = StepSwarm(6, seed=seed, arena=CORNER_ARENA)[CORNERED]
@@ -146,6 +147,7 @@ def test_a_robot_told_to_avoid_drives_around_what_stops_it_else(tmp_path):
     assert distances_m.min() - 0.05 - BODY_RADIUS_M > 0.003
 
 
+@pytest.mark.slow
 def test_a_robot_whose_wheels_do_not_turn_fails_and_says_so():
     swarm = StepSwarm(2, error=["left_gain=0,right_gain=0,robot=1"])
     swarm[0].turn(1.0)
@@ -188,6 +190,7 @@ def test_a_started_motion_ends_by_cancel_by_stop_and_by_another(monkeypatch):
         assert is_at_rest(swarm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wifi", ["ideal", "router"])
 def test_one_stop_brings_robots_to_rest_at_each_phase_of_their_loop(wifi, monkeypatch):
     swarm = StepSwarm(4, wifi=wifi)
@@ -345,6 +348,7 @@ def test_goals_and_poses_that_mean_nothing_are_refused_at_once():
     assert swarm.now_s < 5.0
 
 
+@pytest.mark.slow
 def test_dropping_a_swarm_with_a_motion_on_its_way_is_no_error(recwarn):
     gc.collect()  # what other tests left
     recwarn.clear()

@@ -51,6 +51,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
     assert first != other
 
 
+@pytest.mark.slow
 def test_each_world_of_a_batch_is_that_of_its_seed_alone():
     batch = StepSwarm(3, seed=7, worlds=3)
     log = batch.log(ranges=True)
@@ -125,6 +126,7 @@ def test_robots_and_places_are_those_of_the_command_line():
     assert swarm.rows.world.errors.servo_center_us[1, 0] == 1540.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wifi", ["ideal", "hotspot"])
 def test_hero_plus_beside_a_stock_robot_drives_and_measures_ahead(wifi):
     options = {"perfect": True, "error": ["slip=0"], "model": "hero_plus,robot=1"}

@@ -282,6 +282,7 @@ class WholeFirmware:
             self.world.step()
 
 
+@pytest.mark.slow
 def test_the_timers_are_those_of_the_whole_firmware():
     rows, whole = RobotRows(build_world(1, 0, scale=0.0)), WholeFirmware(build_world(1, 0, scale=0.0))
     rng, command_ms, cycles, scans = np.random.RandomState(1), 0, [], []

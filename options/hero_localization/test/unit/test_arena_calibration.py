@@ -357,12 +357,14 @@ def tape(random, sd_m, wrong=None, scale=1.0):
     return places
 
 
+@pytest.mark.slow
 def test_a_tape_of_2_mm_leaves_no_tag_out_that_is_right():
     found = [calibrate_arena(LENS, see_all(), tape(np.random.RandomState(seed), 0.002)) for seed in range(20)]
     assert sum(bool(result.left_out) for result in found) <= 3
     assert np.median([result.sd_m for result in found]) > 0.001
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sd_m", [0.0007, 0.002])
 def test_standard_deviation_is_that_of_places_in_the_field(sd_m):
     true_m2, told_m2 = [], []
@@ -376,6 +378,7 @@ def test_standard_deviation_is_that_of_places_in_the_field(sd_m):
     assert 0.75 < math.sqrt(np.mean(true_m2) / np.mean(told_m2)) < 1.33
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.995, 1.005])
 def test_a_scale_that_is_half_a_percent_off_is_named(scale):
     for seed in range(5):
@@ -383,6 +386,7 @@ def test_a_scale_that_is_half_a_percent_off_is_named(scale):
         assert any("of their size" in problem for problem in found.problems)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.991, 1.009])
 def test_another_lens_is_not_taken_for_a_wrong_tag(share):
     lens = LENS._replace(matrix=np.diag((share, share, 1.0)) @ LENS.matrix)

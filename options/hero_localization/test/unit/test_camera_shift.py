@@ -63,6 +63,7 @@ SHIFTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [4, 6])
 @pytest.mark.parametrize("shift", SHIFTS)
 def test_small_shift_of_a_camera_is_named_and_corrected_slowly(shift, count):
@@ -77,6 +78,7 @@ def test_small_shift_of_a_camera_is_named_and_corrected_slowly(shift, count):
     assert text.startswith("camera: the camera has moved by") and "which is corrected" in text
 
 
+@pytest.mark.slow
 def test_a_camera_that_did_not_move_stays_as_it_is():
     for count in (4, 6):
         shifted = Shifted(count, corner_px=0.15)
@@ -84,6 +86,7 @@ def test_a_camera_that_did_not_move_stays_as_it_is():
         assert shifted.texts == [] and np.array_equal(shifted.tracker.camera.position_m, CALIBRATED.position_m)
 
 
+@pytest.mark.slow
 def test_one_tag_that_moved_is_named_and_moves_no_camera():
     shifted = Shifted(wrong=102)
     after_m, sd_m = shifted.run(4.0)
@@ -94,12 +97,14 @@ def test_one_tag_that_moved_is_named_and_moves_no_camera():
     assert after_m < 0.0002 and sd_m > 0.0012, "of four tags none is known to be right"
 
 
+@pytest.mark.slow
 def test_a_camera_and_a_tag_that_both_moved_are_told_apart():
     shifted = Shifted(6, (0.004, 0.0, 0.0), wrong=101)
     after_m, _ = shifted.run(9.0)
     assert after_m < 0.0003 and sorted(text.partition(":")[0] for text in shifted.texts) == ["camera", "tag 101"]
 
 
+@pytest.mark.slow
 def test_shifts_are_followed_after_time_has_gone_back():
     shifted = Shifted(6, *SHIFTS["aside"])
     shifted.run(1.5)

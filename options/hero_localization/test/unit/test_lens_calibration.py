@@ -291,6 +291,7 @@ def test_the_focal_error_is_that_of_the_jackknife(monkeypatch):
     assert found == pytest.approx(errors.max(), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_images_that_no_lens_explains_are_refused():
     views = [BoardView(np.arange(12), np.zeros((12, 2), np.float32)) for _ in range(8)]
     with pytest.raises(CalibrationError, match="no lens explains these images"):
@@ -367,6 +368,7 @@ def test_a_board_is_blurred_by_pixel_and_lens():
     assert steepest[0] > 0.85
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "distortion"),
     [

@@ -105,6 +105,7 @@ def test_odometry_alone_drifts_much_further():
     assert rms(errors) > 0.02
 
 
+@pytest.mark.slow
 def test_a_pose_counts_at_the_time_at_which_it_was_measured():
     stamped_at_arrival = follow(Drive(1).run(20.0), PoseFilter(), delay_s=DELAY_S, stamp_error_s=DELAY_S)
     stamped_at_capture = follow(Drive(1).run(20.0), PoseFilter(), delay_s=DELAY_S)

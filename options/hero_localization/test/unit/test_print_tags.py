@@ -76,6 +76,7 @@ def test_papers_have_their_sizes():
     assert [side_mm / 25.4 for side_mm in print_tags.PAPERS_MM["letter"]] == pytest.approx([8.5, 11.0])
 
 
+@pytest.mark.slow
 def test_ruler_is_100_mm_long():
     (page,) = list_pages("--robots", "1")
     image = scan(print_tags.draw_page(page, "36h11", A4_MM))
@@ -94,6 +95,7 @@ def test_board_on_paper_is_that_of_the_lens_calibration():
         assert along_mm == pytest.approx(1e3 * SQUARE_M * (COLUMNS - 2), abs=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "pages", "told"),
     [
@@ -189,6 +191,7 @@ def test_the_ruler_has_a_mark_for_each_centimeter_above_its_line():
     assert axes.get_xlim() == (0.0, 210.0) and axes.get_ylim() == (0.0, 297.0)
 
 
+@pytest.mark.slow
 def test_the_board_lies_in_the_middle_above_the_ruler():
     for paper_mm in print_tags.PAPERS_MM.values():
         (axes,) = print_tags.draw_board_page(paper_mm).axes

@@ -213,6 +213,7 @@ def test_a_delay_is_known_well_enough_to_five_milliseconds(error_s, is_named, mo
     assert found.problems == (["the delay is known to 5 ms only: let the robot turn to and fro"] if is_named else [])
 
 
+@pytest.mark.slow
 def test_the_delay_and_its_error_are_those_of_least_squares():
     random = np.random.RandomState(2)
     odometry_s = np.arange(0.0, 12.0, 0.03)

@@ -167,6 +167,7 @@ def test_a_file_that_cannot_be_written_is_an_error(tmp_path):
         settings.update(str(tmp_path / "file" / "camera.yaml"), {})
 
 
+@pytest.mark.slow
 def test_no_part_is_lost_when_several_calibrations_write_a_file(path):
     def calibrate(first):
         for number in range(first, first + 12):

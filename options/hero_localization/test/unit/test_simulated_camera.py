@@ -188,6 +188,7 @@ def test_same_seed_gives_the_same_bytes_and_another_seed_others():
     assert (first == again).all() and (first != other).any()
 
 
+@pytest.mark.slow
 def test_robots_out_of_the_picture_leave_it_as_it_is():
     empty = render(np.empty((0, 3)), ())
     for pose in ((5.0, 0.0, 0.0), (-5.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, -5.0, 0.0)):

@@ -72,6 +72,7 @@ def list_clocks(drive):
     return [(clock.name, clock.text.split(" come ")[1].split(":")[0]) for clock in drive.localizer.list_clocks()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay_s", [0.1, -0.1, 0.2])
 def test_a_camera_whose_clock_is_off_is_named_and_corrected(delay_s):
     drive = Drive([delay_s])
@@ -86,6 +87,7 @@ def test_a_camera_whose_clock_is_off_is_named_and_corrected(delay_s):
     assert len(named) == 1 and "poses from /track come with stamps" in named[0]
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_off_is_named_only_where_it_is_not_corrected():
     drive = Drive([0.1], is_correcting=False)
     drive.run(14.0)
@@ -95,6 +97,7 @@ def test_a_clock_that_is_off_is_named_only_where_it_is_not_corrected():
     assert drive.run(4.0) > 0.015
 
 
+@pytest.mark.slow
 def test_clocks_that_agree_are_left_as_they_are():
     for seed in range(3):
         drive = Drive([0.0, 0.004], seed)
@@ -102,6 +105,7 @@ def test_clocks_that_agree_are_left_as_they_are():
         assert list_clocks(drive) == [] and len(drive.lines) == 1, drive.lines
 
 
+@pytest.mark.slow
 def test_the_camera_whose_clock_is_off_is_told_from_the_other_one():
     drive = Drive([0.0, 0.03], 1)
     assert drive.run(15.0) < 0.003
@@ -109,12 +113,14 @@ def test_the_camera_whose_clock_is_off_is_told_from_the_other_one():
     assert name == "/track_2" and 25.0 < float(text.split()[2]) < 35.0
 
 
+@pytest.mark.slow
 def test_two_cameras_are_compared_on_a_straight_path_too():
     drive = Drive([0.0, 0.1], 2, lambda now_s: (0.2 if now_s % 6.0 < 5.0 else 0.0, 0.0))
     drive.run(16.0)
     assert [name for name, _ in list_clocks(drive)] == ["/track_2"]
 
 
+@pytest.mark.slow
 def test_correction_does_not_look_like_a_hand():
     drive = Drive([0.1], 3)
     drive.run(6.0)
@@ -123,6 +129,7 @@ def test_correction_does_not_look_like_a_hand():
     assert not [line for line in drive.lines if "by hand" in line]
 
 
+@pytest.mark.slow
 def test_wheels_that_slip_in_place_are_no_clock():
     drive = Drive([0.0])
     move, drive._move = drive._move, lambda pose, speed: move(pose, speed if pose is drive.counted else 0.0 * speed)
@@ -137,6 +144,7 @@ def test_one_clock_is_kept_for_all_topics_of_a_node():
     assert len(clocks._sources) == 1
 
 
+@pytest.mark.slow
 def test_a_clock_that_is_set_right_is_found_again():
     drive = Drive([0.1])
     drive.run(12.0)
@@ -145,6 +153,7 @@ def test_a_clock_that_is_set_right_is_found_again():
     assert list_clocks(drive) == [] and drive.run(3.0) < 0.003
 
 
+@pytest.mark.slow
 def test_poses_at_the_present_are_not_behind_the_robot():
     errors_m = {False: [], True: []}
     drive = Drive([0.0])

@@ -51,6 +51,7 @@ def test_a_robot_with_wrong_poses_stops_soon_and_says_what_is_wrong(measure, rea
         assert robot.velocity == (0.0, 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("place_sd_m", "yaw_sd_rad", "off_rad"), [(0.003, 0.05, 0.0), (0.002, 0.02, 0.5)])
 def test_a_robot_with_noisy_or_somewhat_turned_poses_reaches_its_goals(place_sd_m, yaw_sd_rad, off_rad):
     rng = np.random.RandomState(3)
@@ -67,6 +68,7 @@ def test_a_robot_with_noisy_or_somewhat_turned_poses_reaches_its_goals(place_sd_
             assert math.dist(robot.true_pose[:2], goal) < 0.04
 
 
+@pytest.mark.slow
 def test_a_robot_moved_by_hand_once_still_reaches_its_goal():
     with StepSwarm(1, seed=3, arena="empty") as swarm:
         robot = swarm[0]
@@ -107,6 +109,7 @@ def test_the_map_shows_the_walls_before_which_robots_turn():
     assert len(walls_m) > 40 and np.mean(walls_m < 0.016) > 0.9
 
 
+@pytest.mark.slow
 def test_errors_of_the_camera_are_a_bias_of_each_robot_and_noise():
     assert CameraModel() == (0.1, 0.001, 0.005, 0.0005, 0.005)
     with StepSwarm(1, seed=3, arena="empty", worlds=60) as swarm:

@@ -192,6 +192,7 @@ def test_a_pose_of_a_robot_that_is_not_expected_is_refused():
         Swarm(0).localizer.add_measurement(7, StampedPose(0.0, Pose(0.0, 0.0, 0.0), COVARIANCE), 0.0)
 
 
+@pytest.mark.slow
 def test_many_robots_lost_and_found_make_one_line_in_ten_seconds():
     robots = range(8)
     places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}
@@ -217,6 +218,7 @@ def test_a_jump_back_in_time_gives_lost_robots_their_lines_again():
     assert swarm.lines == ["hero_%d lost: its pose follows its odometry" % robot_id for robot_id in robots]
 
 
+@pytest.mark.slow
 def test_after_a_quiet_while_each_lost_robot_has_a_line_again():
     robots = range(8)
     places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}
@@ -312,6 +314,7 @@ def test_robots_are_listed_by_id_each_with_the_origin_of_its_odometry():
     assert swarm[2].state is RobotState.TRACKED, "one that is expected already goes on"
 
 
+@pytest.mark.slow
 def test_four_lines_on_lost_robots_are_passed_on_and_the_others_counted():
     robots = range(16)
     places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}

@@ -59,6 +59,7 @@ def test_robots_pose_is_that_of_its_center_not_of_the_tag(yaw_rad):
     assert_near(seen.robots[4].pose, robot)
 
 
+@pytest.mark.slow
 def test_covariance_holds_what_noise_of_the_corners_does():
     random, pose = np.random.RandomState(0), Pose(0.9, -0.3, 1.0)
     tags = [see(1, pose, noise_px=random.normal(0.0, 0.1, (4, 2))) for _ in range(2000)]

@@ -203,6 +203,7 @@ def test_a_tag_that_is_missed_is_found_by_a_finer_detector_at_once(side_px, monk
     assert all(watch.see(tags) == [1] for _ in range(70))
 
 
+@pytest.mark.slow
 def test_a_tag_that_is_gone_is_looked_for_by_one_finer_detector_at_times():
     watch, tags = Watch(with_fine=True), everywhere()[:100:4]
     expected = dict(tags)

@@ -173,6 +173,7 @@ def test_what_is_missed_moved_or_missing_counts_from_its_limit_on():
         assert len(tracker.list_problems()) == count, last_s
 
 
+@pytest.mark.slow
 def test_a_tag_expected_near_the_border_need_not_be_seen():
     for place, count in (((41.0, 500.0), 1), ((40.0, 500.0), 0), ((1880.0, 500.0), 0), ((1879.0, 41.0), 1),
                          ((1881.0, 41.0), 0), ((900.0, 1039.0), 1), ((900.0, 1041.0), 0),

@@ -79,6 +79,7 @@ class CoveredSwarm:
         return np.sqrt((np.array(shares) ** 2).mean(axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRIVES)
 def test_the_reported_uncertainty_is_the_true_error(name, arena):
     swarm = CoveredSwarm(arena, DRIVES[name])

@@ -101,6 +101,7 @@ def test_a_topic_of_another_type_is_ignored():
     assert find_robot_topic("/hero_5/speech", "std_msgs/String") is None
 
 
+@pytest.mark.slow
 def test_paths_are_in_the_shared_frame(two_robots):
     seen = observe(two_robots)
     assert sorted(seen.robots) == [0, 3]

@@ -77,6 +77,7 @@ def test_a_file_that_is_no_bag_is_refused_with_the_reason(tmp_path):
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_bag_that_was_cut_off_is_refused_and_can_be_repaired(tmp_path):
     path = tmp_path / "cut.bag"
     write_bag(path, seconds=20.0)
@@ -141,6 +142,7 @@ def damage(path, share):
     return bytes(data)
 
 
+@pytest.mark.slow
 def test_a_copy_is_kept_where_damage_in_the_middle_is_cut_off(tmp_path):
     path = tmp_path / "damaged.bag"
     write_bag(path, seconds=20.0)
@@ -150,6 +152,7 @@ def test_a_copy_is_kept_where_damage_in_the_middle_is_cut_off(tmp_path):
     assert len(read_all(open_set(path))) > 0
 
 
+@pytest.mark.slow
 def test_a_bag_without_a_readable_message_is_left_as_it_is(tmp_path):
     path = tmp_path / "damaged.bag.active"
     write_bag(path, seconds=20.0)

@@ -234,6 +234,7 @@ def test_a_path_begins_white_and_ends_with_the_robot_and_its_front():
     ]
 
 
+@pytest.mark.slow
 def test_frames_are_told_where_robots_are_not_all_in_one():
     def describe(*robots):
         seen = Observations()

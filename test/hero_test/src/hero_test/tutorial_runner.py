@@ -52,10 +52,10 @@ COLUMNS = 400  # so that nothing wraps
 
 UNSHOWN_LINE = re.compile(
     r"\[WARN\] \[[\d.]+\]: (Inbound TCP/IP connection failed|Could not process inbound connection"
-    r"|commands are late by [\d.]+ s: |poses are [\d.]+ s old: )"
+    r"|commands are late by [\d.]+ s: |poses are [\d.]+ s old: |waiting for odometry on )"
 )
-"""Warnings that no page shows: rospy's of a subscriber that connected twice at once, or too late, and hero_client's on
-a busy PC. A robot that is slow for a moment still does what its page shows."""
+"""Warnings that no page shows: rospy's of a subscriber that connected twice at once, or too late, and those of a busy
+PC, whose robots still do what the page shows, if a moment later."""
 
 CONTROL_SEQUENCE = re.compile(r"\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)|\x1b\[[0-9;?]*[A-Za-z]|\x1b[=>]|\x07")
 

@@ -5,7 +5,7 @@ import time
 TIMEOUT_S = 60.0
 """Only a test that fails waits this long; a busy machine needs its time."""
 
-MAX_PAUSE_S = 0.05
+MAX_PAUSE_S = 0.1
 
 
 def wait_for(condition, what, timeout_s=TIMEOUT_S):
