@@ -64,7 +64,7 @@ def make_workspace_jobs(results_dir):
     others = {path.name for path in (ROOT / "test" / "workspaces").glob("test_*.py")}
     parts += [(name, "") for name in sorted(others - {"test_build_modes.py", "test_core.py"})]
     jobs = [make_core_job(results_dir / "core", "not unit_tests")]  # they have run, with all packages
-    environment = {"PATH": run_rostests.make_program_path(results_dir)}
+    environment = {"PATH": run_rostests.make_program_path(results_dir), **run_rostests.DISTUTILS}
     for file, mode in parts:
         arguments = (str(ROOT / "test" / "workspaces" / file), *(("-k", f"[{mode}]") if mode else ()))
         name = " ".join(["workspaces:", file, mode]).rstrip()

@@ -206,7 +206,7 @@ def test_a_box_at_the_end_of_a_wall_pivots_as_its_moments_say(push_n, pivots):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_in_a_pile_nothing_overlaps_or_outruns_its_pushers(seed):
     rng = random.Random(seed)
     walls = [(-0.5, -0.5, 0.5, -0.5), (0.5, -0.5, 0.5, 0.5), (0.5, 0.5, -0.5, 0.5), (-0.5, 0.5, -0.5, -0.5)]
@@ -222,7 +222,7 @@ def test_in_a_pile_nothing_overlaps_or_outruns_its_pushers(seed):
     places_m = [(-0.42, -0.4 + 0.2 * k) for k in range(4)]
     bench = Bench(bodies, walls, robots=places_m, heading_rad=[rng.uniform(-0.3, 0.3) for _ in places_m])
     worst_m = 0.0
-    for _ in range(300):
+    for _ in range(150):
         before = [body.pose for body in bench.bodies]
         places_m = bench.step()
         bodies = bench.bodies

@@ -67,16 +67,16 @@ def test_a_world_gives_the_same_bytes_on_every_machine():
 @pytest.mark.slow
 def test_a_world_in_a_batch_gives_the_same_bytes_as_alone():
     seeds = (3, 7, 5)
-    together, meetings = drive(*seeds, steps=1000)
-    assert together == [drive(seed, steps=1000)[0][0] for seed in seeds]
-    assert meetings > 10
+    together, meetings = drive(*seeds, steps=500)
+    assert together == [drive(seed, steps=500)[0][0] for seed in seeds]
+    assert meetings > 5
     assert len(set(together)) == len(seeds)
 
 
 @pytest.mark.slow
 def test_it_changes_nothing_how_seldom_neighbors_are_looked_up(monkeypatch):
-    usual, meetings = drive(7, steps=1500)
+    usual, meetings = drive(7, steps=600)
     for margin_m in 0.0, 0.2:
         monkeypatch.setattr(contacts, "_MARGIN_M", margin_m)
-        assert drive(7, steps=1500) == (usual, meetings)
-    assert meetings > 10
+        assert drive(7, steps=600) == (usual, meetings)
+    assert meetings > 1

@@ -186,7 +186,7 @@ happenings = st.sampled_from(["lost", "made", "failed", "frozen", "blocked", "un
 
 @given(script=st.lists(st.tuples(st.integers(0, 120), st.one_of(packet_bytes, happenings)), max_size=25))
 @example(script=[(0, "restarted"), (0, "frozen"), (70, "unblocked")] * 5)
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_whatever_happens_to_its_link_a_robot_runs_again_but_not_at_once(script):
     driver = DriverSide()
     driver.start_streaming()

@@ -268,7 +268,7 @@ tunings = st.tuples(
 )
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     seed=st.integers(0, 1000),
     sent=st.lists(st.tuples(st.integers(0, 4), st.one_of(twists, pulses, gains, tunings)), min_size=5, max_size=20),
