@@ -1,4 +1,1 @@
-"""The gateway between HeRo robots (rosserial over TCP) and ROS.
-
-`hero_driver.rosserial` is pure protocol and needs neither ROS nor a network; everything else is the node.
-"""
+"""The gateway between HeRo robots (rosserial over TCP) and ROS; `rosserial` is pure protocol, the rest is the node."""

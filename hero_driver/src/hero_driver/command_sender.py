@@ -1,12 +1,9 @@
-"""Sends pending commands: takes from each robot's command queue the commands that may be sent now.
-
-Runs on the thread of the sockets. A robot that does not acknowledge is asked again later and
-delays no other.
-"""
+"""Sends the commands that wait and may be sent now; a robot that does not acknowledge delays no other."""
 
 import time
 
-from .peer import Peer, PeerOwner
+from .peer import Peer
+from .ros.robot_commands import Owner
 from .rosserial.errors import RosserialError
 from .transport.event_loop import CallLater
 
@@ -18,7 +15,7 @@ SILENCE_LIMIT_S = 0.5
 class CommandSender:
     """The way out of the driver."""
 
-    def __init__(self, call_later: CallLater, owner: PeerOwner) -> None:
+    def __init__(self, call_later: CallLater, owner: Owner) -> None:
         """Take the loop's call_later(delay_s, call)."""
         self._call_later = call_later
         self._owner = owner

@@ -1,7 +1,6 @@
-"""The node's private parameters: read once, checked, frozen.
+"""The node's private parameters: read once, checked, frozen; some are declared in the rooms that they concern.
 
-The rooms declare those that they depend on, DriverConfig the others. docs/driver_parameters.md and
-config/hero_driver.yaml are generated from these declarations.
+docs/driver_parameters.md and config/hero_driver.yaml are generated from these declarations.
 """
 
 import dataclasses
@@ -36,9 +35,7 @@ class DriverConfig(CommandSettings, CorrectionSettings, SessionLimits, Admission
     declare_timeout_s: float = declare(
         number(20.0, 2.0, 600.0, "s", "time for a robot to declare a topic that identifies it; then it is disconnected")
     )
-    grace_s: float = declare(
-        number(10.0, 0.0, 3600.0, "s", "time that a robot's topics and id are kept after it disconnects")
-    )
+    grace_s: float = declare(number(10.0, 0.0, 3600.0, "s", "time that topics and id of an absent robot are kept"))
     start_stopped: str = declare(
         choice(
             "as_before",

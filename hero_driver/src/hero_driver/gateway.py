@@ -24,10 +24,10 @@ from .reports.robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
 from .ros.robot_bridge import BridgeContext, RobotBridge
 from .ros.transform_publisher import TransformPublisher
-from .ros.worker import Worker
 from .rosserial.payloads import Log
 from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
 from .stops.delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
+from .transport.call_queue import Worker
 from .transport.event_loop import THE_DRIVER_ENDS, EventLoop
 from .transport.link import READ_LENGTH, Link, LinkHandler
 
@@ -50,20 +50,18 @@ class Gateway(LinkHandler):
         clock_ns: Callable[[], int],
         on_change: Callable[[], None],
     ) -> None:
-        """node is the driver's name in ROS; clock_ns gives ROS time.
-
-        on_change() is called when a robot's state changes; it must not block.
-        """
+        """node: the driver's name in ROS; clock_ns: ROS time; on_change(), of a robot's state, must not block."""
         self._config = config
         self._loop = loop
         self._log = log
         self._registrar = registrar
         self._clock_ns = clock_ns
-        self._on_change = on_change
         self._node = node
         self._admission = Admission(config)
-        self._sender = CommandSender(loop.call_later, self)
         self._stops = StopDelivery(loop.call_later, self)
+        self.note_change = on_change
+        self.send_commands = CommandSender(loop.call_later, self).send_commands
+        self.stop_robot = self._stops.begin
         self._robot_log = RobotLog(log, self._stops.begin, self.warn_late)
         self._transforms = TransformPublisher(loop.call_later)
         self._context = BridgeContext(
@@ -429,18 +427,6 @@ class Gateway(LinkHandler):
                 " whether robots that were stopped are at rest; end other programs"
                 % (os.getloadavg()[0], os.cpu_count() or 1, late_s),
             )
-
-    def note_change(self) -> None:
-        """A robot's state changed."""
-        self._on_change()
-
-    def send_commands(self, peer: Peer) -> None:
-        """Send the commands that wait, as soon as the robot can take them."""
-        self._sender.send_commands(peer)
-
-    def stop_robot(self, peer: Peer) -> None:
-        """Stop the robot."""
-        self._stops.begin(peer)
 
     def _read_without_loop(self, peer: Peer) -> None:
         try:

@@ -1,9 +1,6 @@
 """The driver of HeRo robots: connects any number of them to ROS, and stops them at its end.
 
-    rosrun hero_driver hero_driver                   robots connect to port 11411
-    rosrun hero_driver hero_driver _port:=11412      to another one
-
-main() reads the parameters, wires everything and waits.
+rosrun hero_driver hero_driver _port:=11412
 """
 
 import errno
@@ -45,9 +42,9 @@ from .ros.rospy_internals import (
     limit_clock,
 )
 from .ros.thread_watch import ThreadWatch
-from .ros.worker import Worker
 from .stops.interface import StopInterface
 from .stops.store import StopStore
+from .transport.call_queue import Worker
 from .transport.event_loop import EventLoop, NoAnswerError
 from .transport.link import HostNotFoundError
 

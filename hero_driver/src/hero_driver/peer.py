@@ -1,7 +1,7 @@
 """One connection and what is known of it. Thread of the sockets."""
 
 from dataclasses import dataclass, field
-from typing import List, Optional, Protocol
+from typing import List, Optional
 
 from .commands.burst_gate import BurstGate
 from .commands.stop_progress import StopProgress
@@ -62,19 +62,3 @@ class Peer:
     def has_acknowledged_motion(self) -> bool:
         """Return whether the robot's TCP has acknowledged the last motion command."""
         return self.link.handed_length - self.link.read_unacknowledged_length() >= self.motion_mark
-
-
-class PeerOwner(Protocol):
-    """Interface of the gateway for stops and commands, on the thread of the sockets."""
-
-    stopped: bool
-    """True if all robots are stopped until they are released."""
-
-    def warn_robot(self, peer: Peer, text: str) -> None:
-        """Log what is wrong with a robot."""
-
-    def warn_late(self) -> None:
-        """Log that what robots send is read too late to tell what they do, if that is this PC's doing."""
-
-    def note_change(self) -> None:
-        """A robot's state changed."""

@@ -153,11 +153,11 @@ def test_transforms_are_read_one_by_one():
         for number, tail in enumerate(tails)
     ]
     read = message_layouts.read_transforms(build_transform_message(*transforms))
-    assert [transform.stamp_ns for transform in read] == [NOW_NS, NOW_NS + 1, NOW_NS + 2]
-    assert [message_layouts.split_frames(transform.frames) for transform in read] == [
+    assert [stamp_ns for stamp_ns, _, _ in read] == [NOW_NS, NOW_NS + 1, NOW_NS + 2]
+    assert [message_layouts.split_frames(frames) for _, frames, _ in read] == [
         (b"hero_0/base_link", b"hero_0/link_%d" % number) for number in range(3)
     ]
-    assert [transform.tail for transform in read] == tails
+    assert [tail for _, _, tail in read] == tails
 
 
 def test_a_transform_that_was_read_is_packed_as_the_same_bytes():

@@ -310,7 +310,8 @@ def test_data_on_an_id_that_the_robot_receives_is_not_passed_on():
 
 
 @pytest.mark.parametrize(
-    "packet_id, text", [(4, "wants to call a service"), (5, "wants to call a service"), (6, "asks for a parameter")]
+    "packet_id, text",
+    [(4, "packet of kind 4"), (5, "services or parameters"), (6, "kind 6")],
 )
 def test_requests_that_only_other_devices_make_are_refused_by_name(packet_id, text):
     session = open_declared_session()

@@ -5,8 +5,7 @@ import threading
 
 import pytest
 
-from hero_driver.ros.worker import Worker
-from hero_driver.transport.call_queue import CallQueue
+from hero_driver.transport.call_queue import CallQueue, Worker
 
 DEADLINE_S = 60.0
 

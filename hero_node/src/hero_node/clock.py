@@ -17,14 +17,12 @@ class Clock(ABC):
         """Wait for duration_s; return whether the program is to continue."""
 
     def rate(self, hz: float) -> Iterator[float]:
-        """Repeat the body of a `for` loop hz times per second, until the program is to end.
+        """Repeat the body of a `for` loop hz times per second, until the program is to end; yield the seconds so far.
 
             for time_s in swarm.rate(10):
                 robot.drive(0.1, math.sin(time_s))
 
-        Yields the seconds since the start of the loop. A body that takes longer than its period is not made up for.
-
-        Raises: ValueError unless hz is more than 0.
+        A body that takes longer than its period is not made up for. Raises: ValueError unless hz is more than 0.
         """
         if not hz > 0.0:
             raise ValueError(f"a rate must be more than 0 Hz, not {hz!r}")

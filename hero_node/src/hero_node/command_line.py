@@ -27,10 +27,7 @@ OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 
 
 def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> NoReturn:
-    """Call main and end the process with its exit status (None: 0).
-
-    A HeroError, or one of errors, becomes one line and status 1.
-    """
+    """Call main and end the process with its exit status (None: 0); a HeroError, or one of errors, is a line and 1."""
     sys.exit(call(main, *errors))
 
 
@@ -98,10 +95,7 @@ def check_node_arguments(package: str, name: str, text: Optional[str], arguments
 
 
 def say(text: str, stream: Optional[IO[str]] = None, end: str = "\n") -> None:
-    """Write a line at once, to stdout unless stream is given; the program continues even if its output is closed.
-
-    For work that must not end because of its output: a recording, robots that are being measured.
-    """
+    """Write a line at once, to stdout unless stream is given; the program goes on even if its output is closed."""
     stream = stream or sys.stdout
     if stream is None:  # the program was started without
         return

@@ -37,10 +37,7 @@ def encode_pose(x_m: float, y_m: float, yaw_rad: float, z_m: float = 0.0) -> byt
 
 
 def find_messages(data: Union[bytes, bytearray], length_max: int) -> Iterator[Tuple[int, int]]:
-    """Yield the start and end of each complete message; what follows the last one is incomplete.
-
-    Raises: TooLongError behind the messages before it.
-    """
+    """Yield the start and end of each complete message. Raises: TooLongError behind the messages before it."""
     end, data_length, prefix_length = 0, len(data), LENGTH.size
     while data_length - end >= prefix_length:
         length: int = LENGTH.unpack_from(data, end)[0]

@@ -96,10 +96,7 @@ class CommandQueue:
         return commands
 
     def due_in_s(self, motion_may_go: bool, now_s: float) -> Optional[float]:
-        """Return in how many seconds to call take() again, None if nothing waits.
-
-        motion_may_go: whether the next motion command waits for nothing but its time.
-        """
+        """Return in how many s to call take() again, None: nothing waits; motion_may_go: if its time has come."""
         if self._is_idle:
             return None
         if self._waiting:
@@ -114,10 +111,7 @@ class CommandQueue:
         return due_s if motion_may_go or due_s is None else max(RETRY_S, due_s)
 
     def _is_behind_a_stop(self, name: str, shaper: VelocityShaper) -> bool:
-        """Return whether the motion that waits on a topic has to wait for an older stop of another topic.
-
-        Not for newer ones: another program's stream of zeros would hold it up for ever.
-        """
+        """Return whether motion waits for an older stop of another topic; newer zeros would hold it up for ever."""
         if len(self._shapers) == 1 or not shaper.has_motion:
             return False
         return any(

@@ -73,10 +73,7 @@ class CommandSource:
             self._intervals_s.append(interval_s)
 
     def forgive_pause(self, pause_s: float, now_s: float) -> None:
-        """Do not count a pause of the driver as silence.
-
-        Once between two commands: a driver that pauses again and again must stop a robot whose program hangs.
-        """
+        """Do not count a pause of the driver as silence; once between two commands, so that hangs are noticed."""
         if not self._was_forgiven:
             self._was_forgiven = True
             self.commanded_s = min(self.commanded_s + pause_s, now_s)
@@ -154,10 +151,7 @@ class CommandSources:
                 commander.forgive_pause(pause_s, now_s)
 
     def is_zero_missed(self, now_s: float) -> bool:
-        """Return, once, whether the wheels show that the robot did not take a zero.
-
-        One that hung for a moment reads the zeros together with the motion before them, and its firmware drops them.
-        """
+        """Return, once, whether the wheels show that the robot missed a zero: after a hang its firmware drops them."""
         if self._zero is None or now_s - self._zero.now_s < ZERO_SHOWS_S:
             return False
         wheels, is_heard = self._wheels, self._wheels.readings > self._zero.readings
@@ -165,11 +159,7 @@ class CommandSources:
         return wheels.readings > 0 and not (is_heard and wheels.still_readings >= STILL_READINGS)
 
     def find_silent(self, silence_s: float, now_s: float) -> Optional[CommandSource]:
-        """Return a program that moves the robot and has fallen silent, None if there is none.
-
-        A call that comes WATCH_PERIOD_S after the last one does not count that time: the driver heard nothing
-        meanwhile, or has not read it yet.
-        """
+        """Return a program that moves the robot and has fallen silent, without pauses of the driver; or None."""
         self._forgive_pause(now_s)
         self._looked_s = now_s
         if now_s < self._silent_from_s:
@@ -199,10 +189,7 @@ class CommandSources:
         return f"its wheels have not turned for 5 s, although {nodes} commands it: are its battery and motors good?"
 
     def needs_another_stop(self, commander: CommandSource, now_s: float) -> bool:
-        """Return whether a stop of commander has to end motion of other topics than its own.
-
-        Not where another program drives the robot there at this moment.
-        """
+        """Return whether a stop of commander has to end motion of other topics, which no other program drives now."""
         others = [
             other
             for other in self._by_topic.values()

@@ -1,7 +1,6 @@
 """Checks service requests before they reach a robot, which checks nothing itself. Pure: bytes in, words out.
 
-The firmware prints what it is given into buffers of 100 bytes (VelocityControl.ino:209) and stores it in its
-flash, so a number that is not finite, or absurd, would outlive a reboot.
+The firmware prints them into 100 bytes (VelocityControl.ino:209) and keeps them in flash, over reboots.
 """
 
 import math

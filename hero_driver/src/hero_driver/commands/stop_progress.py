@@ -58,11 +58,7 @@ class StopState(enum.Enum):
 
 
 class StopProgress:
-    """The stop of one robot over one connection: when to send, and what is known. Pure.
-
-    Attributes:
-        state: what is known.
-    """
+    """The stop of one robot over one connection: when to send, and its `state`, which is what is known."""
 
     def __init__(self, now_s: float, wheels: WheelMotion) -> None:
         """Begin at now_s; wheels are the robot's."""
@@ -96,10 +92,7 @@ class StopProgress:
         )
 
     def is_due(self, is_acknowledged: bool, now_s: float) -> bool:
-        """Look at the wheels; return whether a stop is to be sent now.
-
-        is_acknowledged: whether the robot's TCP has acknowledged the last stop.
-        """
+        """Look at the wheels; return whether a stop is due. is_acknowledged: the robot's TCP has the last one."""
         self._assess(is_acknowledged, now_s)
         if self.state is StopState.AT_REST or now_s < self._next_s:
             return False
@@ -111,10 +104,7 @@ class StopProgress:
         return is_acknowledged or self._stops == 0
 
     def needs_burst(self, tunes: bool, now_s: float) -> bool:
-        """Return whether the next stop has to be one that ends a self-tuning.
-
-        tunes: whether that is known. If not, wheels tell that go on without slowing down for 0.8 s.
-        """
+        """Return whether the next stop has to end a self-tuning: tunes, or wheels that do not slow down for 0.8 s."""
         return tunes or (self._has_passed(self._watched, MOVES_KEPT, now_s) and self._wheels.go_on)
 
     def note_sent(self, was_burst: bool, now_s: float) -> None:

@@ -30,10 +30,9 @@ STOP_PAYLOADS = {"geometry_msgs/Twist": ZERO_TWIST, "hero_msgs/Motor": STOPPED_M
 
 
 def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
-    """Return what to send for payload (geometry_msgs/Twist), or None if a component is not finite.
+    """Return what to send for a geometry_msgs/Twist: ZERO_TWIST for a stop; None if a component is not finite.
 
-    What stops the robot becomes ZERO_TWIST: it uses only linear.x and angular.z. With clamp, these
-    two are brought into the firmware's limits.
+    The robot uses only linear.x and angular.z. clamp brings these two into the firmware's limits.
     """
     if len(payload) != TWIST_FORM.size:
         return None
@@ -57,10 +56,7 @@ def check_motor_pulses(payload: bytes) -> Optional[bytes]:
 
 
 class VelocityShaper:
-    """The pending commands of one motion topic of one robot.
-
-    At most one stop and one later command wait; a stop that waits is never replaced by what comes after it.
-    """
+    """The pending commands of one motion topic of one robot: a stop, which nothing replaces, and one later command."""
 
     def __init__(self, stop_payload: bytes = ZERO_TWIST, interval_s: float = COMMAND_INTERVAL_S) -> None:
         """stop_payload: the command that stops the robot; interval_s: least time between two commands."""

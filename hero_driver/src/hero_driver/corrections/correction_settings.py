@@ -16,6 +16,11 @@ def _read_diagonal(name: str, value: Any) -> Tuple[float, ...]:
     return tuple(float(entry) for entry in value)
 
 
+def _declare_diagonal(what: str, unit: str, *default: float) -> Any:
+    text = f"diagonal of odom's {what} covariance: x, y, z, roll, pitch, yaw"
+    return declare(Parameter(default, _read_diagonal, text, unit))
+
+
 class OwnWheels(NamedTuple):
     """A robot's calibrated wheels."""
 
@@ -33,33 +38,14 @@ class CorrectionSettings:
     """Wheels, and accuracy of odometry."""
 
     wheel_diameter_m: float = declare(number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel, except HeRo+'s"))
-    wheel_separation_m: float = declare(
-        number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "distance between the wheels, except HeRo+'s")
-    )
-    ticks_per_turn: float = declare(
-        number(TICKS_PER_TURN, 1.0, 1000000.0, "", "encoder ticks per revolution of a wheel, except HeRo+'s")
-    )
+    wheel_separation_m: float = declare(number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "their distance, except HeRo+'s"))
+    ticks_per_turn: float = declare(number(TICKS_PER_TURN, 1.0, 1e6, "", "encoder ticks per turn, except HeRo+'s"))
     calibration_folder: str = declare(
-        string(
-            "~/hero_calibration",
-            "folder of calibrate's files hero_N.yaml, whose wheels replace those above; empty: none",
-        )
+        string("~/hero_calibration", "folder of calibrate's hero_N.yaml, whose wheels replace those above; empty: none")
     )
-    pose_covariance: Tuple[float, ...] = declare(
-        Parameter(
-            (1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2),
-            _read_diagonal,
-            "diagonal of odom's pose covariance: x, y, z, roll, pitch, yaw",
-            "m^2, rad^2",
-        )
-    )
-    twist_covariance: Tuple[float, ...] = declare(
-        Parameter(
-            (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2),
-            _read_diagonal,
-            "diagonal of odom's twist covariance: x, y, z, roll, pitch, yaw",
-            "m^2/s^2, rad^2/s^2",
-        )
+    pose_covariance: Tuple[float, ...] = _declare_diagonal("pose", "m^2, rad^2", 1e-4, 1e-4, 1e-9, 1e-9, 1e-9, 1e-2)
+    twist_covariance: Tuple[float, ...] = _declare_diagonal(
+        "twist", "m^2/s^2, rad^2/s^2", 1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2
     )
     own_wheels: Mapping[str, OwnWheels] = field(default_factory=dict)
     """Wheels of robots whose wheels were calibrated, by name, such as hero_3; from ~calibration_folder."""

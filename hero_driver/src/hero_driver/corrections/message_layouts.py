@@ -1,12 +1,8 @@
-"""The few message types that the driver reads or writes, as bytes in and bytes out, at fixed offsets.
-
-Message bytes pass through unread wherever possible; this is what remains: headers, odometry, encoder,
-transforms, laser scans. Field order is that of the ROS message definitions. Pure.
-"""
+"""The messages that the driver reads or writes, by fixed offsets, in the order of their definitions. Pure."""
 
 import math
 import struct
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 from hero_node import HEADER, LENGTH, POSE_FORM, TWIST_FORM, encode_header
 
@@ -125,10 +121,9 @@ class OdometryWriter:
     def rewrite(
         self, payload: bytes, seq: int, stamp_ns: int, estimate: Optional[Tuple[bytes, float, float]]
     ) -> Optional[bytes]:
-        """Return the robot's message with stamp and covariances, and with another estimate if one is given.
+        """Return the robot's message with stamp and covariances; None if it is not one, or its numbers cannot be true.
 
-        estimate: pose, from encode_pose(), and velocities ahead (m/s) and around z (rad/s). None if payload is not a
-        nav_msgs/Odometry, or the robot's own numbers, where they are used, cannot be true.
+        estimate: replaces pose, as encode_pose() gives it, and velocities ahead (m/s) and around z (rad/s).
         """
         # A robot's frames never change, so they are looked at once.
         frames = payload[_ODOMETRY_FRAMES]
@@ -191,12 +186,8 @@ def _holds_two_texts(data: bytes) -> bool:
     return position == len(data)
 
 
-class Transform(NamedTuple):
-    """One geometry_msgs/TransformStamped as it lies in a tf message."""
-
-    stamp_ns: int
-    frames: bytes  # frame_id and child_frame_id with their lengths, as on the wire
-    tail: bytes  # translation and rotation
+Transform = Tuple[int, bytes, bytes]
+"""Stamp (ns); frame_id and child_frame_id with their lengths, as on the wire; translation and rotation."""
 
 
 def read_transforms(payload: bytes) -> Optional[List[Transform]]:
@@ -218,7 +209,7 @@ def read_transforms(payload: bytes) -> Optional[List[Transform]]:
         if end > len(payload):
             return None
         frames_start = position + _SEQ_AND_STAMP.size
-        transforms.append(Transform(secs * NS_PER_S + nsecs, payload[frames_start:frames_end], payload[frames_end:end]))
+        transforms.append((secs * NS_PER_S + nsecs, payload[frames_start:frames_end], payload[frames_end:end]))
         position = end
     return transforms if position == len(payload) else None
 
@@ -235,7 +226,7 @@ read_transforms_start: Callable[[bytes], Tuple[int, int, int, int]] = struct.Str
 
 
 def split_frames(frames: bytes) -> Tuple[bytes, bytes]:
-    """Return (frame_id, child_frame_id) of Transform.frames."""
+    """Return (frame_id, child_frame_id) of a Transform's frames."""
     length = LENGTH.unpack_from(frames)[0]
     child = LENGTH.size + length
     return frames[LENGTH.size : child], frames[child + LENGTH.size :]
@@ -257,12 +248,10 @@ _PROXIMITY_TAIL = struct.Struct("<7fI8fI8f")
 
 
 def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) -> Optional[bytes]:
-    """Return the sensor_msgs/LaserScan of the eight real beams in a stock laser message, by REP 117.
+    """Return the sensor_msgs/LaserScan of the eight beams in a stock laser message, by REP 117; None if it is not one.
 
-    The stock message has 16 ranges of which the odd ones are averages, an increment that matches none of
-    them and finite values for nothing in range (RangeSensor.ino:66-72, 123-125, 167-173). NaN stays: the firmware
-    sends it for a sensor without calibration, and for nothing else.
-    None if payload is not a stock laser message.
+    Of its 16 ranges the odd ones are averages, its increment matches none, and nothing in range is a finite value
+    (RangeSensor.ino:66-72, 123-125, 167-173). NaN stays: it stands for a sensor without calibration only.
     """
     end = len(payload) - _STOCK_SCAN_TAIL.size  # of the header
     if end < HEADER.size or HEADER.size + HEADER.unpack_from(payload)[3] != end:

@@ -35,12 +35,7 @@ class Sink(Protocol):
 
 
 class OdometryCorrector:
-    """The odometry of one robot; one per robot, kept over its reconnects.
-
-    Attributes:
-        ticks: the odometry from its ticks.
-        wheels: whether its wheels turn.
-    """
+    """The odometry of one robot, kept over its reconnects: `ticks`, its tick odometry, and `wheels`, their motion."""
 
     def __init__(
         self,
@@ -60,10 +55,7 @@ class OdometryCorrector:
         self.restart(False, WheelMotion())
 
     def restart(self, rebooted: bool, wheels: WheelMotion) -> None:
-        """A new connection begins; after a reboot the robot's counters begin anew too.
-
-        wheels is told of the encoder's readings, or of odometry where there is no encoder.
-        """
+        """A new connection begins, after a reboot with counters that begin anew; wheels is told of all readings."""
         self.wheels = wheels
         self._readings: Optional[int] = None  # of the encoder, on this connection; None before it is declared
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS

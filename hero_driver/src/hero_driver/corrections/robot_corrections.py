@@ -1,7 +1,4 @@
-"""Corrects the messages of one robot: odometry from ticks, proximity from its scan, ranges, stamps, transforms.
-
-Takes payloads and times of arrival, and publishes payloads. Topics that are not in ROUTES pass unchanged.
-"""
+"""Corrects the messages of one robot, from payloads to payloads; topics that are not in ROUTES pass unchanged."""
 
 import collections
 import functools
@@ -33,15 +30,7 @@ TypedTopic = Tuple[str, str]
 
 
 class RobotCorrections:
-    """The data of one robot; one per robot, kept over its reconnects.
-
-    Attributes:
-        models: the robot's model.
-        stamps: the filter of all its stamps.
-        odometry: its odometry.
-        transforms: its transforms.
-        refused: messages and transforms that could not be used.
-    """
+    """The data of one robot, kept over its reconnects; refused: messages and transforms that could not be used."""
 
     def __init__(self, namespace: str, settings: CorrectionSettings, add_transform: AddTransform) -> None:
         """Correct the messages of the robot in namespace; add_transform takes the transforms of all robots."""

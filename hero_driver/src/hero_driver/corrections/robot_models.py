@@ -17,11 +17,7 @@ DISTANCE = "/distance"
 
 
 class ModelWatch:
-    """The model of one robot, kept over its reconnects.
-
-    Attributes:
-        model: STOCK or HERO_PLUS, by the newest declaration of its Encoder message; STOCK before that.
-    """
+    """The model of one robot, by its newest Encoder declaration; STOCK before that. Kept over reconnects."""
 
     def __init__(self, namespace: str, settings: CorrectionSettings) -> None:
         self.model = STOCK

@@ -1,9 +1,7 @@
-"""Differential-drive odometry from wheel ticks, on exact arcs.
+"""Differential-drive odometry from wheel ticks, on exact arcs. Pure: ticks and stamps in, pose and twist out (REP 103).
 
 The firmware's own integration loses a third and more of the distance while the velocity controller drives
 (VelocityControl.ino:112 overwrites what Odometry.ino:130 has not read yet); its tick counters stay right.
-Pure: ticks and stamps in, pose and twist out. Source of the geometry: config of the robot, robot's frames
-by REP 103 (x ahead, y left, yaw counter-clockwise).
 """
 
 import collections
@@ -102,10 +100,7 @@ class TickOdometry:
         )
 
     def integrate(self, left_ticks: float, right_ticks: float, stamp_s: float) -> bool:
-        """Take one reading of the counters (ticks since boot or set_odom, forward positive).
-
-        Returns whether the pose is another one now.
-        """
+        """Take a reading of the counters (ticks since boot or set_odom); return whether the pose is another one now."""
         # A sum of the two is finite only if both are.
         if not math.isfinite(left_ticks + right_ticks):
             self.fault = "encoder counts %g and %g ticks, which odometry ignores: reboot the robot" % (

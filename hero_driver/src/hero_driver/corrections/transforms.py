@@ -1,7 +1,4 @@
-"""Keeps the transforms of a robot's own frames and corrects their stamps.
-
-Takes payloads of tf2_msgs/TFMessage, gives single transforms.
-"""
+"""Keeps the transforms of a robot's own frames and corrects their stamps: tf2_msgs/TFMessage in, single ones out."""
 
 import re
 from typing import Callable, Dict, Set
@@ -34,11 +31,7 @@ TakeOdomTransform = Callable[[bytes, bytes], None]
 
 
 class TransformCorrector:
-    """The transforms of one robot; one per robot, kept over its reconnects.
-
-    Attributes:
-        foreign_frames: frames of transforms that are not the robot's own, by name, for the report.
-    """
+    """The transforms of one robot, kept over its reconnects; foreign_frames: refused ones, for the report."""
 
     def __init__(
         self,

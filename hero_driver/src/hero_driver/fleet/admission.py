@@ -45,9 +45,7 @@ class AdmissionLimits:
     max_connections_per_address: int = declare(whole_number(400, 1, 5000, "", "connections per address"))
     max_unidentified: int = declare(whole_number(200, 1, 5000, "", "connections that have not identified themselves"))
     max_packets_per_s: int = declare(whole_number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211"))
-    max_bytes_per_s: int = declare(
-        whole_number(2000000, 1000, 100000000, "bytes/s", "bytes per robot; stock robots send 44051")
-    )
+    max_bytes_per_s: int = declare(whole_number(2000000, 1000, 100000000, "bytes/s", "of each; stock robots: 44051"))
 
 
 class Admission:
@@ -76,9 +74,8 @@ class Admission:
     def find_eviction(self, host: str) -> Optional[Tuple[Any, str]]:
         """Return the connection that has to end for one of host's, and the parameter that demands it.
 
-        It is of the address with the most connections of those that are capped: the oldest unidentified one, else the
-        newest. None while there is room, where host may not connect anyway, or where no address has more than host
-        would have: so no address can keep others out.
+        It is of the address with the most: the oldest unidentified one, else the newest. None while there is room, or
+        where no address has more than host would have: so no address can keep others out.
         """
         if self._find_own_refusal(host) is not None:
             return None
@@ -104,10 +101,7 @@ class Admission:
         self._unidentified.remove(connection)
 
     def admit_new_robot(self, host: str, now_s: float) -> Optional[str]:
-        """Count a robot of host that is not known yet; return why it has to wait, None if it may come.
-
-        Ever new names would keep the ROS master and the registrar busy.
-        """
+        """Count a robot of host that is not known yet, which costs calls to the master; return why it has to wait."""
         if self._new_robots.take(host, 1.0, now_s):
             return None
         return "more than %d new robots from one address, and %g more per second" % (
@@ -142,10 +136,7 @@ class Admission:
 
 
 class RateLimit:
-    """Limits of one connection's packets and bytes per second.
-
-    Two token buckets of one second each, as the times up to which the permitted rates are used: one call per read.
-    """
+    """Limits of one connection's packets and bytes per second: the times up to which the rates are used."""
 
     def __init__(self, max_packets_per_s: int, max_bytes_per_s: int, now_s: float) -> None:
         self._max_packets_per_s = max_packets_per_s

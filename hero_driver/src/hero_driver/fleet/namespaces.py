@@ -37,10 +37,7 @@ def identify(topic_name: str) -> Optional[Identity]:
 
 
 def resolve(topic_name: str, identity: Identity) -> Optional[str]:
-    """Return the ROS name for what the HeRo identity calls topic_name, None if it may not use that name.
-
-    The firmware sends hero_N/laser_enable without its slash (RangeSensor.ino:79); it means the same place.
-    """
+    """Return the ROS name for topic_name, slash or not (RangeSensor.ino:79), None if the HeRo may not use it."""
     if topic_name in TF_TOPICS:
         return "/tf"
     name = topic_name if topic_name.startswith("/") else "/" + topic_name

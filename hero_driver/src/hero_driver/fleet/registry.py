@@ -1,10 +1,8 @@
 """The robots of one driver: arrival, return, duplicate, departure with a grace period. Pure; time enters as now_s.
 
-A robot is known by its namespace. It has at most one connection that counts; a second one from the same
-address is the robot after a power cycle and takes over, one from another address is a second robot with the
-same id and has to wait: until the first one has been away for the grace period, so that it does not get the id
-of a robot that loses its connection for a moment. A robot that was never there at the same time as the known one is
-the known one at a new address.
+A robot is known by its namespace, with one connection that counts. A second one from the same address is the robot
+after a power cycle and takes over; from another address, while the first one is there or within its grace period, it
+is a second robot with the same id and has to wait. One that was never there with the known one is that elsewhere.
 """
 
 import enum
@@ -143,10 +141,7 @@ class FleetRegistry:
 
     @staticmethod
     def is_reserved(record: RobotRecord, host: str) -> bool:
-        """Return whether the id is kept for the known robot when one from host wants it.
-
-        So it is where the known one was heard after another from host was refused: there are two of them.
-        """
+        """Return whether one of host may not have the id: the known robot was heard after another was refused."""
         refused_s = record.rivals.get(host)
         return refused_s is not None and record.last_heard_s > refused_s
 

@@ -22,7 +22,7 @@ class RobotLog:
     """The log of all robots' lines."""
 
     def __init__(self, log: LogRelay, stop: Callable[[Peer], None], warn_late: Callable[[], None]) -> None:
-        """stop(peer) stops a robot that tunes itself though it was not told to; warn_late() is PeerOwner's."""
+        """stop(peer) stops a robot that tunes itself though it was not told to; warn_late() is Owner's."""
         self._log = log
         self._stop = stop
         self._warn_late = warn_late

@@ -47,10 +47,7 @@ def describe_robot(
     duplicate_stops: Mapping[str, StopState],
     now_s: float,
 ) -> RobotStatus:
-    """Return the state of the robot that record tells of; bridge and peer are its own, where it has them.
-
-    duplicate_stops: by the addresses of refused connections.
-    """
+    """Return the state of a robot; duplicate_stops: by the addresses of refused connections."""
     corrections = None if bridge is None else bridge.corrections
     dropped = record.dropped_messages
     problem = calibration_problem = command_fault = ""

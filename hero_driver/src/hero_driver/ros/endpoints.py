@@ -1,7 +1,7 @@
-"""Registers the publishers, subscribers and services of one robot with the ROS master, which may block.
+"""Registers the publishers, subscribers and services of one robot with the ROS master: jobs of the registrar.
 
-Everything here is a job of the registrar, except what says otherwise. A topic or service that a robot declares again
-with another type or md5 is unregistered first: programs made for the previous one must not reach the other.
+What a robot declares again with another type or md5 is unregistered first: programs made for the previous one must
+not reach the other.
 """
 
 import functools

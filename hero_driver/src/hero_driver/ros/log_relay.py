@@ -1,8 +1,4 @@
-"""Log lines to /rosout on a thread of their own, the same problem at most once in a while.
-
-rospy writes to the terminal and a file when it logs; both can block, so the thread of the sockets hands
-lines over here. When too many wait they are dropped and the number is logged.
-"""
+"""Log lines to /rosout on a thread of their own, as terminal and file may block; each at most once in a while."""
 
 import logging
 import sys
@@ -11,8 +7,8 @@ from typing import Dict, List, Tuple
 
 from hero_node import TokenBuckets, print_error
 
+from ..transport.call_queue import Worker
 from .rospy_internals import ROSOUT_LOGGER, list_log_handlers
-from .worker import Worker
 
 QUEUE_LENGTH = 2000
 THROTTLE_S = 10.0
@@ -24,14 +20,6 @@ ROBOT_LINES_MAX = 20
 HOST_LINES_MAX = 300
 """Lines about what comes from one address, likewise, however many robots it says that it is; a hundred simulated
 robots that join at once are a hundred lines."""
-
-_LEVELS = {
-    "debug": logging.DEBUG,
-    "info": logging.INFO,
-    "warn": logging.WARNING,
-    "error": logging.ERROR,
-    "fatal": logging.CRITICAL,
-}
 
 
 class LogRelay:
@@ -48,7 +36,7 @@ class LogRelay:
     def log(self, level: str, text: str) -> None:
         """Log one line at level debug, info, warn, error or fatal."""
         # Robots send a routine line per second each; to hand one over costs more than a burst of their data.
-        number = _LEVELS[level]
+        number: int = getattr(logging, level.upper())
         if not self._logger.isEnabledFor(number):
             return
         dropped = self._worker.refused
@@ -58,10 +46,7 @@ class LogRelay:
             self._reported_drops = dropped
 
     def log_throttled(self, level: str, key: str, text: str, robot: str = "", host: str = "") -> None:
-        """Log one line unless one with the same key was logged in the last THROTTLE_S; say how many were not.
-
-        Lines about one robot and about one host, where they are given, are limited, too.
-        """
+        """Log a line unless its key was in the last THROTTLE_S; those about a robot and a host are limited, too."""
         now_s = time.monotonic()
         last_s, suppressed = self._last.get(key, (None, 0))
         if last_s is not None and now_s - last_s < THROTTLE_S:

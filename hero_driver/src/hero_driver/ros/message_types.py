@@ -1,7 +1,6 @@
 """Finds ROS message classes for declared types, checks their md5, and makes classes that carry raw bytes.
 
-The firmware speaks of hero_common, the package that this suite's hero_msgs replaces on the PC, and of the
-tf package of old; both have equals with the same md5.
+The firmware's hero_common is this suite's hero_msgs on the PC, its tf package tf2_msgs, with the same md5.
 """
 
 import functools
@@ -73,10 +72,7 @@ def make_raw_service(service_class: Any) -> Any:
 
 
 def find_message_class(type_name: str, md5sum: str) -> Any:
-    """Return the class of the message type that a robot calls type_name.
-
-    May read files; not for the thread that owns the sockets. Raises: MessageTypeError.
-    """
+    """Return the class of the message type that a robot calls type_name; may read files. Raises: MessageTypeError."""
     ros_type = apply_aliases(type_name)
     message_class = _load(roslib.message.get_message_class, "msg", ros_type)
     _check_md5sum("type", type_name, ros_type, md5sum, message_class._md5sum)
@@ -84,10 +80,7 @@ def find_message_class(type_name: str, md5sum: str) -> Any:
 
 
 def find_service_class(type_name: str, request_md5sum: str, response_md5sum: str) -> Any:
-    """Return the class of the service type that a robot calls type_name; it declares one md5 per half.
-
-    May read files; not for the thread that owns the sockets. Raises: MessageTypeError.
-    """
+    """Return the class of a service type, declared by one md5 per half; may read files. Raises: MessageTypeError."""
     ros_type = apply_aliases(type_name)
     service_class = _load(roslib.message.get_service_class, "srv", ros_type)
     halves: Tuple[Tuple[str, str, Any], ...] = (
@@ -116,10 +109,7 @@ def _load(loader: Any, kind: str, ros_type: str) -> Any:
 
 
 def _is_generated(package: str, kind: str, name: str) -> bool:
-    """Return whether package has generated code for a type, without importing anything.
-
-    The name comes from the network: it must not decide which Python modules this process runs.
-    """
+    """Return whether package has code for a type, without importing: peers must not choose which modules run here."""
     try:
         spec = importlib.util.find_spec(package)
     except (ImportError, ValueError):

@@ -1,10 +1,8 @@
 """Publishes raw messages to all subscribers of a topic, without waiting for a slow one.
 
-rospy gives each subscriber a thread and a queue; waking one thread per message costs about as much as all
-the rest of the driver. Here the thread of the sockets writes to the subscribers' sockets itself and never
-waits: what a slow subscriber's socket does not take is kept, whole messages only, up to a limit, then the
-oldest goes. rospy does everything else: registration, handshakes, statistics, shutdown.
-Source of the framing: ROS TCPROS, a 32-bit length before each message.
+Waking rospy's thread of each subscriber would cost as much as the rest of the driver. Here the thread of the sockets
+writes itself and never waits: what a slow socket does not take is kept, whole messages only, up to a limit, then the
+oldest goes. rospy does the rest: registration, handshakes, statistics, shutdown.
 """
 
 import collections

@@ -1,10 +1,8 @@
 """Subscribes to a topic and passes on raw messages, read by the event loop's thread.
 
-rospy reads each publisher of a topic on its own thread; waking it, and then the thread of the sockets,
-for every command costs several times what the command itself costs. Here rospy does the registration and the
-handshake and hands over the first message; then its thread rests, and the publisher's socket is read by the
-loop until it ends. After that rospy proceeds by its own rules: it closes, or it connects again.
-Source of the framing: ROS TCPROS, a 32-bit length before each message.
+Waking rospy's thread of each publisher, then that of the sockets, would cost several times what a command costs. rospy
+registers, shakes hands and hands over the first message; then its thread rests, and the loop reads the publisher's
+socket until it ends. After that rospy proceeds by its own rules: it closes, or it connects again.
 """
 
 import fcntl
@@ -63,8 +61,7 @@ class RawSubscriber:
     ) -> None:
         """receive(payload) is called on the loop's thread, on_sender_lost() when the newest one's publisher left.
 
-        moves: whether messages are motion commands. Then is_old is wanted, which takes one more call to the ROS
-        master, and of a publisher that is ahead only the newest message of each read is passed on.
+        moves: of motion commands is_old is wanted, and of a publisher that is ahead only the newest of each read.
         """
         self.receive = receive
         self.on_sender_lost = on_sender_lost

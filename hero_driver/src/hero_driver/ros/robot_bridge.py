@@ -17,15 +17,15 @@ from ..corrections.correction_settings import CorrectionSettings
 from ..corrections.robot_corrections import TRANSFORMS, RobotCorrections
 from ..fleet.namespaces import Identity
 from ..rosserial.session import Topic, TopicKind
+from ..transport.call_queue import Worker
 from ..transport.event_loop import EventLoop
 from . import message_types
 from .endpoints import QUEUE_LENGTH, Endpoints, Layout
 from .log_relay import LogRelay
 from .raw_publisher import RawPublisher
-from .robot_commands import CommandOwner, RobotCommands
+from .robot_commands import Owner, RobotCommands
 from .services import RobotService
 from .transform_publisher import TransformPublisher
-from .worker import Worker
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 VELOCITY_ALIAS = "/cmd_vel"
@@ -41,7 +41,7 @@ SET_ODOM_TYPE = "hero_msgs/SetOdom"
 class BridgeContext(NamedTuple):
     """Objects that all bridges share."""
 
-    owner: CommandOwner
+    owner: Owner
     loop: EventLoop
     log: LogRelay
     transforms: TransformPublisher
@@ -156,7 +156,7 @@ class RobotBridge:
         return is_usable
 
     def _take_input(self, topic: Topic, name: str, layout: Layout, register: Callable[[], bool]) -> None:
-        """The robot takes what is sent to name; register() is a job that tells whether that can be used.
+        """Pass on to the robot what is sent to name, once register(), a job, says that it can be used.
 
         It gets nothing before that where programs may still send what was declared under this name before.
         """

@@ -1,9 +1,6 @@
-"""Commands on their way to one robot: from the subscriber that receives them to the queue that they are sent from.
+"""Commands on their way to one robot, from subscribers to its queue; which program moves it, and whether it still does.
 
-    make_subscriber() -> _receive_motion() or _receive_command() -> CommandQueue
-
-Knows which program moves the robot, and stops the robot when that program ends, falls silent or sends no valid command.
-Thread of the sockets.
+make_subscriber() -> _receive_motion() or _receive_command() -> CommandQueue
 """
 
 import functools
@@ -36,17 +33,26 @@ TUNING_SILENCE_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
 
 
-class CommandOwner(Protocol):
-    """Interface of the gateway for commands."""
+class Owner(Protocol):
+    """Interface of the gateway for stops and commands, on the thread of the sockets; each peer is a Peer."""
 
     stopped: bool
-    """True if all robots are stopped."""
+    """True if all robots are stopped until they are released."""
 
     def send_commands(self, peer: Any) -> None:
         """Send the commands that wait for the robot of a connection, as soon as it can take them."""
 
     def stop_robot(self, peer: Any) -> None:
         """Stop the robot of a connection."""
+
+    def warn_robot(self, peer: Any, text: str) -> None:
+        """Log what is wrong with a robot."""
+
+    def warn_late(self) -> None:
+        """Log that what robots send is read too late to tell what they do, if that is this PC's doing."""
+
+    def note_change(self) -> None:
+        """A robot's state changed."""
 
 
 class RobotCommands:
@@ -60,9 +66,7 @@ class RobotCommands:
         was_told_to_tune: whether a program called the service that starts its self-tuning.
     """
 
-    def __init__(
-        self, namespace: str, owner: CommandOwner, loop: EventLoop, log: LogRelay, settings: CommandSettings
-    ) -> None:
+    def __init__(self, namespace: str, owner: Owner, loop: EventLoop, log: LogRelay, settings: CommandSettings) -> None:
         """Take the commands for the robot in namespace."""
         self.queue = CommandQueue(settings.command_max_age_s)
         self.refused = 0

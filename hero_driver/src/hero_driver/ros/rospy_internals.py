@@ -1,20 +1,16 @@
-"""Every access to rospy's internals, each with its reason; no other module of the driver looks behind rospy's API.
+"""Every access of the driver to rospy's internals, each with its reason.
 
-Sources: rospy 1.15 to 1.17 (impl/tcpros_base.py, impl/rosout.py, topics.py), and the TCPROS protocol: a 32-bit
-length before each connection header and each message.
+Sources: rospy 1.15 to 1.17 (impl/tcpros_base.py, impl/rosout.py, topics.py).
 """
 
 import logging
 import socket
-import threading
 import time
-import traceback
 from types import SimpleNamespace
 from typing import Any, Callable, FrozenSet, List, Optional, Tuple
 
 import rosgraph
 import rospy
-from rosgraph_msgs.msg import Log
 from rospy.impl import rosout, tcpros_pubsub
 from rospy.impl.registration import (
     RegManager,
@@ -48,9 +44,9 @@ def limit_clock() -> None:
 def keep_publishers_connected() -> None:
     """Connect again to publishers that rospy would overlook for ever; call it before rospy.init_node().
 
-    rospy connects to a publisher that is announced unless it has a connection to that node. It keeps one that the
-    publisher refused because it had ended meanwhile, and does not look again when one ends whose publisher has been
-    replaced by another in the same program: every later publisher of that program would go unheard, its stops too.
+    rospy connects to an announced publisher unless it has a connection to that node. It keeps one that the publisher
+    refused, and does not look again when one ends whose publisher has been replaced by another in the same program:
+    every later publisher of that program would go unheard, its stops too.
     """
     connect = tcpros_pubsub.robust_connect_subscriber
 
@@ -76,11 +72,10 @@ NO_CONNECTIONS = SimpleNamespace(connections=())
 
 
 def open_publisher(name: str, raw_class: Any) -> Tuple[Any, Any]:
-    """Register a topic; return its publisher, and what holds the `connections` of its subscribers.
+    """Register a topic, which may block; return its publisher, and what holds the `connections` of its subscribers.
 
-    rospy replaces the list of connections and never changes one, so that any thread may read it. With a queue rospy
-    would start a thread for each subscriber, which costs as much as the rest of the driver. Asks the ROS master, so
-    it may block.
+    Any thread may read that list, which rospy replaces and never changes. With a queue rospy would start a thread for
+    each subscriber, which costs as much as the rest of the driver.
     """
     publisher = rospy.Publisher(name, raw_class, queue_size=1, tcp_nodelay=True)
     publisher.impl.set_queue_size(None)
@@ -88,10 +83,7 @@ def open_publisher(name: str, raw_class: Any) -> Tuple[Any, Any]:
 
 
 def send(connection: Any, data: bytes) -> bytes:
-    """Return what the subscriber's socket did not take; a broken connection takes everything and is closed.
-
-    rospy's own write_data() waits for a slow subscriber.
-    """
+    """Return what a socket did not take, where write_data() would wait; a broken connection takes all and is closed."""
     sock = connection.socket
     if sock is None:
         return b""
@@ -108,10 +100,7 @@ def send(connection: Any, data: bytes) -> bytes:
 
 
 def list_publishers(name: str, message_type: str) -> Optional[FrozenSet[str]]:
-    """Register as a subscriber of a topic; return the URIs of the nodes that publish it already, None if not known.
-
-    To be called before rospy subscribes, which registers again. Asks the ROS master, so it may block.
-    """
+    """Register as a subscriber, before rospy does; return the URIs of publishers, None if unknown. May block."""
     try:
         uris = rosgraph.Master(rospy.get_name()).registerSubscriber(name, message_type, rospy.get_node_uri())
     except (rosgraph.MasterException, OSError):
@@ -120,18 +109,12 @@ def list_publishers(name: str, message_type: str) -> Optional[FrozenSet[str]]:
 
 
 def is_latched_before(connection: Any, earlier: Optional[FrozenSet[str]]) -> bool:
-    """Return whether the first message on a connection may be one that its publisher had latched before.
-
-    earlier: what list_publishers() gave. A publisher that came later latches nothing but what is new.
-    """
+    """Return whether the first message on a connection may have been latched before list_publishers() gave earlier."""
     return connection is not None and connection.is_latched and (earlier is None or connection.endpoint_id in earlier)
 
 
 def find_connection(name: str, message: Any) -> Any:
-    """Return the connection on which a message came to the subscriber of a topic; None where rospy has to read it on.
-
-    Where topic statistics are wanted (/enable_statistics), rospy has to see every message.
-    """
+    """Return a message's connection; None where rospy has to read it on, as for statistics (/enable_statistics)."""
     impl = get_topic_manager().get_subscriber_impl(name)
     if impl is None or impl.statistics_logger is not None:
         return None
@@ -147,19 +130,14 @@ def read_caller(connection: Any) -> str:
 
 
 def replace_reading(connection: Any, read: Callable[[], Any]) -> None:
-    """Make rospy's thread call read() instead of its own, once it has passed on all that it has read.
-
-    Waking that thread, and then the thread of the sockets, for every command costs several times what the command
-    itself costs. read() raises as rospy's own reading does when the connection ends.
-    """
+    """Make rospy's thread call read(), which raises at the end, once it has passed on what it has read."""
     connection.receive_once = read
 
 
 def take_socket(connection: Any) -> Tuple[Any, bytes]:
-    """Return a socket of one's own for a connection, None if it is closed, and the begun message that rospy has read.
+    """Return a socket of one's own for a connection (None: closed), and the begun message that rospy has read.
 
-    rospy may close its socket on another thread at any time; it shuts the connection down with it, so that this one
-    ends too.
+    rospy may close its own at any time, and shuts the connection down with it, so that this one ends too.
     """
     sock, buffer = connection.socket, connection.read_buff
     if sock is None or buffer is None:
@@ -174,10 +152,9 @@ def count_read(connection: Any, length: int, messages: int) -> None:
 
 
 def unregister(topic: Any) -> None:
-    """Unregister a publisher or subscriber of rospy and give back its file; asks the ROS master, so it may block.
+    """Unregister a publisher or subscriber and give back its file; asks the ROS master, so it may block.
 
-    rospy's poller of a topic refers to itself, so its file would stay open until Python collects garbage: a
-    dozen files for each robot that left, until there are no more files.
+    rospy's poller refers to itself: a dozen files for each robot that left would stay open until a garbage collection.
     """
     impl = topic.impl
     topic.unregister()
@@ -192,48 +169,13 @@ def unregister(topic: Any) -> None:
 # Log lines.
 
 
-class RosoutHandler(logging.Handler):
-    """Publishes log lines on /rosout without the names of this node's topics.
-
-    rospy puts all of them into each message, 2,400 with 100 robots: to list and write them keeps Python's one lock for
-    milliseconds, in which no robot is served.
-    """
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._of_this_thread = threading.local()
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Publish one log line."""
-        publisher = rosout._rosout_pub
-        if publisher is None or getattr(self._of_this_thread, "is_publishing", False):
-            # To publish may log in turn.
-            return
-        self._of_this_thread.is_publishing = True
-        try:
-            line = Log(
-                level=rosout._logging_to_rospy_levels.get(record.levelno, Log.INFO),
-                name=rospy.get_name(),
-                msg=self.format(record),
-                file=record.filename,
-                line=record.lineno,
-                function=record.funcName,
-            )
-            line.header.stamp = rospy.Time.now()
-            publisher.publish(line)
-        except Exception:  # noqa: BLE001 - as rospy: a line that cannot be published is in the log file
-            logging.getLogger("rospy.rosout").error("/rosout: %s", traceback.format_exc())
-        finally:
-            self._of_this_thread.is_publishing = False
-
-
 def leave_topics_out_of_rosout() -> None:
-    """Publish log lines by RosoutHandler; call it after rospy.init_node()."""
-    logger = logging.getLogger(ROSOUT_LOGGER)
-    for handler in list(logger.handlers):
-        if isinstance(handler, rosout.RosOutHandler):
-            logger.removeHandler(handler)
-            logger.addHandler(RosoutHandler())
+    """Publish log lines on /rosout without the names of this node's topics, and without asking the ROS master.
+
+    rospy puts all into each line, 2,400 with 100 robots, which keeps Python's one lock for milliseconds.
+    """
+    rosout.rospy = SimpleNamespace(names=rospy.names, get_param_cached=lambda *_: False, has_param=lambda _: False)
+    rosout.get_topic_manager = lambda: SimpleNamespace(get_topics=list)
 
 
 def list_log_handlers() -> List[logging.Handler]:

@@ -60,10 +60,7 @@ class RobotService:
         self._late_until_s = 0.0
 
     def call(self, request: bytes) -> bytes:
-        """Return the robot's answer to request; on a thread of rospy's.
-
-        Raises: rospy.ServiceException with the reason of a failure.
-        """
+        """Return the robot's answer; on a thread of rospy's. Raises: rospy.ServiceException: why there is none."""
         limit_s = 1.5 * self._timeout_s + HANG_WAIT_S
         try:
             answer: Answer = self._loop.ask(functools.partial(self._begin, request), limit_s)

@@ -1,7 +1,6 @@
 """Notices that a thread could not start, or ran out of memory: on rospy's threads that would only be a traceback.
 
-rospy starts a thread for each connection to a program and each call from one, and one that registers the node. Without
-any of them robots would join while some program's commands and stops go unheard.
+Without a thread for each connection and call, robots would join while some program's stops go unheard.
 """
 
 import threading
@@ -16,11 +15,7 @@ NO_THREAD = "can't start new thread"
 
 
 class ThreadWatch:
-    """All threads of this process, from now on.
-
-    Attributes:
-        failure: what went wrong first, with a remedy, for users; empty: nothing.
-    """
+    """All threads of this process, from now on; failure: what went wrong first, with a remedy, for users."""
 
     def __init__(self) -> None:
         self.failure = ""

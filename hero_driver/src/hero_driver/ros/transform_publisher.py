@@ -1,7 +1,6 @@
-"""Publishes the transforms of all robots: those that arrive within PERIOD_S as one message.
+"""Publishes the transforms of all robots: those that arrive within PERIOD_S as one message. Thread of the sockets.
 
-One message for each transform, as robots send them, would make every listener of /tf handle 150 messages
-per robot and second, and a small queue would lose most of them. Runs on the thread of the sockets.
+One message for each, as robots send them, would be 150 per robot and second for every listener.
 """
 
 from typing import Callable, List

@@ -1,8 +1,4 @@
-"""The exceptions of the rosserial core: all of them are mistakes of ours, never of the peer.
-
-What a peer does wrong is an event or a counter (see packets.PacketReader and session.Session); decoding
-functions raise PayloadError so that the session can turn it into such an event.
-"""
+"""The exceptions of the rosserial core: mistakes of ours. What a peer does wrong is an event or a counter."""
 
 
 class RosserialError(ValueError):

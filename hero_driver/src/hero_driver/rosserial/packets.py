@@ -1,9 +1,8 @@
-"""Packets of rosserial protocol 2: encoding, and finding them in a stream of bytes.
+"""Packets of rosserial protocol 2: encoding, and finding them in a stream of bytes. Source: node_handle.h.
 
     ff fe | length (2, little endian) | ~(length bytes) | id (2, little endian) | payload | ~(id and payload)
 
-`~(x)` is 255 minus the sum of the bytes x modulo 256. Source: ros_lib node_handle.h (publish() and the
-states of spinOnce()).
+`~(x)` is 255 minus the sum of the bytes x modulo 256.
 """
 
 import functools
@@ -37,9 +36,7 @@ DEFAULT_MAX_PAYLOAD_LENGTH = 4096
 ID_PUBLISHER = 0  # also: an empty packet with this id asks the robot for its topics
 ID_SUBSCRIBER = 1
 ID_SERVICE_SERVER_PUBLISHER = 2  # the answers of a service that the robot offers
-ID_SERVICE_SERVER_SUBSCRIBER = 3  # its requests
-ID_SERVICE_CLIENT_PUBLISHER = 4  # the requests of a service that the robot calls
-ID_SERVICE_CLIENT_SUBSCRIBER = 5  # its answers
+ID_SERVICE_SERVER_SUBSCRIBER = 3  # its requests; 4 and 5 are services that a robot calls
 ID_PARAMETER_REQUEST = 6
 ID_LOG = 7
 ID_TIME = 10
@@ -85,10 +82,7 @@ def _make_splitter(length: int) -> Callable[[Bytes], Tuple[bytes, ...]]:
 
 
 def encode_packet(topic_id: int, payload: Bytes) -> bytes:
-    """Return the packet that carries payload under topic_id.
-
-    Raises: RosserialError for an id outside 0..65535, or more than 65535 bytes of payload.
-    """
+    """Return the packet that carries payload under topic_id. Raises: RosserialError where they do not fit 16 bits."""
     if not 0 <= topic_id <= 0xFFFF:
         raise RosserialError(f"topic id {topic_id!r} is outside 0..65535")
     length = len(payload)

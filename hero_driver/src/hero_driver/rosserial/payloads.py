@@ -1,8 +1,4 @@
-"""Encodes and decodes the payloads of rosserial's own packets; payloads of topics are not touched here.
-
-Field order is the wire of rosserial_msgs: TopicInfo (id, name, type, md5, buffer size), Log (level, text),
-and std_msgs/Time (seconds, nanoseconds). Little endian, strings with a 32-bit length in front.
-"""
+"""Encodes and decodes the payloads of rosserial's own packets, little endian, in the order of their definitions."""
 
 import struct
 from typing import NamedTuple
@@ -92,10 +88,7 @@ def encode_topic_info(info: TopicInfo) -> bytes:
 
 
 def decode_topic_info(payload: Bytes) -> TopicInfo:
-    """Return what payload declares.
-
-    Raises: PayloadError if it is cut short or longer than its fields.
-    """
+    """Return what payload declares. Raises: PayloadError if it is cut short or longer than its fields."""
     cursor = _Cursor(payload, "TopicInfo")
     info = TopicInfo(
         cursor.read_number(_UINT16, "topic_id"),
@@ -114,10 +107,7 @@ def encode_log(log: Log) -> bytes:
 
 
 def decode_log(payload: Bytes) -> Log:
-    """Return the log line in payload, color codes and all.
-
-    Raises: PayloadError if it is cut short or longer than its fields.
-    """
+    """Return the log line in payload, color codes and all. Raises: PayloadError as decode_topic_info()."""
     cursor = _Cursor(payload, "Log")
     level = cursor.read_bytes(1, "level")[0]
     log = Log(level, cursor.read_text("msg"))
@@ -126,10 +116,7 @@ def decode_log(payload: Bytes) -> Log:
 
 
 def encode_time(time: WireTime) -> bytes:
-    """Return the eight bytes of time.
-
-    Raises: PayloadError if a part does not fit 32 bits.
-    """
+    """Return the eight bytes of time. Raises: PayloadError if a part does not fit 32 bits."""
     try:
         return _TIME.pack(time.secs, time.nsecs)
     except struct.error as error:
@@ -137,10 +124,7 @@ def encode_time(time: WireTime) -> bytes:
 
 
 def decode_time(payload: Bytes) -> WireTime:
-    """Return the time in payload.
-
-    Raises: PayloadError unless payload has eight bytes.
-    """
+    """Return the time in payload. Raises: PayloadError unless payload has eight bytes."""
     if len(payload) != _TIME.size:
         raise PayloadError(f"Time: has {len(payload)} bytes instead of 8")
     return WireTime(*_TIME.unpack(payload))

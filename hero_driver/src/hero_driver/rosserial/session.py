@@ -66,13 +66,6 @@ class TopicKind(enum.Enum):
 _FROM_ROBOT = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS))
 _KIND_BY_PACKET_ID = {kind.value: kind for kind in TopicKind}
 
-_NOT_SERVED = {
-    packets.ID_SERVICE_CLIENT_PUBLISHER: "wants to call a service of ROS, which robots cannot",
-    packets.ID_SERVICE_CLIENT_SUBSCRIBER: "wants to call a service of ROS, which robots cannot",
-    packets.ID_PARAMETER_REQUEST: "asks for a parameter of ROS, which robots cannot read",
-}
-"""Requests that rosserial allows and no HeRo makes."""
-
 
 def _ignore(payload: bytes, arrival_ns: int) -> None:
     """Take a message without a receiver."""
@@ -80,12 +73,7 @@ def _ignore(payload: bytes, arrival_ns: int) -> None:
 
 @dataclass
 class Topic:
-    """One declared id of this conversation.
-
-    Attributes:
-        receive: what takes the payloads of this topic, with the time of arrival (ns); set by the
-            receiver after the declaration, nothing until then.
-    """
+    """One declared id of this conversation; receive: what takes its payloads and their arrival (ns)."""
 
     info: TopicInfo
     kind: TopicKind
@@ -93,10 +81,7 @@ class Topic:
 
 
 class MessagesReceived(NamedTuple):
-    """The robot sent payloads, one after the other, on topics that it declared or as answers of services it offers.
-
-    One event for all of them, because a robot sends 200 messages per second.
-    """
+    """The robot sent payloads on topics that it declared: one event for all of a read, 200 messages per second."""
 
     messages: List[Tuple[Topic, bytes]]
 
@@ -122,9 +107,7 @@ class SessionLimits:
     """Parameters that limit one peer."""
 
     max_topics: int = declare(whole_number(64, 1, 1000, "", "topic ids that one robot may declare"))
-    max_payload_length: int = declare(
-        whole_number(4096, 64, 65535, "bytes", "longest payload of a packet from a robot")
-    )
+    max_payload_length: int = declare(whole_number(4096, 64, 65535, "bytes", "longest payload from a robot"))
     silence_timeout_s: float = declare(number(6.0, 3.0, 600.0, "s", "silence after which a connection is closed"))
 
 
@@ -228,9 +211,8 @@ class Session:
     def encode_message(self, topic_id: int, payload: Bytes) -> bytes:
         """Return the packet that sends payload to the robot.
 
-        Raises: RosserialError unless this connection declared topic_id as something that the robot receives
-        (the robot indexes an array with the id unchecked, node_handle.h:326), and for more than the robot's
-        buffer (unchecked too, node_handle.h:232).
+        Raises: RosserialError unless this connection declared topic_id as received, with a buffer for the payload: the
+        robot checks neither (node_handle.h:326, 232).
         """
         topic = self._receivers.get(topic_id)
         if topic is None:
@@ -260,8 +242,8 @@ class Session:
             if not self.topics or now_s - self._last_configured_s > UNCONFIGURED_S:
                 self._ask_by(self._earliest_repeat_s(now_s))
             return log
-        if topic_id in _NOT_SERVED:
-            return Problem(_NOT_SERVED[topic_id])
+        if packets.ID_SERVICE_SERVER_SUBSCRIBER < topic_id < packets.ID_LOG:
+            return Problem(f"sends a packet of kind {topic_id}; robots cannot use services or parameters of ROS")
         return self._receive_undeclared(topic_id, now_s)
 
     def _receive_undeclared(self, topic_id: int, now_s: float) -> Optional[Event]:

@@ -22,9 +22,9 @@ from typing import Callable, Iterable, List, Optional
 from ..commands.stop_progress import StopProgress, StopState
 from ..commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
 from ..corrections.message_layouts import MD5SUMS
-from ..peer import Peer, PeerOwner
+from ..peer import Peer
 from ..ros.message_types import apply_aliases
-from ..ros.robot_commands import LIGHT_SUFFIX, NO_LIGHT
+from ..ros.robot_commands import LIGHT_SUFFIX, NO_LIGHT, Owner
 from ..rosserial.errors import RosserialError
 from ..rosserial.session import Topic
 from ..transport.event_loop import CallLater
@@ -82,7 +82,7 @@ def encode_stop(peer: Peer, with_burst: bool) -> bytes:
 class StopDelivery:
     """The stops of all robots of one driver."""
 
-    def __init__(self, call_later: CallLater, owner: PeerOwner) -> None:
+    def __init__(self, call_later: CallLater, owner: Owner) -> None:
         """Take the loop's call_later(delay_s, call)."""
         self._call_later = call_later
         self._owner = owner
@@ -133,9 +133,9 @@ class StopDelivery:
         check()
 
     def stop_without_loop(self, peers: Iterable[Peer], deadline_s: float, read: Callable[[Peer], None]) -> List[Peer]:
-        """Stop all peers although the loop has broken; return those that are not known to be at rest.
+        """Stop all peers although the loop has broken; return those that are not known to be at rest. Blocks.
 
-        read(peer) takes what a robot has sent. Blocks until all are at rest, or until deadline_s.
+        read(peer) takes what a robot has sent.
         """
         waiting = list(peers)
         for peer in waiting:

@@ -17,7 +17,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 from ..commands.stop_progress import StopState
 from ..ros.log_relay import LogRelay
 from ..ros.rospy_internals import find_connection, is_latched_before, list_publishers
-from ..ros.worker import Worker
+from ..transport.call_queue import Worker
 from ..transport.event_loop import EventLoop, NoAnswerError
 from .store import UNKNOWN_TIME_S, StopStore
 

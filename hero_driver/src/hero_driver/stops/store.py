@@ -1,7 +1,7 @@
 """The stop of the robots, kept on disk for a driver that is started again under the same name and ROS master.
 
-An empty file says it by its name: NAME.released becomes NAME.stopped and back. Renaming needs no space on the disk, so
-a disk that has filled up since the driver's start loses no stop. When they were stopped is the file's time.
+The name of an empty file says it, NAME.released or NAME.stopped, its time since when. Renaming needs no space: a disk
+that has filled up since the driver's start loses no stop.
 """
 
 import os
@@ -36,10 +36,7 @@ class StopStore:
             return UNKNOWN_TIME_S
 
     def write(self, stopped: bool) -> None:
-        """Keep stopped, and return when it is on the disk; the time of a stop that is kept already stays.
-
-        Raises: OSError where it cannot be kept.
-        """
+        """Keep stopped, until it is on the disk; the time of a stop that is kept already stays. Raises: OSError."""
         old, new = (self._released_path, self.path) if stopped else (self.path, self._released_path)
         os.makedirs(self._folder, exist_ok=True)
         try:

@@ -1,5 +1,4 @@
-"""TCP: accepts robots that connect; owns sockets, clock and write buffers.
+"""TCP: accepts robots, owns sockets, clock and write buffers; knows of packets only that each is one send.
 
-One thread runs the loop and calls a LinkHandler with bytes; it knows nothing of packets beyond that each one
-is written with one send. Other threads hand over work with EventLoop.call_soon() and ask(). Nothing here blocks.
+One thread runs the loop and never blocks; others hand over work with EventLoop.call_soon() and ask().
 """

@@ -1,8 +1,4 @@
-"""Work handed between threads: a bounded queue of calls, which the receiving thread makes in order.
-
-When the queue is full the new call is refused and counted, and its sender notified. The loop of the sockets has one
-such queue, and so has every worker.
-"""
+"""Work handed between threads: a bounded queue of calls, made in order; when it is full, new ones are refused."""
 
 import collections
 import contextlib
@@ -11,14 +7,11 @@ from typing import Callable, Deque
 
 Call = Callable[[], object]
 
+SHUTDOWN_WAIT_S = 0.5
+
 
 class CallQueue:
-    """Calls for one thread, from any other.
-
-    Attributes:
-        waiting: the calls that wait; to be looked at only.
-        refused: calls that were refused.
-    """
+    """Calls for one thread, from any other: `waiting`, to be looked at only, and the number of `refused` ones."""
 
     def __init__(self, length_max: int, wake: Call, on_error: Callable[[BaseException], None]) -> None:
         """wake() is called after each new call, on its sender's thread; on_error gets what a call raises."""
@@ -61,3 +54,26 @@ class CallQueue:
             if not drain:
                 self.waiting.clear()
         self._wake()
+
+
+class Worker(CallQueue):
+    """A thread for what can block (the ROS master, files, terminals): it makes the calls of its queue."""
+
+    def __init__(self, name: str, queue_length: int, on_error: Callable[[BaseException], None]) -> None:
+        """on_error gets what a call raises, on the worker's thread; the next call is made all the same."""
+        self._ready = threading.Event()
+        super().__init__(queue_length, self._ready.set, on_error)
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def close(self, drain: bool = False) -> None:
+        """Refuse new calls, and wait a little for the end of the thread; one that hangs is left behind. Safe twice."""
+        super().close(drain)
+        if self._thread is not threading.current_thread():
+            self._thread.join(SHUTDOWN_WAIT_S)
+
+    def _run(self) -> None:
+        while not self._closed or self.waiting:
+            self._ready.wait()
+            self._ready.clear()
+            self.make_calls()

@@ -82,10 +82,7 @@ class EventLoop(LinkOwner):
     """The thread that owns all sockets. open(), then run() on that thread, stop() from any."""
 
     def __init__(self, host: str, port: int, user_timeout_s: float) -> None:
-        """Listen on host and port (0: any free one).
-
-        user_timeout_s: without acknowledgement the kernel gives a connection up after this time (TCP_USER_TIMEOUT).
-        """
+        """Listen on host and port (0: any); the kernel waits user_timeout_s for acknowledgements (TCP_USER_TIMEOUT)."""
         self._host, self._port = host, port
         self._user_timeout_ms = int(user_timeout_s * 1000)
         self._handler = LinkHandler()
@@ -112,10 +109,7 @@ class EventLoop(LinkOwner):
         self.listening = Address(host, port)
 
     def open(self, handler: LinkHandler) -> None:
-        """Bind the listening socket; handler receives the events of all links.
-
-        Raises: OSError if the address cannot be bound.
-        """
+        """Listen; handler receives the events of all links. Raises: OSError if the address cannot be bound."""
         self._handler = handler
         self._listener = _listen(self._host, self._port)
         self.listening = Address(*self._listener.getsockname()[:2])
@@ -190,10 +184,7 @@ class EventLoop(LinkOwner):
         self._calls.submit(call, always=threading.get_ident() == self._thread_id)
 
     def ask(self, call: Callable[[Callable[[T], None]], None], timeout_s: float) -> T:
-        """Run call(answer) on the loop's thread; wait for what it gives to answer() and return that.
-
-        From any other thread. Raises: NoAnswerError after timeout_s.
-        """
+        """Run call(answer) on the loop's thread; return its answer. Raises: NoAnswerError after timeout_s."""
         answers: queue.SimpleQueue[T] = queue.SimpleQueue()
         self.call_soon(lambda: call(answers.put))
         try:

@@ -44,43 +44,34 @@ def find_socket_address(address: Address, flags: int = 0) -> Any:
 
 
 class LinkHandler:
-    """Callbacks of the transport, always on the loop's thread."""
+    """Callbacks of the transport, always on the loop's thread; none does anything here."""
 
     def open_link(self, link: "Link") -> Optional[str]:
         """A connection is open; return a reason to refuse it, or None."""
-        raise NotImplementedError
 
     def receive_data(self, link: "Link", data: bytes, now_s: float) -> None:
         """Bytes came in."""
-        raise NotImplementedError
 
     def close_link(self, link: "Link", reason: str) -> None:
         """The connection was closed, by either side."""
-        raise NotImplementedError
 
     def poll(self, now_s: float) -> None:
         """Called every POLL_INTERVAL_S, before poll_link() for every other connection."""
-        raise NotImplementedError
 
     def poll_link(self, link: "Link", now_s: float) -> None:
         """Called every POLL_INTERVAL_S for each connection."""
-        raise NotImplementedError
 
     def resume(self, now_s: float) -> None:
         """The loop runs again after a pause in which it received nothing; called before anything else."""
-        raise NotImplementedError
 
     def report_bug(self, error: Exception) -> None:
         """One of the calls above, or one made for the loop, raised error; the loop continues."""
-        raise NotImplementedError
 
     def stop_without_loop(self) -> None:
         """The loop itself has broken and ends after this: stop what moves at the other ends; this may block."""
-        raise NotImplementedError
 
     def warn_network(self, text: str) -> None:
         """Something about the network that the user should know."""
-        raise NotImplementedError
 
 
 class LinkOwner(Protocol):

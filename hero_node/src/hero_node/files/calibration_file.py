@@ -1,7 +1,4 @@
-"""Files of `calibrate`, hero_N.yaml: their schema, and a folder of them. Knows no ROS.
-
-One damaged file leaves its robot uncalibrated, and is told of; it never keeps the others' from being read.
-"""
+"""Files of `calibrate`, hero_N.yaml: their schema, and a folder of them, of which a damaged one harms no other."""
 
 import math
 import os
@@ -75,7 +72,7 @@ class KeptCalibration(NamedTuple):
 
 
 class Calibrations(NamedTuple):
-    """A folder: what can be used, and why the rest cannot, both by names of robots such as hero_3.
+    """A folder: what can be used, and why the rest cannot, by names of robots such as hero_3.
 
     A file that does not say whose it is has its own name in problems, a folder that cannot be read an empty one.
     """

@@ -27,13 +27,7 @@ class EntryError(HeroError):
 
 
 class Entry(NamedTuple):
-    """A value of the file.
-
-    Attributes:
-        value: text, number, truth value or None; a list of Entry; or a dictionary of name -> Entry.
-        name: what it is called, with what it is in: "seeds.count".
-        place: file and line.
-    """
+    """A value of the file, a list of entries, or a dictionary of them; its name, such as "seeds.count"; its place."""
 
     value: Any
     name: str

@@ -1,9 +1,4 @@
-"""Files that survive a power cut, a full disk and other writers; files that users name, whatever they are.
-
-Imports nothing of ours, and no ROS.
-
-A file is replaced as a whole (rename(2)): whatever happens, its path holds the old content or the new one.
-"""
+"""Files that are replaced as a whole (rename(2)), so that they survive a power cut, a full disk and other writers."""
 
 import errno
 import fcntl
@@ -30,7 +25,7 @@ NO_LOCKS = (errno.EBADF, errno.EINVAL, errno.ENOLCK, errno.ENOTSUP)
 
 
 def read_file(path: str) -> bytes:
-    """Return the content of a file that a user names: opening a pipe would wait for its writer, a device has no end.
+    """Return the content of a file that a user names; a pipe would wait for its writer, a device has no end.
 
     Raises: OSError, also for what is no regular file, or has more than MAX_FILE_BYTES.
     """
@@ -53,10 +48,7 @@ def read_file(path: str) -> bytes:
 def lock_file(path: str) -> Iterator[None]:
     """Keep other programs and threads that lock this file out, from reading it until it is replaced.
 
-    It is the folder that is locked, as a file that is replaced, or not there yet, cannot be: within this context no
-    other file of the same folder can be locked. The folder must exist.
-
-    Raises: OSError, after LOCK_TIMEOUT_S with EBUSY.
+    Its folder is locked, which must exist: within this context no other file of it can be locked. Raises: OSError.
     """
     folder = os.open(os.path.dirname(os.path.realpath(path)), os.O_RDONLY)
     try:
@@ -82,8 +74,7 @@ def lock_file(path: str) -> Iterator[None]:
 def hold_file(path: str, is_shared: bool = False) -> Iterator[bool]:
     """Hold the file at path, which is made if it is missing, for this program alone, or with others that share it.
 
-    True: no other program holds it, on NFS none of any host; False: the file system has no locks.
-    Raises: BlockingIOError, at once, if another program holds it. OSError.
+    True: no other program holds it; False: the file system has no locks. Raises: OSError, BlockingIOError if held.
     """
     with open(path, "ab") as file:  # NFS locks only files that are open for writing
         is_held = True
@@ -110,10 +101,8 @@ def name_file(path: str) -> Iterator[None]:
 def replace_file(path: str) -> Iterator[IO[bytes]]:
     """Give a new file to write, which replaces the one at path at the end of the context, unless that raises.
 
-    Symbolic links stay, and the file that they point to is replaced; so do its mode and, where permitted, its owner.
-    What is no regular file, such as /dev/stdout, is written as it is.
-
-    Raises: OSError; the file at path is then the old one, and nothing lies beside it.
+    Symbolic links stay, and mode and owner of what they point to. What is no regular file, such as /dev/stdout, is
+    written as it is. Raises: OSError; the file at path is then the old one, and nothing lies beside it.
     """
     path = os.path.realpath(path)
     old = os.stat(path) if os.path.exists(path) else None

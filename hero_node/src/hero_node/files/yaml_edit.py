@@ -22,9 +22,9 @@ def _dump(key: Any, value: Any) -> str:
 
 
 def replace_values(text: str, content: Mapping[str, Any]) -> str:
-    """Return text, a mapping in YAML, with content instead; what is equal in both stays as it is written.
+    """Return text, a mapping in YAML, with content instead; comments and what is equal in both stay as they are.
 
-    Comments stay, unless text has aliases or is a flow mapping (JSON): that is written anew.
+    A text with aliases or a flow mapping (JSON) is written anew.
     """
     try:
         edited = _edit(text, content)

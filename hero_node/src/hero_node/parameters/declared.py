@@ -1,7 +1,4 @@
-"""Parameters of a program: declared with a default and a check; see ros.private_parameters. Pure.
-
-A wrong value ends the program with one line: the name, the value and what it must be.
-"""
+"""Parameters of a program, with a default and a check: a wrong value ends it with one line. Pure."""
 
 import argparse
 import dataclasses
@@ -97,8 +94,7 @@ def find_declared(settings: Type[Any]) -> Dict[str, Parameter]:
 def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> Dict[str, Any]:
     """Return the checked value of each declared parameter, its default where none is given.
 
-    declared: name -> a Parameter, or a default that needs no check.
-    Raises: ProgramError for a value that fails its check, or a name that is not declared, with those that are.
+    declared: name -> a Parameter, or a default that needs no check. Raises: ProgramError, also for other names.
     """
     for name in sorted(set(given) - set(declared)):
         near = difflib.get_close_matches(name, declared, 1)
@@ -128,9 +124,8 @@ def make_error(name: str, value: Any, allowed: str) -> ProgramError:
 
 
 def parse_robot_ids(name: str, value: Any) -> Optional[List[int]]:
-    """Return the ids in value: a number, a list of numbers, or text such as "0 1 2", "0,1,2" or "0-3".
+    """Return the ids in value: a number, a list of numbers, or text such as "0 1 2" or "0-3"; None for "all".
 
-    Returns None, which means all robots, for the word "all".
     Raises: ProgramError for anything else, for a negative or repeated id, and for an empty list.
     """
     example = 'ids such as "0 1 2 3" or "0-3", or "all"'
@@ -208,8 +203,7 @@ def _parse_id_range(word: Any) -> Tuple[int, int]:
 def parse_poses(name: str, text: Any, ids: Optional[Sequence[int]]) -> Dict[int, Tuple[float, float, Optional[float]]]:
     """Return id -> (x_m, y_m, yaw_rad) from text such as "0 0; 0.3 0 90" (m, degrees), in the order of the ids.
 
-    Of "x y" alone yaw_rad is None. No text: no poses.
-    Raises: ProgramError for anything else, or another number of poses than of ids.
+    Of "x y" alone yaw_rad is None. No text: no poses. Raises: ProgramError for anything else.
     """
     parts = [part.split() for part in str(text).split(";") if part.strip()]
     if not parts:

@@ -1,7 +1,6 @@
-"""Serves programs that connect to this node's topics and services: none can hold up another.
+"""Serves programs that connect to this node's topics and services, by rospy's internals: none can hold up another.
 
-rospy has no setting for it, so this file uses its internals. Sources: rospy 1.15 to 1.17 (impl/tcpros_base.py), and the
-TCPROS protocol.
+Sources: rospy 1.15 to 1.17 (impl/tcpros_base.py), and the TCPROS protocol.
 """
 
 import socket
@@ -53,9 +52,8 @@ def limit_xmlrpc_connections() -> None:
 def open_tcpros_server(warn: Callable[[str, str], None]) -> None:
     """Serve programs that connect, none of which can hold up another; call it before rospy.init_node().
 
-    rospy reads connection headers on the thread that accepts connections, one after another and without a time
-    limit: one connection that sends two bytes and waits would keep every other subscriber and service client out.
-    warn(address, text) is called from any thread.
+    rospy reads one connection header after another, without a time limit: one that sends two bytes and waits would keep
+    every other subscriber out. warn(address, text) is called from any thread.
     """
     server = tcpros_base.init_tcpros_server()
 

@@ -1,8 +1,4 @@
-"""Reads the connection headers of programs that connect, each on its own thread: none can delay another.
-
-TCPROS: a program that connects sends a 32-bit length and a connection header of that length, then it waits for the
-answer. Knows no ROS: a complete header goes to serve().
-"""
+"""Reads the headers of connections (TCPROS: behind their length), each on its own thread: none can delay another."""
 
 import contextlib
 import socket
@@ -92,10 +88,7 @@ class HandshakeReader:
             sock.close()
 
     def _read_header(self, sock: socket.socket) -> bytes:
-        """Return a header with its length, empty if there is none; what follows it is left unread.
-
-        Raises: OSError where the connection breaks or the time is over.
-        """
+        """Return a header with its length; empty: there is none. Raises: OSError: it broke, or the time is over."""
         deadline_s = time.monotonic() + self._timeout_s
         data = _read(sock, LENGTH.size, deadline_s)
         if len(data) < LENGTH.size:

@@ -1,7 +1,4 @@
-"""XML-RPC calls to the ROS master and to nodes, with a time limit: rospy would wait for ever.
-
-Source: ROS Master API, ROS Slave API.
-"""
+"""XML-RPC calls to the ROS master and to nodes, with a time limit: rospy would wait for ever."""
 
 import errno
 import http.client
@@ -65,10 +62,7 @@ def read_master_uri() -> str:
 
 
 def ask_master(method: str, *arguments: Any) -> Any:
-    """Call a method of the ROS master (Master API) and return its value.
-
-    Raises: MasterRefusalError if the master refuses, another NodeError if it does not answer in time.
-    """
+    """Return the value of a method of the master. Raises: MasterRefusalError, NodeError if it does not answer."""
     uri = read_master_uri()
     try:
         with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as master:
@@ -95,10 +89,7 @@ def check_master() -> None:
 def find_running_node(default_name: str) -> str:
     """Return the full name that this node will have, if a node of that name answers, else an empty string.
 
-    Call it before rospy.init_node(), which would end the other node. A registration that a dead node left behind does
-    not count.
-
-    default_name: the name that is passed to rospy.init_node(); remappings and the namespace are applied.
+    For the time before rospy.init_node(), to which default_name is passed, and which would end the other node.
     """
     name: str = rosgraph.names.resolve_name(rospy.names.get_mappings().get("__name", default_name), rospy.get_name())
     try:

@@ -1,7 +1,6 @@
-"""Notices that the ROS master was started again, and registers everything with it once more.
+"""Notices that the ROS master was started again, and registers everything with it once more, by rospy's internals.
 
-rospy registers a topic once; a master that ends takes all registrations with it, and programs that start afterwards do
-not find this node. Open connections are not affected. rospy tells what is registered only by its internals.
+Programs that start after that would not find this node; open connections are not affected.
 """
 
 import xmlrpc.client
@@ -18,11 +17,7 @@ SENTINEL = "~get_loggers"
 
 
 class MasterWatch:
-    """The ROS master as look() finds it.
-
-    Attributes:
-        is_lost: whether the master did not answer, or lacks registrations.
-    """
+    """The ROS master as look() finds it; is_lost: it did not answer, or lacks registrations."""
 
     def __init__(self) -> None:
         self.is_lost = False
@@ -31,7 +26,6 @@ class MasterWatch:
         """Ask the master, and register with one that was started again; return what was registered, for users.
 
         Registering is repeated by the next look() until it has succeeded as a whole.
-
         Raises: NodeError, OSError or xmlrpc.client.Error if the master or this node does not answer in time.
         """
         was_restarted = False

@@ -21,10 +21,7 @@ def _list_own() -> List[str]:
 
 
 def delete_own_parameters() -> None:
-    """Take what is given on the command line off the parameter server, where the next start would find it.
-
-    What a launch file gives stays: roslaunch starts nodes again with it.
-    """
+    """Take the command line's off the parameter server, where the next start would find them; a launch file's stay."""
     with suppress(OSError, rospy.ROSException):
         for name in _list_own():
             with suppress(KeyError):
@@ -32,11 +29,7 @@ def delete_own_parameters() -> None:
 
 
 def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
-    """Return the node's private parameters, checked, with defaults for those that are not set.
-
-    declared: name -> a Parameter, or a default that needs no check.
-    Raises: ProgramError for a value that fails its check, or a name that is not declared, with those that are.
-    """
+    """Return the node's private parameters, as check_parameters(). Raises: ProgramError."""
     try:
         given = rospy.get_param("~", {})
     except KeyError:

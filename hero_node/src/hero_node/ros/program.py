@@ -1,8 +1,7 @@
 """The frame of a program that moves robots: start, rate, sleep, and an end that stops the robots.
 
 Signals, `rosnode kill` and a lost terminal become one flag that the program's loop checks; the loop then ends, and
-`with` blocks stop the robots while the topics still work. (rospy's own signal handler closes the topics while user
-code still runs.) This module knows no robot and no topic.
+`with` blocks stop the robots while the topics still work, which rospy's own signal handler would close.
 """
 
 import io
@@ -31,15 +30,11 @@ SHUTDOWN_WAIT_S = 1.0
 class Program(Clock):
     """A started ROS node, whether it is `running`, and waits that end early when it is to end.
 
-    Use as a context manager around everything that moves robots: leaving it tells ROS that the node ends.
-    Signals are taken over from the main thread only; they end the program once its loop has noticed.
+    Use as a context manager around everything that moves robots; signals are taken over from the main thread only.
     """
 
     def __init__(self, name: str, anonymous: bool = False) -> None:
-        """Start the node name; anonymous adds a number so that several can run.
-
-        Raises: NodeError without a ROS master, or for wrong remappings on the command line.
-        """
+        """Start the node name; anonymous adds a number. Raises: NodeError: no ROS master, or wrong remappings."""
         self.end_signal: Optional[int] = None
         self._ending = False
         self._finished = threading.Event()
@@ -95,7 +90,7 @@ class Program(Clock):
     def ask(self, question: str) -> Optional[str]:
         """Ask the user in the terminal; return the answer in lower case, None without one or if the program is to end.
 
-        Unlike input(), which would keep waiting after Ctrl-C: signals only set a flag.
+        input() would keep waiting after Ctrl-C: signals only set a flag.
         """
         if sys.stdin is None:
             return None

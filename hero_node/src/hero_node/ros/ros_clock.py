@@ -1,7 +1,4 @@
-"""The time of a ROS program that is no Program: the machine's, and waits that tell when ROS has ended.
-
-And the time for what lasts as long in simulated time.
-"""
+"""The machine's time, for a ROS program that is no Program, and the time for what lasts as long in simulated time."""
 
 import time
 

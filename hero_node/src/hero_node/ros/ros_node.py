@@ -1,7 +1,7 @@
 """Starts and ends a ROS node, or says in one line why not, without waiting for a master or program that hangs.
 
-rospy waits for a master without a time limit, and a call that hangs holds a lock that other threads and the end of the
-node wait for. rospy has no setting for either, so this file uses its internals.
+rospy waits for a master without limit, and a call that hangs holds a lock that others wait for; it has no setting for
+either, so this file uses its internals.
 """
 
 import threading
@@ -37,8 +37,7 @@ def limit_master_calls() -> None:
 def start_ros_node(name: str, anonymous: bool = False) -> None:
     """Start the node of this process; signals stay with the caller.
 
-    Raises: NodeError without a ROS master, without a directory for logs, for wrong remappings, or if a node of this
-        name already runs, which ROS would end.
+    Raises: NodeError: no ROS master, no directory for logs, wrong remappings, or a node of this name already runs.
     """
     check_master()
     # A name that is given (__name:=) is never made anonymous.
@@ -53,9 +52,8 @@ def start_ros_node(name: str, anonymous: bool = False) -> None:
 
 
 def init_ros_node(name: str, anonymous: bool = False, arguments: Optional[List[str]] = None) -> None:
-    """Call rospy.init_node(), which waits for a master without limit; signals stay with the caller.
+    """Call rospy.init_node(), which waits for a master without limit; arguments replace the command line's.
 
-    arguments: ROS's, in place of those of the command line.
     Raises: NodeError without a directory for logs, or for wrong remappings.
     """
     try:
@@ -73,8 +71,8 @@ def init_ros_node(name: str, anonymous: bool = False, arguments: Optional[List[s
 def end_without_delay() -> None:
     """End this node as soon as its topics are closed.
 
-    rospy's registration thread, for which the interpreter waits, looks for the end only every 0.5 s: it is woken as
-    the shutdown begins, too early, and sleeps again before rospy says that the node is down. Here it is woken after.
+    rospy's registration thread, for which the interpreter waits, looks for the end every 0.5 s. It is woken as the
+    shutdown begins, too early; here it is woken after.
     """
     managers = [listener for listener in get_registration_listeners().listeners if isinstance(listener, RegManager)]
 

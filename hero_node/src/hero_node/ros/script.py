@@ -28,9 +28,7 @@ def start_node(name: str = "hero_program") -> None:
     """Start a ROS node for a plain script, unless one runs already; Robot and Swarm call this.
 
     Ctrl-C raises KeyboardInterrupt as in every Python program, SIGTERM and SIGHUP raise SystemExit: `with` blocks stop
-    their robots before ROS shuts down. An uncaught HeroError is printed as one line, with exit status 1.
-
-    Raises: NodeError if no ROS master answers within 3 s, also for a node that runs already.
+    their robots before ROS shuts down. An uncaught HeroError is printed as one line. Raises: NodeError: no ROS master.
     """
     if sys.excepthook is sys.__excepthook__ and not hasattr(sys, "ps1"):  # no shell or notebook
         sys.excepthook = _print_exception
@@ -46,10 +44,7 @@ def start_node(name: str = "hero_program") -> None:
 
 
 def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
-    """Run a file of a package, a script of plain rospy, and end the process.
-
-    Without arguments of its own the script is a node, for which a ROS master must answer: rospy would wait for one.
-    """
+    """Run a file of a package, a script of plain rospy, and end the process; without arguments it needs a master."""
     path = os.path.join(rospkg.RosPack().get_path(package), file)
 
     def main() -> None:
