@@ -24,8 +24,9 @@ def report_place(label: str, sources: Sources) -> Iterator[None]:
         yield
     except Exception as error:
         called = traceback.extract_tb(error.__traceback__)
-        place = ([line for line in called if sources.has_read(line.filename)] or called)[-1]
-        text = "%s: %s: %s (%s, line %s)"
-        where = os.path.basename(place.filename), place.lineno
-        values = label, type(error).__name__, " ".join(str(error).split()), *where
-        raise ExperimentError(text % values) from error
+        own = [line for line in called if sources.has_read(line.filename)]
+        place = (own or called)[-1]
+        # A file of the suite with its folder: a user's may have the same name.
+        name = os.sep.join(place.filename.split(os.sep)[-1 if own else -3 :])
+        text = f"{label}: {type(error).__name__}: {' '.join(str(error).split())} ({name}, line {place.lineno})"
+        raise ExperimentError(text) from error
