@@ -126,12 +126,14 @@ class Behavior:
         metric: name of the metric (hero_swarm.metrics) that shows how well it does.
         drive: how its speeds reach the wheels: "velocity", the firmware's velocity controller, or "pulses", servo
             pulses, which wheels follow sooner (see wheel_pulses) and which robots with calibrated motors take.
+        arena: of its virtual sensors, where the program is given none: a name or file of the simulator.
         settings: those of its numbers that pages may set, with limits and units; the numbers are the defaults.
     """
 
     rate_hz: float = 20.0
     metric: str = "dispersion_ratio"
     drive: str = VELOCITY
+    arena: str = ""
     settings: Dict[str, Parameter] = {}
 
     def __init__(self, **parameters: Any) -> None:

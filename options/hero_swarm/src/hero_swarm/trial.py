@@ -7,7 +7,7 @@ for time_s, poses in trial.run(200.0):
 
 import math
 from collections import deque
-from typing import Any, Deque, Iterator, List, Optional, Sequence, Tuple
+from typing import Any, Deque, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -145,6 +145,7 @@ class Trial:
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
         self._control = Control(behavior, random, filter_commands, arena=arena, robots=self.rows)
         self._arena, self._decided_ms = arena, -1
+        self._kept: Dict[str, Any] = {}
         self._delay_s, self._is_filtered = delay_s, filter_commands is not None
         self._seen: Deque[Tuple[float, np.ndarray]] = deque([(0.0, self.poses)])
         objects = [arena.objects] if objects is None else objects
@@ -168,7 +169,7 @@ class Trial:
         control, radii_m = self._control, self.rows.world.errors.radius_m[: self.poses.shape[1], 0]
         of_behavior = control.sensed, control.memory, control.colors
         objects, time_s = lock(self.things.poses), self.rows.now_ms / 1000.0
-        return State(time_s, self.poses, self.velocities, objects, lock(radii_m), self._arena, *of_behavior)
+        return State(time_s, self.poses, self.velocities, objects, lock(radii_m), self._arena, *of_behavior, self._kept)
 
     def _decide(self) -> None:
         """Send the commands of now, unless they were sent."""

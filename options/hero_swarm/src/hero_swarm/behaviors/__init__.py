@@ -2,14 +2,17 @@
 
 import importlib
 import inspect
+import os
 from typing import Any, Dict, List, Optional, Type
 
-from hero_node.files import YamlError, parse_yaml
+from hero_node.files import EntryError, YamlError, parse_yaml
 from hero_node.parameters import is_number
 
 from ..behavior import MAX_RATE_HZ, MIN_RATE_HZ, Behavior
 from ..learning.policy import load_policy
+from ..machines.machine_file import ENDING, read_controller
 from ..sources import Sources, load_file, read_content
+from .machine import make_machine
 
 __all__ = ["find_behavior", "list_classes", "list_names", "make_behavior"]
 
@@ -47,9 +50,9 @@ def list_names() -> List[str]:
 
 
 def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior]:
-    """Return a behavior by its name, its module.Class, FILE.py, FILE.py:Class or POLICY.npz; sources: None: read anew.
+    """Return a behavior by its name, its module.Class, FILE.py, FILE.py:Class, POLICY.npz or MACHINE.controller.
 
-    Raises: ValueError that says what there is.
+    sources: None: read anew. Raises: ValueError that says what there is.
     """
     sources = sources or Sources()
     if name in _MODULES or name in _MODULES.values():
@@ -59,8 +62,10 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
     path, _, class_name = name.partition(":")
     if name.endswith(POLICY_ENDING):
         return load_policy(name, read_content("policy", name, sources))
+    if name.endswith(ENDING):
+        return _load_controller(name, sources)
     if not path.endswith(".py"):
-        text = "behavior %r: must be FILE.py, FILE.py:Class, POLICY.npz, or one of %s"
+        text = "behavior %r: must be FILE.py, FILE.py:Class, POLICY.npz, MACHINE.controller, or one of %s"
         raise ValueError(text % (name, ", ".join(list_names())))
     classes = list_classes(path, sources)
     if class_name in classes:
@@ -70,6 +75,20 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
             f"behavior {name}: name one class as {path}:CLASS; it has {', '.join(sorted(classes)) or 'none'}"
         )
     return next(iter(classes.values()))
+
+
+def _load_controller(path: str, sources: Sources) -> Type[Behavior]:
+    """Return the behavior of a controller's file. Raises: ValueError."""
+    try:
+        made = read_controller(path, read_content("controller", path, sources))
+        if made.states:
+            return make_machine([made.states], made.is_tree, arena=made.arena)
+        is_file = made.behavior.partition(":")[0].endswith((".py", POLICY_ENDING))
+        kind = find_behavior(os.path.join(os.path.dirname(path), made.behavior) if is_file else made.behavior, sources)
+        changed, names = kind(**made.numbers), {name.partition(".")[0] for name in made.numbers}
+        return type(kind.__name__, (kind,), {"arena": made.arena, **{name: getattr(changed, name) for name in names}})
+    except (EntryError, TypeError) as error:
+        raise ValueError(f"{path}: {error}" if isinstance(error, TypeError) else str(error)) from None
 
 
 def list_classes(path: str, sources: Sources) -> Dict[str, Type[Behavior]]:

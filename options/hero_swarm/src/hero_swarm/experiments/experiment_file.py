@@ -84,6 +84,11 @@ class Metric(NamedTuple):
     last_s: float = 0.0
     bound: Optional[Bound] = None
 
+    @property
+    def falls(self) -> bool:
+        """True if less is better."""
+        return self.bound is not None or self.source in FALLING
+
 
 class Start(NamedTuple):
     """Placement of robots; lengths in m.
@@ -178,8 +183,9 @@ class Experiment(NamedTuple):
         return list(dict.fromkeys(cell.behavior for cell in self.cells))
 
     def locate(self, name: str) -> str:
-        """Return a built-in name, or FILE.py with what follows, or POLICY.npz, as it is found from any folder."""
-        return os.path.join(self.folder, name) if name.partition(":")[0].endswith((".py", ".npz")) else name
+        """Return a built-in name, or that of a file with what follows, as it is found from any folder."""
+        is_file = name.partition(":")[0].endswith((".py", ".npz", ".controller"))
+        return os.path.join(self.folder, name) if is_file else name
 
     def list_code(self) -> Dict[str, bytes]:
         """Return the contents of all files that runs read besides those of list_files(), by paths relative to folder.
@@ -233,13 +239,14 @@ def parse_experiment(
     Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
     """
     try:
-        return _parse(text, file, os.path.dirname(file) if folder is None else folder, sources or Sources())
+        entry = read_entries(text, file, "behavior: aggregation.Aggregation")
+        return check_experiment(entry, os.path.dirname(file) if folder is None else folder, sources or Sources())
     except EntryError as error:
         raise ExperimentError(str(error)) from None
 
 
-def _parse(text: str, file: str, folder: str, sources: Sources) -> Experiment:
-    entry = read_entries(text, file, "behavior: aggregation.Aggregation")
+def check_experiment(entry: Entry, folder: str, sources: Sources) -> Experiment:
+    """Return what the entries of a file describe; arguments and errors as of parse_experiment(), EntryError too."""
     root = entry.mapping((*_KEYS, *(name for name in entry.mapping() if name in ERROR_KEYS)), _REQUIRED)
     seeds = _parse_seeds(root["seeds"])
     cells = _parse_cells(root, entry.place, len(seeds))

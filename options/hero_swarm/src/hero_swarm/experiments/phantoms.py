@@ -17,7 +17,6 @@ from hero_node.files import write_file
 from hero_node.parameters import within
 
 from ..behaviors import find_behavior
-from ..metrics import FALLING
 from . import runner
 from .errors import ExperimentError
 from .experiment_file import Experiment, read_experiment
@@ -90,10 +89,11 @@ def find_shares(experiment: Experiment, values: np.ndarray) -> Dict[str, float]:
     values: the first metric (cells, seeds). nan where the nominal score is zero, infinite or missing.
     """
     metric = experiment.metrics[0]
-    falls = metric.bound is not None or metric.source in FALLING
     worlds = np.array([cell.varied["world"] for cell in experiment.cells])
     scores = {world: float(np.nanmedian(values[worlds == world])) for world in WORLDS}
-    pairs = {world: (scores[NOMINAL], score) if falls else (score, scores[NOMINAL]) for world, score in scores.items()}
+    pairs = {
+        world: (scores[NOMINAL], score) if metric.falls else (score, scores[NOMINAL]) for world, score in scores.items()
+    }
     return {world: _divide(*pair) for world, pair in pairs.items()}
 
 

@@ -4,7 +4,7 @@ The caller measures poses and moves the robots; time is that since the start of 
 """
 
 import math
-from typing import Any, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -41,6 +41,7 @@ class RobotTrial:
         self._control = Control(setup.behavior, random, safety, arena=self._arena, robots=readings)
         self.lateness = self._control.lateness
         self._samples: List[np.ndarray] = []
+        self._kept: Dict[str, Any] = {}
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._reached = False
 
@@ -80,7 +81,7 @@ class RobotTrial:
             velocities = (poses - self._last[1]) / max(time_s - self._last[0], 1e-3)
         self._last = (time_s, poses.copy())
         measured, control = (poses[None], velocities[None], things.poses, self.safety.radii_m), self._control
-        state = State(time_s, *measured, self._arena, control.sensed, control.memory, control.colors)
+        state = State(time_s, *measured, self._arena, control.sensed, control.memory, control.colors, self._kept)
         (sample,), (self._reached,) = measure(self._experiment, state)
         self._samples.append(sample)
 

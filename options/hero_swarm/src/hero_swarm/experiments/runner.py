@@ -53,16 +53,10 @@ def _parse_executor(text: str) -> str:
     return text[len(DASK) :]
 
 
-def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(prog="run", description="Run an experiment: all seeds of all cells.")
-    parser.add_argument("file", metavar="EXPERIMENT.yaml", help="experiment file")
-    parser.add_argument("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
+def add_engine_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say where runs are computed."""
     parser.add_argument(
         "--jobs", type=within(1, 1024, int), default=os.cpu_count() or 1, help="worker processes (%(default)s)"
-    )
-    parser.add_argument(
-        "--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (about 10 s of work)"
     )
     parser.add_argument(
         "--executor",
@@ -71,6 +65,17 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
         help="a Dask cluster: tls://HOST:PORT, tcp://127.0.0.1:PORT, or scheduler file",
     )
     parser.add_argument("--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts")
+
+
+def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(prog="run", description="Run an experiment: all seeds of all cells.")
+    parser.add_argument("file", metavar="EXPERIMENT.yaml", help="experiment file")
+    parser.add_argument("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
+    parser.add_argument(
+        "--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (about 10 s of work)"
+    )
+    add_engine_options(parser)
     parser.add_argument(
         "--robots", type=explicit_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9"
     )
@@ -113,7 +118,7 @@ def list_batches(
             yield Batch(own, hash_suite(), cell, chosen, os.path.abspath(folder.name_series(cell, chosen)))
 
 
-def _choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor], int]:
+def choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor], int]:
     """Return what opens the executor, and its number of workers."""
     if options.executor is None:
         return functools.partial(engines.open_pool, options.jobs), options.jobs
@@ -172,7 +177,7 @@ def _run_missing(options: argparse.Namespace, experiment: Experiment, folder: Re
     own = set(folder.list_missing(())[part - 1 :: parts])
     missing = [key for key in folder.list_missing(runs) if key in own]
     if missing:
-        opener, workers = _choose_engine(options)
+        opener, workers = choose_engine(options)
         batches = list_batches(experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()
         for computed in _watch(engines.compute(opener, workers, compute_batch, batches), len(missing), len(runs)):

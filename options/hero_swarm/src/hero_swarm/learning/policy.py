@@ -6,12 +6,13 @@ A file (.npz) has the layers of a network that all robots share, and what it obs
 import io
 import json
 import zipfile
-from typing import Any, Dict, List, Sequence, Tuple, Type
+from typing import Any, Dict, Sequence, Tuple, Type
 
 import numpy as np
 
 from hero_client.values import MAX_LINEAR_M_S
 from hero_node import one_line
+from hero_node.files import write_file
 
 from .. import behavior as known
 from ..behavior import Behavior, Command, Random, Sensed
@@ -32,7 +33,12 @@ def run_network(layers: Layers, observed: np.ndarray) -> np.ndarray:
 
 
 def save_policy(path: str, layers: Layers, observation: Observation, rate_hz: float = 10.0) -> None:
-    """Write a policy; observation, rate_hz: of the environment in which it was learned.
+    """Write a policy, as dump_policy() does. Raises: ValueError. OSError."""
+    write_file(path, dump_policy(layers, observation, rate_hz))
+
+
+def dump_policy(layers: Layers, observation: Observation, rate_hz: float) -> bytes:
+    """Return the file of a policy; observation, rate_hz: of the environment in which it was learned.
 
     Raises: ValueError for layers that do not fit each other, or a sensor of your own.
     """
@@ -43,8 +49,9 @@ def save_policy(path: str, layers: Layers, observation: Observation, rate_hz: fl
     sensors = {name: [type(sensor).__name__, sensor._asdict()] for name, sensor in observation.sensors.items()}
     about = {"version": VERSION, "rate_hz": rate_hz, **observation._asdict(), "sensors": sensors}
     arrays = {f"{kind}_{number}": array for number, layer in enumerate(layers) for kind, array in zip("wb", layer)}
-    with open(path, "wb") as file:
-        np.savez(file, about=np.array(json.dumps(about)), **arrays)
+    content = io.BytesIO()
+    np.savez(content, about=np.array(json.dumps(about)), **arrays)
+    return content.getvalue()
 
 
 def load_policy(path: str, content: bytes) -> Type[Behavior]:
@@ -59,12 +66,15 @@ def load_policy(path: str, content: bytes) -> Type[Behavior]:
         given = {name: getattr(known, kind)(**fields) for name, (kind, fields) in about["sensors"].items()}
         observation = Observation(tuple(about["bounds_m"]), about["neighbors"], about["range_m"], given)
         _check_layers(layers, len(layers[0][0]))
-        sensors = observation.list_sensors()
-        return type(
-            "Policy", (_Policy,), {**sensors, "rate_hz": about["rate_hz"], "_file": (path, observation, layers)}
-        )
+        return make_policy(layers, observation, about["rate_hz"], path)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, zipfile.BadZipFile) as error:
         raise ValueError(f"policy {path} cannot be read: {one_line(error)}") from error
+
+
+def make_policy(layers: Layers, observation: Observation, rate_hz: float, path: str = "") -> Type[Behavior]:
+    """Return a policy as a behavior; layers may also be those of a network for each world: (W, K, L) and (W, 1, L)."""
+    attributes = {**observation.list_sensors(), "rate_hz": rate_hz, "_file": (path, observation, layers)}
+    return type("Policy", (_Policy,), attributes)
 
 
 def _check_layers(layers: Layers, inputs: int) -> None:
@@ -80,13 +90,15 @@ def _check_layers(layers: Layers, inputs: int) -> None:
 class _Policy(Behavior):
     """A network that all robots share."""
 
-    _file: Tuple[str, Observation, List[Tuple[np.ndarray, np.ndarray]]]
+    _file: Tuple[str, Observation, Layers]
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
         path, observation, layers = self._file
         observed = observation.read(sensed)
-        if observed.shape[1] != len(layers[0][0]):
+        *worlds, inputs, _ = layers[0][0].shape
+        if observed.shape[1] != inputs:
             text = "policy %s takes %d numbers, but its sensors give %d: save it again"
-            raise ValueError(text % (path, len(layers[0][0]), observed.shape[1]))
-        shares = np.where(sensed.is_known[:, None], run_network(layers, observed), 0.0)
+            raise ValueError(text % (path, inputs, observed.shape[1]))
+        shares = run_network(layers, observed.reshape(*worlds, -1, inputs)).reshape(-1, 2)
+        shares = np.where(sensed.is_known[:, None], shares, 0.0)
         return MAX_LINEAR_M_S * shares[:, 0], MAX_LEARNED_ANGULAR_RAD_S * shares[:, 1], memory

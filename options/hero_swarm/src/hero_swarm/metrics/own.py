@@ -27,6 +27,7 @@ class State(NamedTuple):
         arena: walls, areas and lamps.
         sensed: what the behavior sensed: an attribute for each sensor, whose rows are all R = W * N robots.
         memory, colors: what it keeps, and shows (R, 3), or None.
+        kept: what metrics keep from one second to the next, by names of their own.
     """
 
     time_s: float
@@ -38,6 +39,7 @@ class State(NamedTuple):
     sensed: Any = None
     memory: Any = None
     colors: Optional[np.ndarray] = None
+    kept: Any = None
 
     def by_world(self, values: Any) -> np.ndarray:
         """Return values of all robots (R, ...), as those of sensed and memory are, by world (W, N, ...)."""

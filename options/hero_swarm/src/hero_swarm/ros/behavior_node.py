@@ -86,7 +86,8 @@ class BehaviorNode:
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         random, readings = Random([parameters["seed"]], len(ids)), OwnReadings(swarm, self.behavior.sensors())
-        self._arena = arena = load_arena(parameters["arena"]) if parameters["arena"] else None
+        name = parameters["arena"] or self.behavior.arena
+        self._arena = arena = load_arena(name) if name else None
         self.control = Control(self.behavior, random, self._filter, robots=readings, arena=arena)
         self._start_s = read_duration_clock_s()
         self._last: Optional[Tuple[float, np.ndarray]] = None

@@ -46,7 +46,7 @@ class Batch(NamedTuple):
     stem: str
 
 
-_one_at_a_time = threading.RLock()
+one_at_a_time = threading.RLock()
 """Modules of users are those of one batch."""
 
 
@@ -74,14 +74,14 @@ def compute_batch(experiment: Experiment, suite: str, cell: int, seeds: Sequence
 
     Raises: ExperimentError, also for whatever the behavior raises, and in a process with other sources of the suite.
     """
-    with _one_at_a_time:
+    with one_at_a_time:
         check_suite(suite)
         setup = set_up(experiment, experiment.cells[0])
         trial = setup.build_trial(seeds)
         label = "%s with seeds %d to %d" % (setup.cell.label, seeds[0], seeds[-1])
         place = report_place(label, experiment.sources)
         with _record_poses(experiment, trial, stem + POSES_ENDING) as poses, place:
-            series, ends = _run(experiment, trial, poses)
+            series, ends = run_trial(experiment, trial, poses)
         _write_metrics(stem + METRICS_ENDING, series, ends)
     return [
         Run(cell, seed, take_values(experiment, series[: ends[world] + 1, world])) for world, seed in enumerate(seeds)
@@ -129,7 +129,7 @@ def _record_poses(experiment: Experiment, trial: Trial, path: str) -> Iterator[A
             os.remove(new)
 
 
-def _run(experiment: Experiment, trial: Trial, poses: Any) -> Tuple[np.ndarray, List[int]]:
+def run_trial(experiment: Experiment, trial: Trial, poses: Any = None) -> Tuple[np.ndarray, List[int]]:
     """Run a trial; return the samples (T, W, metrics) and the last sample of each world.
 
     poses: array of _record_poses() that is filled.

@@ -1,0 +1,1 @@
+"""Controllers made of few behaviors and conditions: their files, pictures and arrays."""
