@@ -491,10 +491,10 @@ def test_parts_follow_each_other_and_robots_are_placed_where_they_need_it(calls,
 
 def test_a_folder_that_is_full_fails_the_robot_in_its_line(calls, tmp_path, monkeypatch, capsys):
     def refuse(*arguments):
+        assert [probe.sent[-1:] for probe in session.probes] == [["stop"]] * 2, "robots stand before what may fail"
         raise CalibrationError("hero_0.yaml cannot be written: disk full")
 
     monkeypatch.setattr(store, "save", refuse)
     session = FakeSession(2)
     assert Calibration(session, (MOTORS,), str(tmp_path), None).run() == 1
     assert "hero_1: FAILED: hero_0.yaml cannot be written: disk full\n  motors    measured\n" in capsys.readouterr().out
-    assert session.probes[0].sent[-1] == "stop"

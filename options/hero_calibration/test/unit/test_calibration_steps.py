@@ -199,6 +199,24 @@ def test_pulses_are_swept_up_and_down_at_their_times(monkeypatch):
     assert np.diff(measured[2]) == pytest.approx(np.full(81, 0.45), abs=0.01)
 
 
+def test_a_robot_that_fails_while_gains_are_tried_is_left_with_the_best(monkeypatch):
+    session, rounds = FakeSession(2), []
+
+    def test(session):
+        rounds.append(session.now_s)
+        if len(rounds) == 4:
+            session.probes[1].failure = "velocity: too few readings"
+        error = 0.1 if len(rounds) == 2 else 0.3  # the first gains that are tried are the best
+        response = step_response.Response(error, 0.0, 0.5, ())
+        return {probe.robot_id: [response] * 2 for probe in session.active}
+
+    monkeypatch.setattr(velocity, "_test", test)
+    assert list(velocity.calibrate_velocity(session, {})) == [0]
+    for probe in session.probes:
+        written = [command for command in probe.sent if command[0] == "velocity_gains"]
+        assert len(written) > 3 and written[-1] == written[0] != written[1], probe.robot_id
+
+
 def test_a_velocity_test_turns_to_each_side_for_its_time(monkeypatch):
     session, tested = FakeSession(1), []
 

@@ -79,8 +79,8 @@ class Ros:
     def __init__(self, monkeypatch, ends):
         self.now_s = 100.0
         self.jobs, self.publishers, self.failing = [], {}, set()
-        self.types = [["/flag", "std_msgs/Bool"], ["/odd", "no_such/Type"]]
-        self.nodes = [["/flag", ["/node"]], ["/odd", ["/node"]]]
+        self.types = [["/odd", "no_such/Type"], ["/flag", "std_msgs/Bool"]]
+        self.nodes = [["/odd", ["/node"]], ["/flag", ["/node"]]]
         self._ends = ends
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s, time_ns=lambda: 7))
         monkeypatch.setattr(module, "ask_master", self.ask)

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 import yaml
@@ -187,11 +188,21 @@ def test_a_program_that_ignores_sigint_is_ended_by_force(started, monkeypatch):
     assert started.programs.count == 0
 
 
+def is_alive(pid):
+    try:
+        state = Path("/proc/%d/stat" % pid).read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state != "Z"
+
+
 def test_a_program_whose_guard_is_killed_ends_too(started, monkeypatch):
     read = wait_for_output(monkeypatch)
-    started.start("import os; print(os.getppid(), flush=True); import signal; signal.pause()")
-    os.kill(int(read()), signal.SIGKILL)
+    started.start("import os; print(os.getppid(), os.getpid(), flush=True); import signal; signal.pause()")
+    guard, program = map(int, read().split())
+    os.kill(guard, signal.SIGKILL)
     started.wait()
+    wait_for(lambda: not is_alive(program), "the end of the program")
     assert started.programs.describe()[0]["failure"]
 
 

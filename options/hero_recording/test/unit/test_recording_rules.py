@@ -309,6 +309,23 @@ def test_files_that_vanish_while_they_are_listed_hide_no_others(recording):
     assert recording.said[-1] == "0.2 MB in 2 s"
 
 
+def test_a_file_that_cannot_be_repaired_keeps_no_other_from_it(recording, monkeypatch):
+    paths = [recording.folder / ("hero_2026_%d.bag.active" % number) for number in range(2)]
+
+    def repair(path):
+        monkeypatch.setattr(record, "repair_bag", lambda path: "repaired " + path)
+        raise RecordingError("nothing can be read")
+
+    def write():
+        for path in paths:
+            path.write_bytes(bytes(EMPTY_BAG_BYTES + 1))
+
+    monkeypatch.setattr(record, "repair_bag", repair)
+    recording.reasons[0.5], recording.ends_s = write, 1.0
+    assert recording.run() == 1
+    assert recording.errors[0] == "nothing can be read" and "repaired %s" % paths[1] in recording.said
+
+
 def test_silence_and_a_recorder_that_fails_are_told(recording):
     recording.ends_s, recording.code = SILENCE_S + 5.0, 3
     assert recording.run() == 1
