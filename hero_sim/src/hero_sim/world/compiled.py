@@ -1,4 +1,4 @@
-"""Compiles loops over numbers with numba where it is installed; without, the same source runs on lists.
+"""Compiles the loops over wheels and bodies with numba where it is installed; without, the same source runs on lists.
 
 Both give the same bytes: numba contracts and reorders nothing by default (no fastmath), and only operations
 that IEEE 754 defines to the last bit are used.
@@ -6,34 +6,33 @@ that IEEE 754 defines to the last bit are used.
 
 import importlib
 from functools import lru_cache
-from typing import Any, Callable, Optional, Sequence, Tuple
+from types import FunctionType, SimpleNamespace
+from typing import Any, Optional
 
-import numpy as np
-
-Loop = Callable[..., Any]
-Hold = Callable[[np.ndarray], Any]
+from . import body_loops, wheel_loops
 
 COMPILED_ROWS = 50
 """For fewer robots loading numba, about 0.5 s, takes longer than it saves."""
 
 
 @lru_cache(maxsize=None)
-def _compile(loop: Loop) -> Optional[Loop]:
-    """Return loop compiled, or None without numba."""
+def _compile_loops() -> Optional[Any]:
+    """Return the functions of both modules compiled, as attributes, or None without numba."""
     try:
         numba = importlib.import_module("numba")
     except ImportError:
         return None
-    compiled: Loop = numba.njit(cache=True)(loop)
-    return compiled
+    loops = SimpleNamespace()
+    for module in (wheel_loops, body_loops):
+        names = dict(vars(module))
+        for name, loop in vars(module).items():
+            if isinstance(loop, FunctionType):
+                # In these names, for it to call the others compiled.
+                names[name] = numba.njit(cache=True)(FunctionType(loop.__code__, names, name))
+                setattr(loops, name, names[name])
+    return loops
 
 
-def compile_loops(rows: int, *loops: Loop) -> Tuple[Hold, Sequence[Loop]]:
-    """Return loops, whose arguments are numbers and arrays with one axis, for this many rows; and hold().
-
-    hold(array) is what the loops read and change: the array, or a list, whose single reads are several times faster.
-    """
-    compiled = [loop for loop in map(_compile, loops) if loop is not None] if rows >= COMPILED_ROWS else []
-    if not compiled:
-        return np.ndarray.tolist, loops
-    return np.ascontiguousarray, compiled
+def compile_loops(rows: int) -> Optional[Any]:
+    """Return the functions of both modules compiled, as attributes; None for few rows and without numba."""
+    return _compile_loops() if rows >= COMPILED_ROWS else None

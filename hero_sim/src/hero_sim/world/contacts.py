@@ -1,359 +1,322 @@
-"""Contacts of robots with walls, obstacles, things and each other: which there are, and what they do to the bodies.
+"""Moves the bodies of all worlds by their wheels, and keeps them apart: robots, walls, obstacles and things.
 
-Pure: numpy only, over all robots of all worlds at once; robots of different worlds never meet. What a contact does is
-up to friction.py; here bodies that are near each other are listed, and only when they could touch.
+Pure: numpy only; robots of different worlds never meet. What a contact does is up to body_loops.py; here bodies that
+are near each other are listed, and looked at only when they could touch. What happens does not depend on when they are
+looked at, nor on whether the loops over worlds are compiled.
 """
 
 import math
-from typing import Any, List, Sequence, Tuple
+from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from . import body_loops
 from .arena import Arena, list_obstacles, measure_clearance, square_length
+from .body_loops import (
+    BODY_ROWS,
+    CASTER_N,
+    CONTACT_ROWS,
+    COSINE,
+    CREEP,
+    FRICTION,
+    GAP,
+    GIVE,
+    GRAVITY_M_S2,
+    HALF,
+    HELD_N,
+    KEPT_ROWS,
+    LEFT,
+    LEVER_1,
+    LEVER_2,
+    MOVED_X,
+    MOVING_ROWS,
+    ON_ROBOT,
+    ON_WALL,
+    PRESSURE,
+    RADIUS,
+    SHARE,
+    SHIFT_M,
+    STEP_X,
+    THETA,
+    THING_CREEP_M_S,
+    TOUCH_M,
+    TOUCHING,
+    TURN,
+    TURNED,
+    WHEEL_N,
+    X,
+    follow_arc,
+    shape_arc,
+)  # fmt: skip
 from .compiled import compile_loops
-from .friction import GRAVITY_M_S2, HELD_N, IDLE, STARTS, THING_CREEP_M_S, TOUCH_M, solve_contacts
+from .kinematics import find_heading, join_wheels
 from .pushing.pushing import Pushing, Touch
-from .pushing.shapes import Motion
+from .pushing.shapes import PushedBody
 from .robot_errors import RobotErrors
-
-_WALL_PASSES = 50
 
 _STATIC_CREEP_M_S = 1e3
 """Faster than anything: what holds walls does not depend on what happened in another world."""
 
-_FAR_M = 1e6
-"""Nothing is there."""
-
-_SHIFT_M = 0.006
-"""Largest approach of two robots, or of a robot and an obstacle, while a step's contacts are solved."""
-
 _MARGIN_M = 0.03
 """Distance that bodies may move until their neighbors are listed again; a larger margin makes each step slower."""
 
+_MANY = 12
+"""Contacts of a robot for which there is room at the start."""
 
-def _find_contacts(
-    x: Any, y: Any, step_x: Any, step_y: Any, turns: Any, first: Any, second: Any, touching: Any, first_lever: Any,
-    second_lever: Any, start_x: Any, start_y: Any, along_x: Any, along_y: Any, length2: Any, pressure: Any,
-    state: Any, gap: Any, slide: Any, normal_x: Any, normal_y: Any,
-) -> Tuple[bool, float]:  # fmt: skip
-    """Find the contacts that matter in this step: their states, gaps, slides and normals, in place.
 
-    x, y: where the free twists took robots; step_x, step_y, turns: these twists in the step. Of the contacts, whose
-    robots and obstacles have to be touching apart, the last ones are of a robot, the second, with an obstacle, a
-    segment (see Segments). Return whether bodies touch, and how far all may move until something could touch. A loop
-    for compile_loops().
+class _Near(NamedTuple):
+    """The bodies that may touch something, and their contacts, as the loops take them.
+
+    Attributes:
+        columns: which of all bodies they are, which contacts number: robots, things, and the world without bodies.
+        robots: how many of them are robots.
+        keys: of each contact, its bodies among all bodies, and its obstacle.
+        worlds: of each contact, where it is.
+        pairs: contacts of two robots, which come first.
+        numbers: first and second bodies, obstacles and states.
+        bodies: the rows of these bodies.
     """
-    touches, least = False, math.inf
-    pairs = len(first) - len(start_x)
-    for k in range(len(first)):
-        b = second[k]
-        if k < pairs:
-            a = first[k]
-            away_x, away_y = x[b] - x[a], y[b] - y[a]
-        else:
-            o = k - pairs
-            to_x, to_y = x[b] - start_x[o], y[b] - start_y[o]
-            along = min(max((to_x * along_x[o] + to_y * along_y[o]) / length2[o], 0.0), 1.0)
-            away_x, away_y = to_x - along * along_x[o], to_y - along * along_y[o]
-        distance = math.sqrt(away_x * away_x + away_y * away_y)
-        between = distance - touching[k]
-        share = between / 2.0 if k < pairs else between
-        if share < least:  # in lists twice as fast as min()
-            least = share
-        if share >= _SHIFT_M and pressure[k] == 0.0:
-            state[k] = IDLE
-            continue
-        touches = touches or between < -TOUCH_M or pressure[k] != 0.0
-        state[k] = STARTS
-        # Robots that were placed into each other come apart step by step, never through a wall.
-        gap[k] = max(between, -_SHIFT_M) if k < pairs else between
-        n_x, n_y = (away_x / distance, away_y / distance) if distance > TOUCH_M else (1.0, 0.0)
-        normal_x[k], normal_y[k] = n_x, n_y
-        slid = n_x * step_y[b] - n_y * step_x[b] + second_lever[k] * turns[b]
-        if k < pairs:
-            slid -= n_x * step_y[first[k]] - n_y * step_x[first[k]] + first_lever[k] * turns[first[k]]
-        slide[k] = slid
-    return touches, least
 
-
-def _leave_walls(
-    x: Any, y: Any, pairs: int, second: Any, touching: Any, state: Any, start_x: Any, start_y: Any, along_x: Any,
-    along_y: Any, length2: Any,
-) -> None:  # fmt: skip
-    """Put robots that are left in a wall out of it: whatever presses, walls are never entered. As _find_contacts()."""
-    for _ in range(_WALL_PASSES):
-        is_inside = False
-        for k in range(pairs, len(touching)):
-            if state[k] == IDLE:
-                continue
-            a, o = second[k], k - pairs
-            to_x, to_y = x[a] - start_x[o], y[a] - start_y[o]
-            along = min(max((to_x * along_x[o] + to_y * along_y[o]) / length2[o], 0.0), 1.0)
-            away_x, away_y = to_x - along * along_x[o], to_y - along * along_y[o]
-            distance = max(math.sqrt(away_x * away_x + away_y * away_y), TOUCH_M)
-            if distance < touching[k] - TOUCH_M:
-                is_inside = True
-                share = (touching[k] - distance) / distance
-                x[a] += away_x * share
-                y[a] += away_y * share
-        if not is_inside:
-            break
+    columns: np.ndarray
+    robots: int
+    keys: List[Tuple[int, int, int]]
+    worlds: List[int]
+    pairs: int
+    numbers: List[Any]
+    bodies: Any
+    contacts: Any
+    active: Any
 
 
 class Contacts:
-    """Keeps all bodies of worlds with the same arena apart. Positions are arrays (2, R), x and y (m), world by world.
+    """The bodies of worlds with the same arena.
 
-    Only those that are near each other are compared, and only when they could touch: how far all may move until then
-    is kept. So what happens does not depend on when it is looked up.
+    Attributes:
+        poses (3, R), headings (2, R): of the robots, x y theta and cosine and sine; changed in place.
     """
 
-    # As the loops take them, of the robots that are near something: see _list_entries().
-    _forces: List[Any]  # pressures, drags, and gives of the contacts
-    _found: List[Any]  # states, gaps, slides, and normals (x, y)
-    _slips: List[Any]
-    _floor: List[Any]
-    _zeros: Any
-    _ones: Any
-    _pair_ends: Any
-    _wall_ends: Any
-    _no_ends: Any
-
     def __init__(
-        self, arena: Arena, worlds: int, errors: RobotErrors, step_s: float, pushing: Sequence[Pushing] = ()
-    ) -> None:
-        """Expect robots with errors, spread evenly over the worlds; pushing: the things of each world, if any."""
-        radii_m = errors.radius_m[:, 0]
-        rows = len(radii_m)
-        self._radii_m = radii_m
-        self._frictions = errors.friction
-        self._arena = arena
-        self._pushing = pushing
-        self._shape = (worlds, rows // worlds)
-        # Of each two robots the earlier one is the first.
-        self._ordered = np.triu(np.ones((self._shape[1], self._shape[1]), dtype=bool), k=1)
-        self._obstacles, obstacle_radii_m = list_obstacles(arena)
-        self._free_m = radii_m[:, None] + obstacle_radii_m
-        self._world_ends = np.arange(worlds + 1) * self._shape[1]
-        self._hold, loops = compile_loops(rows, _find_contacts, solve_contacts, _leave_walls)
-        self._find_contacts, self._solve, self._leave_walls = loops
-        self._list_floors(errors, step_s)
-        no_entries = np.empty((2, 0), dtype=int)
-        self._list_entries(no_entries, no_entries, np.empty((3, 0)))
-        # Load what is compiled now: at the first contact robots in real time would pause meanwhile.
-        self._reach_m = np.inf
-        far = np.full((3, rows), _FAR_M)
-        self.separate(far, np.ones((2, rows)), np.zeros((2, rows)), np.zeros(rows), is_first=True)
-        # How far all may still move until the lists are incomplete, and until something could touch.
-        self._reach_m = self._gap_m = -np.inf
+        self, arena: Arena, poses: np.ndarray, worlds: int, errors: RobotErrors, step_s: float,
+        pushing: Sequence[Optional[Pushing]],
+    ) -> None:  # fmt: skip
+        """Put robots with errors at poses (3, R), spread evenly over the worlds; pushing: the things of each world."""
+        rows = poses.shape[1]
+        self._arena, self._pushing = arena, pushing
+        self._rows, self._robots = rows, rows // worlds
+        self._separations_m, self._radii_m = errors.wheel_separation_m[:, 0].copy(), errors.radius_m[:, 0]
+        segments, thickness_m = list_obstacles(arena)
+        self._segments, self._free_m = segments.for_each_place(), self._radii_m[:, None] + thickness_m
+        obstacles = np.vstack((segments.start_m, segments.along_m, segments.length_m2, thickness_m))
+        self._bodies = self._list_bodies(errors, step_s)
+        self.poses, self.headings = self._bodies[X : THETA + 1, :rows], self._bodies[COSINE : COSINE + 2, :rows]
+        self.poses[:], self.headings[:] = poses, find_heading(poses[2])
+        compiled = compile_loops(rows)
+        self._loops: Any = compiled or body_loops
+        self._hold = np.ascontiguousarray if compiled else np.ndarray.tolist
+        self._obstacles = self._hold(obstacles)
+        self._near: Optional[_Near] = None
+        self._is_compiled = compiled is not None and not any(pushing)
+        # How far all robots may still move until the lists are incomplete, and until something could touch: in each
+        # world, or in all together.
+        self._reach_m, self._gap_m = np.full((2, worlds if self._is_compiled else 1), -np.inf)
+        if self._is_compiled:
+            self._ends = np.zeros((worlds, 2), dtype=np.int64)
+            self._numbers, self._contacts = (
+                np.zeros((worlds, 4, 0), dtype=np.int64),
+                np.zeros((worlds, CONTACT_ROWS, 0)),
+            )
+            self._make_room(_MANY * self._robots)
+            self.move(np.empty((0, 2, rows)))  # loads what is compiled now: robots in real time would pause
 
-    def _list_floors(self, errors: RobotErrors, step_s: float) -> None:
-        """Note what holds each body to the floor: robots, things, and what is never moved (see friction.py)."""
-        weights_n = errors.mass_kg[:, 0] * GRAVITY_M_S2
-        loads = errors.wheel_load[:, 0]
-        things = [thing for pushing in self._pushing for thing in pushing.bodies]
-        on_wheels_n = errors.wheel_friction[:, 0] * weights_n * loads / 2.0
-        on_casters_n = errors.friction[:, 2] * weights_n * (1.0 - loads)
-        on_things_n = [thing.friction_n / 2.0 for thing in things]
-        none = [0.0] * (len(things) + 1)
-        creeps_m_s = [*errors.creep_m_s[:, 0], *[THING_CREEP_M_S] * len(things), _STATIC_CREEP_M_S]
-        halves_m = [thing.shape.friction_radius_m for thing in things]
-        self._floors = np.array((
-            np.concatenate((errors.wheel_separation_m[:, 0] / 2.0, halves_m, [1.0])),
-            np.concatenate((on_wheels_n, on_things_n, [HELD_N])),
-            np.concatenate((on_casters_n, none)),
-            np.array(creeps_m_s) * step_s,
-        ))  # fmt: skip
-        self._slips_m = np.zeros((3, len(creeps_m_s)))  # of the wheels and the caster in the last step
+    def _list_bodies(self, errors: RobotErrors, step_s: float) -> np.ndarray:
+        """Return the rows of all bodies: robots, things, and what is never moved (see body_loops)."""
+        rows, things = self._rows, [thing for own in self._pushing if own for thing in own.bodies]
+        bodies = np.zeros((BODY_ROWS, rows + len(things) + 1))
+        weights_n, loads = errors.mass_kg[:, 0] * GRAVITY_M_S2, errors.wheel_load[:, 0]
+        bodies[HALF, :rows] = self._separations_m / 2.0
+        bodies[WHEEL_N, :rows] = errors.wheel_friction[:, 0] * weights_n * loads / 2.0
+        bodies[CASTER_N, :rows] = errors.friction[:, 2] * weights_n * (1.0 - loads)
+        bodies[CREEP, :rows] = errors.creep_m_s[:, 0]
+        bodies[RADIUS, :rows], bodies[[ON_ROBOT, ON_WALL], :rows] = self._radii_m, errors.friction[:, :2].T
+        bodies[HALF, rows:] = [thing.shape.friction_radius_m for thing in things] + [1.0]
+        bodies[WHEEL_N, rows:] = [thing.friction_n / 2.0 for thing in things] + [HELD_N]
+        bodies[CREEP, rows:] = [THING_CREEP_M_S] * len(things) + [_STATIC_CREEP_M_S]
+        bodies[CREEP] *= step_s
+        bodies[COSINE, rows:] = 1.0
+        return bodies
 
-    def could_touch(self, moved_m: float) -> bool:
-        """Note how far the fastest has moved; return whether bodies could have come to touch something."""
-        self._reach_m -= moved_m
-        self._gap_m -= moved_m
-        return self._gap_m <= 0.0
+    def _make_room(self, room: int) -> None:
+        """Make room for so many more contacts of each world."""
+        worlds = len(self._gap_m)
+        self._numbers = np.dstack((self._numbers, np.zeros((worlds, 4, room), dtype=np.int64)))
+        self._contacts = np.dstack((self._contacts, np.zeros((worlds, CONTACT_ROWS, room))))
+        self._contacts[:, SHARE] = 1.0
+        room = self._contacts.shape[2]
+        self._spare = np.zeros((3, room), dtype=np.int64), np.zeros((GIVE + 1 - PRESSURE, room))
 
-    def separate(
-        self,
-        poses: np.ndarray,
-        headings: np.ndarray,
-        steps_m: np.ndarray,
-        turns_rad: np.ndarray,
-        is_first: bool = False,
-    ) -> None:
-        """Move robots to where contacts let them go: poses (3, R), x y theta, and headings (2, R), in place.
-
-        steps_m (2, R), turns_rad (R,): the free twist in this step, after which the robots are at poses. is_first:
-        compute everything, whether anything touches or not.
-        """
-        if self._reach_m < 0.0:
-            self._list_neighbors(poses[:2])
-        rows, hold, count = self._rows, self._hold, len(self._rows)
-        before = poses.take(rows, axis=1)
-        steps = steps_m.take(rows, axis=1)
-        x, y = map(hold, before[:2])
-        touches, gap_m = self._find_contacts(
-            x, y, *map(hold, steps), hold(turns_rad.take(rows)), *self._pairs_and_walls, *self._walls,
-            self._forces[0], *self._found,
-        )  # fmt: skip
-        things = [
-            own.list_touches(*self._list_robots(world, poses[:2], steps_m, turns_rad))
-            for world, own in enumerate(self._pushing)
-        ]
-        self._gap_m = min(gap_m, self._reach_m, *(own.gap_m for own in self._pushing))
-        if not (touches or any(things) or is_first):
+    def move(self, ground_m: np.ndarray) -> None:
+        """Move the robots by K steps of their left and right wheels over the ground (K, 2, R)."""
+        if not self._is_compiled:
+            self._move_together(ground_m)
             return
-        rolling = np.zeros((3, len(self._bodies)))
-        rolling[0, count:] = 1.0
-        rolling[:2, :count] = headings.take(rows, axis=1)
-        rolling[2, :count] = np.sqrt(square_length(steps))
-        cosine, sine, rolled = map(hold, rolling)
-        moved = np.array(self._solve_step(cosine, sine, rolled, things)).reshape(3, -1)
-        before += moved[:, :count]
-        x, y = map(hold, before[:2])
-        _, second, touching, *_ = self._pairs_and_walls
-        self._leave_walls(x, y, self._pairs.shape[1], second, touching, self._found[0], *self._walls)
-        poses[:, rows] = x[:count], y[:count], before[2]
-        headings[:, rows] = cosine[:count], sine[:count]
-        self._note_motion(float(np.abs(moved[:2]).max(initial=0.0)))
+        begun, members = np.zeros(len(self._gap_m), dtype=np.int64), np.zeros(self._bodies.shape[1], dtype=np.int64)
+        while not self._loops.move_worlds(
+            ground_m, self._separations_m, _MARGIN_M, begun, self._reach_m, self._gap_m, self._ends, self._numbers,
+            self._contacts, self._bodies, self._obstacles, members, *self._spare,
+        ):  # fmt: skip
+            self._make_room(self._contacts.shape[2])
 
-    def _list_robots(self, world: int, *of_all: np.ndarray) -> List[Any]:
-        """Return what is known of all robots for those of a world."""
-        own = slice(world * self._shape[1], (world + 1) * self._shape[1])
-        return [values[..., own].T.tolist() for values in of_all]
+    def _move_together(self, ground_m: np.ndarray) -> None:
+        """Do what move_worlds() does, with arrays over the robots of all worlds."""
+        travels_m, turns_rad = join_wheels(ground_m[:, 0], ground_m[:, 1], self._separations_m)
+        fastest_m = np.abs(travels_m).max(axis=1).tolist()
+        (x_m, y_m, theta_rad), (cosine, sine) = self.poses, self.headings
+        for moved_m, turn_rad, *arc in zip(fastest_m, turns_rad, *shape_arc(travels_m, turns_rad)):
+            step_x_m, step_y_m, cosine[:], sine[:] = follow_arc(cosine, sine, *arc)
+            x_m += step_x_m
+            y_m += step_y_m
+            theta_rad += turn_rad
+            self._note_motion(moved_m)
+            if self._gap_m[0] <= 0.0:
+                self._bodies[STEP_X : TURN + 1, : self._rows] = step_x_m, step_y_m, turn_rad
+                self._separate()
 
     def _note_motion(self, moved_m: float) -> None:
-        self.could_touch(moved_m * math.sqrt(2.0))
-        # Those that press on each other are looked at in each step.
-        if np.count_nonzero(self._forces[0]) or any(own.is_pressed for own in self._pushing):
-            self._gap_m = 0.0
+        self._reach_m -= moved_m
+        self._gap_m -= moved_m
 
-    def _solve_step(self, cosine: Any, sine: Any, rolled: Any, things: List[List[Touch]]) -> List[Any]:
-        """Return how far all bodies are moved, x and y in m, and turned."""
-        first, second, _, first_lever, second_lever = self._pairs_and_walls
-        state, gap, slide, normal_x, normal_y = self._found
-        contacts = [
-            first, second, normal_x, normal_y, self._zeros, first_lever, self._zeros, second_lever, gap, slide,
-            self._friction, state, self._ones, *self._forces,
-        ]  # fmt: skip
-        count, thing_ends = len(first), self._no_ends
+    def _separate(self) -> None:
+        """Move the bodies to where contacts let them go."""
+        loops, near = self._loops, self._near
+        if near is None or self._reach_m[0] < 0.0:
+            near = self._near = self._list_near(near)
+        bodies, (first, second, obstacle, state) = near.bodies, near.numbers
+        bodies[:MOVING_ROWS] = self._hold(self._bodies[:MOVING_ROWS].take(near.columns, axis=1))
+        touches, gap_m, count = loops.find_contacts(
+            near.pairs, len(first), *near.numbers, near.contacts, bodies, self._obstacles, near.active
+        )
+        things = [own.list_touches(*self._list_robots(world)) if own else [] for world, own in enumerate(self._pushing)]
+        self._gap_m[0] = min(gap_m, self._reach_m[0], *(own.gap_m for own in self._pushing if own))
+        if not (touches or any(things)):
+            return
+        listed, contacts, pairs = near.active[:count], near.contacts, near.pairs
+        worlds: List[List[int]] = [[] for _ in self._pushing]
+        for k in listed:
+            if k < pairs:
+                worlds[near.worlds[k]].append(k)
         if any(things):
-            contacts, thing_ends = self._add_things(contacts, things)
-        moved = [self._hold(np.zeros(len(self._bodies))) for _ in range(3)]
-        self._solve(
-            *contacts, self._pair_ends, thing_ends, self._wall_ends, len(self._rows),
-            cosine, sine, *self._floor, rolled, *self._slips, *moved,
-        )  # fmt: skip
+            first, second, state, contacts = self._add_things(near, things, worlds)
+            bodies[MOVED_X : TURNED + 1] = self._hold(np.zeros((3, len(near.columns))))
+        for k in listed:
+            if k >= pairs:
+                worlds[near.worlds[k]].append(k)
+        pressure, gap, members = contacts[PRESSURE], contacts[GAP], self._hold(np.zeros(len(near.columns), dtype=int))
+        farthest_m, presses = 0.0, False
+        for world, active in enumerate(worlds):
+            for k in active:
+                if pressure[k] != 0.0 or gap[k] < -TOUCH_M:
+                    own = first, second, state, contacts, bodies, members, near.robots, bool(things[world])
+                    moved_m, pressed = loops.solve_contacts(active if loops is body_loops else np.array(active), *own)
+                    farthest_m, presses = max(farthest_m, moved_m), presses or pressed
+                    break
+        loops.leave_walls(pairs, listed, second, obstacle, contacts, bodies, self._obstacles)
+        self._bodies[:KEPT_ROWS, near.columns] = bodies[:KEPT_ROWS]
         if any(things):
-            self._forces = [force[:count] for force in contacts[-3:]]
-            self._move_things(moved, contacts[-3][count:], things)
-        return moved
+            for row in range(PRESSURE, GIVE + 1):
+                near.contacts[row][:] = contacts[row][: len(near.keys)]
+            self._move_things(bodies, things)
+        self._note_motion(farthest_m * math.sqrt(2.0))
+        if presses:  # those that press on each other are looked at in each step
+            self._gap_m[0] = 0.0
 
-    def _add_things(self, contacts: List[Any], things: List[List[Touch]]) -> Tuple[List[Any], Any]:
-        """Return the contacts with those of things behind them, and where the ones of each world end."""
-        robots, static = self._shape[1], len(self._bodies) - 1
-        columns = []
-        ends, begin = [len(contacts[0])], len(self._rows)
-        for world, (own, touches) in enumerate(zip(self._pushing, things)):
-            numbers = [*range(world * robots, (world + 1) * robots), *range(begin, begin + len(own.bodies)), static]
-            begin += len(own.bodies)
-            ends.append(ends[-1] + len(touches))
+    def _list_robots(self, world: int) -> List[Any]:
+        """Return the places, steps and turns of a world's robots."""
+        own = slice(world * self._robots, (world + 1) * self._robots)
+        known = self.poses[:2], self._bodies[STEP_X:TURN], self._bodies[TURN]
+        return [values[..., own].T.tolist() for values in known]
+
+    def _add_things(self, near: _Near, things: List[List[Touch]], worlds: List[List[int]]) -> List[Any]:
+        """Return near's contacts with those of things behind them, and add these to the active ones of each world."""
+        static, begin = len(near.columns) - 1, self._rows
+        columns: List[np.ndarray] = []
+        added: List[List[int]] = [[], [], []]
+        for world, touches in enumerate(things):
+            bodies = len(self._list_things(world))
+            numbers = [*range(world * self._robots, (world + 1) * self._robots), *range(begin, begin + bodies), static]
+            begin += bodies
+            worlds[world] += range(len(near.keys) + len(columns), len(near.keys) + len(columns) + len(touches))
             for touch in touches:
-                contact = touch.contact
-                columns.append((
-                    numbers[touch.first], numbers[touch.second], contact.normal_x, contact.normal_y,
-                    *touch.first_arms_m, *touch.second_arms_m, -contact.depth_m, touch.slide_m, touch.friction,
-                    touch.state, touch.share, 0.0, 0.0, 0.0,
-                ))  # fmt: skip
-        joined = [self._hold(np.array([*values, *new])) for values, new in zip(contacts, zip(*columns))]
-        return joined, self._hold(np.array(ends))
+                found, column = touch.contact, np.zeros(CONTACT_ROWS)
+                column[FRICTION : SHARE + 1] = touch.friction, *touch.first_arms_m, *touch.second_arms_m, touch.share
+                column[GAP : GAP + 4] = -found.depth_m, touch.slide_m, found.normal_x, found.normal_y
+                columns.append(column)
+                for values, value in zip(added, (numbers[touch.first], numbers[touch.second], touch.state)):
+                    values.append(value)
+        first, second, _, state = near.numbers
+        joined = [np.array([*values, *new]) for values, new in zip((first, second, state), added)]
+        return [self._hold(array) for array in (*joined, np.hstack((near.contacts, np.array(columns).T)))]
 
-    def _move_things(self, moved: List[Any], pressures: Any, things: List[List[Touch]]) -> None:
-        begin, body, slips_m, creeps_m = 0, len(self._rows), self._slips[0], self._floor[3]
-        for own, touches in zip(self._pushing, things):
-            numbers = range(body, body + len(own.bodies))
-            if touches:
-                driven = [i for i in numbers if slips_m[i] >= creeps_m[i]]
-                own.move({i - body: _pick(moved, i) for i in driven}, pressures[begin : begin + len(touches)])
-            begin, body = begin + len(touches), body + len(own.bodies)
+    def _list_things(self, world: int) -> List[PushedBody]:
+        own = self._pushing[world]
+        return own.bodies if own else []
 
-    def _list_neighbors(self, places_m: np.ndarray) -> None:
-        """List which robots are near each other, and near what."""
-        self._reach_m = _MARGIN_M
-        near_m = _SHIFT_M + _MARGIN_M
-        pairs = self._find_pairs(places_m, 2.0 * float(self._radii_m.max()) + 2.0 * near_m)
-        count, forces = self._pairs.shape[1], np.array(self._forces).reshape(3, -1)
-        pair_forces = _carry_over(self._pairs, forces[:, :count], pairs, places_m.shape[1])
-        away_m = self._obstacles.for_each_place().point_away(places_m[..., None])
-        free_m = self._free_m + near_m
-        beside = np.array((square_length(away_m) < free_m * free_m).nonzero())
-        wall_forces = _carry_over(self._beside, forces[:, count:], beside, self._free_m.shape[1])
-        self._slips_m[:, self._bodies] = np.array(self._slips).reshape(3, -1)
-        self._list_entries(pairs, beside, np.hstack((pair_forces, wall_forces)))
+    def _move_things(self, bodies: Any, things: List[List[Touch]]) -> None:
+        number = self._rows
+        for world, touches in enumerate(things):
+            for thing in self._list_things(world):
+                if touches and bodies[LEFT][number] >= bodies[CREEP][number]:
+                    thing.move(
+                        (
+                            float(bodies[MOVED_X][number]),
+                            float(bodies[MOVED_X + 1][number]),
+                            float(bodies[TURNED][number]),
+                        )
+                    )
+                number += 1
 
-    def _list_entries(self, pairs: np.ndarray, beside: np.ndarray, forces: np.ndarray) -> None:
-        """Note which robots are near each other, and near what, for loops that number only these robots.
+    def _list_near(self, before: Optional[_Near]) -> _Near:
+        """List which bodies are near each other, and near what."""
+        self._reach_m[0] = _MARGIN_M
+        near_m, rows, radii_m = SHIFT_M + _MARGIN_M, self._rows, self._radii_m
+        firsts, seconds = self._find_pairs(2.0 * float(radii_m.max()) + 2.0 * near_m)
+        away_m, free_m = self._segments.point_away(self.poses[:2, :, None]), self._free_m + near_m
+        robots, obstacles = (square_length(away_m) < free_m * free_m).nonzero()
+        things = self._bodies.shape[1] - 1 - rows
+        near = np.arange(rows) if things else np.unique(np.concatenate((firsts, seconds, robots)))
+        columns = np.concatenate((near, np.arange(rows, rows + things + 1)))
+        contacts = np.zeros((CONTACT_ROWS, len(firsts) + len(robots)))
+        contacts[TOUCHING] = np.concatenate((radii_m[firsts] + radii_m[seconds], self._free_m[robots, obstacles]))
+        on_robot, on_wall = self._bodies[ON_ROBOT], self._bodies[ON_WALL]
+        contacts[FRICTION] = np.concatenate((np.sqrt(on_robot[firsts] * on_robot[seconds]), on_wall[robots]))
+        contacts[LEVER_1, : len(firsts)] = radii_m[firsts]
+        seconds = np.concatenate((seconds, robots))
+        contacts[LEVER_2], contacts[SHARE] = -radii_m[seconds], 1.0
+        first = np.concatenate((near.searchsorted(firsts), np.full(len(robots), len(columns) - 1)))
+        obstacle = np.concatenate((np.full(len(firsts), -1), obstacles))
+        keys = list(zip(columns[first].tolist(), seconds.tolist(), obstacle.tolist()))
+        if before and any(before.contacts[PRESSURE]):
+            forces = dict(zip(before.keys, np.array(before.contacts)[PRESSURE : GIVE + 1].T))
+            for k in [k for k, key in enumerate(keys) if key in forces]:
+                contacts[PRESSURE : GIVE + 1, k] = forces[keys[k]]
+        numbers = [self._hold(each) for each in (first, near.searchsorted(seconds), obstacle, np.zeros_like(first))]
+        worlds, active = (seconds // self._robots).tolist(), self._hold(np.zeros_like(first))
+        bodies = self._hold(self._bodies.take(columns, axis=1))
+        return _Near(columns, len(near), keys, worlds, len(firsts), numbers, bodies, self._hold(contacts), active)
 
-        pairs (2, P) of robots; beside (2, Q): a robot and an obstacle; forces (3, P + Q): of the step before.
-        """
-        hold = self._hold
-        self._pairs, self._beside = pairs, beside
-        (firsts, seconds), (rows, obstacles) = pairs, beside
-        robots, things = len(self._radii_m), self._slips_m.shape[1] - 1 - len(self._radii_m)
-        near = np.arange(robots) if things else np.unique(np.concatenate((firsts, seconds, rows)))
-        self._rows = near
-        self._bodies = np.concatenate((near, np.arange(robots, robots + things + 1)))
-        static = np.full(len(rows), len(near) + things)
-        first = np.concatenate((near.searchsorted(firsts), static))
-        second = near.searchsorted(np.concatenate((seconds, rows)))
-        touching_m = np.concatenate((self._radii_m[firsts] + self._radii_m[seconds], self._free_m[rows, obstacles]))
-        first_levers_m = np.concatenate((self._radii_m[firsts], np.zeros(len(rows))))
-        second_levers_m = -self._radii_m[np.concatenate((seconds, rows))]
-        entries = (first, second, touching_m, first_levers_m, second_levers_m)
-        self._pairs_and_walls = [hold(part) for part in entries]
-        robot_friction, wall_friction, _ = self._frictions.T
-        between = np.sqrt(robot_friction[firsts] * robot_friction[seconds])
-        self._friction = hold(np.concatenate((between, wall_friction[rows])))
-        nearest = self._obstacles.take(obstacles)
-        self._walls = [hold(part) for part in (*nearest.start_m, *nearest.along_m, nearest.length_m2)]
-        self._forces = [hold(part) for part in forces]
-        count = len(first)
-        self._zeros, self._ones = hold(np.zeros(count)), hold(np.ones(count))
-        self._found = [hold(np.zeros(count, dtype=int)), *(hold(np.zeros(count)) for _ in range(4))]
-        self._pair_ends = hold(firsts.searchsorted(self._world_ends))
-        self._wall_ends = hold(len(firsts) + rows.searchsorted(self._world_ends))
-        self._no_ends = hold(np.full(len(self._world_ends), count))
-        self._floor = [hold(part) for part in self._floors[:, self._bodies]]
-        self._slips = [hold(part) for part in self._slips_m[:, self._bodies]]
-
-    def _find_pairs(self, positions_m: np.ndarray, distance_m: float) -> np.ndarray:
+    def _find_pairs(self, distance_m: float) -> np.ndarray:
         """Return the rows (2, P) of the first and the second of all two robots less than distance_m apart."""
-        places_m = positions_m.reshape(2, *self._shape)
+        places_m, robots = self.poses[:2].reshape(2, -1, self._robots), self._robots
         near = square_length(places_m[..., None] - places_m[:, :, None]) < distance_m * distance_m
-        worlds, firsts, seconds = (near & self._ordered).nonzero()
-        first_rows = worlds * self._shape[1]
-        return np.array((first_rows + firsts, first_rows + seconds))
+        worlds, firsts, seconds = (near & np.triu(np.ones((robots, robots), dtype=bool), k=1)).nonzero()
+        return np.array((worlds * robots + firsts, worlds * robots + seconds))
 
-    def measure_overlaps(self, positions_m: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    def measure_overlaps(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""
-        pairs = self._find_pairs(positions_m, 2.0 * float(self._radii_m.max()))
-        distances_m = np.sqrt(square_length(positions_m[:, pairs[0]] - positions_m[:, pairs[1]]))
+        places_m = self.poses[:2]
+        pairs = self._find_pairs(2.0 * float(self._radii_m.max()))
+        distances_m = np.sqrt(square_length(places_m[:, pairs[0]] - places_m[:, pairs[1]]))
         depths_m = np.maximum(self._radii_m.take(pairs).sum(axis=0) - distances_m, 0.0)
-        robots_m = np.zeros(positions_m.shape[1])
+        robots_m = np.zeros(self._rows)
         # Not broadcast: numpy 2.2 reads past the end of values that are.
         np.maximum.at(robots_m, pairs.ravel(), np.tile(depths_m, 2))
-        return robots_m, np.maximum(self._radii_m - measure_clearance(positions_m.T, self._arena), 0.0)
-
-
-def _pick(moved: List[Any], body: int) -> Motion:
-    x_m, y_m, rotation_rad = (float(values[body]) for values in moved)
-    return x_m, y_m, rotation_rad
-
-
-def _carry_over(entries: np.ndarray, values: Any, wanted: np.ndarray, columns: int) -> np.ndarray:
-    """Return the values (3, W) of the wanted entries (2, W), zero for new ones; both in ascending order."""
-    carried = np.array(values).reshape(3, -1)
-    if not np.count_nonzero(carried):
-        return np.zeros((3, wanted.shape[1]))
-    keys, wanted_keys = entries[0] * columns + entries[1], wanted[0] * columns + wanted[1]
-    found = keys.searchsorted(wanted_keys)
-    known = keys.take(found, mode="clip") == wanted_keys
-    return np.where(known, carried.take(found, axis=1, mode="clip"), 0.0)
+        return robots_m, np.maximum(self._radii_m - measure_clearance(places_m.T, self._arena), 0.0)

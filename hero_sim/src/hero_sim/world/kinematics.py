@@ -6,11 +6,12 @@ numpy's sine and cosine differ between versions and processors.
 """
 
 import math
-from typing import Any, NamedTuple, Sequence, Tuple
+from typing import Any, Sequence, Tuple
 
 import numpy as np
 
 from ..robot_constants import WHEEL_SEPARATION_M
+from .body_loops import follow_arc, shape_arc
 
 # Half pi in two parts, of which the first, with 33 bits, gives exact products with small whole numbers.
 _HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
@@ -18,8 +19,7 @@ _HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")
 
 _SINE_TERMS = [(-1.0) ** n / math.factorial(2 * n + 1) for n in range(9)]
 _COSINE_TERMS = [(-1.0) ** n / math.factorial(2 * n) for n in range(9)]
-_HALF_TANGENT_TERMS = [1.0 / 2.0, 1.0 / 24.0, 1.0 / 240.0, 17.0 / 40320.0]
-"""Taylor series in the square of the angle; the last is that of tan(angle / 2), divided by the angle."""
+"""Taylor series in the square of the angle."""
 
 Number = Any  # a float or an array of float64; both work everywhere below
 
@@ -53,43 +53,9 @@ def find_heading(theta_rad: Number) -> Tuple[np.ndarray, np.ndarray]:
     return sign * np.where(swapped, -sine, cosine), sign * np.where(swapped, cosine, sine)
 
 
-class Arcs(NamedTuple):
-    """Shapes of consecutive arcs (K, R): what depends on no other arc.
-
-    Attributes:
-        half_tangents, turns: tangent of half the rotation, and what it turns a heading by along the chord.
-        lengths_m: length of the chord, as a multiple of follow_arc()'s.
-    """
-
-    half_tangents: np.ndarray
-    turns: np.ndarray
-    lengths_m: np.ndarray
-
-
-def shape_arcs(travels_m: np.ndarray, rotations_rad: np.ndarray) -> Arcs:
-    """Return the shapes of arcs by their lengths and turns (K, R) of less than 0.5 rad."""
-    ratios = _sum_series(_HALF_TANGENT_TERMS, rotations_rad * rotations_rad)
-    half_tangents = rotations_rad * ratios
-    shorten = 2.0 / (1.0 + half_tangents * half_tangents)
-    return Arcs(half_tangents, half_tangents * shorten, travels_m * ratios * shorten)
-
-
-def follow_arc(
-    heading: np.ndarray, half_tangent: np.ndarray, turn: np.ndarray, length_m: np.ndarray
-) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the displacement (2, R), x and y in m, along one arc, and the heading after it.
-
-    heading: cosine and sine (2, R) before it. It stays of length 1 whatever the number of arcs.
-    """
-    cosine, sine = heading
-    # The direction of the chord, 1 / cos(rotation / 2) long.
-    chord = np.array((cosine - half_tangent * sine, sine + half_tangent * cosine))
-    return chord * length_m, np.array((cosine - turn * chord[1], sine + turn * chord[0]))
-
-
 def follow_arcs(heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return the displacements (K, 2, R) along K consecutive arcs, and the heading (2, R) after them."""
-    displacements_m = np.empty((len(travels_m), *heading.shape))
-    for step, arc in enumerate(zip(*shape_arcs(travels_m, rotations_rad))):
-        displacements_m[step], heading = follow_arc(heading, *arc)
+    displacements_m, heading = np.empty((len(travels_m), *heading.shape)), np.array(heading)
+    for displacement_m, *arc in zip(displacements_m, *shape_arc(travels_m, rotations_rad)):
+        displacement_m[0], displacement_m[1], heading[0], heading[1] = follow_arc(heading[0], heading[1], *arc)
     return displacements_m, heading

@@ -13,7 +13,7 @@ from hero_node.files import read_file
 from ..errors import OptionError
 from ..key_values import parse_values
 from ..robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
-from .friction import CREEP_M_S
+from .body_loops import CREEP_M_S
 from .noise import draw_normal
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 

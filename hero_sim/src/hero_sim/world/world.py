@@ -3,8 +3,7 @@
 Pure: numpy only. Everything is an array over robots: one row for each, world after world, all in one arena and with
 the same number of robots in each world. The robots' bodies set servo pulses and read the wheels; nothing here knows
 about messages. A world gives the same bytes alone, in any place of a batch, and on any machine: a step uses
-only operations that IEEE 754 defines to the last bit, and random numbers are rounded to single precision, in
-which the differences between mathematical libraries vanish.
+only operations that IEEE 754 defines to the last bit, and random numbers that are made of whole ones.
 """
 
 import copy
@@ -13,9 +12,10 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple, U
 import numpy as np
 
 from .arena import Arena, Segments
+from .compiled import compile_loops
 from .contacts import Contacts
-from .kinematics import find_heading, follow_arc, join_wheels, shape_arcs
-from .noise import draw_normal
+from .kinematics import join_wheels
+from .noise import draw_keys, draw_steps
 from .pushing.pushing import Pushing
 from .pushing.shapes import PushedBody, list_outlines
 from .range_sensors import (
@@ -28,6 +28,7 @@ from .range_sensors import (
     measure_signals,
 )
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
+from .wheel_loops import draw_normal_at, drive_wheel, find_place
 
 STEP_MS = 10
 """Length of a physics step; the fastest robot moves 3 mm in it, far less than its radius."""
@@ -35,7 +36,7 @@ STEP_MS = 10
 _STEP_S = STEP_MS / 1000.0
 
 _BLOCK_STEPS = 32
-"""Steps for which random numbers are drawn at once."""
+"""Steps that bodies follow their wheels at once; without compiled loops, random numbers are drawn for as many."""
 
 _SCAN_ROWS = 200
 """Robots whose sensors are computed at once: what they see fits the processor's cache."""
@@ -110,24 +111,21 @@ class World:
         self._robots = rows // self.worlds  # of each
         self.time_ms = 0
         self.errors = errors
-        self._rngs = rngs
         self._views = 0
-        self._scan_seeds = [int(rng.randint(0, 2**31 - 1)) for rng in rngs]
-        self._scan_rng = np.random.RandomState(0)
+        self._motion_keys, self._scan_keys = draw_keys(rngs), draw_keys(rngs)
         objects = [arena.objects] * self.worlds if objects is None else objects
-        self._poses = np.array(poses, dtype=float).reshape(rows, 3).T.copy()
-        self._shown_poses = self._poses.T
-        self._shown_poses.flags.writeable = False
-        self._headings = np.array(find_heading(self._poses[2]))  # cosine and sine
         self._separations_m, radii_m = errors.wheel_separation_m[:, 0], errors.radius_m[:, 0]
         obstacles = arena.segments_m.tolist(), arena.circles_m.tolist()
         of_robots = radii_m.reshape(self.worlds, -1).tolist(), errors.friction[:, 1].reshape(self.worlds, -1).tolist()
         self._pushing = [
-            Pushing([thing.put(thing.pose) for thing in things], *obstacles, *own)
+            Pushing([thing.put(thing.pose) for thing in things], *obstacles, *own) if things else None
             for things, *own in zip(objects, *of_robots)
-            if things
         ]
-        self._contacts = Contacts(arena, self.worlds, errors, _STEP_S, self._pushing)
+        self._contacts = Contacts(
+            arena, np.array(poses, dtype=float).reshape(rows, 3).T, self.worlds, errors, _STEP_S, self._pushing
+        )
+        self._shown_poses = self._contacts.poses.T
+        self._shown_poses.flags.writeable = False
         self._commands = np.zeros((2, rows))
         self._wheels = np.zeros((4, rows))
         self._travels, self._speeds = self._wheels[:2], self._wheels[2:]
@@ -137,8 +135,10 @@ class World:
         # Below its center the left wheel rolls forward.
         self.servo_gains_m_s_us = errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US)
         # The share of the difference to its command by which a servo's speed changes in one step.
-        shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32)
-        self._servo_shares = np.tile(shares.astype(float), (2, 1))  # of each wheel: faster than broadcast in each step
+        shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32).astype(float)
+        each = errors.ripple_m_s.T, errors.slip.T, errors.wheel_scale.T * _STEP_S, shares
+        self._spreads = np.vstack([np.broadcast_to(values, (2, rows)) for values in each])  # see roll_wheels()
+        self._loops = compile_loops(rows)
         # Of the steps in a block, those that the wheels have taken, and the bodies: these wait until they are read.
         self._block_step = self._body_step = _BLOCK_STEPS
         self._ground_m = np.empty((_BLOCK_STEPS, 2, rows))
@@ -166,55 +166,55 @@ class World:
         """Stop the pulses of rows: their wheels come to rest."""
         self.commands_m_s[rows] = 0.0
 
-    def step(self) -> None:
-        """Move everything on by STEP_MS."""
-        if self._block_step == _BLOCK_STEPS:
-            self._begin_block()
-        step, speeds_m_s = self._block_step, self._speeds
-        # Travel is taken with the speed of the step's start, so that reads within the step meet its end.
-        self._travels += speeds_m_s * _STEP_S
-        np.multiply(speeds_m_s, self._ground_s[step], out=self._ground_m[step])
-        reached_m_s = self._commands + self._ripples_m_s[step]
-        reached_m_s[np.logical_not(self._commands)] = 0.0
-        reached_m_s -= speeds_m_s
-        reached_m_s *= self._servo_shares
-        speeds_m_s += reached_m_s
-        self._wheel_rows = None
-        self._block_step += 1
-        self.time_ms += STEP_MS
+    def step(self, count: int = 1) -> None:
+        """Move everything on by STEP_MS, or by count times that."""
+        while count:
+            if self._block_step == _BLOCK_STEPS:
+                self._begin_block()
+            first, end = self._block_step, min(self._block_step + count, _BLOCK_STEPS)
+            self._roll_wheels(self._ground_m[first:end], first)
+            self._wheel_rows = None
+            self._block_step = end
+            self.time_ms += STEP_MS * (end - first)
+            count -= end - first
 
     def _begin_block(self) -> None:
-        """Draw what chance does in the next steps, and end the motion of wheels that hardly move."""
+        """End the motion of wheels that hardly move, and draw what chance does in the next steps."""
         self._move_bodies()
-        drawn = [draw_normal(rng, (_BLOCK_STEPS, 4, self._robots)) for rng in self._rngs]
-        noise = np.concatenate(drawn, axis=2)
-        self._ripples_m_s = noise[:, :2] * self.errors.ripple_m_s.T
-        # Distance of a wheel's body over the ground for each m/s.
-        self._ground_s = (1.0 - np.abs(noise[:, 2:]) * self.errors.slip.T) * (self.errors.wheel_scale.T * _STEP_S)
         self._block_step = self._body_step = 0
         self._speeds[np.abs(self._speeds) < _REST_M_S] = 0.0
+        if self._loops is None:
+            first_step = self.time_ms // STEP_MS
+            noise = draw_steps(self._motion_keys, first_step, _BLOCK_STEPS, 4, self._robots)
+            self._ripples_m_s = noise[:, :2] * self._spreads[:2]
+            # Distance of a wheel's body over the ground for each m/s.
+            self._ground_s = (1.0 - np.abs(noise[:, 2:]) * self._spreads[2:4]) * self._spreads[4:6]
+
+    def _roll_wheels(self, ground_m: np.ndarray, step: int) -> None:
+        """Take K steps of the wheels, the first of which is a step of the block; ground_m (K, 2, R): their ways."""
+        if self._loops is not None:
+            first_step = self.time_ms // STEP_MS
+            self._loops.roll_wheels(
+                self._motion_keys, first_step, self._wheels, self._commands, self._spreads, ground_m, _STEP_S
+            )
+            return
+        speeds_m_s, shares = self._speeds, self._spreads[6:]
+        for rolled_m, ground_s, ripples_m_s in zip(ground_m, self._ground_s[step:], self._ripples_m_s[step:]):
+            # Travel is taken with the speed of the step's start, so that reads within the step meet its end.
+            self._travels += speeds_m_s * _STEP_S
+            np.multiply(speeds_m_s, ground_s, out=rolled_m)
+            speeds_m_s[:] = drive_wheel(speeds_m_s, self._commands, ripples_m_s, shares)
 
     def _move_bodies(self) -> None:
         """Move the bodies by the wheels' steps."""
         if self._body_step < self._block_step:
-            self._roll(self._ground_m[self._body_step : self._block_step])
+            self._contacts.move(self._ground_m[self._body_step : self._block_step])
             self._body_step = self._block_step
-
-    def _roll(self, ground_m: np.ndarray) -> None:
-        """Move all bodies by K steps of their left and right wheels over the ground (K, 2, R)."""
-        travels_m, rotations_rad = join_wheels(ground_m[:, 0], ground_m[:, 1], self._separations_m)
-        fastest_m = np.abs(travels_m).max(axis=1).tolist()
-        places_m, theta_rad = self._poses[:2], self._poses[2]
-        for moved_m, rotation_rad, *arc in zip(fastest_m, rotations_rad, *shape_arcs(travels_m, rotations_rad)):
-            displacement_m, self._headings = follow_arc(self._headings, *arc)
-            places_m += displacement_m
-            theta_rad += rotation_rad
-            if self._contacts.could_touch(moved_m):
-                self._contacts.separate(self._poses, self._headings, displacement_m, rotation_rad)
 
     def measure_overlaps(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""
-        return self._contacts.measure_overlaps(self.poses[:, :2].T)
+        self._move_bodies()
+        return self._contacts.measure_overlaps()
 
     def measure_body_speeds(self) -> np.ndarray:
         """Return linear (m/s) and angular speed (rad/s) of each robot (R, 2), as its wheels have it."""
@@ -225,8 +225,8 @@ class World:
         """Return where all bodies are now."""
         self._views += 1
         places_m = self.poses[:, :2].copy()
-        obstacles = [self._list_obstacles(pushing) for pushing in self._pushing]
-        return View(self._views, places_m, self._headings.T.copy(), obstacles)
+        obstacles = [self._list_obstacles(pushing) for pushing in self._pushing if pushing]
+        return View(self._views, places_m, self._contacts.headings.T.copy(), obstacles)
 
     def _list_obstacles(self, pushing: Pushing) -> Obstacles:
         """Return the walls and the circles of a world, with its objects where they are now."""
@@ -238,13 +238,13 @@ class World:
     def object_poses(self) -> np.ndarray:
         """True poses of the objects at time_ms (W, M, 3), as of robots; each world has as many."""
         self._move_bodies()
-        worlds = [[pushed.pose for pushed in pushing.bodies] for pushing in self._pushing]
+        worlds = [[pushed.pose for pushed in pushing.bodies] for pushing in self._pushing if pushing]
         return np.array(worlds, dtype=float).reshape(self.worlds, -1, 3) if worlds else np.empty((self.worlds, 0, 3))
 
     def list_objects(self) -> List[PushedBody]:
         """Return copies of the objects of the first world, where they are at time_ms."""
         self._move_bodies()
-        return [copy.copy(pushed) for pushing in self._pushing[:1] for pushed in pushing.bodies]
+        return [copy.copy(pushed) for pushing in self._pushing[:1] if pushing for pushed in pushing.bodies]
 
     def read_infrared(self, which: np.ndarray, view: Optional[View] = None) -> np.ndarray:
         """Return one noisy reading (whole counts, 0..1023) of the eight sensors of the robots which, (K, 8).
@@ -271,11 +271,9 @@ class World:
 
     def _draw_noise(self, which: np.ndarray, view: View) -> np.ndarray:
         """Return the noise of a view (K, 8), each world's for its own robots: motion is the same if it is not read."""
-        counts, noise = np.bincount(which // self._robots, minlength=self.worlds), []
-        for world in counts.nonzero()[0].tolist():
-            self._scan_rng.seed((self._scan_seeds[world], view.number))
-            noise.append(draw_normal(self._scan_rng, (counts[world], BEAMS)))
-        return np.concatenate(noise)
+        places = find_place(2 * view.number, np.arange(BEAMS), (which % self._robots)[:, None])
+        noise: np.ndarray = draw_normal_at(self._scan_keys[which // self._robots][:, None], places)
+        return noise
 
     def _look(self, which: np.ndarray, view: View) -> Iterator[Tuple[np.ndarray, Sight]]:
         """Yield rows that see the same obstacles, a few at a time, with what they may see."""

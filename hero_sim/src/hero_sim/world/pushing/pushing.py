@@ -1,13 +1,13 @@
 """The things of one world, where they touch robots, each other and walls, and how they are moved. Pure.
 
-What a touch does is up to friction.py. Things move only while a robot presses on one of them.
+What a touch does is up to body_loops.py. Things move only while a robot presses on one of them.
 """
 
 import math
-from typing import Dict, List, NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Sequence, Tuple
 
-from ..friction import CONTINUES, STARTS
-from .shapes import Contact, Motion, PushedBody, find_contacts, touch_circle, touch_walls
+from ..body_loops import CONTINUES, STARTS
+from .shapes import Contact, PushedBody, find_contacts, touch_circle, touch_walls
 
 CONTACT_FRICTION = 0.3
 """Coefficient of friction between things, and of things with walls (plastic on cardboard); a robot has its own."""
@@ -26,7 +26,7 @@ Arms = Tuple[float, float]
 
 
 class Touch(NamedTuple):
-    """A contact, as friction.py takes it. Bodies are numbered: robots, then things."""
+    """A contact, as body_loops.py takes it. Bodies are numbered: robots, then things."""
 
     first: int
     second: int
@@ -45,7 +45,6 @@ class Pushing:
     Attributes:
         bodies: in a fixed order.
         gap_m: how far robots may move until one could touch a thing.
-        is_pressed: whether robots pressed on things in the last step.
     """
 
     def __init__(
@@ -59,7 +58,6 @@ class Pushing:
         """walls_m: x1 y1 x2 y2 of each; circles_m: round obstacles, x y radius; radii_m, frictions: of robots."""
         self.bodies = list(bodies)
         self.gap_m = -math.inf
-        self.is_pressed = False
         self._walls_m, self._circles_m = walls_m, circles_m
         self._radii_m, self._frictions = radii_m, frictions
 
@@ -85,7 +83,6 @@ class Pushing:
                         touches.append(touch)
                 self.gap_m = min(self.gap_m, gap_m)
         if self.gap_m > 0.0:
-            self.is_pressed = False
             return []
         return touches + self._list_others(len(places_m))
 
@@ -107,12 +104,6 @@ class Pushing:
             arms_m = [((0.0, 0.0), _list_arms(contact, pushed)) for contact in contacts]
             touches += _join(STATIC, robots + second, contacts, arms_m)
         return touches
-
-    def move(self, motions: Dict[int, Motion], pressures: Sequence[float]) -> None:
-        """Move things by their index; pressures: of what list_touches() returned."""
-        self.is_pressed = any(pressure != 0.0 for pressure in pressures)
-        for index, motion in motions.items():
-            self.bodies[index].move(motion)
 
 
 def _list_arms(contact: Contact, body: PushedBody) -> Arms:
