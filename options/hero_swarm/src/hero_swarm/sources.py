@@ -1,7 +1,7 @@
 """Files of users that a run depends on: each is read once, so that what was hashed is what runs, in any process.
 
-Python files, and the modules beside them that they import, are compiled from these contents: no .pyc, which may be older
-than its file, is read or written.
+Python files, and the modules beside them that they import, are compiled from these contents: no .pyc, which may be
+older than its file, is read or written.
 """
 
 import errno

@@ -16,7 +16,7 @@ from hero_client.swarm import open_swarm
 from hero_client.values import BODY_RADIUS_M, PlacedObjects
 from hero_node.parameters import choice, number, robot_ids, string, whole_number
 from hero_node.ros import read_duration_clock_s
-from hero_sim.world import load_arena
+from hero_sim.world import Arena, build_default, load_arena
 
 from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior
@@ -63,6 +63,13 @@ def _make_filter(parameters: Any) -> SafetyFilter:
     return SafetyFilter(mode, fence_m)
 
 
+def _find_arena(name: str, simulated: int) -> Optional[Arena]:
+    """Return the arena of a name or file; without one, that of this many simulated robots, None on others."""
+    if name:
+        return load_arena(name)
+    return build_default(simulated) if simulated else None
+
+
 class BehaviorNode:
     """One behavior on one swarm.
 
@@ -86,9 +93,8 @@ class BehaviorNode:
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         random, readings = Random([parameters["seed"]], len(ids)), OwnReadings(swarm, self.behavior.sensors())
-        name = parameters["arena"] or self.behavior.arena
-        self._arena = arena = load_arena(name) if name else None
-        self.control = Control(self.behavior, random, self._filter, robots=readings, arena=arena)
+        self._arena = _find_arena(parameters["arena"] or self.behavior.arena, simulated)
+        self.control = Control(self.behavior, random, self._filter, robots=readings, arena=self._arena)
         self._start_s = read_duration_clock_s()
         self._last: Optional[Tuple[float, np.ndarray]] = None
         self._sources = Sources()
@@ -167,7 +173,7 @@ PARAMETERS = {
     "parameters": {},
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
-    "arena": string("", "a name or file of the simulator, for Floor, Light and Pheromone"),
+    "arena": string("", "a name or file of the simulator, for Floor, Light, Pheromone and wall_following"),
     "objects_topic": string("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
     "object_radius_m": number(0.05, 0.001, 5.0, "m", "of the circle around an object"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),

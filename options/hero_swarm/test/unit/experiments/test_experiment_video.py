@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 from hero_client.values import BODY_RADIUS_M
 from hero_sim.world import list_outlines, load_arena
@@ -29,17 +28,19 @@ def catch_frames(monkeypatch):
     """What the writers of files are given: [(path, frames), ...]."""
     written = []
     for name in ("_write_gif", "_write_with_ffmpeg"):
-        monkeypatch.setattr(video, name, lambda path, frames, name=name: written.append((name, path, list(frames))))
+        monkeypatch.setattr(
+            video, name, lambda path, images, name=name: written.append((name, path, list(map(np.asarray, images))))
+        )
     return written
 
 
 def test_frames_are_a_tenth_of_a_second_of_the_video_apart(written, monkeypatch):
-    shown = []
-    monkeypatch.setattr(video, "draw_moving", lambda axes, *frame: shown.append(frame) or [])
+    shown, draw = [], video.draw_frame
+    monkeypatch.setattr(video, "draw_frame", lambda *frame: shown.append(frame[2:]) or draw(*frame))
     video.write_video(make_trial(), 2.0, 4.0, "run.gif")
     ((writer, path, frames),) = written
     assert (writer, path, len(frames)) == ("_write_gif", "run.gif", 5)
-    assert frames[0].ndim == 3 and frames[0].shape[2] == 3 and frames[0].shape[0] == frames[0].shape[1]
+    assert frames[0].shape == (600, 600, 3)
     assert [time_s for time_s, *_ in shown] == pytest.approx([0.0, 0.4, 0.8, 1.2, 1.6])
     assert shown[0][1][0, 0] == -0.5 and shown[-1][1][0, 0] == pytest.approx(-0.36, abs=0.05)
     monkeypatch.setattr(video.shutil, "which", lambda name: "/usr/bin/" + name)
@@ -51,12 +52,10 @@ def test_frames_are_a_tenth_of_a_second_of_the_video_apart(written, monkeypatch)
 
 
 def test_a_video_shows_the_arena_or_where_robots_were():
-    trial, box = make_trial(), make_trial(load_arena("box"))
     frames = [(np.array([(0.0, 1.0, 0.0), (2.0, -1.0, 0.0)]), None, None), (np.array([(-3.0, 0.5, 0.0)]), None, None)]
-    low_m, high_m = video._find_limits(trial, frames)
-    assert low_m.tolist() == [-3.2, -1.2] and high_m.tolist() == [2.2, 1.2]
-    low_m, high_m = video._find_limits(box, frames)
-    bounds_m = box.rows.world.arena.bounds_m
+    assert video._find_limits(OPEN, frames).tolist() == [[-3.2, -1.2], [2.2, 1.2]]
+    box = load_arena("box")
+    (low_m, high_m), bounds_m = video._find_limits(box, frames), box.bounds_m
     assert low_m.tolist() == (bounds_m[:2] - 0.2).tolist() and high_m.tolist() == (bounds_m[2:] + 0.2).tolist()
 
 
@@ -84,20 +83,16 @@ def test_each_frame_replaces_the_one_before(written):
     assert first[rear].tolist() == [0x00, 0x72, 0xB2] and last[rear].tolist() == [0xFF] * 3
 
 
-def test_a_frame_is_drawn_in_parts_that_can_be_removed():
-    axes = Figure(figsize=(6.0, 6.0)).add_axes((0.0, 0.0, 1.0, 1.0))
-    parts = []
-    poses = np.array([(1.0, 2.0, 0.0), (3.0, 4.0, np.pi / 2.0)])
-    for time_s, shift_m in ((0.0, 5.0), (1.25, 0.0)):
-        for part in parts:
-            part.remove()
-        objects = [(0.0, 0.0, 1.0, 0.0)], [(0.0, 0.0, 0.3)]
-        parts = video.draw_moving(axes, time_s, poses + (shift_m, 0.0, 0.0), *objects)
-        assert len(axes.collections) == 4 and len(axes.texts) == 1
-    outlines, objects, robots, noses = axes.collections
-    assert outlines.get_segments()[0].tolist() == [[0.0, 0.0], [1.0, 0.0]]
-    assert (2.0 * objects._widths).tolist() == [0.6] and objects.get_offsets().tolist() == [[0.0, 0.0]]
-    assert np.allclose(2.0 * robots._widths, 2.0 * BODY_RADIUS_M) and robots.get_offsets().tolist() == [[1, 2], [3, 4]]
-    tips_m = [segment[1] for segment in noses.get_segments()]
-    assert np.allclose(tips_m, [(1.0 + BODY_RADIUS_M, 2.0), (3.0, 4.0 + BODY_RADIUS_M)])
-    assert axes.texts[0].get_text() == "1.2 s" and axes.texts[0].get_position() == (0.02, 0.97)
+def test_a_frame_shows_robots_with_their_noses_and_the_time():
+    limits_m, poses = np.array([(0.0, 0.0), (3.0, 3.0)]), np.array([(1.0, 2.0, 0.0), (2.0, 1.0, np.pi / 2.0)])
+    frame = np.asarray(video.draw_frame(OPEN, limits_m, 1.25, poses, [], []))
+    for x_m, y_m, yaw_rad in poses.tolist():
+        ahead, side = np.array((np.cos(yaw_rad), np.sin(yaw_rad))), np.array((-np.sin(yaw_rad), np.cos(yaw_rad)))
+        for distance_m, color in ((-0.8, (0x00, 0x72, 0xB2)), (0.6, (0xFF, 0xFF, 0xFF)), (-1.5, (0xFF, 0xFF, 0xFF))):
+            column, row = (
+                np.array((x_m, 3.0 - y_m)) * 200.0 + np.array((1, -1)) * 200.0 * distance_m * BODY_RADIUS_M * ahead
+            )
+            assert tuple(frame[round(row), round(column)]) == color, distance_m
+        column, row = np.array((x_m, 3.0 - y_m)) * 200.0 + np.array((1, -1)) * 200.0 * 0.6 * BODY_RADIUS_M * side
+        assert tuple(frame[round(row), round(column)]) == (0x00, 0x72, 0xB2)
+    assert (frame[10:30, 10:60] == 0).any(), "the time"
