@@ -24,7 +24,7 @@ from hero_swarm import Behavior
 from hero_swarm.behavior import PULSES, VELOCITY, Command, Random, Sensed
 from hero_swarm.behaviors import find_behavior
 from hero_swarm.behaviors.binary_family import WheelGenome
-from hero_swarm.metrics import CHANCE, METRICS, cluster_fraction, dispersion_ratio, time_until
+from hero_swarm.metrics import CHANCE, METRICS, cluster_fraction, dispersion_ratio
 from hero_swarm.metrics.graphs import measure_distances
 from hero_swarm.safety import OFF, ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN, Trial
@@ -81,7 +81,9 @@ def measure_aggregation(seeds: Sequence[int], drive: Optional[str], robots: int)
         overlap_m = max(overlap_m, 2.0 * BODY_RADIUS_M - float(measure_distances(poses[..., :2]).min()))
     print("aggregation, %d robots, %s: cluster after 120 s %s" % (robots, trial.behavior.drive, describe(clusters)))
     print(f"  dispersion after 300 s, of the ideal: {describe(ratios[-1])}: {np.round(ratios[-1], 3)}")
-    print(f"  time until it is below 1.15: {describe(time_until(np.array(times_s), np.array(ratios), 1.15))} s")
+    reached = np.array(ratios) <= 1.15
+    until_s = np.where(reached.any(axis=0), np.array(times_s)[reached.argmax(axis=0)], np.inf)
+    print(f"  time until it is below 1.15: {describe(until_s)} s")
     print(f"  deepest overlap: {1000.0 * overlap_m:.2f} mm")
 
 

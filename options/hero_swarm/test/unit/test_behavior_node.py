@@ -26,7 +26,7 @@ from hero_sim.stepped.swarm import StepWorld
 from hero_swarm.behavior import Behavior, Binary, Neighbors, Sight, sense
 from hero_swarm.metrics import consensus_error
 from hero_swarm.metrics.graphs import measure_distances
-from hero_swarm.ros import behavior_node, other_robots, pose_source
+from hero_swarm.ros import behavior_node, pose_source
 from hero_swarm.ros.behavior_markers import BehaviorMarkers
 from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode, _parse_fence
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
@@ -56,8 +56,8 @@ class Stage:
         monkeypatch.setattr(rospy, "Publisher", self.advertise)
         monkeypatch.setattr(rospy, "logwarn", lambda text, *values: self.warnings.append(text % values))
         self.joined = range(count)
-        monkeypatch.setattr(other_robots, "share_drivers", lambda: self)
-        for module in (behavior_node, pose_source, other_robots, ros_clock):
+        monkeypatch.setattr(pose_source, "share_drivers", lambda: self)
+        for module in (behavior_node, pose_source, ros_clock):
             monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.swarm.now_s))
 
     def advertise(self, topic, message_class, **options):
@@ -343,9 +343,8 @@ def test_robots_that_localize_alone_knows_are_avoided_in_its_frame(stage, monkey
     poses._report = PoseReport("map", 0.0, 0.0, robots)
     monkeypatch.setattr(poses, "find", lambda robot_id, *_, **__: places.get(robot_id))
     monkeypatch.setattr(poses, "age_s", lambda _: 0.1)
-    for module in (other_robots, pose_source):
-        monkeypatch.setattr(module, "share_poses", lambda: poses)
-    others = other_robots.OtherRobots([0], "map")
+    monkeypatch.setattr(pose_source, "share_poses", lambda: poses)
+    others = pose_source.OtherRobots([0], "map")
     assert others.read().tolist() == [[1.0, 2.0, BODY_RADIUS_M]]
     assert others.describe_missing() == "not avoided, for want of a pose in the frame map: hero_4"
 

@@ -21,7 +21,7 @@ from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.results_folder import ResultsFolder
 from hero_swarm.fitting import robot_fit
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body
-from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, predict_ends
+from hero_swarm.fitting.motor_fit import _PARAMETERS, DELAY, Motors, build_errors, predict_ends
 from hero_swarm.fitting.recording import (
     PULSES,
     VELOCITY,
@@ -31,7 +31,6 @@ from hero_swarm.fitting.recording import (
     measure_wheels,
     sample_times,
 )
-from hero_swarm.fitting.replay import Motors, build_errors
 from hero_swarm.fitting.robot_fit import describe_fit, fit_robot
 from hero_swarm.trial import OPEN
 from hero_test.nonempty import nonempty

@@ -115,24 +115,8 @@ def test_robots_of_another_model_collide_at_their_own_radius():
         assert metrics.METRICS["collisions"](poses, poses, None, radii_m).tolist() == [collisions]
 
 
-def test_coverage_is_the_share_of_the_area_in_range():
-    bounds_m = np.array((-1.0, -1.0, 1.0, 1.0))
-    assert metrics.coverage(np.zeros((1, 1, 2)), bounds_m, 0.5) == pytest.approx([math.pi * 0.25 / 4.0], abs=0.01)
-    assert metrics.coverage(np.zeros((1, 1, 2)), bounds_m, 2.0) == pytest.approx([1.0])
-    # Of 10 x 5 cells those whose middles are near the robot in a corner, or another one in the corner across.
-    corners_m, bounds_m = np.array([[(1.0, 2.0)], [(2.0, 2.5)]]), np.array((1.0, 2.0, 2.0, 2.5))
-    assert metrics.coverage(corners_m, bounds_m, 0.2, 0.1) == pytest.approx([3.0 / 50.0] * 2)
-    assert metrics.coverage(corners_m.reshape(1, 2, 2), bounds_m, 0.2, 0.1) == pytest.approx([6.0 / 50.0])
-
-
 def test_consensus_is_the_spread_about_the_mean():
     assert metrics.consensus_error(np.array([[[0.0], [2.0]], [[5.0], [5.0]]])) == pytest.approx([1.0, 0.0])
-
-
-def test_the_time_until_is_the_first_one_and_endless_if_never():
-    times_s, values = np.arange(4.0), np.array([(3, 3), (2, 3), (1, 3), (2, 3)], dtype=float)
-    assert metrics.time_until(times_s, values, 2.0).tolist() == [1.0, math.inf]
-    assert metrics.time_until(times_s, values, 3.0, falls=False).tolist() == [0.0, 0.0]
 
 
 def test_one_robot_has_no_area_and_no_connectivity():

@@ -17,9 +17,10 @@ from hero_node.files import write_file
 from hero_node.parameters import within
 
 from ..behaviors import find_behavior
+from ..metrics import CHANCE, score
 from . import runner
 from .errors import ExperimentError
-from .experiment_file import Experiment, read_experiment
+from .experiment_file import Experiment, Metric, read_experiment
 from .report import write_report
 from .results import load
 from .worlds import NOMINAL, USUAL, WORLDS, WORST
@@ -86,15 +87,20 @@ def _put_in_worlds(content: Dict[str, Any], seeds: int) -> Dict[str, Any]:
 def find_shares(experiment: Experiment, values: np.ndarray) -> Dict[str, float]:
     """Return which share of the nominal score each world keeps, over all cells: medians of the first metric.
 
-    values: the first metric (cells, seeds). nan where the nominal score is zero, infinite or missing.
+    values: the first metric (cells, seeds), which counts above chance where that is known (metrics.score). nan where
+    the nominal score is zero, infinite or missing.
     """
     metric = experiment.metrics[0]
+    if _has_chance(metric):
+        values = score(metric.source, values)
     worlds = np.array([cell.varied["world"] for cell in experiment.cells])
-    scores = {world: float(np.nanmedian(values[worlds == world])) for world in WORLDS}
-    pairs = {
-        world: (scores[NOMINAL], score) if metric.falls else (score, scores[NOMINAL]) for world, score in scores.items()
-    }
-    return {world: _divide(*pair) for world, pair in pairs.items()}
+    medians = {world: float(np.nanmedian(values[worlds == world])) for world in WORLDS}
+    nominal = medians[NOMINAL]
+    return {world: _divide(*((nominal, own) if metric.falls else (own, nominal))) for world, own in medians.items()}
+
+
+def _has_chance(metric: Metric) -> bool:
+    return metric.bound is None and metric.source in CHANCE
 
 
 def _divide(part: float, whole: float) -> float:
@@ -103,19 +109,17 @@ def _divide(part: float, whole: float) -> float:
     return max(0.0, part / whole)
 
 
-def describe(shares: Mapping[str, float], metric: str) -> str:
+def describe(shares: Mapping[str, float], metric: Metric) -> str:
     """Return the verdict for users: a line for each world, and which assumption takes most."""
-    lines = ["share of the nominal %s that is kept" % metric]
-    lines += [
-        "  %-16s %s" % (world, "no score" if math.isnan(share) else "%.2f" % share) for world, share in shares.items()
-    ]
-    single = {world: share for world, share in shares.items() if world not in (NOMINAL, USUAL, WORST)}
+    above, zero = (" above chance", "not above chance") if _has_chance(metric) else ("", "zero")
+    lines = [f"share of the nominal {metric.name}{above} that is kept"]
+    lines += [f"  {world:16} {'no score' if math.isnan(own) else f'{own:.2f}'}" for world, own in shares.items()]
     if math.isnan(shares[USUAL]):
-        return "\n".join([*lines, "no verdict: the nominal score is zero, or never reached"])
+        return "\n".join([*lines, f"no verdict: the nominal score is {zero}, or never reached"])
+    single = {world: share for world, share in shares.items() if world not in (NOMINAL, USUAL, WORST)}
     weakest = min(single, key=lambda world: single[world] if math.isfinite(single[world]) else math.inf)
-    return "\n".join(
-        [*lines, f"usual robots keep {shares[USUAL]:.2f}; most is lost by {weakest} ({single[weakest]:.2f})"]
-    )
+    lines.append(f"usual robots keep {shares[USUAL]:.2f}; most is lost by {weakest} ({single[weakest]:.2f})")
+    return "\n".join(lines)
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
@@ -127,5 +131,5 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     fresh = ["--fresh"] if options.fresh else []
     print(runner.run_experiment(runner.parse_options([path, "--jobs", str(options.jobs), *fresh])))
     write_report(folder)
-    results = load(folder)
-    print(describe(find_shares(experiment, results.metrics[experiment.metrics[0].name]), experiment.metrics[0].name))
+    metric = experiment.metrics[0]
+    print(describe(find_shares(experiment, load(folder).metrics[metric.name]), metric))

@@ -1,11 +1,4 @@
-"""Results of experiments as labelled arrays, for figures and tables of your own.
-
-from hero_swarm.experiments import load
-
-results = load("aggregation")
-row = results.find(robots=25, errors="perfect")[0]
-plt.plot(results.times_s, np.nanmedian(results.series["dispersion"][row], axis=0))
-"""
+"""Results of experiments as labelled arrays, for figures and tables of your own."""
 
 import csv
 import os
@@ -74,9 +67,12 @@ class Results:
     def list_columns(self) -> Dict[str, List[Any]]:
         """Return the metrics over time as columns of a table: a row for each cell, seed and time."""
         cells, seeds, samples = len(self.cells), len(self.seeds), len(self.times_s)
-        columns: Dict[str, List[Any]] = {
-            name: [cell[name] for cell in self.cells for _ in range(seeds * samples)] for name in self.cells[0]
-        }
+        columns: Dict[str, List[Any]] = {}
+        for name in self.cells[0]:
+            values = [cell[name] for cell in self.cells]
+            if len(set(map(type, values))) > 1:  # such as errors: [perfect, 0.5]: a column of Parquet has one type
+                values = list(map(str, values))
+            columns[name] = [value for value in values for _ in range(seeds * samples)]
         columns["seed"] = np.tile(np.repeat(self.seeds, samples), cells).tolist()
         columns["time_s"] = np.tile(self.times_s, cells * seeds).tolist()
         return {**columns, **{name: values.ravel().tolist() for name, values in self.series.items()}}

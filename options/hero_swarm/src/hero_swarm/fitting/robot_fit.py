@@ -7,9 +7,8 @@ import numpy as np
 from hero_client.values import WHEEL_SEPARATION_M
 
 from .body_fit import fit_body
-from .motor_fit import fit_motors, predict_ends
+from .motor_fit import Motors, fit_motors, predict_ends
 from .recording import Recording
-from .replay import Motors
 
 HELD_OUT_SHARE = 1.0 / 3.0
 """The end of each recording, which the fit does not see."""

@@ -8,14 +8,13 @@ from hero_client.values import BODY_RADIUS_M
 
 from .graphs import algebraic_connectivity, cluster_fraction, collisions, nearest_neighbor
 from .motion import consensus_error, order, rotation, wall_following
-from .objects import object_cluster_fraction, object_distance
-from .shapes import coverage, dispersion, dispersion_ratio, fatness, hull_area
+from .shapes import dispersion, dispersion_ratio, fatness, hull_area, object_cluster_fraction, object_distance
 
 __all__ = [
     "CHANCE", "FALLING", "METRICS", "UNITS", "algebraic_connectivity", "cluster_fraction", "collisions",
-    "consensus_error", "coverage", "dispersion",
+    "consensus_error", "dispersion",
     "dispersion_ratio", "fatness", "hull_area", "nearest_neighbor",
-    "object_cluster_fraction", "object_distance", "order", "rotation", "score", "time_until", "wall_following",
+    "object_cluster_fraction", "object_distance", "order", "rotation", "score", "wall_following",
 ]  # fmt: skip
 
 Metric = Callable[..., np.ndarray]
@@ -59,9 +58,3 @@ CHANCE = {"rotation": 0.78, "wall_following": 0.3, "order": 0.39, "cluster_fract
 def score(name: str, values: np.ndarray) -> np.ndarray:
     """Return how far values of a metric in CHANCE are from chance, 0, to the best, 1; 0.5 and more names a behavior."""
     return np.clip((values - CHANCE[name]) / (1.0 - CHANCE[name]), 0.0, 1.0)
-
-
-def time_until(times_s: np.ndarray, values: np.ndarray, limit: float, falls: bool = True) -> np.ndarray:
-    """Return when values (T, W) first reach limit from above, or from below (W,); inf if they never do."""
-    reached = values <= limit if falls else values >= limit
-    return np.where(reached.any(axis=0), times_s[reached.argmax(axis=0)], np.inf)

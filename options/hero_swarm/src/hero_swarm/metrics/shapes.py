@@ -1,4 +1,4 @@
-"""Metrics of the shape of a swarm. Pure: places (W, N, 2) in m; results (W,)."""
+"""Metrics of the shape of a swarm, or of objects that it pushes. Pure: places (W, N, 2) in m; results (W,)."""
 
 import math
 from functools import lru_cache
@@ -7,6 +7,8 @@ from typing import List, Tuple
 import numpy as np
 
 from hero_client.values import BODY_RADIUS_M
+
+from .graphs import cluster_fraction
 
 Point = Tuple[float, ...]
 
@@ -75,12 +77,17 @@ def _turn(first: Point, second: Point, third: Point) -> float:
     return (second[0] - first[0]) * (third[1] - first[1]) - (second[1] - first[1]) * (third[0] - first[0])
 
 
-def coverage(places_m: np.ndarray, bounds_m: np.ndarray, range_m: float, cell_m: float = 0.05) -> np.ndarray:
-    """Return the share of the area in bounds_m (x min, y min, x max, y max) within range_m of a robot."""
-    x_min, y_min, x_max, y_max = bounds_m
-    x_m, y_m = np.arange(x_min + cell_m / 2, x_max, cell_m), np.arange(y_min + cell_m / 2, y_max, cell_m)
-    to_x_m = x_m[None, :, None] - places_m[..., 0][:, None]
-    to_y_m = y_m[None, :, None] - places_m[..., 1][:, None]
-    near = (to_x_m**2)[:, :, None] + (to_y_m**2)[:, None] < range_m * range_m
-    share: np.ndarray = near.any(axis=3).mean(axis=(1, 2))
-    return share
+def object_cluster_fraction(places_m: np.ndarray, reach_m: float = 0.2) -> np.ndarray:
+    """Return the share of objects in the largest cluster.
+
+    Two belong together if their centers are less than reach_m apart: by default two diameters of a disc of 0.1 m, so
+    that no third one fits between them (M. Gauci et al., Clustering objects with robots that do not
+    compute, AAMAS 2014).
+    """
+    return cluster_fraction(places_m, reach_m) if places_m.shape[1] else np.full(len(places_m), np.nan)
+
+
+def object_distance(places_m: np.ndarray) -> np.ndarray:
+    """Return the mean distance (m) of the objects' centers from the origin, the goal of behaviors that push them."""
+    distances_m = np.hypot(places_m[..., 0], places_m[..., 1])
+    return distances_m.mean(axis=1) if places_m.shape[1] else np.full(len(places_m), np.nan)

@@ -25,9 +25,8 @@ from ..metrics.own import State, measure_metric
 from ..safety import FENCE, MODES, OFF, ROBOTS, SafetyFilter
 from ..sources import Sources
 from .behavior_markers import BehaviorMarkers
-from .other_robots import OtherRobots
 from .own_readings import OwnReadings
-from .pose_source import ObjectSource, PoseSource
+from .pose_source import ObjectSource, OtherRobots, PoseSource
 from .wheel_commands import WheelCommands
 
 SHOW_PERIOD_S = 0.1

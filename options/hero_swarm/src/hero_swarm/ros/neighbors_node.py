@@ -4,7 +4,7 @@ rosrun hero_swarm neighbors _range_m:=1.0
 """
 
 import math
-from typing import Any, Dict, List, Sequence
+from typing import Any, Callable, Dict, List, Sequence
 
 import numpy as np
 import rospy
@@ -20,17 +20,20 @@ from hero_node.parameters import flag, number, robot_ids, string, whole_number
 from ..behavior import Random
 from .pose_source import PoseSource
 
-PARAMETERS = {
+SENSING = {
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
+    "seed": whole_number(0, 0, 2**31 - 1, "", "of all that is random"),
+    "rate_hz": number(10.0, 1.0, 50.0, "Hz", "of the messages"),
+}
+PARAMETERS = {
+    **SENSING,
     "range_m": number(1000.0, 0.0, 1000.0, "m", "between the centers, of neighbors that are sensed"),
     "field_rad": number(2.0 * math.pi, 0.0, 2.0 * math.pi, "rad", "width of the field of view, centered on the front"),
     "range_noise_m": number(0.0, 0.0, 1.0, "m", "standard deviation of ranges"),
     "bearing_noise_rad": number(0.0, 0.0, 1.0, "rad", "the same of bearings and headings"),
     "dropout": number(0.0, 0.0, 1.0, "", "probability that a neighbor is missed"),
     "occlusion": flag(False, "whether bodies hide those behind them"),
-    "seed": whole_number(0, 0, 2**31 - 1, "", "of noise and drop-outs"),
-    "rate_hz": number(10.0, 1.0, 50.0, "Hz", "of the messages"),
 }
 
 
@@ -113,10 +116,15 @@ class NeighborsNode(SensingNode):
             publisher.publish(message)
 
 
-def main() -> None:
-    """Publish neighbors until the program is to end. Raises: ProgramError for a wrong parameter."""
-    with Program("neighbors") as program:
-        parameters = read_parameters(PARAMETERS)
-        node = NeighborsNode(parameters)
+def run_sensing(name: str, declared: Dict[str, Any], make_node: Callable[[Dict[str, Any]], SensingNode]) -> None:
+    """Publish what robots sense until the program is to end. Raises: ProgramError for a wrong parameter."""
+    with Program(name) as program:
+        parameters = read_parameters(declared)
+        node = make_node(parameters)
         for _ in program.rate(parameters["rate_hz"]):
             node.step()
+
+
+def main() -> None:
+    """Run the program."""
+    run_sensing("neighbors", PARAMETERS, NeighborsNode)

@@ -21,12 +21,10 @@ from ..experiments.computing import set_up
 from ..experiments.errors import ExperimentError
 from ..experiments.experiment_file import Experiment
 from ..experiments.results_folder import REAL, ResultsFolder, Run
-from ..experiments.robot_trial import RobotTrial
-from ..experiments.start_drive import PERIOD_S, StartDrive
+from ..experiments.robot_trial import PERIOD_S, RobotTrial, StartDrive
 from ..safety import ROBOTS, SafetyFilter
-from .other_robots import OtherRobots
 from .own_readings import OwnReadings
-from .pose_source import ObjectSource, PoseSource
+from .pose_source import ObjectSource, OtherRobots, PoseSource
 from .wheel_commands import WheelCommands
 
 OBJECT_RADIUS_M = 0.05

@@ -15,24 +15,20 @@ import rospy
 from geometry_msgs.msg import Vector3
 from std_msgs.msg import ColorRGBA, Float32, Float32MultiArray, MultiArrayDimension, MultiArrayLayout
 
-from hero_client import Program, read_parameters
-from hero_node.parameters import number, robot_ids, string, whole_number
+from hero_node.parameters import number, string
 from hero_sim.world import load_arena
 
 from ..sensors import Surroundings
 from ..sensors.virtual import Floor, Light, Messages, Pheromone, RangeAndBearing
-from .neighbors_node import SensingNode
+from .neighbors_node import SENSING, SensingNode, run_sensing
 
 PARAMETERS = {
+    **SENSING,
     "arena": string("empty", "a name or file of the simulator, with areas and lamps, in the frame of the poses"),
-    "robots": robot_ids("all", "ids; all: those that have joined a driver"),
-    "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
     "range_m": number(0.5, 0.0, 1000.0, "m", "of messages"),
     "loss": number(0.0, 0.0, 1.0, "", "probability that a message is lost"),
     "light_reach_m": number(1.0, 0.01, 1000.0, "m", "distance at which the light of a lamp is half as strong"),
     "half_life_s": number(30.0, 0.1, 1e6, "s", "of pheromone"),
-    "seed": whole_number(0, 0, 2**31 - 1, "", "of losses"),
-    "rate_hz": number(10.0, 1.0, 50.0, "Hz", "of the messages"),
 }
 
 DEPOSIT_S = 1.0
@@ -103,28 +99,13 @@ class VirtualSensorsNode(SensingNode):
 
     def _pack(self, near: Messages, row: int) -> Float32MultiArray:
         """Return a row for each message: id of its robot, range m, bearing rad, its numbers."""
-        rows = [
-            [
-                float(self._ids[column]),
-                near.range_m[row, column],
-                near.bearing_rad[row, column],
-                *near.data[row, column],
-            ]
-            for column in near.seen[row].nonzero()[0]
-            if not np.isnan(near.data[row, column]).all()
-        ]
-        width = len(rows[0]) if rows else 0
-        dimensions = [
-            MultiArrayDimension("message", len(rows), len(rows) * width),
-            MultiArrayDimension("", width, width),
-        ]
-        return Float32MultiArray(MultiArrayLayout(dimensions, 0), [number for own in rows for number in own])
+        came = near.seen[row] & ~np.isnan(near.data[row]).all(axis=1)
+        columns = np.array(self._ids, dtype=float), near.range_m[row], near.bearing_rad[row], near.data[row]
+        rows = np.column_stack(columns)[came]
+        sizes = MultiArrayDimension("message", len(rows), rows.size), MultiArrayDimension("", *rows.shape[1:] * 2)
+        return Float32MultiArray(MultiArrayLayout(list(sizes), 0), rows.ravel().tolist())
 
 
 def main() -> None:
-    """Publish virtual sensors until the program is to end. Raises: ProgramError for a wrong parameter."""
-    with Program("virtual_sensors") as program:
-        parameters = read_parameters(PARAMETERS)
-        node = VirtualSensorsNode(parameters)
-        for _ in program.rate(parameters["rate_hz"]):
-            node.step()
+    """Run the program."""
+    run_sensing("virtual_sensors", PARAMETERS, VirtualSensorsNode)

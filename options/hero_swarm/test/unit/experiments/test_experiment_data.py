@@ -107,6 +107,9 @@ def test_the_table_over_time_has_a_row_for_each_run_and_second(folder, tmp_path,
         "farthest",
     ]
     assert [row["time_s"] for row in rows[:4]] == ["0.0", "1.0", "2.0", "3.0"] and rows[4]["seed"] == "6"
+    mixed = load(str(folder))
+    mixed.cells[0] = {**mixed.cells[0], "speed_m_s": "slow"}
+    assert set(map(type, mixed.list_columns()["speed_m_s"])) == {str}, "a column of Parquet has one type"
     with pytest.raises(ExperimentError, match="a.txt: a table ends with .csv or .parquet"):
         load(str(folder)).write_table(str(tmp_path / "a.txt"))
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)

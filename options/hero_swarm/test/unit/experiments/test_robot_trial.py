@@ -10,8 +10,7 @@ from hero_sim.stepped import RobotRows
 from hero_swarm.experiments.computing import set_up
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
-from hero_swarm.experiments.robot_trial import RobotTrial
-from hero_swarm.experiments.start_drive import PERIOD_S, StartDrive
+from hero_swarm.experiments.robot_trial import PERIOD_S, RobotTrial, StartDrive
 from hero_swarm.metrics import METRICS
 from hero_swarm.safety import ROBOTS, SafetyFilter
 from hero_swarm.trial import OPEN

@@ -111,20 +111,25 @@ def compute(
 
     Raises: ExperimentError if pools keep breaking, or the cluster ends; whatever function raises.
     """
-    waiting: Deque[Task] = collections.deque(tasks)
+    left: Deque[Task] = collections.deque(tasks)
     new_pools = 0
-    while waiting:
+    while left:
         executor = open_executor()
         running: Dict[Future[Any], Task] = {}
         try:
-            yield from _drain(executor, workers * _WAITING, function, waiting, running)
+            while left or running:
+                while left and len(running) < workers * _WAITING:
+                    running[executor.submit(function, *left[0])] = left[0]
+                    left.popleft()
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    result = future.result()
+                    yield running.pop(future), result
         except BrokenExecutor as error:
             new_pools += 1
             if new_pools > MAX_NEW_POOLS:
-                raise ExperimentError(
-                    "worker processes died %d times (out of memory?): use fewer --jobs or a smaller --batch" % new_pools
-                ) from error
-            waiting.extendleft(running.values())
+                text = "worker processes died %d times (out of memory?): use fewer --jobs or a smaller --batch"
+                raise ExperimentError(text % new_pools) from error
+            left.extendleft(running.values())
         except CancelledError as error:
             text = "the Dask cluster ended: start it again, and then this; what is done is kept"
             raise ExperimentError(text) from error
@@ -138,20 +143,3 @@ def compute(
             for future in running:
                 future.cancel()
             executor.shutdown(wait=True)
-
-
-def _drain(
-    executor: Executor,
-    most: int,
-    function: Callable[..., Any],
-    waiting: Deque[Task],
-    running: Dict["Future[Any]", Task],
-) -> Iterator[Tuple[Task, Any]]:
-    """Run what waits; running holds what is not done yet, also when this ends by an error."""
-    while waiting or running:
-        while waiting and len(running) < most:
-            running[executor.submit(function, *waiting[0])] = waiting[0]
-            waiting.popleft()
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            result = future.result()
-            yield running.pop(future), result
