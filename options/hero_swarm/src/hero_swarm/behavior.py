@@ -1,16 +1,6 @@
 """Behaviors: a class with sensors, a rate, parameters with units, and step() for one robot or for all.
 
 Pure: numpy only. R robots are the rows of all arrays, world after world.
-
-    class Aggregation(Behavior):
-        sees = Binary()
-        v0_m_s, w0_rad_s = -0.108, -0.75  # nothing seen
-        v1_m_s, w1_rad_s = 0.0, -5.02     # a robot seen
-
-        def step(self, sensed, memory, random):
-            linear_m_s = np.where(sensed.sees, self.v1_m_s, self.v0_m_s)
-            angular_rad_s = np.where(sensed.sees, self.w1_rad_s, self.w0_rad_s)
-            return linear_m_s, angular_rad_s, memory
 """
 
 import zlib

@@ -1,9 +1,4 @@
-"""Runs a behavior on stepped robots: many worlds at once, in virtual time. Pure.
-
-trial = Trial(Milling(), arena=build_rectangle(1.71, 1.42, 1), robots=20, seeds=range(10))
-for time_s, poses in trial.run(200.0):
-    print(time_s, rotation(poses[..., :2], trial.velocities))
-"""
+"""Runs a behavior on stepped robots: many worlds at once, in virtual time. Pure."""
 
 import math
 from collections import deque

@@ -76,21 +76,6 @@ def test_order_and_fatness_have_their_extremes():
     assert metrics.fatness(np.concatenate((places_m, np.zeros((1, 1, 2))), axis=1)) == pytest.approx([1.0])
 
 
-def test_the_hull_of_a_polygon_is_its_area_wherever_it_lies():
-    for corners in range(3, 9):
-        ring_m, _ = ring(corners, 0.3)
-        for turn_rad in (0.0, 0.4, 2.0):
-            turn = np.array(((math.cos(turn_rad), -math.sin(turn_rad)), (math.sin(turn_rad), math.cos(turn_rad))))
-            polygon_m = np.concatenate((ring_m, 0.5 * ring_m), axis=1) @ turn + (-2.0, 5.0)
-            expected_m2 = 0.5 * corners * 0.09 * math.sin(2.0 * math.pi / corners)
-            assert metrics.hull_area(polygon_m) == pytest.approx([expected_m2])
-
-
-def test_the_hull_of_a_square_is_its_area_whatever_lies_inside():
-    square = np.array([(0, 0), (2, 0), (2, 1), (0, 1), (1, 0.5), (0.2, 0.3), (1, 0)], dtype=float)
-    assert metrics.hull_area(square[None]) == pytest.approx([2.0])
-
-
 def test_connectivity_of_a_path_is_the_closed_form_and_zero_if_apart():
     path = np.column_stack((np.arange(5) * 0.1, np.zeros(5)))
     expected = 2.0 * (1.0 - math.cos(math.pi / 5.0))
@@ -121,7 +106,6 @@ def test_consensus_is_the_spread_about_the_mean():
 
 def test_one_robot_has_no_area_and_no_connectivity():
     alone = np.array([[(0.3, 0.4, 1.0)], [(0.0, 0.0, 0.0)]])
-    assert metrics.METRICS["hull_area"](alone).tolist() == [0.0, 0.0]
     assert np.isnan(metrics.METRICS["algebraic_connectivity"](alone)).all()
     assert metrics.METRICS["cluster_fraction"](alone).tolist() == [1.0, 1.0]
 

@@ -1,12 +1,5 @@
 """The file of an experiment: which behavior, what varies, how long, which seeds and metrics. Pure.
 
-    behavior: aggregation.Aggregation
-    vary: {robots: [10, 25], errors: [perfect, default]}
-    start: {kind: uniform, cover: 0.02, gap_m: 0.0}
-    time_s: 300
-    seeds: {from: 1, count: 30}
-    metrics: [cluster_fraction, {time_until: {dispersion_ratio: 1.15}}]
-
 Each combination of the values that vary is a cell; each cell runs with every seed. Paths of files (of a behavior, an
 arena, errors, start places, metrics) are relative to the file's folder.
 """

@@ -1,13 +1,4 @@
-"""The environment of PettingZoo (J. Terry et al., NeurIPS 2021) on simulated robots. Needs pettingzoo.
-
-from hero_swarm.learning.parallel_env import SwarmEnv
-
-env = SwarmEnv(robots=20, time_s=60.0)
-observations, infos = env.reset(seed=1)
-while env.agents:
-    actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-    observations, rewards, terminations, truncations, infos = env.step(actions)
-"""
+"""The environment of PettingZoo (J. Terry et al., NeurIPS 2021) on simulated robots. Needs pettingzoo."""
 
 from typing import Any, Dict, List, Optional, Tuple
 

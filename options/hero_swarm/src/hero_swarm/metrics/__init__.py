@@ -8,12 +8,12 @@ from hero_client.values import BODY_RADIUS_M
 
 from .graphs import algebraic_connectivity, cluster_fraction, collisions, nearest_neighbor
 from .motion import consensus_error, order, rotation, wall_following
-from .shapes import dispersion, dispersion_ratio, fatness, hull_area, object_cluster_fraction, object_distance
+from .shapes import dispersion, dispersion_ratio, fatness, object_cluster_fraction, object_distance
 
 __all__ = [
     "CHANCE", "FALLING", "METRICS", "UNITS", "algebraic_connectivity", "cluster_fraction", "collisions",
     "consensus_error", "dispersion",
-    "dispersion_ratio", "fatness", "hull_area", "nearest_neighbor",
+    "dispersion_ratio", "fatness", "nearest_neighbor",
     "object_cluster_fraction", "object_distance", "order", "rotation", "score", "wall_following",
 ]  # fmt: skip
 
@@ -31,7 +31,6 @@ METRICS: Dict[str, Metric] = {
     "dispersion": lambda poses, *_: dispersion(poses[..., :2]),
     "dispersion_ratio": lambda poses, *_: dispersion_ratio(poses[..., :2]),
     "fatness": lambda poses, *_: fatness(poses[..., :2]),
-    "hull_area": lambda poses, *_: hull_area(poses[..., :2]),
     "nearest_neighbor": lambda poses, *_: nearest_neighbor(poses[..., :2]),
     "object_cluster_fraction": lambda poses, velocities, objects, *_: object_cluster_fraction(objects[..., :2]),
     "object_distance": lambda poses, velocities, objects, *_: object_distance(objects[..., :2]),
@@ -43,10 +42,10 @@ METRICS: Dict[str, Metric] = {
 }
 """Those that need no more than that, by name."""
 
-UNITS = {"consensus_error": "m", "dispersion": "m", "hull_area": "m^2", "nearest_neighbor": "m", "object_distance": "m"}
+UNITS = {"consensus_error": "m", "dispersion": "m", "nearest_neighbor": "m", "object_distance": "m"}
 """Units of those that have one."""
 
-FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "hull_area", "object_distance")
+FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "object_distance")
 """Metrics for which less is better: a bound without <= or >= is an upper one; it is a lower one for all others."""
 
 

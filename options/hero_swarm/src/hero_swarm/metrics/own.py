@@ -1,9 +1,4 @@
-"""Metrics of users, named FILE.py:FUNCTION: functions of a State that return one number for each world. Pure.
-
-def sortedness(state):
-    x_m = state.poses[..., 0]
-    return (np.diff(x_m) > 0.0).mean(axis=1)
-"""
+"""Metrics of users, named FILE.py:FUNCTION: functions of a State that return one number for each world. Pure."""
 
 from typing import Any, Collection, Iterator, NamedTuple, Optional
 

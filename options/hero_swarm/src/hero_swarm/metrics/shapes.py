@@ -2,15 +2,12 @@
 
 import math
 from functools import lru_cache
-from typing import List, Tuple
 
 import numpy as np
 
 from hero_client.values import BODY_RADIUS_M
 
 from .graphs import cluster_fraction
-
-Point = Tuple[float, ...]
 
 
 def _distances_from_center(places_m: np.ndarray) -> np.ndarray:
@@ -46,35 +43,6 @@ def fatness(places_m: np.ndarray) -> np.ndarray:
     distances_m = _distances_from_center(places_m)
     ratio: np.ndarray = distances_m.min(axis=1) / distances_m.max(axis=1)
     return 1.0 - ratio * ratio
-
-
-def hull_area(places_m: np.ndarray) -> np.ndarray:
-    """Return the area (m2) of the convex hull of all centers."""
-    return np.array([_measure_hull(world_m) for world_m in places_m])
-
-
-def _measure_hull(points_m: np.ndarray) -> float:
-    """Return the area of a convex hull, found by the monotone chain (Andrew 1979); nan where a point is not known."""
-    if np.isnan(points_m).any():
-        return math.nan
-    if len(points_m) < 3:
-        return 0.0
-    order = np.lexsort((points_m[:, 1], points_m[:, 0]))
-    corners: List[Point] = []
-    for way in (points_m[order], points_m[order[::-1]]):
-        chain: List[Point] = []
-        for point in map(tuple, way.tolist()):
-            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0.0:
-                chain.pop()
-            chain.append(point)
-        corners += chain[:-1]
-    x_m, y_m = np.array(corners).T
-    return abs(float(x_m @ np.roll(y_m, -1) - y_m @ np.roll(x_m, -1))) / 2.0
-
-
-def _turn(first: Point, second: Point, third: Point) -> float:
-    """Return twice the area of a triangle, positive if its corners go counter-clockwise."""
-    return (second[0] - first[0]) * (third[1] - first[1]) - (second[1] - first[1]) * (third[0] - first[0])
 
 
 def object_cluster_fraction(places_m: np.ndarray, reach_m: float = 0.2) -> np.ndarray:

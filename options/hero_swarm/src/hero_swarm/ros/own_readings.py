@@ -32,8 +32,7 @@ class OwnReadings:
     @property
     def counts(self) -> np.ndarray:
         """Counts of the infrared sensors (R, 8), rear first."""
-        front_first = self._read("laser", lambda robot: robot.infrared_counts, 8)
-        return np.roll(front_first, 4, axis=1)
+        return np.roll(self._read("laser", lambda robot: robot.infrared_counts, 8), 4, axis=1)
 
     @property
     def distance_m(self) -> np.ndarray:
@@ -43,12 +42,12 @@ class OwnReadings:
     @property
     def odometry(self) -> np.ndarray:
         """Poses by odometry (R, 3), each in its robot's own frame."""
-        return self._read("odom", lambda robot: robot.pose, 3)
+        return np.array([robot.fresh_pose() or [np.nan] * 3 for robot in self._swarm])
 
     @property
     def velocities(self) -> np.ndarray:
         """Linear m/s and angular rad/s by odometry (R, 2)."""
-        return self._read("odom", lambda robot: robot.velocity, 2)
+        return np.array([robot.fresh_velocity() or [np.nan] * 2 for robot in self._swarm])
 
     def _read(self, topic: str, read: Callable[[Any], Any], columns: int) -> np.ndarray:
         """Return what robots tell, without waiting for what they did not send yet."""

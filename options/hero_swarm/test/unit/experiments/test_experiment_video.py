@@ -9,6 +9,7 @@ from hero_swarm import video
 from hero_swarm.behavior import Behavior
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.trial import OPEN, Trial
+from hero_test.nonempty import nonempty
 
 
 class Straight(Behavior):
@@ -86,7 +87,7 @@ def test_each_frame_replaces_the_one_before(written):
 def test_a_frame_shows_robots_with_their_noses_and_the_time():
     limits_m, poses = np.array([(0.0, 0.0), (3.0, 3.0)]), np.array([(1.0, 2.0, 0.0), (2.0, 1.0, np.pi / 2.0)])
     frame = np.asarray(video.draw_frame(OPEN, limits_m, 1.25, poses, [], []))
-    for x_m, y_m, yaw_rad in poses.tolist():
+    for x_m, y_m, yaw_rad in nonempty(poses.tolist()):
         ahead, side = np.array((np.cos(yaw_rad), np.sin(yaw_rad))), np.array((-np.sin(yaw_rad), np.cos(yaw_rad)))
         for distance_m, color in ((-0.8, (0x00, 0x72, 0xB2)), (0.6, (0xFF, 0xFF, 0xFF)), (-1.5, (0xFF, 0xFF, 0xFF))):
             column, row = (

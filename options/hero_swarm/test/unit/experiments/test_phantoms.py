@@ -28,7 +28,7 @@ errors.friction: 0.2
 start: {kind: circle, gap_m: 0.2}
 time_s: 2
 seeds: {from: 7, count: 50}
-metrics: [hull_area, dispersion]
+metrics: [fatness, dispersion]
 record: {hz: 1}
 compare: {metric: dispersion, between: errors}
 """
@@ -49,7 +49,7 @@ def test_an_experiment_is_run_in_all_worlds_in_place_of_its_own(path, capsys):
     assert made["seeds"] == {"from": 7, "count": 2}
     assert set(made) == {"behavior", "vary", "start", "time_s", "seeds", "metrics"}
     lines = capsys.readouterr().out.splitlines()
-    first = lines.index("share of the nominal hull_area that is kept")
+    first = lines.index("share of the nominal fatness that is kept")
     assert [line.split("  ")[1].strip() for line in lines[first + 1 : -1]] == list(WORLDS)
     assert lines[first + 1].split()[-1] == "1.00"
     assert lines[-1].startswith("usual robots keep ")
@@ -110,12 +110,12 @@ def test_the_share_that_is_kept_knows_which_way_is_better(metrics, scores, share
 @pytest.mark.parametrize(
     "metrics, nominal, words",
     [
-        ("[hull_area]", 0.0, "zero"), ("[{time_until: {rotation: 0.9}}]", math.inf, "zero"),
+        ("[fatness]", 0.0, "zero"), ("[{time_until: {rotation: 0.9}}]", math.inf, "zero"),
         ("[rotation]", 0.77, "not above chance"),
     ],
 )  # fmt: skip
 def test_without_a_nominal_score_there_is_no_verdict(metrics, nominal, words):
-    source = "rotation" if words != "zero" else "hull_area"
+    source = "rotation" if words != "zero" else "fatness"
     text = phantoms.describe(find_shares(metrics, {"nominal": nominal}), Metric("x", source))
     assert "no score" in text and text.endswith(f"no verdict: the nominal score is {words}, or never reached")
 
