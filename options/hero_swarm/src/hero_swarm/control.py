@@ -16,7 +16,7 @@ from .behavior import Behavior, Random, Sensed, act, decide, sense
 from .safety import MAX_AGE_S, SafetyFilter
 
 LAG_S = 0.13
-"""Mean time from a command to the wheels: 51 ms between reads, 47 Hz of the velocity controller, 80 ms of the servos."""
+"""Mean time from a command to the wheels: 51 ms between reads, 47 Hz of the velocity controller, 80 ms of servos."""
 
 
 class Control:
