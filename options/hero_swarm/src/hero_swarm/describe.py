@@ -15,6 +15,7 @@ from hero_node import print_error
 
 from .behavior import Behavior
 from .behaviors import find_behavior, list_classes, list_names
+from .machines.machine_file import ENDING
 from .sources import Sources
 
 _TITLES = {"formation": "formation by distances"}
@@ -45,15 +46,16 @@ def find_exported() -> List[str]:
 def describe_behaviors(folders: Sequence[str] = ()) -> List[Dict[str, Any]]:
     """Return what pages need of each behavior; a file that cannot be loaded is told of and left out."""
     found = [_describe(name, name, find_behavior(name)) for name in list_names()]
-    for path in (path for folder in folders for path in sorted(glob.glob(os.path.join(folder, "*.py")))):
+    patterns = [os.path.join(folder, "*" + ending) for folder in folders for ending in (".py", ENDING)]
+    for path in (path for pattern in patterns for path in sorted(glob.glob(pattern))):
         try:
-            classes = list_classes(path, Sources())
+            classes = list_classes(path, Sources()) if path.endswith(".py") else {"": find_behavior(path)}
         except ValueError as error:
             print_error(str(error))
             continue
         for class_name, kind in classes.items():
             name = os.path.splitext(os.path.basename(path))[0]
-            found.append(_describe(name if len(classes) == 1 else class_name, f"{path}:{class_name}", kind))
+            found.append(_describe(name if len(classes) == 1 else class_name, f"{path}:{class_name}".rstrip(":"), kind))
     return found
 
 

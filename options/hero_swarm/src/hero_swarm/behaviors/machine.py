@@ -24,8 +24,7 @@ _COLORS = np.array([(0, 0, 1), (1, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 1), (0, 1
 class Machine(Behavior):
     """A machine whose states robots show by their lights.
 
-    All behaviors keep clear of what infrared sensors see, but exploration, which drives straight ahead and turns at
-    obstacles, for a random number of steps up to turn_steps.
+    Its behaviors keep clear of what infrared sensors see; exploration turns there for up to turn_steps steps.
     """
 
     near = Neighbors(range_m=0.5)

@@ -11,8 +11,7 @@ from typing import Any, Callable, Dict, Iterator, List, Sequence, Tuple
 import numpy as np
 from tqdm import tqdm
 
-from hero_node import one_line
-from hero_node.files import read_file, write_file
+from hero_node.files import read_file
 
 from ..experiments.computing.batch import one_at_a_time, run_trial, take_values
 from ..experiments.computing.cell_setup import set_up
@@ -65,9 +64,11 @@ class History:
                 raise ExperimentError("%s, line %d: is damaged; %s" % (path, number, remedy))
             candidate, seed, score = run.split(",")
             self.runs.append((candidate, int(seed), float(score)))
-        whole = "".join([head, *lines[2:]])
-        if whole != content:
-            write_file(path, whole.encode())
+        if not self.runs:
+            with open(path, "wb") as file:
+                file.write(head.encode())
+        else:
+            os.truncate(path, len("".join(lines)))
 
     def _seal(self, run: str) -> str:
         """Return the check of a line, on which those of all later lines depend."""
@@ -100,8 +101,8 @@ class Evaluation:
         self._common, self._mission, self._history = (mission, hash_suite(), options.method), mission, history
         self._workers, self._seed, self._is_first = workers, seed, True
         self._is_stacked = METHODS[options.method][0](mission).is_stacked
-        begun, every_s = len(history.runs), 0.1 if sys.stderr.isatty() else REPORT_S
-        self.bar = tqdm(desc=history.path, total=options.budget, initial=begun, unit="run", mininterval=every_s)
+        begun = {"total": options.budget, "initial": len(history.runs), "desc": history.path}
+        self.bar = tqdm(mininterval=0.1 if sys.stderr.isatty() else REPORT_S, unit="run", **begun)
 
     def __call__(self, genomes: np.ndarray, seeds: range) -> np.ndarray:
         """Return the scores (C, seeds). Raises: ExperimentError, also if the first ones tell no candidates apart."""
@@ -114,30 +115,26 @@ class Evaluation:
             self.bar.update(len(own))
         values = self._mission.sign * np.array(scores).reshape(len(genomes), len(seeds))
         if self._is_first and len(genomes) > 1 and (values == values[0, 0]).all():
-            text = "score %s: is %g in all %d runs of %d controllers: it tells none apart; change score or mission"
-            name = self._mission.experiment.metrics[0].name
-            raise ExperimentError(text % (name, scores[0], len(scores), len(genomes)))
+            text = "score: is %g in all %d runs of %d controllers: it tells none apart; change score or mission"
+            raise ExperimentError(text % (scores[0], len(scores), len(genomes)))
         self._is_first = False
         self.bar.set_postfix(best="%.4g" % (self._mission.sign * values.mean(axis=1).max()), refresh=False)
         return values
 
-    def _compute(
-        self, genomes: np.ndarray, keys: Sequence[Tuple[str, int]], first: int, each: int
-    ) -> Iterator[List[float]]:
+    def _compute(self, genomes: np.ndarray, keys: List[Any], first: int, each: int) -> Iterator[List[float]]:
         """Yield the scores of all runs from the first one on, in their order. Raises: ExperimentError."""
         executor, count = self._workers
         size = max(1, min(choose_batch(self._mission.experiment, 0), math.ceil((len(keys) - first) / count)))
         ends = range(first + size, len(keys), size) if self._is_stacked else range(0, len(keys), each)
         places = [first, *(end for end in ends if end > first), len(keys)] if first < len(keys) else []
-        seeds = [seed for _, seed in keys]
-        pairs = zip(places, places[1:])
-        futures = [executor.submit(score_runs, *self._common, genomes[a:b], seeds[a:b]) for a, b in pairs]
+        parts, seeds = zip(places, places[1:]), [seed for _, seed in keys]
+        futures = [executor.submit(score_runs, *self._common, genomes[a:b], seeds[a:b]) for a, b in parts]
         try:
             for future in futures:
                 yield future.result()
         except (BrokenExecutor, CancelledError) as error:
-            text = f"a worker died ({one_line(error)}; out of memory?): start again, what is computed is kept"
-            raise ExperimentError(text) from error
+            text = "a worker died (%s; out of memory?): start again, what is computed is kept"
+            raise ExperimentError(text % error) from error
         finally:
             for future in futures:
                 future.cancel()

@@ -25,11 +25,8 @@ NEIGHBORS, RANGE_M, RATE_HZ = 5, 0.5, 10.0
 
 
 class Kind(NamedTuple):
-    """Meaning of candidates.
-
-    make() returns the behavior of candidates (W, G), one for each world, all equal where not is_stacked; dump() the
-    file of one (G,), from the arena's path and a first line.
-    """
+    """Meaning of candidates (W, G): make() returns their behavior, world by world, and of equal ones if not is_stacked;
+    dump() the file of one (G,), from the arena's path and a first line."""
 
     genes: Genes
     make: Callable[[np.ndarray], Behavior]

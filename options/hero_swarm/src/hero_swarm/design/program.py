@@ -1,7 +1,6 @@
 """Program design: controllers for a mission, and what they keep of their score in pseudo-reality.
 
-Pseudo-reality (A. Ligot and M. Birattari, Swarm Intelligence 2019): the finalists run with robots, Wi-Fi and poses that
-they were not designed with. It is an ordinary experiment, as is their comparison in the mission's own world.
+Pseudo-reality (A. Ligot and M. Birattari, Swarm Intelligence 2019): robots, Wi-Fi and poses that they do not expect.
 """
 
 import argparse
@@ -37,9 +36,7 @@ FINALISTS, SEEDS = 3, 1_000_000
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="design", description="Design controllers for a mission.")
-    parser.add_argument(
-        "file", metavar="MISSION.yaml", help="mission; of a .controller, checks it and draws its picture"
-    )
+    parser.add_argument("file", metavar="MISSION.yaml", help="a mission; a .controller is checked and drawn")
     parser.add_argument("--method", choices=METHODS, default="chocolate", help="(%(default)s)")
     parser.add_argument("--budget", type=within(1, SEEDS, int), default=2000, help="runs of each design (%(default)s)")
     parser.add_argument("--designs", type=within(1, 1000, int), default=1, help="independent designs (%(default)s)")
@@ -70,10 +67,9 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         for number in range(options.part[0], options.designs + 1, options.part[1]):
             design(options, mission, kind, f"{folder}/design_{number}", (executor, count))
     files = [sorted(glob.glob(f"{folder}/design_{one}_*{kind.ending}")) for one in range(1, options.designs + 1)]
-    if all(files):
-        print(compare(options, mission, folder, [path for own in files for path in own]))
-    else:
-        print(f"{folder}: designs of other parts are still to be made")
+    finalists = [path for own in files for path in own]
+    missing = f"{folder}: designs of other parts are still to be made"
+    print(compare(options, mission, folder, finalists) if all(files) else missing)
 
 
 def design(options: Any, mission: Mission, kind: Kind, stem: str, workers: Any) -> None:
@@ -95,6 +91,8 @@ def design(options: Any, mission: Mission, kind: Kind, stem: str, workers: Any) 
                 found = METHODS[options.method][1](evaluate, kind.genes, options.budget, random)
     except BlockingIOError:
         raise ExperimentError(f"{path}: another program adds to it: wait for its end") from None
+    for old in glob.glob(stem + "_*"):
+        os.remove(old)
     for rank, genome in enumerate(found[:FINALISTS], 1):
         file = f"{stem}_{rank}{kind.ending}"
         write_file(file, kind.dump(genome, arena, f"# Designed by {about}\n"))
@@ -103,13 +101,11 @@ def design(options: Any, mission: Mission, kind: Kind, stem: str, workers: Any) 
 
 def compare(options: Any, mission: Mission, folder: str, finalists: Sequence[str]) -> str:
     """Run finalists and baseline in the mission's world and in pseudo-reality; return their ranks for users."""
-    content = mission.content
+    content, own = mission.content, os.path.dirname(options.file) or "."
     shared = {key: value for key, value in content.items() if key not in OWN}
     shared.update(seeds={"count": options.tests}, metrics=[content["score"]])
-    own = os.path.dirname(options.file) or "."
-    names = [os.path.relpath(path, own) for path in finalists] + (
-        [content["baseline"]] if "baseline" in content else []
-    )
+    names = [*(os.path.relpath(path, own) for path in finalists), content.get("baseline")]
+    names = names if names[-1] else names[:-1]
     other = {key: value for key, value in shared.items() if key not in REPLACED and not key.startswith("errors.")}
     worlds: Dict[str, Any] = {"vary": {"behavior": names, "world": [USUAL, WORST]}}
     if options.errors:
@@ -127,21 +123,23 @@ def compare(options: Any, mission: Mission, folder: str, finalists: Sequence[str
 
 def _run(options: argparse.Namespace, stem: str, content: Dict[str, Any]) -> np.ndarray:
     """Run an experiment and write its report; return the medians of its only metric (behaviors, worlds)."""
-    path, text = stem + ".yaml", yaml.safe_dump(content, sort_keys=False).encode()
+    path, behaviors = stem + ".yaml", content["vary"]["behavior"]
+    files = [os.path.join(os.path.dirname(path), name.partition(":")[0]) for name in behaviors]
+    code = hash_code({file: read_file(file) for file in files if os.path.isfile(file)})
+    text = f"# Made by design for {code}\n{yaml.safe_dump(content, sort_keys=False)}".encode()
     run = runner.parse_options([path, "--jobs", str(options.jobs)])
-    run.executor, run.fresh = options.executor, options.fresh or (os.path.exists(path) and read_file(path) != text)
+    run.executor, run.fresh = options.executor, os.path.exists(path) and read_file(path) != text
     write_file(path, text)
     runner.run_experiment(run)
     write_report(stem)
     (values,) = load(stem).metrics.values()
-    medians: np.ndarray = np.median(values, axis=1).reshape(len(content["vary"]["behavior"]), -1)
+    medians: np.ndarray = np.median(values, axis=1).reshape(len(behaviors), -1)
     return medians
 
 
 def draw(path: str) -> str:
     """Draw a machine beside its file; return what to do with it. Raises: EntryError for an invalid controller."""
     states = read_controller(path, read_file(path)).states if path.endswith(ENDING) else []
-    if not states:
-        return path
-    write_file(path + ".dot", draw_dot(states).encode())
-    return f"{path}; draw it: dot -Tsvg {path}.dot"
+    if states:
+        write_file(path + ".dot", draw_dot(states).encode())
+    return f"{path}; draw it: dot -Tsvg {path}.dot" if states else path

@@ -1,7 +1,4 @@
-"""Ways to find the best candidate, a row of numbers within the limits of its genes. Pure, but for two libraries.
-
-Methods are functions of evaluate, genes, a budget in runs and a RandomState; they return candidates, best first (C, G).
-"""
+"""Functions of evaluate, genes, a budget in runs and a RandomState that return candidates (C, G), best first. Pure."""
 
 import math
 from typing import Any, Callable, NamedTuple, Sequence, Tuple
@@ -11,7 +8,7 @@ import numpy as np
 from hero_node import import_optional
 
 Evaluate = Callable[[np.ndarray, range], np.ndarray]
-"""Function of candidates (C, G) and seeds, counted from 0: scores (C, seeds), larger ones better."""
+"""Scores (C, seeds), larger ones better, of candidates (C, G) with seeds, counted from 0."""
 
 WHOLE, CHOICE, REAL = "whole", "choice", "real"
 """Kinds of genes; choices are whole numbers that have no order."""
@@ -42,8 +39,7 @@ class Genes(NamedTuple):
         return self.low + np.where(self.is_whole, steps, shares * (self.high - self.low))
 
     def vary(self, parents: np.ndarray, spread: float, random: Any) -> np.ndarray:
-        """Return children (C, G): choices change with this probability, numbers by a normal of this share of half their
-        range."""
+        """Return children (C, G): choices change with probability spread, numbers by a normal of spread / 2 ranges."""
         moved = parents + random.standard_normal(parents.shape) * spread * (self.high - self.low) / 2.0
         moved = np.clip(np.where(self.is_whole, np.rint(moved), moved), self.low, self.high)
         chance, shares = random.random_sample((2, *parents.shape))

@@ -14,9 +14,9 @@ Kinds = Dict[str, Tuple[str, ...]]
 _PLAIN: Kinds = dict.fromkeys(("stop", "phototaxis", "anti-phototaxis"), ())
 DO: Kinds = {"exploration": ("turn_steps",), **_PLAIN, **dict.fromkeys(("attraction", "repulsion"), ("gain",))}
 
-_FLOORS = ("black floor", "gray floor", "white floor")
-_COUNTS: Kinds = dict.fromkeys(("neighbor count", "inverted neighbor count"), ("neighbors", "steepness"))
-WHEN: Kinds = {**dict.fromkeys((*_FLOORS, "fixed probability"), ("probability",)), **_COUNTS}
+_SHARES = "black floor", "gray floor", "white floor", "fixed probability"
+_COUNTS = "neighbor count", "inverted neighbor count"
+WHEN: Kinds = {**dict.fromkeys(_SHARES, ("probability",)), **dict.fromkeys(_COUNTS, ("neighbors", "steepness"))}
 
 WHOLE_LIMITS = {"turn_steps": (1, 100), "neighbors": (0, 10)}
 LIMITS = {"gain": (1.0, 5.0), "probability": (0.0, 1.0), "steepness": (0.0, 20.0), **WHOLE_LIMITS}

@@ -114,6 +114,14 @@ def test_a_mission_becomes_controllers_that_are_compared(path, capsys, monkeypat
     assert output.splitlines()[:2] == ["m_chocolate_simulated", "m_chocolate_pseudo_reality"], "reports are written"
     program.main(options)  # nothing is computed again
     assert "runs in" not in capsys.readouterr().err
+    Path(best).write_text("states: [{name: rest, do: stop}]\n")
+    Path("own.controller").write_text("states: [{name: rest, do: stop}]\n")
+    content = {**read_mission("m.yaml").content, "baseline": "own.controller"}
+    mission = read_mission("m.yaml")._replace(content=content)
+    for text in ("states: [{name: rest, do: stop}]\n", "states: [{name: rest, do: phototaxis}]\n"):
+        Path("own.controller").write_text(text)  # a baseline that was edited is run again, by itself
+        program.compare(program.parse_options(options), mission, "m_chocolate", [best])
+        assert "own.controller" in Path("m_chocolate_simulated/runs.csv").read_text()
 
 
 def test_a_killed_design_goes_on_to_the_same_bytes(path, light, capsys):
@@ -253,7 +261,7 @@ def test_a_score_that_is_nan_or_tells_nothing_is_refused(path):
         program.main(["m.yaml", "--budget", "200"])
     (path.parent / "score.py").write_text(SCORE.replace("mean(axis=1)", "mean(axis=1) * 0.0"))
     with pytest.raises(
-        ExperimentError, match="is 0 in all 100 runs of 20 controllers: it tells none apart; change score"
+        ExperimentError, match="score: is 0 in all 100 runs of 20 controllers: it tells none apart; change score"
     ):
         program.main(["m.yaml", "--budget", "200", "--fresh"])
     assert len(Path("m_chocolate/design_1.csv").read_text().splitlines()) == 102, "what was computed is kept"

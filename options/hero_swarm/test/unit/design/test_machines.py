@@ -5,7 +5,9 @@ import pytest
 
 from hero_sim.world import load_arena
 from hero_swarm.behavior import Random, sense
-from hero_swarm.behaviors import find_behavior, make_machine
+from hero_swarm.behaviors import find_behavior, list_names
+from hero_swarm.behaviors.machine import make_machine
+from hero_swarm.describe import describe_behaviors
 from hero_swarm.machines.machine_file import read_controller
 from hero_swarm.machines.modules import draw_dot, follow
 from hero_swarm.trial import Trial
@@ -147,6 +149,14 @@ def test_numbers_of_another_behavior_are_a_controller(folder):
     path.write_text("behavior: dispersion\nnumbers: {spacing_m: 0.3, near.range_m: 0.7}\n")
     behavior = find_behavior(str(path))()
     assert behavior.spacing_m == 0.3 and behavior.near.range_m == 0.7 and type(behavior).__name__ == "Dispersion"
+
+
+def test_pages_offer_the_controllers_of_a_folder(folder, capsys):
+    (folder / "wrong.controller").write_text("states: []\n")
+    offers = {offer["behavior"]: offer for offer in describe_behaviors([str(folder)])}
+    offer = offers[str(folder / "search.controller")]
+    assert offer["title"] == "search" and offer["sentence"] == "A machine whose states robots show by their lights."
+    assert "wrong.controller, line 1: states is" in capsys.readouterr().err and len(offers) == len(list_names()) + 1
 
 
 def test_a_machine_is_drawn_with_its_conditions(folder):
