@@ -8,8 +8,7 @@ from .rosserial.errors import RosserialError
 from .transport.event_loop import CallLater
 
 SILENCE_LIMIT_S = 0.5
-"""A robot that has been silent for this long gets no motion commands: it would take them late, all at once. Pauses of
-0.1 s are common on Wi-Fi; motion that waits is sent when the robot sends again."""
+"""A robot that has been silent for this long gets motion when it sends again; 0.1 s are common on Wi-Fi."""
 
 
 class CommandSender:

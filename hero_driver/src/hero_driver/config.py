@@ -7,7 +7,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, Mapping
 
-from hero_node.files import KeptCalibration, read_calibrations
+from hero_node.files import read_calibrations
 from hero_node.parameters import (
     check_parameters,
     choice,
@@ -19,7 +19,7 @@ from hero_node.parameters import (
 )
 
 from .commands.command_settings import CommandSettings
-from .corrections.correction_settings import CorrectionSettings, OwnWheels
+from .corrections.correction_settings import CorrectionSettings
 from .fleet.admission import AdmissionLimits
 from .rosserial.session import SessionLimits
 
@@ -54,11 +54,5 @@ def read_config(given: Mapping[str, Any]) -> DriverConfig:
     """Return the checked configuration in the given parameters (names without "~"). Raises: ProgramError."""
     config = DriverConfig(**check_parameters(PARAMETERS, given))
     calibrations = read_calibrations(config.calibration_folder)
-    own_wheels = {name: _take_wheels(kept) for name, kept in calibrations.found.items() if "wheels_m" in kept.values}
+    own_wheels = {name: kept for name, kept in calibrations.found.items() if "wheels_m" in kept.values}
     return dataclasses.replace(config, own_wheels=own_wheels, calibration_problems=calibrations.problems)
-
-
-def _take_wheels(kept: KeptCalibration) -> OwnWheels:
-    left_m, right_m, separation_m = kept.values["wheels_m"]
-    ticks_per_turn, model = kept.others.get("ticks_per_turn"), kept.others.get("model", "")
-    return OwnWheels((left_m + right_m) / 2.0, separation_m, right_m / left_m, ticks_per_turn, model)

@@ -175,20 +175,15 @@ class Gateway(LinkHandler):
         peer: Optional[Peer] = self.peers.pop(link, None)
         if peer is None:
             self.last_refusal = f"{link.address}: {reason}"
-            self._log.log_throttled(
-                "warn",
-                "refused " + link.address.host,
-                f"connection of {link.address} refused: {reason}",
-            )
+            text = f"connection of {link.address} refused: {reason}"
+            self._log.log_throttled("warn", "refused " + link.address.host, text)
             return
         self._admission.release(link)
+        level = "debug" if reason == THE_DRIVER_ENDS else "warn"
         if peer.record is None:
             self.last_refusal = f"{link.address}: {reason}"
-            self._log.log_throttled(
-                "debug" if reason == THE_DRIVER_ENDS else "warn",
-                "unidentified " + link.address.host + reason[:12],
-                f"unidentified connection of {link.address} ended: {reason}",
-            )
+            text = f"unidentified connection of {link.address} ended: {reason}"
+            self._log.log_throttled(level, "unidentified " + link.address.host + reason[:12], text)
             return
         if peer.refused:
             peer.record.refused.pop(str(link.address), None)
@@ -201,12 +196,8 @@ class Gateway(LinkHandler):
         if record.link is link:
             record.last_heard_s = peer.session.last_receive_s
         if self.fleet.leave(link, reason, time.monotonic()) is not None:
-            self._log.log_throttled(
-                "debug" if reason == THE_DRIVER_ENDS else "warn",
-                "left " + record.identity.namespace,
-                f"{peer.label} left ({link.address}): {reason}",
-                host=link.address.host,
-            )
+            text = f"{peer.label} left ({link.address}): {reason}"
+            self._log.log_throttled(level, "left " + record.identity.namespace, text, host=link.address.host)
             self.note_change()
         if peer.bridge is not None:
             peer.bridge.detach(reason)
@@ -214,12 +205,9 @@ class Gateway(LinkHandler):
 
     def report_bug(self, error: Exception) -> None:
         """Log a bug of the driver itself, with the place; only the connection at hand is lost."""
-        place = "".join(traceback.format_tb(error.__traceback__)[-2:]).replace("\n", " ")
-        self._log.log_throttled(
-            "fatal",
-            "fault " + type(error).__name__,
-            f"bug in the driver, please report it: {type(error).__name__}: {error}; {place}",
-        )
+        kind, place = type(error).__name__, "".join(traceback.format_tb(error.__traceback__)[-2:]).replace("\n", " ")
+        text = f"bug in the driver, please report it: {kind}: {error}; {place}"
+        self._log.log_throttled("fatal", "fault " + kind, text)
 
     def warn_network(self, text: str) -> None:
         """Log what the transport warns of."""
@@ -420,13 +408,10 @@ class Gateway(LinkHandler):
         """Log that what robots send is read too late to tell what they do, if that is this PC's doing."""
         late_s = self._loop.find_lateness_s()
         if late_s > 0.0:
-            self._log.log_throttled(
-                "warn",
-                "overload",
-                "the PC is overloaded (load %.1f on %d CPUs): the driver ran up to %.1f s late, and does not know yet"
-                " whether robots that were stopped are at rest; end other programs"
-                % (os.getloadavg()[0], os.cpu_count() or 1, late_s),
-            )
+            load = f"load {os.getloadavg()[0]:.1f} on {os.cpu_count() or 1} CPUs"
+            text = f"the PC is overloaded ({load}): the driver ran up to {late_s:.1f} s late, and does not know yet"
+            text += " whether robots that were stopped are at rest; end other programs"
+            self._log.log_throttled("warn", "overload", text)
 
     def _read_without_loop(self, peer: Peer) -> None:
         try:

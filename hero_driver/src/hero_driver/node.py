@@ -54,8 +54,7 @@ REGISTRAR_QUEUE_LENGTH = 20000
 """Topics that may wait for the ROS master: 200 robots of 24 topics that come, leave and come again."""
 
 SWITCH_INTERVAL_S = 0.001
-"""Time limit of other threads on the GIL while the thread of the sockets waits for it; Python's default of 5 ms delayed
-robots while the driver logged a lot, or spoke with the ROS master."""
+"""Time limit of other threads on the GIL while the thread of the sockets waits; Python's 5 ms delayed robots."""
 
 REPORT_CHECK_S = 0.1
 
@@ -325,12 +324,10 @@ def _read_private_parameters() -> Any:
 
 
 def _explain_bind_error(config: DriverConfig, error: OSError) -> str:
-    where = "~host %s, ~port %d" % (config.host, config.port)
+    where = f"~host {config.host}, ~port {config.port}"
     if error.errno == errno.EADDRINUSE:
-        return "%s is in use: end the other program (ss -ltnp 'sport = :%d' names it) or choose another ~port" % (
-            where,
-            config.port,
-        )
+        remedy = f"end the other program (ss -ltnp 'sport = :{config.port}' names it) or choose another ~port"
+        return f"{where} is in use: {remedy}"
     if error.errno == errno.EACCES:
         return f"{where} may not be used without privileges: choose a ~port above 1023"
     if error.errno == errno.EADDRNOTAVAIL:

@@ -177,7 +177,7 @@ def test_wheels_of_calibrated_robots_are_read_from_their_files(tmp_path):
     assert (wheels.wheel_diameter_m, wheels.wheel_separation_m, wheels.ticks_per_turn) == (0.01, 1.0, 1.0)
     (tmp_path / "hero_3.yaml").write_text("robot: hero_3\nmodel: hero_plus\nwheels_m: [0.05, 0.05, 0.0641]\n")
     wheels = read_config({"calibration_folder": str(tmp_path)})
-    assert wheels.own_wheels["hero_3"].model == "hero_plus"
+    assert wheels.own_wheels["hero_3"].others["model"] == "hero_plus"
 
 
 def test_hero_plus_has_its_own_wheels_and_keeps_its_ticks_when_calibrated(tmp_path):

@@ -7,8 +7,8 @@ import pytest
 from corrected_robot import CorrectedRobot
 from robot_messages import MS, NOW_NS
 
-from hero_driver.corrections.correction_settings import OwnWheels
 from hero_driver.corrections.message_layouts import PLUS_ENCODER_MD5
+from hero_node.files import KeptCalibration
 
 STOCK_ENCODER_MD5 = "b5586cdbae9b740afc6a1f403a2d7dde"
 
@@ -56,7 +56,9 @@ def test_an_id_whose_model_changes_is_told_of_and_goes_on_from_where_it_is():
 
 @pytest.mark.parametrize("model, diameter_m", [("hero", 0.050), ("hero_plus", 0.048), ("", 0.048)])
 def test_calibrated_wheels_of_another_model_are_told_of_and_not_used(model, diameter_m):
-    robot = CorrectedRobot(own_wheels={"hero_0": OwnWheels(0.048, 0.06, 1.0, model=model)})
+    robot = CorrectedRobot(
+        own_wheels={"hero_0": KeptCalibration(0, "", {"wheels_m": [0.048, 0.048, 0.06]}, {"model": model})}
+    )
     conflicts = declare(robot, PLUS_ENCODER_MD5)
     assert bool(conflicts) == (model == "hero")
     assert all("it is a hero_plus, but its calibration file says hero" in text for text in conflicts)

@@ -1,8 +1,8 @@
 """When the next burst may go to a robot that tunes itself. Pure: times and readings go in.
 
-A robot reads until nothing is left, and does nothing else meanwhile. A burst that reaches it before it has finished the
-one before keeps it there, deaf, and how long it takes for one is not known: 0.06 s and 0.17 s were measured. TCP
-acknowledges for it at once, so only its readings show that it has finished: without them no further burst goes.
+A robot reads until nothing is left, and does nothing else meanwhile: a burst that comes before it has finished the last
+keeps it deaf. How long it takes is not known (0.06 s and 0.17 s were measured), and TCP acknowledges for it at once, so
+only its readings show that it has finished.
 """
 
 from typing import Optional

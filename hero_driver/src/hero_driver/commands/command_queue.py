@@ -1,8 +1,7 @@
-"""Commands that wait to be sent to one robot.
+"""Commands that wait to be sent to one robot: motion is shaped (velocity_shaper), others never wait behind it.
 
-Motion commands are shaped (velocity_shaper), everything else goes in order and never waits behind them. Queues
-are bounded: a motion command that waits is replaced by a newer one, of the rest the oldest is dropped and counted.
-Motion waits for older stops of other topics, and for their repeats: each zero Twist switches the servos off.
+Queues are bounded: newer motion replaces what waits, of others the oldest is dropped and counted. Motion waits for
+older stops of other topics, and for their repeats: each zero Twist switches the servos off.
 """
 
 import collections
@@ -73,11 +72,10 @@ class CommandQueue:
         self._resume_s = -math.inf
 
     def take(self, in_flight_length: int, motion_acknowledged: bool, stops_only: bool, now_s: float) -> List[Command]:
-        """Return what may be sent now.
+        """Return what may be sent now; with stops_only motion waits.
 
-        in_flight_length: bytes that the robot has not acknowledged; motion_acknowledged: whether the last
-        motion command is not among them. Two velocities in flight could reach the robot together, and it would
-        take the older one. stops_only: send stops only, motion waits.
+        in_flight_length: bytes that the robot has not acknowledged; motion_acknowledged: the last motion command is not
+        among them. Of two velocities that reach the robot together it would take the older one.
         """
         commands: List[Command] = []
         is_idle = motion_acknowledged

@@ -42,12 +42,9 @@ class _Zero(NamedTuple):
 
 
 class CommandSource:
-    """A publisher that commands a robot on one motion topic, while no other one does.
+    """A publisher (`sender`, of `node`) that commands a robot on one motion topic by `source`, while no other one does.
 
     Attributes:
-        sender: its connection.
-        node: the name of its node, empty where that is not known.
-        source: the topic of ROS that it publishes on.
         moves: whether its newest command moves the robot.
         commanded_s: when that came; later where the driver could not hear what followed.
     """
@@ -100,7 +97,6 @@ class CommandSources:
         self._by_topic: Dict[str, CommandSource] = {}
         self._zero: Optional[_Zero] = None  # until its effect shows
         self._looked_s = math.inf
-        self._silent_from_s = -math.inf  # until then none can have been silent for long enough
         self._commands, self._counted_s, self._rate_hz = 0, math.inf, 0.0
         self._resting_readings = 0  # number of readings when motion was last not commanded
 
@@ -114,8 +110,6 @@ class CommandSources:
         ends_motion = not moves and self.are_moving
         if commander is None or commander.sender is not sender or commander.source != source:
             commander = self._by_topic[name] = CommandSource(sender, node, source)
-        if moves and not commander.moves:
-            self._silent_from_s = -math.inf
         commander.note_command(moves, now_s)
         if moves:
             self._zero = None
@@ -162,15 +156,9 @@ class CommandSources:
         """Return a program that moves the robot and has fallen silent, without pauses of the driver; or None."""
         self._forgive_pause(now_s)
         self._looked_s = now_s
-        if now_s < self._silent_from_s:
-            return None
-        first_s = math.inf
         for commander in self._by_topic.values():
-            if commander.moves:
-                if commander.has_fallen_silent(silence_s, now_s):
-                    return commander
-                first_s = min(first_s, commander.commanded_s)
-        self._silent_from_s = first_s + silence_s
+            if commander.moves and commander.has_fallen_silent(silence_s, now_s):
+                return commander
         return None
 
     def find_fault(self, now_s: float) -> str:

@@ -17,15 +17,13 @@ BURST_STOPS = 2
 """Number of stops that a burst counts for: the robot reads it in a reading cycle of its own, as it does two stops."""
 
 INTERVAL_S = 0.025
-"""Time between two stops: each reading cycle of the robot (51 ms) has one. Those that the firmware drops, because
-they come within 50 ms of the last one that it took, do no harm."""
+"""Time between two stops: each reading cycle of the robot (51 ms) has one; those that the firmware drops do no harm."""
 
 STOPS_UNREAD = 6
 """Number of stops sent to a robot that gives no readings of its wheels."""
 
 MOVING_READINGS = 29
-"""Wheels that still turn after this many (1 s) are reported; wheels that turned though stopped are at rest again after
-as many without a turn: slow creep shows."""
+"""Wheels that still turn after this many (1 s) are reported, and at rest again after as many: slow creep shows."""
 
 UNREAD_AFTER_S = 1.0
 SILENT_AFTER_S = 2.0

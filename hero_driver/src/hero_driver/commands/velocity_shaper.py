@@ -1,10 +1,8 @@
 """Shapes a stream of motion commands so that the robot accepts all of them and a stop is never lost.
 
-The firmware drops a velocity that arrives within 50 ms of the last accepted one, stops included
-(VelocityControl.ino:159, PositionControl.ino:160). So: the newest command wins, commands are spaced, and a
-stop is always sent, twice. Programs therefore send a stop once; one that they fail to send, because they hang or have
-gone, is begun in robot_commands. Servo pulses (cmd_motor) are shaped alike: the robot reads every 51 ms, so only the
-newest matters, and none may pile up in front of a stop. Pure: payloads and time go in, payloads come out.
+The firmware drops a velocity within 50 ms of the last accepted one, stops included (VelocityControl.ino:159,
+PositionControl.ino:160). So the newest command wins, commands are spaced, and a stop is always sent, twice. Servo
+pulses (cmd_motor) are shaped alike: the robot reads every 51 ms, and none may pile up in front of a stop. Pure.
 """
 
 import math
@@ -58,10 +56,9 @@ def check_motor_pulses(payload: bytes) -> Optional[bytes]:
 class VelocityShaper:
     """The pending commands of one motion topic of one robot: a stop, which nothing replaces, and one later command."""
 
-    def __init__(self, stop_payload: bytes = ZERO_TWIST, interval_s: float = COMMAND_INTERVAL_S) -> None:
-        """stop_payload: the command that stops the robot; interval_s: least time between two commands."""
+    def __init__(self, stop_payload: bytes = ZERO_TWIST) -> None:
+        """stop_payload: the command that stops the robot."""
         self._stop_payload = stop_payload
-        self._interval_s = interval_s
         self._stop_pending = False
         self._newest: Optional[bytes] = None
         self._repeats_left = 0
@@ -121,5 +118,5 @@ class VelocityShaper:
             self._repeats_left -= 1
         else:
             return None
-        self._next_s = now_s + self._interval_s
+        self._next_s = now_s + COMMAND_INTERVAL_S
         return payload

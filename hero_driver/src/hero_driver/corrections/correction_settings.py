@@ -1,9 +1,9 @@
 """The parameters that corrections depend on, and the robots' calibrated wheels. Pure."""
 
 from dataclasses import dataclass, field
-from typing import Any, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Mapping, Tuple
 
-from hero_node.files import STOCK
+from hero_node.files import STOCK, KeptCalibration
 from hero_node.parameters import Parameter, declare, is_number, make_error, number, string
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
@@ -21,18 +21,6 @@ def _declare_diagonal(what: str, unit: str, *default: float) -> Any:
     return declare(Parameter(default, _read_diagonal, text, unit))
 
 
-class OwnWheels(NamedTuple):
-    """A robot's calibrated wheels."""
-
-    diameter_m: float
-    separation_m: float
-    diameter_ratio: float
-    ticks_per_turn: Optional[float] = None
-    """None: as all of its model."""
-    model: str = ""
-    """Model of the robot that was calibrated; empty: not known."""
-
-
 @dataclass(frozen=True)
 class CorrectionSettings:
     """Wheels, and accuracy of odometry."""
@@ -47,7 +35,7 @@ class CorrectionSettings:
     twist_covariance: Tuple[float, ...] = _declare_diagonal(
         "twist", "m^2/s^2, rad^2/s^2", 1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2
     )
-    own_wheels: Mapping[str, OwnWheels] = field(default_factory=dict)
+    own_wheels: Mapping[str, KeptCalibration] = field(default_factory=dict)
     """Wheels of robots whose wheels were calibrated, by name, such as hero_3; from ~calibration_folder."""
     calibration_problems: Mapping[str, str] = field(default_factory=dict)
     """Reasons why calibration files are not used, for users, by the robot's name."""
@@ -57,7 +45,8 @@ class CorrectionSettings:
         geometry, own = PLUS_WHEELS, self.own_wheels.get(name)
         if model == STOCK:
             geometry = WheelGeometry(self.wheel_diameter_m, self.wheel_separation_m, self.ticks_per_turn)
-        if own is None or own.model not in ("", model):
+        if own is None or own.others.get("model", "") not in ("", model):
             return geometry
-        ticks_per_turn = own.ticks_per_turn or geometry.ticks_per_turn
-        return WheelGeometry(own.diameter_m, own.separation_m, ticks_per_turn, own.diameter_ratio)
+        left_m, right_m, separation_m = own.values["wheels_m"]
+        ticks_per_turn = own.others.get("ticks_per_turn") or geometry.ticks_per_turn
+        return WheelGeometry((left_m + right_m) / 2.0, separation_m, ticks_per_turn, right_m / left_m)

@@ -50,9 +50,10 @@ class ModelWatch:
             text = "it was a %s and is a %s now, by whose wheels its odometry goes on: two robots need two ids"
             return text % (self._former[0], self.model)
         own = self._settings.own_wheels.get(self._name)
-        if own is not None and own.model not in ("", self.model):
+        calibrated = "" if own is None else own.others.get("model", "")
+        if calibrated not in ("", self.model):
             text = "it is a %s, but its calibration file says %s, whose wheels are not used: calibrate it again"
-            return text % (self.model, own.model)
+            return text % (self.model, calibrated)
         if self.model == STOCK and self._has_distance:
             return (
                 "it declares the distance sensor of HeRo+ but the Encoder message of stock robots: if its encoders are"

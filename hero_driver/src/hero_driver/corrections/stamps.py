@@ -1,7 +1,6 @@
-"""Corrects stamps of robots: not in the future, never backwards, not uptime.
+"""Corrects stamps (ns) of robots: not in the future, never backwards, not uptime. Pure: time of arrival comes in.
 
-The robot's clock is set anew every 2.5 s and jumps then (node_handle.h:361); before the first answer it
-counts from boot. Pure: stamps are integers in nanoseconds since the epoch, time of arrival comes in.
+The robot's clock is set anew every 2.5 s and jumps then (node_handle.h:361); before that it counts from boot.
 """
 
 import collections
@@ -27,12 +26,10 @@ Topic = Union[str, bytes]
 
 
 class StampFilter:
-    """Corrects the stamps of all topics of one robot, and counts their messages.
+    """Corrects the stamps of all topics of one robot, and counts their messages; corrected: stamps that were replaced.
 
-    Attributes:
-        corrected: stamps that were replaced so far.
-        last_ns: the newest stamp of each topic. One that correct() has let through unchanged at this time of arrival
-            may be written here for other topics with older ones, without asking again.
+    last_ns: the newest stamp of each topic. One that correct() has let through unchanged may be written here for other
+    topics with older ones, at the same time of arrival.
     """
 
     def __init__(self) -> None:

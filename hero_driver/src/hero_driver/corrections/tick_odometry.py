@@ -52,12 +52,10 @@ PLUS_WHEELS = WheelGeometry(wheel_diameter_m=0.050, wheel_separation_m=0.065, ti
 
 
 class TickOdometry:
-    """The odometry of one robot; one per robot, kept over its reconnects.
+    """The odometry of one robot, kept over its reconnects: pose in hero_N/odom, velocity in hero_N/base_link.
 
     Attributes:
-        x_m, y_m, yaw_rad: the pose in frame hero_N/odom.
-        linear_m_s, angular_rad_s: the velocity over the last TWIST_WINDOW readings, in frame hero_N/base_link; zero
-            while there are less than two.
+        linear_m_s, angular_rad_s: over the last TWIST_WINDOW readings; zero while there are less than two.
         has_reading: whether there was one ever.
         resets: steps that were too large for a robot's motion.
         fault: what was wrong with the newest reading that was not believed, with a remedy, for users.

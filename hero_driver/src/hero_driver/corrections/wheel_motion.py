@@ -1,8 +1,7 @@
-"""Tells whether the wheels of a robot turn, from its encoder readings, or from odometry where it has no encoder. Pure.
+"""Tells by encoder readings, or by odometry without them, whether the wheels of a robot turn. Pure.
 
-Rest is counted in readings (29 per second of the robot's own time), not in time of arrival: readings that a
-network held back arrive all at once. Readings behind which more wait to be read are late, and no evidence: they may be
-from before a stop.
+Rest is counted in readings (29 per second of the robot's time): those that a network held back arrive all at once.
+Readings behind which more wait to be read are late, and no evidence: they may be from before a stop.
 """
 
 import collections
@@ -27,12 +26,9 @@ ANGULAR_REST_RAD_S = 0.05
 
 
 class WheelMotion:
-    """Motion of the wheels by the readings of one connection.
+    """Motion of the wheels by the readings of one connection that came in time; still_readings: those since a turn.
 
-    Attributes:
-        is_late: whether the readings that come now are late; set by the receiver.
-        readings: how many came in time.
-        still_readings: how many of them came since a wheel was last seen to turn.
+    is_late: whether the readings that come now are late; set by the receiver.
     """
 
     def __init__(self) -> None:

@@ -10,15 +10,13 @@ from hero_node.parameters import Parameter, declare, make_error, whole_number
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
 
 GARBAGE_BURST_LENGTH = 65536
-"""Bytes outside of packets that one address may send at once: a robot that reconnects leaves a truncated packet of
-below 1 kB, and to search 4096 bytes takes up to 1 ms."""
+"""Bytes outside of packets that one address may send at once: a robot that reconnects leaves below 1 kB."""
 
 GARBAGE_PER_S = 16384.0
 """Bytes outside of packets that one address may send per second after that."""
 
 NEW_ROBOTS_PER_S = 5.0
-"""New robots of one address for which topics are set up, after as many at once as it may have connections: each costs
-20 calls to the ROS master. One hundred simulated robots that are restarted every 30 s stay below it."""
+"""New robots of one address per second, after as many as it may have connections: each is 20 calls to the master."""
 
 
 def _read_networks(name: str, value: Any) -> Tuple[Network, ...]:

@@ -121,12 +121,9 @@ class Endpoints:
             try:
                 call()
             except Exception as error:  # noqa: BLE001 - one that cannot be unregistered must not keep the others
-                self._log(
-                    "error",
-                    "unregister " + type(error).__name__,
-                    "%s: a topic or service could not be unregistered: %s: %s"
-                    % (self._label, type(error).__name__, error),
-                )
+                kind = type(error).__name__
+                text = f"{self._label}: a topic or service could not be unregistered: {kind}: {error}"
+                self._log("error", "unregister " + kind, text)
 
     def _find_class(self, kind: str, name: str, layout: Layout) -> Optional[Any]:
         """Return the class of a topic or service; None, after one clear problem, if it cannot be used."""

@@ -29,8 +29,7 @@ from .transform_publisher import TransformPublisher
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 VELOCITY_ALIAS = "/cmd_vel"
-"""Topic of teleop_twist_keyboard, move_base and the like, an alias of VELOCITY_CONTROLLER: the newest command wins, as
-if two programs published on one topic."""
+"""Topic of teleop_twist_keyboard and the like, an alias of VELOCITY_CONTROLLER: the newest command wins."""
 
 ENCODER_TYPE = "hero_msgs/Encoder"
 TRANSFORM_TYPE = "tf2_msgs/TFMessage"
@@ -214,11 +213,8 @@ class RobotBridge:
         if requests is None or answers is None:
             return
         if requests.info.message_type != answers.info.message_type:
-            self._endpoints.report_error(
-                name,
-                "service %s refused: its halves are %s and %s"
-                % (name, requests.info.message_type, answers.info.message_type),
-            )
+            halves = f"{requests.info.message_type} and {answers.info.message_type}"
+            self._endpoints.report_error(name, f"service {name} refused: its halves are {halves}")
             return
         ros_type = message_types.apply_aliases(requests.info.message_type)
         layout = Layout(ros_type, (requests.info.md5sum, answers.info.md5sum))

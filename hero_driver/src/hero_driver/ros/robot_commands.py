@@ -56,11 +56,9 @@ class Owner(Protocol):
 
 
 class RobotCommands:
-    """The commands of all programs to one robot.
+    """The commands of all programs to one robot: the queue of those that wait, and how many it was refused.
 
     Attributes:
-        queue: those that wait to be sent.
-        refused: how many the robot was not given.
         fault: what is wrong with how the robot is commanded now; empty if nothing is.
         light: the color (std_msgs/ColorRGBA) that its light was given last.
         was_told_to_tune: whether a program called the service that starts its self-tuning.
@@ -132,12 +130,10 @@ class RobotCommands:
         command = check(payload)
         if command is None:
             self.refused += 1
-            self._log.log_throttled(
-                "warn",
-                source,
-                "%s: a command on %s is not finite and was refused; correct the program that sends it"
-                % (self._label, source),
+            text = (
+                f"{self._label}: a command on {source} is not finite and was refused; correct the program that sends it"
             )
+            self._log.log_throttled("warn", source, text)
             if self._commanders.find(name) is not None or self.tunes(time.monotonic()):
                 # It must not continue its previous command.
                 self._stop_robot()
@@ -145,12 +141,8 @@ class RobotCommands:
         moves, subscriber = command != stop_payload, self._subscribers[source]
         if moves and subscriber.is_old:
             self.refused += 1
-            self._log.log_throttled(
-                "warn",
-                "old " + source,
-                "%s: a command on %s was refused, because it may be from before the robot, or the driver, was there"
-                " or ran; send it again" % (self._label, source),
-            )
+            text = f"{self._label}: a command on {source} was refused, because it may be from before the robot, or the"
+            self._log.log_throttled("warn", "old " + source, text + " driver, was there or ran; send it again")
         elif self._peer is None or (moves and self._owner.stopped):
             self.refused += 1
         else:
@@ -172,12 +164,9 @@ class RobotCommands:
         if not before or not after or before == after:
             return
         if after == self._superseded[0] and now_s - self._superseded[1] < SUPERSEDED_S:
-            self._log.log_throttled(
-                "warn",
-                "two programs " + self._label,
-                "%s is commanded by %s and %s at once and obeys the newest command: end one of them"
-                % (self._label, *sorted((before, after))),
-            )
+            text = "%s is commanded by %s and %s at once and obeys the newest command: end one of them"
+            names = (self._label, *sorted((before, after)))
+            self._log.log_throttled("warn", "two programs " + self._label, text % names)
         self._superseded = before, now_s
 
     def _receive_command(self, name: str, payload: bytes) -> None:

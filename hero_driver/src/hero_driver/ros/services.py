@@ -1,10 +1,8 @@
 """Services that a robot offers, as ROS services: one call at a time, with a time limit and clear errors.
 
-A call carries no number on the wire: its answer is known by topic and order only. So one answer at most is outstanding:
-after a timeout the service stays closed, for further calls fail at once, until the late answer has come, the connection
-has ended, which no answer outlasts, or LATE_ANSWER_S has passed, because a request or its answer may be lost.
-Otherwise the late answer would be taken for that of the next call, and each one after it for that of the next but one.
-Everything here runs on the thread of the sockets, except RobotService.call().
+An answer is known by topic and order only, so one at most is outstanding: after a timeout further calls fail at once,
+until the late answer has come, the connection has ended, or LATE_ANSWER_S has passed, because a request or its answer
+may be lost. Otherwise each answer would be taken for that of the next call. Thread of the sockets, but for call().
 """
 
 import collections
@@ -23,8 +21,7 @@ HANG_WAIT_S = 1.0
 """Grace after a call's time limit: the thread of the sockets hangs if it has not answered by then."""
 
 LATE_ANSWER_S = 30.0
-"""An answer that is later than its time limit by more than this never comes. A robot that reads or sends nothing for
-~silence_timeout_s (6 s) is disconnected, and one that runs answers what it has read within 0.1 s."""
+"""A later answer never comes: robots that are silent for 6 s are disconnected, others answer within 0.1 s."""
 
 
 class _Call:

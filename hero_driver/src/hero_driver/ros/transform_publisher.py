@@ -21,13 +21,7 @@ TRANSFORMS_MAX = 500
 
 
 class TransformPublisher:
-    """The publisher of /tf.
-
-    Attributes:
-        add: takes the bytes of one geometry_msgs/TransformStamped, 150 times per robot and second, so it is the list's
-            own method; schedule() has to follow.
-        is_scheduled: whether what was added is going to be published already.
-    """
+    """The publisher of /tf: add(geometry_msgs/TransformStamped as bytes), then schedule() unless is_scheduled."""
 
     def __init__(self, call_later: CallLater) -> None:
         """call_later(delay_s, call) runs call on the same thread."""

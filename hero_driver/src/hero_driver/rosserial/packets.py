@@ -94,15 +94,10 @@ def encode_packet(topic_id: int, payload: Bytes) -> bytes:
 
 
 class PacketReader:
-    """Cuts a stream of bytes into packets, whatever arrives.
+    """Cuts a stream of bytes into packets, whatever arrives, and counts packets, bad_packets and skipped_bytes.
 
-    Wrong bytes are counted and skipped, never raised: after a wrong checksum the search continues one byte
-    behind the packet's start, so that a good packet inside is not lost. At most one packet of unread bytes is kept.
-
-    Attributes:
-        packets: good packets so far.
-        bad_packets: packet starts whose length or payload checksum was wrong, or that were too long.
-        skipped_bytes: bytes that belonged to no good packet.
+    After a wrong checksum the search continues one byte behind the packet's start, so that a good packet inside is not
+    lost. At most one packet of unread bytes is kept.
     """
 
     def __init__(self, max_payload_length: int = DEFAULT_MAX_PAYLOAD_LENGTH) -> None:

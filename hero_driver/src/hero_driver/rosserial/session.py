@@ -1,8 +1,7 @@
 """One conversation with one robot: bytes in and events out, commands in and packets out.
 
-The session asks for the robot's topics until it has them, answers its time requests, keeps what the robot
-declared and never sends an undeclared topic id. It holds no socket and no clock: time enters as `now_s` (monotonic, s)
-and `time_of_day_s` (ROS time, s). A peer's mistake is a Problem event or a counter, never an exception.
+It asks for the robot's topics until it has them, answers its time requests, and never sends an undeclared topic id.
+Time enters as `now_s` (monotonic) and `time_of_day_s` (ROS). A peer's mistake is a Problem event or a counter.
 Source: ros_lib node_handle.h (negotiateTopics, requestSyncTime, spinOnce) and the stock robot as measured.
 """
 
@@ -22,8 +21,7 @@ REQUEST_INTERVAL_S = 1.5
 """Time between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
 
 TIME_WITHOUT_TOPICS_S = 0.2
-"""Time limit for topics after a time request while nothing is declared. In a whole handshake they
-follow in the same burst (node_handle.h:301); alone it is the zero-topic handshake, cured by a new request."""
+"""Time limit for topics after a time request (node_handle.h:301); without them a new request is the cure."""
 
 REPEAT_INTERVAL_S = 0.5
 """Time between two requests for topics when a peer proves that it runs but declared nothing."""
@@ -32,13 +30,10 @@ DATA_SILENCE_S = 5.0
 """A robot that has declared topics sends data 29 times in a second."""
 
 UNCONFIGURED_S = 3.0
-"""A robot that logs but sent neither data nor a time request for this long has lost its configuration (no answer
-for 11 s, node_handle.h:193); it asks for the time every 2.55 s otherwise. Only a new request restores it."""
+"""A robot that only logs for this long has lost its configuration (node_handle.h:193): a new request restores it."""
 
 UNDECLARED_REPEATS = 5
 """Requests that undeclared ids may cause while the robot has declared something else."""
-
-BUFFER_LENGTH_MIN = 1
 
 NAME_LENGTH_MAX = 128
 """Length limit of names of topics and types, bytes."""
@@ -60,10 +55,9 @@ class TopicKind(enum.Enum):
     @property
     def is_from_robot(self) -> bool:
         """Return whether the robot sends this id (else it receives it)."""
-        return self in _FROM_ROBOT
+        return self in (TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS)
 
 
-_FROM_ROBOT = frozenset((TopicKind.PUBLISHER, TopicKind.SERVICE_ANSWERS))
 _KIND_BY_PACKET_ID = {kind.value: kind for kind in TopicKind}
 
 
@@ -112,14 +106,9 @@ class SessionLimits:
 
 
 class Session:
-    """The state of one conversation; one per connection, never reused.
+    """The state of one conversation, one per connection: topics by id, and outgoing packets for take_packets().
 
-    Attributes:
-        topics: declared topics by id.
-        reader: the packet reader, for its counters.
-        undeclared_messages: messages on ids that were not declared.
-        outgoing: packets that the session itself wants to send; take_packets() takes them.
-        last_receive_s: when a whole packet came last, or the conversation began.
+    last_receive_s: when a whole packet came last, or the conversation began.
     """
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
@@ -307,7 +296,7 @@ class Session:
             return f"its md5 {_shorten(info.md5sum)} is not 32 hexadecimal digits"
         if info.topic_id < packets.FIRST_TOPIC_ID:
             return "its id %d is below %d" % (info.topic_id, packets.FIRST_TOPIC_ID)
-        if info.buffer_length < BUFFER_LENGTH_MIN:
+        if info.buffer_length < 1:
             return "its buffer_size is %d" % info.buffer_length
         return None
 

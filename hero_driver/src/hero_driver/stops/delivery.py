@@ -1,19 +1,16 @@
-"""Stops robots, and confirms by their wheels that they are at rest.
+"""Stops robots, and confirms by their wheels that they are at rest. Thread of the sockets.
 
-One stop is one write with a zero for every motion topic that the connection declared, whatever was used before, and
-whichever id it declares. It is repeated until the wheels are at rest or a newer command moves the robot,
-because the firmware drops a Twist that comes within 50 ms of the last one (VelocityControl.ino:159), and because only
-the wheels show what a robot has taken. The two controllers know nothing of each other, so each gets its zero. A zero
-Twist also ends servo pulses (cmd_motor): it switches the servos off. Pulses of 1500 us would not: they turn a wheel
-whose servo has another center, and with the servo timing of ESP8266 Arduino core 3 each costs the robot 20 ms. Only a
-robot that takes no Twist gets them.
+One stop is one write with a zero for every motion topic that the connection declared. It is repeated until the wheels
+rest or a newer command moves the robot: the firmware drops a Twist within 50 ms of the last one
+(VelocityControl.ino:159), and only the wheels show what a robot has taken. The two controllers know nothing of each
+other, so each gets its zero. A zero Twist also ends servo pulses (cmd_motor): it switches the servos off. Pulses of
+1500 us would turn a wheel whose servo has another center, and with the servo timing of ESP8266 Arduino core 3 each
+costs the robot 20 ms: only a robot that takes no Twist gets them.
 
 A robot that tunes itself (pid_calibration) drops every zero within 50 ms of its controller's last run, and that runs
 every 21 ms. Only a read that takes longer lets a zero through: BURST_LIGHTS light commands (1 ms each) and the zeros in
-one write, small enough for the robot's TCP window of 2144 bytes, and no second one before the robot has read the first
-(burst_gate). They hold the robot's last color, so that its light stays as it was, dark if there was none.
-
-Runs on the thread of the sockets and never blocks, except stop_without_loop(), for when that thread's loop has broken.
+one write, below the robot's TCP window of 2144 bytes, and no second one before the robot has read the first
+(burst_gate). They hold the robot's last color, so that its light stays as it was.
 """
 
 import time

@@ -1,7 +1,6 @@
-"""The emergency stop in ROS: the service ~stop, the topic ~stop_request, and the stop kept over restarts.
+"""The emergency stop in ROS: the service ~stop, the topic ~stop_request, and the stop kept over restarts (store).
 
-Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow, and ask
-until ~robots says that the robots are stopped. Whether they are is kept on disk (store).
+Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow.
 """
 
 import contextlib

@@ -31,8 +31,7 @@ LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver is restarted (ArduinoTcpHardware.h:99)."""
 
 POLL_INTERVAL_S = 0.05
-"""The handler is polled this often for what is due: silence of programs, and for every other connection in turn its
-silence and repeated requests. One timer for all, because each costs a turn of the loop; messages wait meanwhile."""
+"""Period of the handler's polls, each for every other connection: one timer for all, as each costs a turn."""
 
 PAUSE_S = 1.0
 """Time from one turn of the loop to the next, s, beyond which the driver or its PC was suspended, or too busy."""
@@ -51,8 +50,7 @@ ACCEPT_PAUSE_S = 0.5
 
 
 FILES_RESERVED = 64
-"""Files that robots leave to ROS, at most a quarter of all: rospy takes no subscriber ever again once it could
-not open a file for one."""
+"""Files that robots leave to ROS, at most a quarter: rospy takes no subscriber ever again once it had none left."""
 
 THE_DRIVER_ENDS = "the driver ends"
 """Reason with which all links are closed at the end."""

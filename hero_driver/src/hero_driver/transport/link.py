@@ -9,12 +9,10 @@ import termios
 from typing import Any, Callable, Deque, NamedTuple, Optional, Protocol
 
 READ_LENGTH = 4096
-"""Read at once from one robot: two bursts. What looks like a packet at every second byte costs 1 ms at this length,
-so that no robot's bytes, however wrong, delay the others by more in a turn of the loop."""
+"""Read at once from one robot: two bursts, which delay the others by 1 ms at most, however wrong they are."""
 
 UNSENT_MAX = 65536
-"""Bytes that wait for a peer that does not read. A robot gets 6 B/s, and commands only after it has taken the
-last ones, so this is no robot."""
+"""Bytes that wait for a peer that does not read: no robot, which gets commands after it has taken the last."""
 
 _INT = struct.Struct("i")
 

@@ -97,15 +97,9 @@ def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> D
     declared: name -> a Parameter, or a default that needs no check. Raises: ProgramError, also for other names.
     """
     for name in sorted(set(given) - set(declared)):
-        near = difflib.get_close_matches(name, declared, 1)
-        raise ProgramError(
-            "unknown parameter ~%s%s; known are: %s"
-            % (
-                name if name.isprintable() else ascii(name),
-                "; did you mean ~%s?" % near[0] if near else "",
-                ", ".join(sorted(declared)),
-            )
-        )
+        hint = "".join(f"; did you mean ~{near}?" for near in difflib.get_close_matches(name, declared, 1))
+        shown = name if name.isprintable() else ascii(name)
+        raise ProgramError(f"unknown parameter ~{shown}{hint}; known are: {', '.join(sorted(declared))}")
     return {
         name: parameter.check(name, given.get(name, parameter.default))
         if isinstance(parameter, Parameter)

@@ -14,13 +14,11 @@ from rospy.impl import tcpros_base
 from .handshakes import ConnectionLimit, HandshakeReader
 
 XMLRPC_CONNECTIONS_MAX = 256
-"""Calls of the master and of other nodes, each with a thread for as long as it is open: they stay open between calls,
-one of each node at most, and are opened again when they were closed meanwhile."""
+"""Connections of the master and of other nodes, one of each, and each with a thread for as long as it is open."""
 
 WAITING_CONNECTIONS = 1024
-"""Subscribers that may wait to be accepted. rospy lets 5 wait, while one recorder or RViz comes for all topics of all
-robots at once: the others' connections stall in TCP's back-off, for a minute and more with fifty robots. The system may
-cap it (net.core.somaxconn, 4096 on Linux)."""
+"""Subscribers that may wait to be accepted; rospy's 5 stall in TCP's back-off when RViz comes for fifty robots' topics.
+The system may cap it (net.core.somaxconn, 4096 on Linux)."""
 
 REASON_LENGTH_MAX = 300
 """rospy's reason to refuse a connection may list every topic of the node: 200 kB with 100 robots."""

@@ -80,10 +80,8 @@ def check_master() -> None:
     try:
         ask_master("getPid")
     except NodeError as error:
-        raise NodeError(
-            "%s: start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI, for example to"
-            " http://localhost:11311" % error
-        ) from None
+        remedy = "start roslaunch hero_bringup hero_bringup.launch first, or set ROS_MASTER_URI, for example to"
+        raise NodeError(f"{error}: {remedy} http://localhost:11311") from None
 
 
 def find_running_node(default_name: str) -> str:
