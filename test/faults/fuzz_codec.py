@@ -50,7 +50,7 @@ def try_bytes(data):
         session.poll(0.01 * index)
     if len(session.topics) > MAX_TOPICS:
         raise AssertionError("more topics than allowed")
-    if session.reader.buffered_length >= DEFAULT_MAX_PAYLOAD_LENGTH + OVERHEAD_LENGTH:
+    if len(session.reader.remainder) >= DEFAULT_MAX_PAYLOAD_LENGTH + OVERHEAD_LENGTH:
         raise AssertionError("more bytes kept than one packet")
 
 

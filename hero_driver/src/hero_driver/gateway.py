@@ -136,12 +136,18 @@ class Gateway(LinkHandler):
     def poll(self, now_s: float) -> None:
         """Stop robots whose programs have fallen silent, and take down what belongs to robots that left for good."""
         for bridge in self.bridges.values():
-            bridge.commands.watch_commanders(now_s)
-            problem = bridge.corrections.take_problem()
-            if problem:
-                line = f"{bridge.label}: {problem}"
-                self._log.log_throttled("warn", bridge.label + problem.split(" ", 1)[0], line, bridge.label)
+            try:
+                self._watch(bridge, now_s)
+            except Exception as error:  # noqa: BLE001 - an error with one robot must not keep the others moving
+                self.report_bug(error)
         self._collect_expired(now_s)
+
+    def _watch(self, bridge: RobotBridge, now_s: float) -> None:
+        bridge.commands.watch_commanders(now_s)
+        problem = bridge.corrections.take_problem()
+        if problem:
+            line = f"{bridge.label}: {problem}"
+            self._log.log_throttled("warn", bridge.label + problem.split(" ", 1)[0], line, bridge.label)
 
     def poll_link(self, link: Link, now_s: float) -> None:
         """Perform what is due in the session."""

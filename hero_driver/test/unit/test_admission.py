@@ -46,7 +46,7 @@ def test_addresses_of_the_allowed_networks_may_come(host):
 def test_other_addresses_are_refused_with_the_name_of_the_parameter(host):
     admission = make_admission("10.42.0.0/24", "fe80::/10", "192.168.4.1")
     assert "~allow" in try_to_connect(admission, host)
-    assert admission.unidentified == 0
+    assert len(admission._unidentified) == 0
 
 
 def test_connections_beyond_the_total_are_refused_until_one_leaves():
@@ -121,7 +121,7 @@ def test_a_refused_connection_counts_nowhere():
         assert try_to_connect(admission, "10.0.0.2") is not None
     admission.release(first)
     connect(admission, "10.0.0.2")
-    assert admission.unidentified == 1
+    assert len(admission._unidentified) == 1
 
 
 # Rates.

@@ -411,19 +411,19 @@ def test_the_loop_listens_where_it_was_told_to():
         opened._close_all()
 
 
-def test_the_handler_is_polled_and_every_other_link_though_it_fails(still_loop, monkeypatch):
+def test_the_handler_and_every_other_link_are_polled_though_each_fails(still_loop, monkeypatch):
     loop, handler = still_loop
     links, polled = [Stub(closed=closed) for closed in (False, False, True, False)], []
     loop._timers.clear()
     monkeypatch.setattr(event_loop.time, "monotonic", lambda: 1000.0)
     monkeypatch.setattr(loop, "_links", dict(enumerate(links, 5)))
     handler.poll = lambda now_s: polled.append(now_s) or 1 / 0
-    handler.poll_link = lambda link, now_s: polled.append(links.index(link))
+    handler.poll_link = lambda link, now_s: polled.append(links.index(link)) or 1 / 0
     loop._poll()
     first = polled[:]
     assert [(due_s, call) for due_s, _, call in loop._timers] == [(1000.05, loop._poll)]
     loop._poll()
-    assert first == [1000.0, 1, 3] and polled[3:] == [1000.0, 0] and len(handler.bugs) == 2
+    assert first == [1000.0, 1, 3] and polled[3:] == [1000.0, 0] and len(handler.bugs) == 5
 
 
 @pytest.mark.parametrize("error", [RuntimeError, MemoryError, SystemExit, KeyboardInterrupt])

@@ -54,8 +54,7 @@ class Driver:
         for module in (gateway_module, delivery):
             monkeypatch.setattr(module.time, "monotonic", lambda: self.now_s)
         log = SimpleNamespace(
-            log_throttled=self.log_throttled,
-            log=lambda level, text: self.lines.append((level, text)),
+            log_throttled=self.log_throttled, log=lambda level, text: self.lines.append((level, text))
         )
         self.lateness_s = 0.0
         loop = SimpleNamespace(
@@ -401,11 +400,11 @@ def test_an_overloaded_pc_is_named_instead_of_robots_until_it_is_not(driver, mon
 
 def test_a_robot_that_has_said_who_it_is_leaves_the_unidentified_ones(driver):
     links = [driver.connect(port=port) for port in (1, 2)]
-    assert driver.gateway._admission.unidentified == 2
+    assert len(driver.gateway._admission._unidentified) == 2
     driver.receive(links[0])
-    assert driver.gateway._admission.unidentified == 1
+    assert len(driver.gateway._admission._unidentified) == 1
     links[1].close("closed by the robot")
-    assert driver.gateway._admission.unidentified == 0
+    assert len(driver.gateway._admission._unidentified) == 0
 
 
 def test_a_topic_keeps_its_publisher_until_its_layout_changes(driver):
@@ -480,12 +479,14 @@ def test_after_the_end_of_a_connection_nothing_of_the_same_read_counts(driver, m
     assert len(received) == 1 and not first.closed
 
 
-def test_commanders_are_watched_at_each_poll(driver):
-    bridge, looks = join_bridge(driver), []
-    bridge.commands.watch_commanders = looks.append
+def test_a_bug_with_one_robot_keeps_the_programs_of_the_others_watched(driver):
+    first, looks = join_bridge(driver), []
+    driver.join(OTHER_HOST, number=7)
+    first.commands.watch_commanders = lambda now_s: 1 / 0
+    driver.gateway.bridges["/hero_7"].commands.watch_commanders = looks.append
     for now_s in (100.0, 100.05):
         driver.gateway.poll(now_s)
-    assert looks == [100.0, 100.05]
+    assert looks == [100.0, 100.05] and driver.lines[-1][0] == "fatal" and "ZeroDivisionError" in driver.lines[-1][1]
 
 
 def test_calls_of_services_fail_with_the_reason_when_the_robot_leaves(driver):

@@ -46,7 +46,7 @@ def read_in_pieces(data, cuts):
 
 
 def count(reader):
-    return reader.packets, reader.bad_packets, reader.skipped_bytes, reader.buffered_length
+    return reader.packets, reader.bad_packets, reader.skipped_bytes, len(reader.remainder)
 
 
 @by_vector
@@ -58,7 +58,7 @@ def test_a_packet_is_encoded_as_written_by_hand(vector):
 def test_a_packet_is_read_whole(vector):
     reader = PacketReader()
     assert reader.receive_bytes(vector.data) == [(vector.topic_id, vector.payload)]
-    assert (reader.packets, reader.bad_packets, reader.skipped_bytes, reader.buffered_length) == (1, 0, 0, 0)
+    assert (reader.packets, reader.bad_packets, reader.skipped_bytes, len(reader.remainder)) == (1, 0, 0, 0)
 
 
 @by_vector
@@ -66,9 +66,9 @@ def test_a_packet_is_read_byte_by_byte_and_comes_with_its_last_byte(vector):
     reader = PacketReader()
     for position in range(len(vector.data) - 1):
         assert reader.receive_bytes(vector.data[position : position + 1]) == []
-        assert reader.buffered_length == position + 1
+        assert len(reader.remainder) == position + 1
     assert reader.receive_bytes(vector.data[-1:]) == [(vector.topic_id, vector.payload)]
-    assert (reader.bad_packets, reader.skipped_bytes, reader.buffered_length) == (0, 0, 0)
+    assert (reader.bad_packets, reader.skipped_bytes, len(reader.remainder)) == (0, 0, 0)
 
 
 @by_vector
@@ -136,7 +136,7 @@ def test_a_payload_over_the_limit_is_bad_as_soon_as_its_header_is_read():
     assert reader.receive_bytes(build_packet(125, bytes(100))) == [(125, bytes(100))]
     assert reader.receive_bytes(build_packet(125, bytes(101))[:7]) == []
     assert reader.bad_packets == 1
-    assert reader.buffered_length == 0
+    assert len(reader.remainder) == 0
     assert reader.receive_bytes(GOOD.data) == [(GOOD.topic_id, GOOD.payload)]
 
 
@@ -150,7 +150,7 @@ def test_arbitrary_bytes_never_raise_and_every_byte_is_accounted_for(data):
     packets = reader.receive_bytes(data)
     assert reader.packets == len(packets)
     used = sum(len(packet.payload) + 8 for packet in packets)
-    assert used + reader.skipped_bytes + reader.buffered_length == len(data)
+    assert used + reader.skipped_bytes + len(reader.remainder) == len(data)
 
 
 @given(before=noise, sent=st.lists(st.tuples(topic_ids, payloads), max_size=5), between=noise, data=st.data())
@@ -168,7 +168,7 @@ def test_at_most_one_packet_waits_in_memory(chunks, limit):
     reader = PacketReader(limit)
     for chunk in chunks:
         reader.receive_bytes(chunk)
-        assert reader.buffered_length < limit + 8
+        assert len(reader.remainder) < limit + 8
 
 
 @given(before=st.binary(max_size=300))
@@ -214,7 +214,7 @@ def test_a_whole_conversation_of_a_real_robot_is_read_without_a_bad_packet(read_
     reader = PacketReader()
     packets = reader.receive_bytes(read_capture("A.robot_to_server.bin"))
     assert len(packets) == 3171
-    assert (reader.bad_packets, reader.skipped_bytes, reader.buffered_length) == (0, 0, 0)
+    assert (reader.bad_packets, reader.skipped_bytes, len(reader.remainder)) == (0, 0, 0)
     assert [packet.topic_id for packet in packets].count(129) == 2180
     assert b"".join(build_packet(*packet) for packet in packets) == read_capture("A.robot_to_server.bin")
 
@@ -239,4 +239,4 @@ def test_a_capture_that_ends_in_the_middle_of_a_packet_waits_for_its_end(read_ca
     reader.receive_bytes(read_capture(name))
     assert reader.bad_packets == 0
     assert reader.skipped_bytes == 0
-    assert 0 < reader.buffered_length < 735
+    assert 0 < len(reader.remainder) < 735

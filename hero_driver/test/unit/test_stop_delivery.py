@@ -415,3 +415,18 @@ def test_a_robot_that_has_left_holds_up_the_stops_of_no_other(monkeypatch):
     stops._peers = [gone, there]
     stops._poll()
     assert advanced == stops._peers == [there]
+
+
+def test_a_bug_with_one_robot_keeps_the_stops_of_the_others_going(monkeypatch):
+    """The robot whose stop fails comes first, and loses its connection; the next one is stopped until it rests."""
+    with Clock().is_the_drivers() as clock:
+        broken, whole = (make_moving(clock, "both controllers") for _ in range(2))
+        bugs, closed = [], []
+        whole.report_bug, broken.peer.link.close = bugs.append, closed.append
+        broken.peer.has_acknowledged_motion = lambda: 1 / 0
+        whole.stopped = True
+        for peer in (broken.peer, whole.peer):
+            whole.stops.begin(peer)
+        clock.run(CONFIRMED_S)
+        assert whole.peer.stop.state is StopState.AT_REST and not whole.motors.is_turning
+        assert closed[0] == "a bug of the driver" and isinstance(bugs[0], ZeroDivisionError)

@@ -16,7 +16,7 @@ from hero_test.nonempty import nonempty
 def read_packets(data):
     reader = packets.PacketReader()
     result = reader.receive_bytes(data)
-    assert reader.bad_packets == 0 and reader.buffered_length == 0
+    assert reader.bad_packets == 0 and len(reader.remainder) == 0
     return result
 
 

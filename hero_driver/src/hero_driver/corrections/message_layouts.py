@@ -20,7 +20,6 @@ from ..robot_constants import (
 from .stamps import NS_PER_S
 
 _SEQ_AND_STAMP = struct.Struct("<III")
-_STAMP = struct.Struct("<II")
 _ENCODER_TICKS = struct.Struct("<2d")
 _COVARIANCE = struct.Struct("<36d")
 
@@ -40,7 +39,6 @@ MD5SUMS = {
 PLUS_ENCODER_MD5 = "ec5c02e99365233af779a0f9f54cb0df"
 """HeRo+'s hero_msgs/Encoder, which has one field more."""
 
-STAMP_OFFSET = 4  # of a message that begins with a header
 TRANSFORM_TAIL_LENGTH = POSE_FORM.size  # translation and rotation
 ODOMETRY_TAIL_LENGTH = POSE_FORM.size + _COVARIANCE.size + TWIST_FORM.size + _COVARIANCE.size
 ENCODER_TAIL_LENGTH = 11 * 8
@@ -58,7 +56,7 @@ def read_stamp_ns(payload: bytes) -> Optional[int]:
     """Return the stamp of a payload that begins with a header, or None if it is too short for one."""
     if len(payload) < HEADER.size:
         return None
-    secs, nsecs = _STAMP.unpack_from(payload, STAMP_OFFSET)
+    _, secs, nsecs, _ = HEADER.unpack_from(payload)
     stamp_ns: int = secs * NS_PER_S + nsecs
     return stamp_ns
 

@@ -62,7 +62,7 @@ class Admission:
         refusal = self._find_own_refusal(host)
         if refusal is None and len(self._connected) >= limits.max_connections:
             refusal = "more than %d connections (~max_connections)" % limits.max_connections
-        if refusal is None and self.unidentified >= limits.max_unidentified:
+        if refusal is None and len(self._unidentified) >= limits.max_unidentified:
             refusal = "more than %d unidentified connections (~max_unidentified)" % limits.max_unidentified
         if refusal is None:
             self._connected.add(connection, host)
@@ -112,11 +112,6 @@ class Admission:
         if self._garbage.take(host, length, now_s):
             return None
         return "its address sends too many bytes outside of packets: this does not speak rosserial"
-
-    @property
-    def unidentified(self) -> int:
-        """Number of unidentified connections."""
-        return len(self._unidentified)
 
     def _find_own_refusal(self, host: str) -> Optional[str]:
         """Return why host may not connect, whatever others do."""

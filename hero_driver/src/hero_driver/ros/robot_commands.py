@@ -51,6 +51,9 @@ class Owner(Protocol):
     def warn_late(self) -> None:
         """Log that what robots send is read too late to tell what they do, if that is this PC's doing."""
 
+    def report_bug(self, error: Exception) -> None:
+        """Log a bug of the driver itself."""
+
     def note_change(self) -> None:
         """A robot's state changed."""
 

@@ -106,12 +106,7 @@ class PacketReader:
         self.bad_packets = 0
         self.skipped_bytes = 0
         self._max_payload_length = max_payload_length
-        self._remainder = b""
-
-    @property
-    def buffered_length(self) -> int:
-        """Bytes of a packet that is not complete yet."""
-        return len(self._remainder)
+        self.remainder = b""  # the begun packet
 
     def receive_bytes(self, data: Bytes) -> List[Packet]:
         """Return the packets that data completes, in order. Never raises, whatever data holds."""
@@ -119,7 +114,7 @@ class PacketReader:
 
     def receive_pairs(self, data: Bytes) -> List[Tuple[int, bytes]]:
         """As receive_bytes(), but as plain tuples, which saves a sixth of the reading."""
-        buffer = self._remainder + data if self._remainder else bytes(data)
+        buffer = self.remainder + data if self.remainder else bytes(data)
         end = len(buffer)
         last_start = end - HEADER_LENGTH
         max_length = self._max_payload_length
@@ -147,7 +142,7 @@ class PacketReader:
             self.bad_packets += 1
             self.skipped_bytes += 1
             position += 1
-        self._remainder = buffer[self._skip_to_sync(buffer, position) :] if position < end else b""
+        self.remainder = buffer[self._skip_to_sync(buffer, position) :] if position < end else b""
         self.packets += len(found)
         return found
 

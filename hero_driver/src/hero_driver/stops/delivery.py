@@ -163,6 +163,13 @@ class StopDelivery:
             self._call_later(POLL_S if is_urgent else REST_POLL_S, self._poll)
 
     def _advance(self, peer: Peer, now_s: float) -> None:
+        try:
+            self._send_due(peer, now_s)
+        except Exception as error:  # noqa: BLE001 - an error with one robot must not keep the others moving
+            self._owner.report_bug(error)
+            peer.link.close("a bug of the driver")
+
+    def _send_due(self, peer: Peer, now_s: float) -> None:
         stop = peer.stop
         if stop is None or peer.link.closed:
             return

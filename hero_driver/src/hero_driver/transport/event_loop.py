@@ -347,7 +347,7 @@ class EventLoop(LinkOwner):
         self._polls += 1
         for link in list(self._links.values())[self._polls % 2 :: 2]:
             if not link.closed:
-                self._handler.poll_link(link, now_s)
+                self._call(functools.partial(self._handler.poll_link, link, now_s))
 
     def _end(self) -> None:
         self._is_running = False
