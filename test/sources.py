@@ -97,6 +97,12 @@ def parse(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
 
 
+@lru_cache(maxsize=None)
+def walk(path: Path) -> List[ast.AST]:
+    """All nodes of a Python file."""
+    return list(ast.walk(parse(path)))
+
+
 def read_cmake(package: str) -> str:
     """CMakeLists.txt of a package."""
     text = (PACKAGES[package] / "CMakeLists.txt").read_text(encoding="utf-8")
@@ -119,7 +125,7 @@ def module_name(path: Path) -> str:
 def read_imports(path: Path) -> List[Import]:
     """All imports of a file, wherever they stand in it; relative ones resolved."""
     imports = []
-    for node in ast.walk(parse(path)):
+    for node in walk(path):
         if isinstance(node, ast.Import):
             imports += [Import(alias.name, node.lineno) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):

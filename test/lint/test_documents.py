@@ -179,7 +179,7 @@ def calls_in(package, names):
     """Calls of functions or classes of these names in the package's modules, as (path, call)."""
     for path in sources.list_source_modules().values():
         if sources.package_of(path) == package:
-            for node in ast.walk(sources.parse(path)):
+            for node in sources.walk(path):
                 if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in names:
                     yield path, node
 

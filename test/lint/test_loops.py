@@ -89,7 +89,7 @@ def list_asserted(node):
 
 def find_empty(path):
     """Yield the iterables of loops with asserts, and of all(), in the tests of a file, that may be empty."""
-    for function in ast.walk(sources.parse(path)):
+    for function in sources.walk(path):
         if isinstance(function, ast.FunctionDef) and function.name.startswith("test_") and not is_property(function):
             for node in ast.walk(function):
                 parts = []

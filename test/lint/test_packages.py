@@ -235,7 +235,7 @@ def find_parameters(package, program):
     path = PACKAGES[package] / "src" / package / f"{program}.py" if package in PACKAGES else None
     if path is None or not path.exists():
         return set()
-    calls = [node for node in ast.walk(sources.parse(path)) if isinstance(node, ast.Call)]
+    calls = [node for node in sources.walk(path) if isinstance(node, ast.Call)]
     tables = [call.args[0] for call in calls if getattr(call.func, "id", "") == "read_parameters"]
     return {key.value for table in tables for key in getattr(table, "keys", []) if isinstance(key, ast.Constant)}
 

@@ -44,7 +44,7 @@ def test_files_are_short():
 
 def test_names_of_tests_are_short():
     for path in TESTS:
-        for node in ast.walk(sources.parse(path)):
+        for node in sources.walk(path):
             if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
                 assert len(node.name) <= MAX_TEST_NAME, f"{sources.name_of(path)}: {node.name}"
 
@@ -58,20 +58,21 @@ def test_names_of_modules_say_what_they_hold():
 def test_tests_wait_on_conditions_not_on_sleeps():
     """A sleep may pace a loop that has a condition and a deadline; a longer one elsewhere is a guess."""
     for path in TESTS:
-        tree = sources.parse(path)
-        loops = [node for node in ast.walk(tree) if isinstance(node, (ast.While, ast.For))]
+        nodes = sources.walk(path)
+        calls = [node for node in nodes if isinstance(node, ast.Call)]
+        sleeps = [call for call in calls if dotted_name(call.func) in ("time.sleep", "rospy.sleep")]
+        loops = [node for node in nodes if sleeps and isinstance(node, (ast.While, ast.For))]
         in_loops = {id(node) for loop in loops for node in ast.walk(loop)}
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Call) and dotted_name(node.func) in ("time.sleep", "rospy.sleep"):
-                argument = node.args[0]
-                paces = isinstance(argument, ast.Constant) and argument.value <= MAX_PACE_S
-                where = f"{sources.name_of(path)}:{node.lineno}"
-                assert paces or id(node) in in_loops, f"{where}: sleep as synchronization"
+        for sleep in sleeps:
+            argument = sleep.args[0]
+            paces = isinstance(argument, ast.Constant) and argument.value <= MAX_PACE_S
+            where = f"{sources.name_of(path)}:{sleep.lineno}"
+            assert paces or id(sleep) in in_loops, f"{where}: sleep as synchronization"
 
 
 def test_public_methods_have_or_inherit_a_docstring():
     files = [path for path in sources.list_source_modules().values() if sources.package_of(path) not in WITHOUT]
-    found = [node for path in files for node in ast.walk(sources.parse(path)) if isinstance(node, ast.ClassDef)]
+    found = [node for path in files for node in sources.walk(path) if isinstance(node, ast.ClassDef)]
     bases = {node.name: {dotted_name(base).split(".")[-1] for base in node.bases} for node in found}
     documented = {(node.name, method.name) for node in found for method in node.body if has_docstring(method)}
 
@@ -94,7 +95,7 @@ def test_docstrings_name_a_thing_or_an_action():
 def test_names_of_bounds_begin_with_min_or_max():
     private = re.compile(r"_?(LEAST|MOST|MAX_FLOAT|LONGEST|FARTHEST|SMALLEST|SHORTEST)_[A-Z]")
     for path in PYTHON:
-        for node in ast.walk(sources.parse(path)):
+        for node in sources.walk(path):
             if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
                 assert not private.match(node.id), f"{sources.name_of(path)}: {node.id}: MIN_ or MAX_"
 

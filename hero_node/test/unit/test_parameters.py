@@ -53,7 +53,7 @@ def test_missing_parameters_have_their_defaults():
         ("view", ["top"], "but must be one of: orbit, top"),
         ("frame", 3, "~frame is 3, but must be a text"),
         ("rate", 3, "unknown parameter ~rate; did you mean ~rate_hz"),
-        ("a\nb", 3, "known are: control, frame, port"),
+        ("a\nb", 3, "unknown parameter ~'a\\nb'; known are: control, frame, port"),
     ],
 )
 def test_a_wrong_value_is_one_line_with_what_is_allowed(name, value, allowed):

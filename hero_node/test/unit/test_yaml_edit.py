@@ -67,6 +67,7 @@ def test_a_long_value_stays_in_one_line():
 
 def test_a_text_of_comments_keeps_them():
     assert replace_values("# mine", {"a": [1, 2]}) == "# mine\na: [1, 2]\n"
+    assert replace_values("# mine\na: 1\n", {}) == "# mine\n"
 
 
 def test_values_that_are_shared_do_not_take_long():
