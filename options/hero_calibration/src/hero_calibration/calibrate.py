@@ -1,11 +1,4 @@
-"""Program calibrate: calibrates servos, velocity gains and infrared sensors of all robots at once, or restores them.
-
-rosrun hero_calibration calibrate                        all three, with questions
-rosrun hero_calibration calibrate motors velocity --yes  without
-rosrun hero_calibration calibrate wheels                 diameters and distance of the wheels, by camera or --tape
-rosrun hero_calibration calibrate restore                write the files into the robots again
-rosrun hero_calibration calibrate status                 print when and how well robots were calibrated
-"""
+"""Program calibrate: calibrates servos, velocity gains and infrared sensors of all robots at once, or restores them."""
 
 import argparse
 import os
@@ -16,13 +9,13 @@ import rospy
 
 from hero_node import say
 from hero_node.files import read_calibrations
-from hero_node.parameters import robot_ids_option
+from hero_node.parameters import robot_ids_option, within
 from hero_node.ros import Program
 
-from .calibration import DEFAULT_PARTS, INFRARED, PARTS, WHEELS, Calibration
+from .calibration import DEFAULT_PARTS, ENDED, INFRARED, PARTS, WHEELS, calibrate_parts
 from .errors import CalibrationError, EndedError
 from .procedures.restore import load_calibrations, restore
-from .robots.ros_session import RosSession, find_robots
+from .robots.ros_probe import RosSession, find_robots
 from .status import describe_status, find_missing
 from .store import make_folder
 
@@ -41,6 +34,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--yes", action="store_true", help="ask nothing: the robots are placed already")
     parser.add_argument("--tape", action="store_true", help="wheels: by a tape measure, without a camera")
     parser.add_argument("--missing", action="store_true", help="only robots whose files lack one of the parts")
+    text = "this many robots at a time, such as fit the wall; each batch is saved before the next"
+    parser.add_argument("--batch", type=within(1, 500, int), metavar="N", help=text)
     parser.add_argument("--folder", default="~/hero_calibration", help="folder of files and pictures (%(default)s)")
     options = parser.parse_args(arguments)
     options.restore = options.parts[:1] == [RESTORE]
@@ -52,6 +47,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
             parser.error(f"{part}: parts are {', '.join(PARTS)}; or: restore [FILE ...]")
     if options.yes and INFRARED in options.parts and len(options.parts) > 1:
         parser.error("--yes: motors and velocity need room around the robots, infrared a wall: name one or the other")
+    if options.yes and options.batch:
+        parser.error("--yes: each batch has to be placed; leave --batch or --yes out")
     if options.tape and WHEELS not in options.parts:
         parser.error("--tape is for wheels")
     options.folder = os.path.abspath(os.path.expanduser(options.folder))
@@ -80,9 +77,8 @@ def main() -> int:
             if not probes:
                 say("every robot has these parts already")
                 return 0
-        session = RosSession(program, probes)
         if options.restore:
-            return restore(session, calibrations)
+            return restore(RosSession(program, probes), calibrations)
 
         def ask(question: str) -> str:
             answer = program.ask(question)
@@ -93,4 +89,13 @@ def main() -> int:
             return answer
 
         tape = ask if options.tape else None
-        return Calibration(session, options.parts, options.folder, None if options.yes else ask, tape).run()
+        placed, size, status = None if options.yes else ask, options.batch or len(probes), 0
+        for first in range(0, len(probes), size):
+            batch = probes[first : first + size]
+            if len(batch) < len(probes):
+                say("\nrobots %s of %d" % (", ".join(probe.name for probe in batch), len(probes)))
+            session = RosSession(program, batch)
+            status = max(status, calibrate_parts(session, options.parts, options.folder, placed, tape))
+            if status == ENDED:
+                break
+        return status

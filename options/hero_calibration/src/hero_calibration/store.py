@@ -33,9 +33,7 @@ def make_folder(folder: str) -> None:
 def save(path: str, calibration: KeptCalibration) -> None:
     """Write a file; the previous one is kept beside it. Its comments and values that were not measured again stay.
 
-    A damaged previous file, or one of another robot or model, does not prevent the new one.
-
-    Raises: CalibrationError.
+    A damaged previous file, or one of another robot or model, does not prevent the new one. Raises: CalibrationError.
     """
     base, suffix = os.path.splitext(path)
     values, others, text = calibration.values, calibration.others, ""

@@ -8,10 +8,10 @@ import pytest
 from stepped_session import StepSession
 
 from hero_calibration import store
-from hero_calibration.calibration import Calibration
+from hero_calibration.calibration import calibrate_parts
 from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.models import infrared_model
-from hero_calibration.models.step_response import ANGULAR_RAD_S, STEP_M_S, GainSearch
+from hero_calibration.models.step_response import ANGULAR_RAD_S, STEP_M_S
 from hero_calibration.procedures.infrared import calibrate_infrared
 from hero_calibration.procedures.motors import MotorResult, calibrate_motors
 from hero_calibration.procedures.placement import place_robots
@@ -71,12 +71,20 @@ def make_session(count=4, seed=0, at_wall=False, known=(), places_m_deg=None, wi
 
 def place_and(procedure, session, at_wall=False):
     """Return the results of a procedure with the robots that are well placed."""
+    results = {}
     place_robots(session, at_wall, ask=None)
-    return procedure(session)
+    procedure(session, results)
+    return results
 
 
-def velocity_alone(session):
-    return calibrate_velocity(session, {})
+def measure_velocity(session, motors):
+    results = {}
+    calibrate_velocity(session, motors, results)
+    return results
+
+
+def velocity_alone(session, results):
+    calibrate_velocity(session, {}, results)
 
 
 def check_accuracy(session, results, range_bound_m=RANGE_BOUND_M):
@@ -110,7 +118,7 @@ class TestAccuracy:
         errors_before = self.measure_errors(session)
         motors = place_and(calibrate_motors, session)
         check_accuracy(session, motors)
-        velocity = calibrate_velocity(session, motors)
+        velocity = measure_velocity(session, motors)
         check_accuracy(session, velocity)
         assert len(motors) == len(velocity) == 16
         errors_after = self.measure_errors(session)
@@ -142,7 +150,7 @@ class TestWifi:
     def test_a_hotspot_changes_neither_centers_nor_gains(self):
         session = make_session(count=6, wifi="hotspot")
         motors = place_and(calibrate_motors, session)
-        velocity = calibrate_velocity(session, motors)
+        velocity = measure_velocity(session, motors)
         assert len(motors) == len(velocity) == 6
         check_accuracy(session, motors)
         check_accuracy(session, velocity)
@@ -158,7 +166,7 @@ class TestWifi:
     def test_on_a_bad_network_robots_are_calibrated_well_or_fail_with_a_reason(self):
         session = make_session(count=6, seed=1, wifi="bad")
         motors = place_and(calibrate_motors, session)
-        velocity = calibrate_velocity(session, motors)
+        velocity = measure_velocity(session, motors)
         check_accuracy(session, motors)
         check_accuracy(session, velocity)
         assert len(velocity) >= 3
@@ -206,24 +214,22 @@ class TestDisturbances:
 
 
 @pytest.mark.slow
-def test_no_robot_keeps_gains_that_were_only_tried(monkeypatch):
-    searches = []
-
-    def search(*arguments):
-        searches.append(GainSearch(*arguments))
-        return searches[-1]
-
-    search.count_rounds = GainSearch.count_rounds
-    monkeypatch.setattr("hero_calibration.procedures.velocity.GainSearch", search)
-    session = make_session(count=2)
+def test_no_robot_keeps_gains_that_were_only_tried():
+    session, results = make_session(count=2), {}
     # The second robot fails in the third test, and the program ends in the fourth.
     session.events[14.0] = partial(setattr, session.probes[1], "failure", "velocity: lost")
     session.end_s = 18.0
+    given = {probe: [] for probe in session.probes}
+    for probe in session.probes:
+        write = probe.write
+        probe.write = lambda key, values, probe=probe, write=write: given[probe].append(values) or write(key, values)
     with pytest.raises(EndedError):
-        place_and(velocity_alone, session)
-    for probe, left, right in nonempty(zip(session.probes, searches[::2], searches[1::2])):
-        best = [*left.best()[0], *right.best()[0]]
-        assert probe.written["velocity_gains"] == best != [*left.next_gains(), *right.next_gains()]
+        velocity_alone(session, results)
+    for probe, (*tests, best) in nonempty(given.items()):
+        # Each wheel has the best of its own.
+        assert [tuple(best[:3]), tuple(best[3:])] == results[probe.robot_id].gains
+        assert best != tests[-1] and best[:3] in [gains[:3] for gains in tests[:-1]]
+        assert probe.written["velocity_gains"] == best == results[probe.robot_id].to_file()["velocity_gains"]
     assert session.probes[1].failure == "velocity: lost"
 
 
@@ -318,7 +324,7 @@ class TestCalibration:
     """The whole program, without ROS."""
 
     def run(self, session, tmp_path, *parts, ask=None):
-        return Calibration(session, parts, str(tmp_path), ask).run()
+        return calibrate_parts(session, parts, str(tmp_path), ask)
 
     def load(self, tmp_path, robot_id):
         return read_calibration(store.name_file(str(tmp_path), robot_id)).values
@@ -340,7 +346,9 @@ class TestCalibration:
         session = make_session(count=2)
         session.end_s = 60.0
         assert self.run(session, tmp_path, "motors", "velocity") == 130
-        assert set(self.load(tmp_path, 1)) == {"motor_centers_us", "dead_zones_us"}
+        kept, written = self.load(tmp_path, 1), session.probes[1].written
+        assert set(kept) == {"motor_centers_us", "dead_zones_us", "velocity_gains", "velocity_errors"}
+        assert {key: kept[key] for key in written} == written, "what the robot holds, also of tests that were ended"
         assert "ended early" in capsys.readouterr().out
         session.sleep(0.5)
         assert is_moving(session) == [False] * 2

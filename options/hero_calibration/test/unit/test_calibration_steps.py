@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from test_calibration_rules import FakeSession
 
-from hero_calibration.errors import CalibrationError
+from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models.encoder_readings import TICK_M, Readings
+from hero_calibration.models.infrared_model import Facing
 from hero_calibration.procedures import infrared, motors, velocity, wheels
 from hero_calibration.robots.session import SETTLE_S
 from hero_node import Pose, transform_pose
@@ -174,8 +175,33 @@ def test_readings_tell_how_far_a_robot_came_to_the_wall(monkeypatch):
 
 def test_infrared_says_how_long_it_takes(monkeypatch, capsys):
     monkeypatch.setattr(infrared, "_face_wall_with_each_sensor", lambda *arguments: {})
-    assert infrared.calibrate_infrared(FakeSession(0)) == {}
+    infrared.calibrate_infrared(FakeSession(0), {})
     assert capsys.readouterr().out.startswith("infrared: about 96 s\n")
+
+
+def test_constants_that_robots_hold_are_kept_if_their_check_is_ended(monkeypatch):
+    rounds, results, session = [], {}, FakeSession(2)
+
+    def face(session, title, samples, walls):
+        rounds.append(title)
+        if len(rounds) > 1:
+            raise EndedError
+        return {
+            probe.robot_id: [Facing(sensor, [], [0.14] * 8, 0.0) for sensor in range(8)] for probe in session.probes
+        }
+
+    def compute(facings):
+        if results:
+            raise CalibrationError("sensor left reads 3 counts")
+        return [0.5] * 8
+
+    monkeypatch.setattr(infrared, "_face_wall_with_each_sensor", face)
+    monkeypatch.setattr(infrared.model, "compute_calibration", compute)
+    with pytest.raises(EndedError):
+        infrared.calibrate_infrared(session, results)
+    assert list(results) == [0] and session.probes[0].sent[-1] == ("infrared_counts_m2", [0.5] * 8)
+    assert results[0].to_file()["infrared_counts_m2"] == [0.5] * 8
+    assert results[0].describe().endswith("mm before, not checked after")
 
 
 def test_pulses_are_swept_up_and_down_at_their_times(monkeypatch):
@@ -189,7 +215,9 @@ def test_pulses_are_swept_up_and_down_at_their_times(monkeypatch):
     result = SimpleNamespace(to_file=lambda: {"motor_centers_us": [1500, 1510]})
     monkeypatch.setattr(motors, "evaluate_sweep", lambda pulses_us, speeds_m_s: result)
     monkeypatch.setattr(type(session.probes[0]), "read_wheels", lambda probe: None)
-    assert motors.calibrate_motors(session) == {0: result, 1: result}
+    results = {}
+    motors.calibrate_motors(session, results)
+    assert results == {0: result, 1: result}
     for probe in nonempty(session.probes):
         sent = [tuple(values) for name, *values in filter(lambda one: one[0] == "pulses", probe.sent)]
         assert sent[:2] == [(1380, 1380), (1620, 1620)]

@@ -61,12 +61,7 @@ WIDEST_US = 200.0
 
 
 class DeadZone(NamedTuple):
-    """Pulses at which a wheel is at rest.
-
-    Attributes:
-        low_us, high_us: edges.
-        gain_m_s_us: speed per pulse beyond the edges, without sign.
-    """
+    """Pulses at which a wheel is at rest; gain_m_s_us: speed per pulse beyond them, without sign."""
 
     low_us: float
     high_us: float

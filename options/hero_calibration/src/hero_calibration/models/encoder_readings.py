@@ -51,11 +51,7 @@ class Readings(NamedTuple):
 
 
 def make_readings(
-    stamps_s: np.ndarray,
-    counts: np.ndarray,
-    left_ticks: np.ndarray,
-    right_ticks: np.ndarray,
-    heard_s: np.ndarray,
+    stamps_s: np.ndarray, counts: np.ndarray, left_ticks: np.ndarray, right_ticks: np.ndarray, heard_s: np.ndarray
 ) -> Readings:
     """Return readings with even steps; stamps_s and counts rise."""
     if len(stamps_s) < 2:

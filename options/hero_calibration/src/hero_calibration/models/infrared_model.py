@@ -45,13 +45,10 @@ PLAUSIBLE_COUNTS_M2 = (0.15, 1.2)
 
 
 class Facing(NamedTuple):
-    """Readings while one sensor faced the wall.
+    """Means of all eight sensors while one of them (its index) faced the wall.
 
-    Attributes:
-        sensor: index of the sensor.
-        counts: mean readings of all eight.
-        ranges_m: mean ranges of all eight as the robot computes them (from its center); NaN without a calibration.
-        moved_m: how much closer to the wall the robot's center is than at the first sensor.
+    ranges_m: as the robot computes them (from its center); NaN without a calibration.
+    moved_m: how much closer to the wall the robot's center is than at the first sensor.
     """
 
     sensor: int

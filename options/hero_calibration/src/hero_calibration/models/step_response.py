@@ -4,7 +4,7 @@ The robots turn on the spot, once to each side: each wheel starts from rest in b
 PID, and its own search. The firmware has no service that tells the gains of a robot.
 """
 
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -23,9 +23,6 @@ STEP_S = 1.5
 LATE_S = 1.0
 """Readings must reach at least 0.2 s beyond this."""
 
-REACHED = 0.9
-"""Share of the target speed that counts as reached."""
-
 OVERSHOOT_WEIGHT = 0.3
 """An overshoot of 100 % weighs as much as 30 % of mean error: it is short, but it shakes the robot."""
 
@@ -39,8 +36,7 @@ DERIVATIVE = 0.1
 INTEGRALS = (4000.0, 6000.0, 8500.0)
 PROPORTIONALS = (400.0, 900.0, 1400.0)
 FIRST_PROPORTIONAL = 650.0
-HIGHEST_GAIN = 30000.0
-"""The firmware prints gains into a buffer of 100 bytes without a check."""
+ROUNDS = 1 + len(INTEGRALS) + len(PROPORTIONALS)
 
 MIN_SPEEDS = 20
 APART = 3
@@ -55,24 +51,22 @@ Curve = Tuple[np.ndarray, np.ndarray]
 
 
 class Response(NamedTuple):
-    """Response of a wheel to a step.
+    """Response of a wheel to a step: mean deviation from the target speed, highest speed beyond it, as shares of it.
 
-    Attributes:
-        mean_error: mean deviation from the target speed, as a share of it.
-        overshoot: highest speed beyond it, as a share.
-        reached_s: time to 90 %; the duration of the test if never reached.
-        curves: for each direction, times s and speeds m/s, positive in the direction of the test.
+    curves: for each direction, times s and speeds m/s, positive in the direction of the test.
     """
 
     mean_error: float
     overshoot: float
-    reached_s: float
     curves: Tuple[Curve, ...]
 
     @property
     def score(self) -> float:
         """The search minimizes it."""
         return self.mean_error + OVERSHOOT_WEIGHT * self.overshoot
+
+
+Tried = Tuple[Gains, Response]
 
 
 def find_start(readings: Readings, command_s: float, may_be_late: bool = False) -> int:
@@ -125,64 +119,29 @@ def measure_speed(readings: Readings, ticks: np.ndarray, start: int, end_s: floa
 
 def evaluate_response(curves: Sequence[Curve]) -> Response:
     """Return how well a wheel followed, from its curves in both directions."""
-    errors, overshoots, reached = [], [], []
+    errors, overshoots = [], []
     for times_s, speeds_m_s in curves:
         share = speeds_m_s / STEP_M_S
-        within = times_s >= 0.0
-        errors.append(np.abs(share[within] - 1.0).mean())
+        errors.append(np.abs(share[times_s >= 0.0] - 1.0).mean())
         overshoots.append(max(0.0, float(share.max()) - 1.0))
-        fast = np.flatnonzero(within & (share >= REACHED))
-        reached.append(float(times_s[fast[0]]) if len(fast) else STEP_S)
-    return Response(
-        float(np.mean(errors)),
-        float(np.mean(overshoots)),
-        float(np.mean(reached)),
-        tuple(curves),
-    )
+    return Response(float(np.mean(errors)), float(np.mean(overshoots)), tuple(curves))
 
 
-class GainSearch:
-    """Search for the gains of one wheel: first the integral gain, then the proportional one.
+def choose_gains(tried: Sequence[Tried], servo_gain_m_s_us: float) -> Gains:
+    """Return the gains of a wheel to try next, in ROUNDS: first for the integral gain, then the proportional one."""
+    if not tried:
+        return DEFAULT_GAINS
+    # Scaled to the servo: a weak one needs longer pulses. A slope far from the nominal one is rather measured wrongly.
+    scale = float(np.clip(NOMINAL_GAIN_M_S_US / servo_gain_m_s_us, 0.5, 2.0))
+    number = len(tried) - 1
+    if number < len(INTEGRALS):
+        proportional, integral = FIRST_PROPORTIONAL, scale * INTEGRALS[number]
+    else:
+        proportional, integral = PROPORTIONALS[number - len(INTEGRALS)], find_best(tried)[0][1]
+    # At most 17,000: the firmware prints gains into a buffer of 100 bytes without a check.
+    return round(scale * proportional, 1), round(integral, 1), DERIVATIVE
 
-    count_rounds() times, next_gains() is tried and its response passed to receive(); best() is the result.
-    """
 
-    def __init__(self, servo_gain_m_s_us: float = NOMINAL_GAIN_M_S_US) -> None:
-        """Start; gains are scaled to the servo: a weak one needs longer pulses."""
-        # A slope far from the nominal one is rather a wrong measurement than an unusual servo.
-        self._scale = float(np.clip(NOMINAL_GAIN_M_S_US / servo_gain_m_s_us, 0.5, 2.0))
-        self._tried: List[Tuple[Gains, Response]] = []
-
-    def _make(self, proportional: float, integral: float) -> Gains:
-        return (
-            round(min(proportional * self._scale, HIGHEST_GAIN), 1),
-            round(min(integral * self._scale, HIGHEST_GAIN), 1),
-            DERIVATIVE,
-        )
-
-    @staticmethod
-    def count_rounds() -> int:
-        """Return how many sets of gains are tried."""
-        return 1 + len(INTEGRALS) + len(PROPORTIONALS)
-
-    def next_gains(self) -> Gains:
-        """Return the gains to try next. Raises: IndexError after count_rounds()."""
-        if not self._tried:
-            return DEFAULT_GAINS
-        number = len(self._tried) - 1
-        if number < len(INTEGRALS):
-            return self._make(FIRST_PROPORTIONAL, INTEGRALS[number])
-        return self._make(PROPORTIONALS[number - len(INTEGRALS)], self.best()[0][1] / self._scale)
-
-    def receive(self, response: Response) -> None:
-        """Store the response to next_gains()."""
-        self._tried.append((self.next_gains(), response))
-
-    @property
-    def has_best(self) -> bool:
-        """Return whether a response was received."""
-        return bool(self._tried)
-
-    def best(self) -> Tuple[Gains, Response]:
-        """Return the best gains so far, and the response to them."""
-        return min(self._tried, key=lambda item: item[1].score)
+def find_best(tried: Sequence[Tried]) -> Tried:
+    """Return the best gains, and the response to them."""
+    return min(tried, key=lambda item: item[1].score)

@@ -39,39 +39,31 @@ class InfraredResult(NamedTuple):
 
     def describe(self) -> str:
         """Return the result as a line of text."""
-        return "largest range error at 10 cm %s before, %s after" % (
-            format_largest(self.before_m),
-            format_largest(self.after_m),
+        before, after = (
+            f"{1000.0 * np.abs(errors_m).max():.0f} mm" if np.isfinite(errors_m).all() else unknown
+            for errors_m, unknown in ((self.before_m, "unknown (no calibration)"), (self.after_m, "not checked"))
         )
+        return f"largest range error at 10 cm {before} before, {after} after"
 
 
-def format_largest(errors_m: np.ndarray) -> str:
-    """Return the largest error as text."""
-    largest_m = np.abs(errors_m).max()
-    return f"{1000.0 * largest_m:.0f} mm" if np.isfinite(largest_m) else "unknown (no calibration)"
-
-
-def calibrate_infrared(session: Session) -> Dict[int, InfraredResult]:
-    """Calibrate all active robots, which face a wall; return the results by robot."""
+def calibrate_infrared(session: Session, results: Dict[int, InfraredResult]) -> None:
+    """Calibrate all active robots, which face a wall; put the results by robot into results as they are found."""
     say(f"infrared: about {model.BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0):.0f} s")
     walls: Dict[int, Pose] = {}
     first = _face_wall_with_each_sensor(session, "infrared", model.SAMPLES, walls)
 
-    def write(probe: Probe) -> List[float]:
-        counts_m2 = model.compute_calibration(first[probe.robot_id])
+    def write(probe: Probe) -> None:
+        facings = first[probe.robot_id]
+        counts_m2 = model.compute_calibration(facings)
         probe.write("infrared_counts_m2", counts_m2)
-        return counts_m2
+        unknown_m = np.full(model.BEAMS, np.nan)
+        results[probe.robot_id] = InfraredResult(counts_m2, model.range_errors_m(facings), unknown_m)
 
-    counts_m2 = session.for_each("infrared", write)
+    session.for_each("infrared", write)
     second = _face_wall_with_each_sensor(session, "check of infrared", model.CHECK_SAMPLES, walls)
-    return {
-        probe.robot_id: InfraredResult(
-            counts_m2[probe.robot_id],
-            model.range_errors_m(first[probe.robot_id]),
-            model.range_errors_m(second[probe.robot_id]),
-        )
-        for probe in session.active
-    }
+    for probe in session.active:
+        after_m = model.range_errors_m(second[probe.robot_id])
+        results[probe.robot_id] = results[probe.robot_id]._replace(after_m=after_m)
 
 
 def _face_wall_with_each_sensor(
@@ -87,10 +79,7 @@ def _face_wall_with_each_sensor(
         say("%s: sensor %s, %d of %d" % (title, model.name_beam(sensor), step + 1, model.BEAMS))
         for probe in session.active:
             probe.forget_scans()
-        session.wait_for(
-            lambda: all(probe.count_scans() >= samples for probe in session.active),
-            SCAN_TIMEOUT_S,
-        )
+        session.wait_for(lambda: all(probe.count_scans() >= samples for probe in session.active), SCAN_TIMEOUT_S)
 
         def evaluate(probe: Probe, sensor: int = sensor) -> float:
             probe.check_alive(session.now_s)

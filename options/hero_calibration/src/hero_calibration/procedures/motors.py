@@ -1,6 +1,6 @@
 """Procedure motors: sweeps the servo pulses of all robots, and writes the centers of their servos."""
 
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
@@ -51,8 +51,8 @@ def evaluate_sweep(pulses_us: np.ndarray, speeds_m_s: np.ndarray) -> MotorResult
     return MotorResult(pulses_us, speeds_m_s, zones)
 
 
-def calibrate_motors(session: Session, results: Optional[Dict[int, MotorResult]] = None) -> Dict[int, MotorResult]:
-    """Calibrate all active robots; return the results by robot, in results: see Session.repeat()."""
+def calibrate_motors(session: Session, results: Dict[int, MotorResult]) -> None:
+    """Calibrate all active robots; put the results by robot into results as they are found."""
     say("motors: pulses are swept up and down, about 40 s")
     sweeps_us: Dict[int, np.ndarray] = {}
 
@@ -69,7 +69,7 @@ def calibrate_motors(session: Session, results: Optional[Dict[int, MotorResult]]
         probe.write("motor_centers_us", result.to_file()["motor_centers_us"])
         return result
 
-    return session.repeat("motors", TRIES, sweep, evaluate, results)
+    session.repeat("motors", TRIES, sweep, evaluate, results)
 
 
 def _plan_sweeps(session: Session, starts: Dict[Probe, Pose]) -> Dict[int, np.ndarray]:

@@ -28,9 +28,7 @@ Ask = Callable[[str], str]
 def place_robots(session: Session, at_wall: bool, ask: Optional[Ask]) -> None:
     """Ask the user to place the robots, and check their places; badly placed robots fail.
 
-    ask: None if they are placed already.
-
-    Raises: EndedError if the user ends the program, and what ask raises.
+    ask: None if they are placed already. Raises: EndedError if the user ends the program, and what ask raises.
     """
     question = "Enter when they are placed, q to end: "
     if ask is not None:

@@ -10,11 +10,14 @@ from ..models.encoder_readings import Readings
 from ..models.step_response import (
     ANGULAR_RAD_S,
     NOMINAL_GAIN_M_S_US,
+    ROUNDS,
     STEP_S,
     Gains,
-    GainSearch,
     Response,
+    Tried,
+    choose_gains,
     evaluate_response,
+    find_best,
     find_start,
     measure_speed,
 )
@@ -33,24 +36,20 @@ class VelocityResult(NamedTuple):
     after: List[Response]
     gains: List[Gains]
 
-    def _mean(self, name: str) -> List[float]:
-        """Return the mean of a value of both wheels, before and after."""
-        return [float(np.mean([getattr(r, name) for r in responses])) for responses in (self.before, self.after)]
+    def measure_errors(self) -> List[float]:
+        """Return the mean error of both wheels, before and after."""
+        return [float(np.mean([response.mean_error for response in part])) for part in (self.before, self.after)]
 
     def to_file(self) -> Dict[str, List[float]]:
         """Return what is kept in the robot's file."""
         return {
             "velocity_gains": [gain for gains in self.gains for gain in gains],
-            "velocity_errors": [round(error, 3) for error in self._mean("mean_error")],
+            "velocity_errors": [round(error, 3) for error in self.measure_errors()],
         }
 
     def describe(self) -> str:
         """Return the result as a line of text."""
-        errors = [100.0 * error for error in self._mean("mean_error")]
-        return "mean error %.0f %% before, %.0f %% after; 90 %% reached in %.2f s before, %.2f s after" % (
-            *errors,
-            *self._mean("reached_s"),
-        )
+        return "mean error %.0f %% before, %.0f %% after" % tuple(100.0 * error for error in self.measure_errors())
 
 
 def evaluate_test(readings: Readings, start_times_s: Sequence[float], may_be_late: bool) -> List[Response]:
@@ -70,37 +69,34 @@ def evaluate_test(readings: Readings, start_times_s: Sequence[float], may_be_lat
     return responses
 
 
-def calibrate_velocity(session: Session, motors: Dict[int, MotorResult]) -> Dict[int, VelocityResult]:
-    """Calibrate all active robots, with the slopes of their servos if motors has them; return the results by robot."""
+def calibrate_velocity(session: Session, motors: Dict[int, MotorResult], results: Dict[int, VelocityResult]) -> None:
+    """Calibrate all active robots, with the slopes of their servos if motors has them; put what is found in results."""
     say("velocity: gains are tried, about a minute")
-    searches: Dict[int, List[GainSearch]] = {}
-    for probe in session.probes:
-        found = motors.get(probe.robot_id)
-        slopes = [zone.gain_m_s_us for zone in found.zones] if found else [NOMINAL_GAIN_M_S_US] * 2
-        searches[probe.robot_id] = [GainSearch(slope) for slope in slopes]
+    tried: Dict[int, List[List[Tried]]] = {probe.robot_id: [[], []] for probe in session.probes}
+    slopes = {probe.robot_id: [NOMINAL_GAIN_M_S_US] * 2 for probe in session.probes}
+    slopes.update({robot_id: [zone.gain_m_s_us for zone in found.zones] for robot_id, found in motors.items()})
 
     def write_next(probe: Probe) -> None:
-        write_gains(probe, [search.next_gains() for search in searches[probe.robot_id]])
+        write_gains(probe, list(map(choose_gains, tried[probe.robot_id], slopes[probe.robot_id])))
 
     def write_best(probe: Probe) -> None:
-        write_gains(probe, [search.best()[0] for search in searches[probe.robot_id]])
+        gains, responses = zip(*map(find_best, tried[probe.robot_id]))
+        write_gains(probe, gains)
+        results[probe.robot_id] = VelocityResult(before[probe.robot_id], list(responses), list(gains))
 
     before = _test(session)
     try:
-        for number in range(1, GainSearch.count_rounds() + 1):
-            say("velocity: gains %d of %d" % (number, GainSearch.count_rounds()))
+        for number in range(1, ROUNDS + 1):
+            say("velocity: gains %d of %d" % (number, ROUNDS))
             session.for_each("velocity", write_next)
             for robot_id, responses in _test(session).items():
-                for search, response in zip(searches[robot_id], responses):
-                    search.receive(response)
+                for wheel, slope, response in zip(tried[robot_id], slopes[robot_id], responses):
+                    wheel.append((choose_gains(wheel, slope), response))
     finally:
         # Robots keep gains in their flash: none may be left with some that were only tried, whatever ends the tests.
-        tested = [probe for probe in session.probes if any(search.has_best for search in searches[probe.robot_id])]
-        session.for_each("velocity", write_best, tested)
-    return {
-        robot_id: VelocityResult(before[robot_id], after, [search.best()[0] for search in searches[robot_id]])
-        for robot_id, after in _test(session).items()
-    }
+        session.for_each("velocity", write_best, [probe for probe in session.probes if tried[probe.robot_id][0]])
+    for robot_id, after in _test(session).items():
+        results[robot_id] = results[robot_id]._replace(after=after)
 
 
 def write_gains(probe: Probe, gains: Sequence[Gains]) -> None:

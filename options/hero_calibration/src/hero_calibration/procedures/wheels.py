@@ -7,7 +7,6 @@ Errors in Mobile Robots (UMBmark), IEEE Transactions on Robotics and Automation 
 """
 
 import math
-from functools import partial
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -43,6 +42,8 @@ MAX_DEVIATION_SD = 3.0
 DIAMETER_M = TICK_M * 288.0 / math.pi
 NOMINAL_M = np.array((DIAMETER_M, DIAMETER_M, WHEEL_SEPARATION_M))
 
+Sd = Tuple[float, float, float]
+
 Drive = Tuple[float, float, float]
 """m/s, rad/s, s."""
 
@@ -57,7 +58,7 @@ class Leg(NamedTuple):
     """Ticks of the left and the right wheel, (K, 2)."""
     moved: Pose
     """Measured: from the first stop to the second, in the robot's frame at the first."""
-    sd: Tuple[float, float, float] = CAMERA_SD
+    sd: Sd = CAMERA_SD
 
 
 class WheelResult(NamedTuple):
@@ -112,14 +113,14 @@ def fit_wheels(legs: Sequence[Leg]) -> WheelResult:
     return WheelResult(NOMINAL_M * scales, *rms)
 
 
-def calibrate_wheels(session: Session, ask: Optional[Ask] = None) -> Dict[int, WheelResult]:
-    """Calibrate all active robots; return the results by robot.
+def calibrate_wheels(session: Session, ask: Optional[Ask], results: Dict[int, WheelResult]) -> None:
+    """Calibrate all active robots; put the results by robot into results as they are found.
 
     ask: asks for what the user measures with a tape; None: localize tells where robots are.
     """
     if ask is not None:
-        legs = _drive_for_tape(session, ask)
-        return session.for_each("wheels", lambda probe: fit_wheels(legs[probe.robot_id]))
+        _drive_for_tape(session, ask, results)
+        return
     say("wheels: squares to the left and to the right, about 1 min")
 
     def drive(probes: Sequence[Probe]) -> List[Stop]:
@@ -138,7 +139,7 @@ def calibrate_wheels(session: Session, ask: Optional[Ask] = None) -> Dict[int, W
             legs.append(Leg(_take_ticks(probe, start_s, end_s), transform_pose(invert_pose(start), end)))
         return fit_wheels(legs)
 
-    return session.repeat("wheels", TRIES, drive, evaluate)
+    session.repeat("wheels", TRIES, drive, evaluate, results)
 
 
 def _list_square(side: float) -> List[Drive]:
@@ -170,28 +171,33 @@ def _take_ticks(probe: Probe, start_s: float, end_s: float) -> np.ndarray:
     return np.column_stack((readings.left_ticks, readings.right_ticks))[kept]
 
 
-def _drive_for_tape(session: Session, ask: Ask) -> Dict[int, List[Leg]]:
-    """Drive robots while the user measures; return the legs by robot."""
+def _drive_for_tape(session: Session, ask: Ask, results: Dict[int, WheelResult]) -> None:
+    """Drive robots while the user measures."""
     legs: Dict[int, List[Leg]] = {probe.robot_id: [] for probe in session.active}
-    straight = [(SPEED_M_S, 0.0, STRAIGHT_S)]
-    for name, parts, sd in (
-        ("straight ahead", straight, STRAIGHT_SD),
+    parts = (
+        ("straight ahead", [(SPEED_M_S, 0.0, STRAIGHT_S)], STRAIGHT_SD),
         ("a square to the left", _list_square(1.0), TAPE_SD),
         ("a square to the right", _list_square(-1.0), TAPE_SD),
-    ):
+    )
+    for name, drives, sd in parts:
         if ask(f"Mark center and heading of each robot for {name}; then Enter, q to end: ") == "q":
             raise EndedError
         start_s = session.now_s
-        for part in parts:
-            _drive(session, session.active, part)
+        for drive in drives:
+            _drive(session, session.active, drive)
         session.pause(MEASURE_S)
-        measured = session.for_each("wheels", partial(_ask_for_leg, ask, start_s, session.now_s, sd))
-        for robot_id, leg in measured.items():
-            legs[robot_id].append(leg)
-    return legs
+        end_s = session.now_s
+
+        def measure(probe: Probe, times_s: Tuple[float, float] = (start_s, end_s), sd: Sd = sd) -> None:
+            legs[probe.robot_id].append(_ask_for_leg(ask, *times_s, sd, probe))
+            if len(legs[probe.robot_id]) == len(parts):
+                results[probe.robot_id] = fit_wheels(legs[probe.robot_id])
+
+        for probe in session.active:  # one after another: there is one terminal
+            session.for_each("wheels", measure, [probe])
 
 
-def _ask_for_leg(ask: Ask, start_s: float, end_s: float, sd: Tuple[float, float, float], probe: Probe) -> Leg:
+def _ask_for_leg(ask: Ask, start_s: float, end_s: float, sd: Sd, probe: Probe) -> Leg:
     wanted = 1 if math.isinf(sd[1]) else 2
     what = "ahead" if wanted == 1 else "ahead and to the left, such as 12 -5"
     question = f"{probe.name}: mm from its mark, {what}: "

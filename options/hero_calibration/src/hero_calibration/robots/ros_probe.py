@@ -1,21 +1,25 @@
-"""A robot under calibration over its topics and services."""
+"""Robots under calibration over ROS: topics and services of each, and the session with its time and its end."""
 
-from typing import Any, Callable, Dict, List, Optional, Tuple
+import time
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_msgs.msg import Encoder, Motor, RobotPose, RobotPoses
+from hero_client.ros import share_drivers
+from hero_msgs.msg import Encoder, Motor, Robot, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 from hero_node import Pose, one_line, pose_of
+from hero_node.ros import Program
 
 from ..errors import CalibrationError
 from ..models.infrared_model import read_signals
 from .probe import Probe
+from .session import Session
 
-SERVICE_WAIT_S = 5.0
+SERVICE_WAIT_S, TIMEOUT_S = 5.0, 10.0
 
 SERVICES: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
     "motor_centers_us": ("motors_parameters", SetMotor, round),
@@ -98,3 +102,55 @@ class RosProbe(Probe):
             raise CalibrationError(f"{name}: {one_line(error)}") from error
         if not answer.success:
             raise CalibrationError(f"{name}: the robot answers: {answer.message}")
+
+
+class RosSession(Session):
+    """The robots under calibration, in ROS time."""
+
+    def __init__(self, program: Program, probes: Sequence[Probe]) -> None:
+        """Work with probes until program ends."""
+        super().__init__(probes)
+        self._program = program
+        self._start_s = rospy.get_time() - time.monotonic()
+
+    @property
+    def now_s(self) -> float:
+        """ROS time, as if the PC's clock were never set: motions are timed by it, and must not last longer for that."""
+        return self._start_s + time.monotonic() if rospy.rostime.is_wallclock() else float(rospy.get_time())
+
+    def sleep(self, duration_s: float) -> bool:
+        """Sleep by the clock of this computer; return whether the program is to continue."""
+        time.sleep(duration_s)
+        return self._program.running
+
+
+def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[RosProbe]:
+    """Return the robots with these ids, None: all that are ready; those that are not connected have failed.
+
+    Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
+    """
+    drivers = share_drivers()
+    report = None
+    ready: List[int] = []
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while time.monotonic() < deadline_s:
+        if not program.sleep(0.05):
+            raise CalibrationError("ended before a robot was found")
+        report = drivers.read()
+        ready = [robot.id for robot in report.robots if robot.state == Robot.READY and robot.id >= 0] if report else []
+        if ready and (drivers.is_settled if robot_ids is None else set(ready).issuperset(robot_ids)):
+            break
+    if report is None:
+        raise CalibrationError(
+            "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
+        )
+    wanted = sorted(ready if robot_ids is None else robot_ids)
+    for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
+        if drivers.is_stopped(driver):
+            raise CalibrationError(f"all robots are stopped; release them: rosservice call {driver}/stop false")
+    if not set(ready).intersection(wanted):
+        raise CalibrationError("no robot is ready: are they on, and connected to the driver?")
+    probes = [RosProbe(robot_id, drivers.find_model("/hero_%d" % robot_id)) for robot_id in wanted]
+    for probe in probes:
+        probe.failure = None if probe.robot_id in ready else "is not connected to the driver: is it on?"
+    return probes

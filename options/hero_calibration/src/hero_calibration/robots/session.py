@@ -23,14 +23,12 @@ CALLS_AT_ONCE = 32
 
 
 class Session(Clock):
-    """The robots under calibration, and the clock; its sleep() takes the whole time also while the program ends.
+    """The robots under calibration (probes), also those that failed, and the clock.
 
-    Attributes:
-        probes: all robots, including those that failed.
+    Its sleep() takes the whole time also while the program ends.
     """
 
     def __init__(self, probes: Sequence[Probe]) -> None:
-        """Work with probes."""
         self.probes = list(probes)
 
     def map(self, work: Callable[[Probe], None], probes: Sequence[Probe]) -> None:
