@@ -25,8 +25,7 @@ from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors
 from hero_localization.tracking.settings import Settings
-from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagLayout, find_smallest_side
+from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagCorners, TagLayout, find_smallest_side
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
 from hero_node import Pose
@@ -125,6 +124,20 @@ def measure_tags(seeds: int) -> None:
         share, cpu_ms = np.mean(results, axis=0)
         smallest_px = find_smallest_side(find_camera(lab), DEFAULT_SIZE_M, DEFAULT_HEIGHT_M)
         print(f"  {name:32} {100.0 * share:6.2f} % {cpu_ms:6.1f} ms {smallest_px:5.0f} px", flush=True)
+
+
+def measure_load(seeds: int) -> None:
+    """Print the CPU of the search for many tags in large images, and for some in many images."""
+    wide = LabCamera(LENS_A._replace(focal_px=2.0 * LENS_A.focal_px, size_px=(3840, 2160)))
+    for lab, count, rate_hz in ((wide, 100, 30.0), (LabCamera(), 20, 60.0)):
+        results = []
+        for seed in range(seeds):
+            random = np.random.RandomState(seed)
+            tags = place_tags(lab, random, count)
+            results.append(run_search(lab, tags, [lab.render(tags, random) for _ in range(3)], FRAMES))
+        share, cpu_ms = np.mean(results, axis=0)
+        text = "%d tags in images of %d px at %.0f Hz: %.2f %% found, %.1f ms of CPU per image, %.2f cores"
+        print(text % (count, lab.lens.size_px[0], rate_hz, 100.0 * share, cpu_ms, cpu_ms * rate_hz / 1e3), flush=True)
 
 
 def measure_shadows(seeds: int) -> None:
@@ -377,6 +390,7 @@ def measure_lenses(seeds: int) -> None:
 
 PARTS: Dict[str, Callable[[int], None]] = {
     "tags": measure_tags,
+    "load": measure_load,
     "shadows": measure_shadows,
     "losses": measure_losses,
     "mistakes": measure_mistakes,

@@ -1,6 +1,6 @@
 """Accuracy and cost of the overhead camera on rendered images, beside what the stock method makes of them.
 
-The camera is calibrated as a user does it: by images of the board, by reference tags whose places are a little wrong,
+The camera is calibrated as a user does it: by views of a board, by reference tags whose places are a little wrong,
 and by robots that turn and drive. Then robots stand all over the field, drive straight, and drive circles. The stock
 method has the same tags and the same lens: a homography of the floor, or the pose of the single tag; stamps of arrival;
 and tags that sit exactly in the robots' centers. The nodes are measured by localization_nodes. Run it with script/bench
@@ -19,18 +19,18 @@ from localization_nodes import measure_nodes
 from measuring import measure_machine_us, print_machine
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
-from hero_localization.calibration.lens_calibration import calibrate_lens, find_board
+from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
+from hero_localization.prints.boards import list_board_corners
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
-from hero_localization.simulated_camera.board_renderer import BoardRenderer, list_board_places
+from hero_localization.simulated_camera.camera_node import scale
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 from hero_localization.tracking.detectors import create_detector
-from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagLayout, fit_squares, locate
+from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagCorners, TagLayout, fit_squares, locate
 from hero_localization.tracking.tag_search import TagSearch
 from hero_node import Pose, measure_distance, wrap_angle
 from hero_sim.stepped import StepSwarm
@@ -43,6 +43,7 @@ FIELD_M = (2.5, 1.4)
 GRID = (4, 3)
 REFERENCES_M = ((-1.3, -0.7), (1.3, -0.7), (1.3, 0.7), (-1.3, 0.7), (0.0, -0.72), (0.0, 0.72))
 BOARD_IMAGES = 24
+CORNER_SD_PX = 0.15
 PLACEMENTS = 20
 COVERED_S = 2.0
 FOUND_AGAIN_S = 0.2
@@ -143,13 +144,19 @@ class Scene:
 
 
 def find_lens(random: np.random.RandomState) -> Intrinsics:
-    """Calibrate the lens by images of the board at places all over them."""
-    views = []
-    renderer = BoardRenderer(OPTIONS)
-    for turn_rad, place_m in itertools.islice(list_board_places(OPTIONS, random), BOARD_IMAGES):
-        view = find_board(renderer.render(turn_rad, place_m, random))
-        if view is not None:
-            views.append(view)
+    """Calibrate the lens by the corners of a board, a little off, that is held tilted all over the image."""
+    views, lens, size_px = [], OPTIONS.geometry.lens, (OPTIONS.width_px, OPTIONS.height_px)
+    corners_m = list_board_corners()
+    for index in range(BOARD_IMAGES):
+        tilt_rad = random.choice((-1.0, 1.0), 2) * random.uniform(0.25, 0.6, 2)
+        rotation = cv2.Rodrigues(np.array((*tilt_rad, random.uniform(-0.3, 0.3))))[0]
+        aim_px = np.array((0.18 + 0.32 * (index % 3), 0.2 + 0.3 * (index // 3 % 3))) * size_px
+        place_m = random.uniform(0.35, 0.5) * np.append(lens.undistort(aim_px[None])[0], 1.0)
+        points_m = (corners_m - corners_m.mean(axis=0)) @ rotation.T + place_m
+        pixels = lens.distort(points_m[:, :2] / points_m[:, 2:])
+        seen = np.flatnonzero(((pixels > 0.0) & (pixels < size_px)).all(axis=1))
+        off_px = random.normal(0.0, CORNER_SD_PX, (len(seen), 2))
+        views.append(BoardView(seen, (pixels[seen] + off_px).astype(np.float32)))
     result = calibrate_lens(views, OPTIONS.width_px, OPTIONS.height_px)
     verdict = "; ".join(result.problems) or "good"
     found_px, true_px = result.lens.matrix[0, 0], OPTIONS.focal_px[0]
@@ -383,6 +390,9 @@ def main() -> None:
     text = "error of the reference tags' places, mm (%(default)s)"
     parser.add_argument("--tape-mm", type=float, default=1.0, help=text)
     parser.add_argument("--count", type=int, default=50, help="robots that the nodes track (%(default)s)")
+    text = "width of the nodes' images, px (%(default)s); 3840 takes 1 GB of memory"
+    parser.add_argument("--width", type=int, default=1920, help=text)
+    parser.add_argument("--rate", type=float, default=30.0, help="of the nodes' images, Hz (%(default)s)")
     parser.add_argument("--seconds", type=float, default=20.0, help="for so long (%(default)s)")
     parser.add_argument("--rounds", type=int, default=1, help="of the nodes (%(default)s)")
     options = parser.parse_args()
@@ -391,7 +401,8 @@ def main() -> None:
     if "accuracy" in options.only:
         measure_accuracy(options.seed, options.tape_mm / 1e3)
     if "nodes" in options.only:
-        measure_nodes(options.count, options.seconds, options.rounds)
+        camera = scale(OPTIONS, options.width, options.width * 9 // 16)._replace(rate_hz=options.rate)
+        measure_nodes(camera, options.count, options.seconds, options.rounds)
 
 
 if __name__ == "__main__":

@@ -20,17 +20,15 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 
 from hero_localization.simulated_camera.renderer import CameraRenderer
-from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
+from hero_localization.simulated_camera.view import PrintedTag
 from hero_localization.tracking.settings import describe_camera, update
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_sim.world.arena import build_rectangle
 
-OPTIONS = CameraOptions()
 ARENA_M = (2.5, 1.4)
 ROWS = 5
-TURN_FRAMES = 90
-TURN_RAD_S = 2.0 * math.pi * OPTIONS.rate_hz / TURN_FRAMES
-DELAY_S = OPTIONS.delay_s + OPTIONS.delay_jitter_s / 2.0
+TURN_S = 3.0
+TURN_RAD_S = 2.0 * math.pi / TURN_S
 ODOMETRY_GROUPS = 5
 """Each robot sends as often as the camera, in as many groups between two images."""
 SETTLE_S = 5.0
@@ -43,23 +41,20 @@ def place_robots(count):
     return np.column_stack((across_m.ravel(), up_m.ravel(), np.zeros(across_m.size)))[:count]
 
 
-def render_turn(poses):
+def render_turn(options, poses):
     """Return the images (H, W) of one turn of all robots."""
-    renderer = CameraRenderer(OPTIONS, build_rectangle(*ARENA_M, 0), [PrintedTag(index) for index in range(len(poses))])
+    renderer = CameraRenderer(options, build_rectangle(*ARENA_M, 0), [PrintedTag(index) for index in range(len(poses))])
     speeds = np.column_stack((np.zeros(len(poses)), np.full(len(poses), TURN_RAD_S)))
-    turns_rad = 2.0 * math.pi * np.arange(TURN_FRAMES) / TURN_FRAMES
+    count = round(TURN_S * options.rate_hz)
+    turns_rad = 2.0 * math.pi * np.arange(count) / count
     return [renderer.render(poses + (0.0, 0.0, turn_rad), speeds) for turn_rad in turns_rad]
-
-
-def write_camera_file(path):
-    """Write the pose of the rendered camera."""
-    update(path, describe_camera(OPTIONS.geometry, {}))
 
 
 class CameraAndDriver:
     """Publishers of images and odometry, and what came of them."""
 
-    def __init__(self, images, count):
+    def __init__(self, options, images, count):
+        self._frame_s, self._delay_s = 1.0 / options.rate_hz, options.delay_s + options.delay_jitter_s / 2.0
         self.arrivals_s, self.measured_s, self.published_s, self.tracked = {}, {}, [], 0
         self._images, self._index, self._start_s = images, 0, rospy.get_time()
         self._image = rospy.Publisher("/camera/image_raw", Image, queue_size=1)
@@ -78,7 +73,7 @@ class CameraAndDriver:
 
     def run(self, is_done):
         """Publish until is_done(), from where the last call ended."""
-        frame_s, late_frames = 1.0 / OPTIONS.rate_hz, math.floor(DELAY_S * OPTIONS.rate_hz)
+        frame_s, late_frames = self._frame_s, math.floor(self._delay_s / self._frame_s)
         while not is_done():
             frame_start_s = self._start_s + self._index * frame_s
             for group in range(ODOMETRY_GROUPS):
@@ -86,7 +81,7 @@ class CameraAndDriver:
                 _sleep_until(now_s)
                 self._send_odometry(self._odometry[group::ODOMETRY_GROUPS], now_s)
             taken_s = frame_start_s - late_frames * frame_s
-            _sleep_until(taken_s + DELAY_S)
+            _sleep_until(taken_s + self._delay_s)
             self._send_image(self._index - late_frames, taken_s)
             self._index += 1
 
@@ -99,7 +94,7 @@ class CameraAndDriver:
             publisher.publish(message)
 
     def _send_image(self, index, taken_s):
-        gray = self._images[index % TURN_FRAMES]
+        gray = self._images[index % len(self._images)]
         message = Image(height=gray.shape[0], width=gray.shape[1], encoding="mono8", step=gray.shape[1])
         message.header.stamp = rospy.Time.from_sec(taken_s)
         message.data = gray.tobytes()
@@ -122,16 +117,16 @@ def _sleep_until(time_s):
     time.sleep(max(0.0, time_s - rospy.get_time()))
 
 
-def measure_nodes(count, seconds, rounds):
+def measure_nodes(options, count, seconds, rounds):
     """Print CPU (of one core) of track and localize, and the ages of images and poses, in each of some rounds."""
-    images = render_turn(place_robots(count))
+    images = render_turn(options, place_robots(count))
     with contextlib.ExitStack() as stack:
         environment = stack.enter_context(start_master())
         os.environ["ROS_MASTER_URI"] = environment["ROS_MASTER_URI"]
         path = str(Path(stack.enter_context(tempfile.TemporaryDirectory())) / "camera.yaml")
-        write_camera_file(path)
+        update(path, describe_camera(options.geometry, {}))
         rospy.init_node("camera_and_driver", disable_signals=True)
-        source = CameraAndDriver(images, count)
+        source = CameraAndDriver(options, images, count)
 
         def start_node(program, *arguments):
             command = ["catkin_find", "--first-only", "--libexec", "hero_localization", program]

@@ -95,12 +95,30 @@ def share_near(points_m, others_m):
     return float(np.mean([np.hypot(*(others_m - point_m).T).min() < NEAR_M for point_m in points_m]))
 
 
+def feed_map(swarm, localization, swarm_map):
+    """Put the robots' scans into a map from now on, as map_arena does; its robots go by their rows."""
+
+    def add_poses(rows):
+        for row in rows.tolist():
+            estimate = localization.published[row]
+            if estimate is not None:
+                swarm_map.add_pose(row, estimate.stamp_s, estimate.pose)
+
+    def add_scans(rows):
+        for row in rows.tolist():
+            swarm_map.add_ranges(row, swarm.rows.scan_ms.item(row) / 1e3, swarm.rows.proximity_m[row].tolist())
+        swarm_map.update()
+
+    swarm.rows.on_cycle.append(add_poses)
+    swarm.rows.on_scan.append(add_scans)
+
+
 def measure_map(program, seed, times_s):
     """Return shares of the wall that is mapped, and of mapped cells that are wall, after each of times_s."""
     grid, surface_m = OccupancyGrid(BOUNDS_M), list_surface(load_arena("obstacles"))
     found: List[Tuple[float, float]] = []
     with StepSwarm(ROBOTS, seed=seed, arena="obstacles") as swarm:
-        StepLocalization(swarm, seed=seed).feed_map(SwarmMap(grid))
+        feed_map(swarm, StepLocalization(swarm, seed=seed), SwarmMap(grid))
         swarm.sleep(SETTLE_S)
         explorers = [Explorer(robot, CommonFrame("map"), seed + robot.robot_id) for robot in swarm]
         walkers = [Walker(robot, WanderLaw(), seed + robot.robot_id) for robot in swarm]

@@ -18,7 +18,6 @@ from hero_sim.stepped import StepSwarm
 from .filter.pose_filter import PoseFilter, make_covariance
 from .filter.pose_hypothesis import StampedPose
 from .filter.swarm_localizer import PUBLISH_RATE_HZ
-from .mapping.swarm_map import SwarmMap
 
 
 class CameraModel(NamedTuple):
@@ -38,7 +37,7 @@ CAMERA = CameraModel()
 
 
 class StepLocalization:
-    """Localizes all robots of a swarm from now on: they then take it for the frame map."""
+    """Localizes all robots of a swarm from now on: they then take it for the frame map; published: estimates by row."""
 
     def __init__(self, swarm: StepSwarm, camera: CameraModel = CAMERA, seed: int = 0) -> None:
         """seed: of the camera's errors."""
@@ -52,7 +51,7 @@ class StepLocalization:
         self._covariance = make_covariance(camera.noise_sd_m, camera.noise_sd_rad)
         self._filters = [PoseFilter() for _ in swarm.robots]
         self._images: List[Deque[Tuple[float, Pose]]] = [deque() for _ in swarm.robots]
-        self._published: List[Optional[StampedPose]] = [None] * count
+        self.published: List[Optional[StampedPose]] = [None] * count
         self._published_s = [0.0] * count
         for robot in swarm.robots:
             robot.localize_by(partial(self.find_pose, robot.row))
@@ -60,27 +59,10 @@ class StepLocalization:
 
     def find_pose(self, row: int) -> Pose:
         """Return where the robot at row is in map. Raises: FrameError before the first image has come."""
-        estimate = self._published[row]
+        estimate = self.published[row]
         if estimate is None:
             raise FrameError("the robot at row %d has no pose in the frame map yet" % row)
         return estimate.pose
-
-    def feed_map(self, swarm_map: SwarmMap) -> None:
-        """Put the robots' scans into a map from now on, as map_arena does; its robots go by their rows."""
-
-        def add_poses(rows: np.ndarray) -> None:
-            for row in rows.tolist():
-                estimate = self._published[row]
-                if estimate is not None:
-                    swarm_map.add_pose(row, estimate.stamp_s, estimate.pose)
-
-        def add_scans(rows: np.ndarray) -> None:
-            for row in rows.tolist():
-                swarm_map.add_ranges(row, self._rows.scan_ms.item(row) / 1e3, self._rows.proximity_m[row].tolist())
-            swarm_map.update()
-
-        self._rows.on_cycle.append(add_poses)
-        self._rows.on_scan.append(add_scans)
 
     def _receive(self, rows: np.ndarray) -> None:
         now_s = self._rows.now_ms / 1e3
@@ -94,4 +76,4 @@ class StepLocalization:
                 taken_s, measured = images.popleft()
                 pose_filter.add_measurement(StampedPose(taken_s, measured, self._covariance))
             if now_s >= self._published_s[row] + 1.0 / PUBLISH_RATE_HZ:
-                self._published_s[row], self._published[row] = now_s, pose_filter.estimate()
+                self._published_s[row], self.published[row] = now_s, pose_filter.estimate()

@@ -20,7 +20,7 @@ from hero_localization.camera.camera_model import Camera, Intrinsics  # noqa: E4
 from hero_localization.errors import CalibrationError  # noqa: E402
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402
 from hero_localization.tracking.detectors import create_detector  # noqa: E402
-from hero_localization.tracking.tag_corners import TagCorners  # noqa: E402
+from hero_localization.tracking.tag_pose import TagCorners  # noqa: E402
 from hero_localization.tracking.tracker import find_moved_references  # noqa: E402
 from hero_node import Pose, transform_pose  # noqa: E402
 

@@ -23,7 +23,7 @@ def test_wrong_ids_are_reported_in_one_line(monkeypatch, capsys):
 
 
 def test_a_camera_with_fewer_pixels_sees_the_same():
-    small = camera_node._scale(CameraOptions(), 960, 540)
+    small = camera_node.scale(CameraOptions(), 960, 540)
     points_m = np.array([(0.7, -0.3, 0.076), (-1.0, 0.5, 0.0)])
     large_px, small_px = (options.geometry.project(points_m) for options in (CameraOptions(), small))
     assert small_px + 0.5 == pytest.approx((large_px + 0.5) / 2.0)
@@ -72,13 +72,6 @@ def test_options_are_taken_up_to_their_limits():
                 camera_node.parse_options(["--" + name, str(value)])
 
 
-def test_the_board_is_shown_four_times_at_each_place():
-    scene = camera_node.BoardScene(camera_node.parse_options(["--board"]), CameraOptions(width_px=64, height_px=36))
-    scene._renderer.render = lambda turn, place_m, random: (turn, place_m)
-    shown = [scene.render(0.0) for _ in range(12)]
-    assert [shown.index(place) for place in shown] == [0] * 4 + [4] * 4 + [8] * 4
-
-
 def test_references_are_printed_for_the_camera_file(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--arena", "empty"])
     camera_node.main()
@@ -92,7 +85,7 @@ def test_references_are_printed_for_the_camera_file(monkeypatch, capsys):
 
 def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):
     monkeypatch.setattr(camera_node.rospy, "Subscriber", lambda *_, **__: None)
-    true = camera_node.TrueRobots([4, 7])
+    true = camera_node.TrueRobots([7])
 
     def receive(stamp_s, x_m):
         message = camera_node.Odometry()
@@ -102,16 +95,16 @@ def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):
         message.twist.twist.linear.x, message.twist.twist.angular.z = 0.2, 1.0
         true._receive(message, 7)
 
-    assert true.find(1.0)[0] == []
+    assert true.find(1.0) is None
     for index in range(30):
         receive(1.0 + 0.5 * index, float(index))
     for stamp_s, x_m, moved_s in ((6.0, 10.0, 0.0), (5.0, 10.0, -0.1), (6.05, 10.0, 0.05), (15.2, 28.0, 0.1),
                                   (15.7, 29.0, 0.1), (15.42, 29.0, -0.08)):  # fmt: skip
-        ids, poses, speeds = true.find(stamp_s)
+        poses, speeds = true.find(stamp_s)
         heading_rad = 1.0 + moved_s / 2.0
         moved_m = 0.2 * moved_s
         expected = (x_m + moved_m * math.cos(heading_rad), 2.0 + moved_m * math.sin(heading_rad), 1.0 + moved_s)
-        assert ids == [7] and speeds.tolist() == [[0.2, 1.0]]
+        assert speeds.tolist() == [[0.2, 1.0]]
         assert poses[0] == pytest.approx(expected), stamp_s
 
 

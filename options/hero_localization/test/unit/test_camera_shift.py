@@ -9,8 +9,7 @@ from test_tracker import CAMERA, SQUARE
 
 from hero_localization.camera.camera_model import Camera
 from hero_localization.tracking.settings import Settings
-from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import TagLayout
+from hero_localization.tracking.tag_pose import TagCorners, TagLayout
 from hero_localization.tracking.tracker import Tracker
 from hero_node import Pose
 

@@ -17,7 +17,7 @@ from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, tag_corners
 from hero_localization.tracking import detectors
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors, find_print_mistake
-from hero_localization.tracking.tag_corners import TagCorners
+from hero_localization.tracking.tag_pose import TagCorners
 from hero_sim.world.arena import build_rectangle
 from hero_test.nonempty import maybe_empty, nonempty
 

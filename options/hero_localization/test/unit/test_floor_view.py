@@ -8,7 +8,7 @@ from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import SettingsError
 from hero_localization.tracking import floor_view
 from hero_localization.tracking.floor_view import MAX_SIDE_PX, FloorView
-from hero_localization.tracking.tag_corners import TagCorners
+from hero_localization.tracking.tag_pose import TagCorners
 from hero_test.nonempty import nonempty
 
 HEIGHT_M = 0.076

@@ -14,7 +14,7 @@ from hero_localization.calibration.arena_calibration import average_tags, calibr
 from hero_localization.camera.frame_source import Frame
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
-from hero_localization.nodes import calibrate_camera
+from hero_localization.nodes import calibrate_camera, calibrate_robots
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 from hero_localization.tracking import settings
@@ -178,11 +178,11 @@ def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeyp
         return SimpleNamespace(unregister=scene.on_odometry.clear)
 
     monkeypatch.setattr(rospy, "Subscriber", subscribe)
-    monkeypatch.setattr(calibrate_camera, "read_duration_clock_s", lambda: scene.swarm.now_s)
-    monkeypatch.setattr(calibrate_camera, "Robot", lambda robot_id: nullcontext(scene.swarm[robot_id]))
+    monkeypatch.setattr(calibrate_robots, "read_duration_clock_s", lambda: scene.swarm.now_s)
+    monkeypatch.setattr(calibrate_robots, "Robot", lambda robot_id: nullcontext(scene.swarm[robot_id]))
     program = SimpleNamespace(sleep=None)
     parsed = calibrate_camera.parse_options(["robots", "--robots", "0", "--file", path])
-    status = calibrate_camera.calibrate_robot_tags(parsed, SteppedPictures(scene, renderer, path), program)
+    status = calibrate_robots.calibrate_robot_tags(parsed, SteppedPictures(scene, renderer, path), program)
     text, is_wrong = capsys.readouterr().out, yaw_rad > 1.0
     assert status == int(is_wrong), text
     assert ("hero_0: the tag is on upside down" in text) == is_wrong, text

@@ -10,7 +10,6 @@ cv2 = pytest.importorskip("cv2")
 
 from hero_localization.errors import SettingsError  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402 - without OpenCV there is no camera
-from hero_localization.simulated_camera.board_renderer import list_board_places  # noqa: E402
 from hero_localization.simulated_camera.lab_setup import (  # noqa: E402
     describe_references,
     hang_above,
@@ -21,7 +20,6 @@ from hero_localization.simulated_camera.renderer import CameraRenderer  # noqa: 
 from hero_localization.simulated_camera.view import (  # noqa: E402
     CameraOptions,
     PrintedTag,
-    hand_outlines,
     list_frames,
     list_rays,
     plane_homography,
@@ -340,27 +338,6 @@ def test_noise_is_centered_and_never_repeats_in_place():
     for index, field in enumerate(noise):
         assert field.std() == pytest.approx(3.0, rel=0.05)
         assert all((field != other).mean() > 0.5 for other in noise[:index])
-
-
-def test_a_hand_reaches_in_from_below():
-    hand, arm = hand_outlines((0.3, 0.2))
-    assert hand.shape == (24, 3) and (hand[:, 2] == 0.25).all() and (arm[:, 2] == 0.25).all()
-    assert np.hypot(*(hand[:, :2] - (0.3, 0.2)).T) == pytest.approx(np.full(24, 0.06))
-    assert sorted(map(tuple, arm[:, :2].round(6).tolist())) == [(0.26, -1.8), (0.26, 0.2), (0.34, -1.8), (0.34, 0.2)]
-    assert cv2.contourArea(arm[:, :2].astype(np.float32)) == pytest.approx(0.16), "its corners in order"
-
-
-def test_boards_are_held_tilted_in_nine_places_of_the_image():
-    options = CameraOptions()
-    holds = list(itertools.islice(list_board_places(options, np.random.RandomState(2)), 90))
-    turns, places = (np.array(values) for values in zip(*holds))
-    (fx, fy), (cx, cy) = options.focal_px, options.center_px
-    pixels = places[:, :2] / places[:, 2:] * (fx, fy) + (cx, cy)
-    expected = [(1920 * u, 1080 * v) for v in (0.2, 0.5, 0.8) for u in (0.18, 0.5, 0.82)]
-    np.testing.assert_allclose(pixels, expected * 10, atol=1e-6)
-    for values, low, high in ((places[:, 2], 0.35, 0.5), (np.abs(turns[:, :2]), 0.25, 0.6), (turns[:, 2], -0.3, 0.3)):
-        assert low <= values.min() < low + 0.1 * (high - low) and high - 0.1 * (high - low) < values.max() <= high
-    assert {tuple(sign) for sign in np.sign(turns[:, :2]).tolist()} == set(itertools.product((-1.0, 1.0), repeat=2))
 
 
 def test_reference_tags_lie_beside_the_arena_and_are_described_by_place():

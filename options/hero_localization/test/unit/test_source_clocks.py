@@ -69,7 +69,8 @@ class Drive:
 
 
 def list_clocks(drive):
-    return [(clock.name, clock.text.split(" come ")[1].split(":")[0]) for clock in drive.localizer.list_clocks()]
+    clocks = drive.localizer.clocks.list_off()
+    return [(name, text.split(" come ")[1].split(":")[0]) for name, text in clocks.items()]
 
 
 @pytest.mark.slow

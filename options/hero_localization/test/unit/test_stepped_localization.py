@@ -7,8 +7,6 @@ import pytest
 
 from hero_client.values import FrameError
 from hero_client.values.errors import GoalError
-from hero_localization.mapping.occupancy_grid import OccupancyGrid
-from hero_localization.mapping.swarm_map import SwarmMap
 from hero_localization.stepped_localization import CameraModel, StepLocalization
 from hero_node import Pose
 from hero_sim.stepped import StepSwarm
@@ -96,20 +94,6 @@ def test_a_camera_without_delay_shows_robots_where_they_are():
 
 
 @pytest.mark.slow
-def test_the_map_shows_the_walls_before_which_robots_turn():
-    grid = OccupancyGrid((-1.1, -1.1, 1.1, 1.1))
-    with StepSwarm(4, seed=1, arena="empty") as swarm:
-        StepLocalization(swarm, seed=1).feed_map(SwarmMap(grid))
-        swarm.sleep(0.5)
-        places = [(0.88, 0.5), (-0.88, -0.5), (0.5, -0.88), (-0.5, 0.88)]
-        motions = [robot.start_go_to(*place, frame="map") for robot, place in zip(swarm, places)]
-        assert [motion.exception() for motion in motions] == [None] * 4
-        swarm.drive(0.0, 1.0, duration_s=3.0)
-    walls_m = np.abs(np.abs(grid.centers_of(grid.occupied)).max(axis=1) - 1.0)
-    assert len(walls_m) > 40 and np.mean(walls_m < 0.016) > 0.9
-
-
-@pytest.mark.slow
 def test_errors_of_the_camera_are_a_bias_of_each_robot_and_noise():
     assert CameraModel() == (0.1, 0.001, 0.005, 0.0005, 0.005)
     with StepSwarm(1, seed=3, arena="empty", worlds=60) as swarm:
@@ -130,7 +114,7 @@ def test_poses_come_after_the_delay_25_times_a_second():
         localization, published_s = StepLocalization(swarm, CameraModel(delay_s=0.2)), []
         for _ in range(400):
             swarm.sleep(0.005)
-            found = localization._published[0]
+            found = localization.published[0]
             if found is not None and (not published_s or found.stamp_s != published_s[-1][1]):
                 published_s.append((swarm.now_s, found.stamp_s))
         times_s = np.array(published_s)

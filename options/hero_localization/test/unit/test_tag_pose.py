@@ -7,10 +7,10 @@ import pytest
 
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.filter.heading_check import HeadingCheck, is_upside_down
-from hero_localization.tracking.tag_corners import TagCorners
 from hero_localization.tracking.tag_pose import (
     SYSTEMATIC_M,
     SYSTEMATIC_RAD,
+    TagCorners,
     TagLayout,
     find_smallest_side,
     fit_squares,

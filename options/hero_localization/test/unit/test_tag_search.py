@@ -6,8 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from hero_localization.tracking.detectors import TagDetector
-from hero_localization.tracking.tag_corners import TagCorners
+from hero_localization.tracking.tag_pose import TagCorners
 from hero_localization.tracking.tag_search import TagSearch, _list_tiles
 
 FRAME_S = 1.0 / 30.0
@@ -18,7 +17,7 @@ FAST_PX_S = 140.0
 """0.2 m/s, 2.2 m below the camera."""
 
 
-class SeenTags(TagDetector):
+class SeenTags:
     """Finds those of the tags given that lie in the window with their margin."""
 
     def __init__(self):

@@ -5,8 +5,7 @@ import pytest
 
 from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.tracking.settings import Settings
-from hero_localization.tracking.tag_corners import TagCorners
-from hero_localization.tracking.tag_pose import TagLayout
+from hero_localization.tracking.tag_pose import TagCorners, TagLayout
 from hero_localization.tracking.tracker import Problem, Tracker
 from hero_node import Pose
 

@@ -1,19 +1,17 @@
-"""The camera pose (extrinsics) from reference tags of known place. Pure but for OpenCV."""
+"""The camera pose (extrinsics) from reference tags of known place. Pure."""
 
 import itertools
 import math
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-import cv2
 import numpy as np
 
 from hero_node import Pose, measure_distance
 
-from ..camera.camera_model import Camera, Intrinsics
+from ..camera.camera_model import Camera, Intrinsics, solve_camera
 from ..errors import CalibrationError
 from ..prints.tag_images import REFERENCE_SIZE_M
-from ..tracking.tag_corners import TagCorners
-from ..tracking.tag_pose import TagPose, fit_squares, list_corners
+from ..tracking.tag_pose import TagCorners, TagPose, fit_squares, list_corners
 
 MIN_TAGS = 4
 MIN_EXTENT_M = 0.3
@@ -50,13 +48,10 @@ _SEEN_SHARE = 0.5
 
 
 class ArenaCalibration(NamedTuple):
-    """The calibrated camera.
+    """The calibrated camera, and what speaks against using it.
 
-    Attributes:
-        camera: intrinsics, and pose in `map`.
-        residuals_m: how far each reference tag is seen from the place it was given, by id.
-        left_out: ids of tags that were left out, as they contradict all others.
-        problems: what speaks against using it; empty: it is good.
+    residuals_m: how far each reference tag is seen from the place it was given, by id.
+    left_out: ids of tags that were left out, as they contradict all others.
     """
 
     camera: Camera
@@ -118,19 +113,18 @@ def calibrate_arena(
             "no camera above the floor sees the reference tags like this: check the ids and places in the camera file"
         )
     camera, left_out = fit.camera, []  # type: Camera, List[int]
-    wrong = _find_wrong_tag(image)
-    suspects = wrong.tag_ids if wrong is not None else []
-    if wrong is not None and len(suspects) == 1 and wrong.gain > LEFT_OUT_GAIN:
-        left_out, camera = suspects, wrong.camera_without
+    suspects, off_m, camera_without = _find_wrong_tag(image, fit)
+    if camera_without is not None:
+        camera, left_out = camera_without, suspects
     residuals_m = measure_residuals(camera, seen, references)
     problems = _judge(residuals_m, left_out, missing)
+    if suspects and not left_out:
+        text = "tag %s is about %.0f mm from its place: measure them again"
+        problems.insert(0, text % (" or ".join(map(str, suspects)), 1e3 * off_m))
     if _compute_rms(residuals_m, left_out) < WORST_RESIDUAL_M:  # or it is no matter of scale
         problems += _check_sizes(camera, [tag for tag in seen if tag.tag_id not in left_out], size_m)
     if len(seen) == MIN_TAGS:
         problems.append("four reference tags cannot be checked: one that is 5 mm off goes unnoticed; add two")
-    if wrong is not None and not left_out:
-        text = "tag %s is about %.0f mm from its place: measure them again"
-        problems.insert(0, text % (" or ".join(map(str, suspects)), 1e3 * wrong.off_m))
     return ArenaCalibration(camera, residuals_m, left_out, problems)
 
 
@@ -154,21 +148,16 @@ class _Image(NamedTuple):
         known = [self.references[tag.tag_id] for tag in self.tags]
         # The yaws are not known: centers first.
         points_m = np.array([(*pose[:2], 0.0) for pose in known])
-        # By rays, as solvePnP does not know all models of lenses.
         pixels = np.array([tag.center for tag in self.tags])
         for _ in range(_YAW_ROUNDS):
-            try:
-                is_found, turn, shift = cv2.solvePnP(points_m, self.lens.undistort(pixels), np.eye(3), None)
-            except cv2.error:
+            camera = solve_camera(self.lens, pixels, points_m)
+            if camera is None:
                 return None
-            if not is_found or not np.isfinite(turn).all() or not np.isfinite(shift).all():
-                return None
-            rotation = cv2.Rodrigues(turn)[0]
-            camera = Camera(self.lens, rotation, (-rotation.T @ shift).ravel())
             yaws_rad = [fit.pose.yaw_rad for fit in fit_squares(camera, self.tags, 0.0)]
             turned = [pose._replace(yaw_rad=yaw_rad) for pose, yaw_rad in zip(known, yaws_rad)]
             points_m = np.vstack([list_corners(pose, self.size_m, 0.0) for pose in turned])
             pixels = np.vstack([tag.corners for tag in self.tags])
+        assert camera is not None
         if not HEIGHTS_M[0] <= camera.position_m[2] <= HEIGHTS_M[1]:
             return None
         return _Fit(camera, _compute_rms(measure_residuals(camera, self.tags, self.references), ()))
@@ -191,47 +180,26 @@ def _refuse_mistakes(image: _Image) -> None:
         raise CalibrationError(f"the places of the reference tags have {', or '.join(causes)}: correct them")
 
 
-class _WrongTag(NamedTuple):
-    """Tags of which one contradicts all others.
+def _find_wrong_tag(image: _Image, fit_of_all: _Fit) -> Tuple[List[int], float, Optional[Camera]]:
+    """Return the tags of which one contradicts all others, how far (m) the likeliest is off, the camera without it.
 
-    Attributes:
-        tag_ids: the likeliest first.
-        off_m: how far it is off.
-        camera_without: the camera without it.
-        gain: by how much the squared residuals are less without it, per degree of freedom, by what remains.
+    No tags: none is wrong, or there is none to spare. No camera: chance may explain it, or another tag.
     """
-
-    tag_ids: List[int]
-    off_m: float
-    camera_without: Camera
-    gain: float
-
-
-def _find_wrong_tag(image: _Image) -> Optional[_WrongTag]:
-    """Return the tags without one of which the others agree by far better; None if there is none, or none to spare."""
-    fit_of_all = image.fit()
-    if len(image.tags) <= MIN_TAGS or fit_of_all is None:
-        return None
-    all_m2, free = len(image.tags) * fit_of_all.rms_m**2, 2.0 * len(image.tags) - 8.0
-    found: Optional[_WrongTag] = None
-    squares_m2: Dict[int, float] = {}
-    for tag in image.tags:
-        others = [other for other in image.tags if other is not tag]
-        fit = image._replace(tags=others).fit()
-        if fit is None:
-            continue
-        alone_m = measure_residuals(fit.camera, [tag], image.references)[tag.tag_id]
-        squares_m2[tag.tag_id] = len(others) * fit.rms_m**2
-        if squares_m2[tag.tag_id] == min(squares_m2.values()):
-            rest_m2 = squares_m2[tag.tag_id]
-            gain = (all_m2 - rest_m2) / 2.0 / max(rest_m2 / free, MIN_RESIDUAL_M**2)
-            is_wrong = alone_m > WRONG_PLACE_M and gain > WRONG_GAIN
-            found = _WrongTag([tag.tag_id], alone_m, fit.camera, gain) if is_wrong else None
-    if found is None:
-        return None
-    limit_m2 = min(squares_m2.values()) + AMBIGUOUS_M2
-    suspects = [tag_id for tag_id, sum_m2 in squares_m2.items() if sum_m2 <= limit_m2]
-    return found._replace(tag_ids=sorted(suspects, key=squares_m2.__getitem__))
+    count, fits, sums_m2 = len(image.tags), {}, {}  # type: int, Dict[int, _Fit], Dict[int, float]
+    for tag in image.tags if count > MIN_TAGS else ():
+        fit = image._replace(tags=[other for other in image.tags if other is not tag]).fit()
+        if fit is not None:
+            fits[tag.tag_id], sums_m2[tag.tag_id] = fit, (count - 1) * fit.rms_m**2
+    if not fits:
+        return [], 0.0, None
+    suspects = sorted(sums_m2, key=sums_m2.__getitem__)
+    camera, rest_m2 = fits[suspects[0]].camera, sums_m2[suspects[0]]
+    off_m = measure_residuals(camera, image.tags, image.references)[suspects[0]]
+    gain = (count * fit_of_all.rms_m**2 - rest_m2) / 2.0 / max(rest_m2 / (2.0 * count - 8.0), MIN_RESIDUAL_M**2)
+    if not (off_m > WRONG_PLACE_M and gain > WRONG_GAIN):
+        return [], 0.0, None
+    suspects = [tag_id for tag_id in suspects if sums_m2[tag_id] <= rest_m2 + AMBIGUOUS_M2]
+    return suspects, off_m, camera if len(suspects) == 1 and gain > LEFT_OUT_GAIN else None
 
 
 def _check_sizes(camera: Camera, tags: Sequence[TagCorners], size_m: float) -> List[str]:

@@ -2,7 +2,7 @@
 
 import math
 from contextlib import suppress
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence
 
 import cv2
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from hero_node import one_line
 from hero_node.files import EntryError, load_entries
 
-from ..camera.camera_model import EQUIDISTANT, MODELS, PLUMB_BOB, RATIONAL, Intrinsics
+from ..camera.camera_model import EQUIDISTANT, MODELS, PLUMB_BOB, RATIONAL, Camera, Intrinsics
 from ..errors import CalibrationError
 from ..prints.boards import DICTIONARY, create_board, list_board_corners
 
@@ -45,10 +45,6 @@ REGIONS = (
 MIN_IN_REGION = 20
 
 
-MAX_PX = 10**6
-"""Limit of sizes in a file, px: Intrinsics knows what is possible."""
-
-
 class BoardView(NamedTuple):
     """The board in one image: ids of its inner corners (K,), and their pixels (K, 2)."""
 
@@ -57,13 +53,10 @@ class BoardView(NamedTuple):
 
 
 class LensCalibration(NamedTuple):
-    """Calibrated intrinsics.
+    """Calibrated intrinsics, how far the board's corners lie from where these put them, and what speaks against them.
 
-    Attributes:
-        rms_px: how far the board's corners lie from where the lens puts them.
-        focal_error: standard deviation of the focal length, share, found by leaving out groups of views.
-        left_out: indices of the views that were left out.
-        problems: what speaks against using it; empty: it is good.
+    focal_error: standard deviation of the focal length, as a share, found by leaving out groups of views.
+    left_out: indices of the views that were left out.
     """
 
     lens: Intrinsics
@@ -151,69 +144,49 @@ class _Fit(NamedTuple):
 
 def _choose_fit(views: Sequence[BoardView], width_px: int, height_px: int) -> _Fit:
     """Return the fit of plumb_bob, unless another model of a lens explains the views clearly better."""
-    plain = _fit(views, width_px, height_px)
+    plain = _fit(views, width_px, height_px, PLUMB_BOB)
     fits = [plain]
     for model in (RATIONAL, EQUIDISTANT) if plain.rms_px > WIDE_RMS_PX else ():
         with suppress(CalibrationError):  # the views do not suffice for this model
-            fits.append(_fit_model(views, width_px, height_px, None, model))
+            fits.append(_fit(views, width_px, height_px, model))
     best = min(fits, key=lambda fit: fit.rms_px)
     return best if best.rms_px < WIDE_SHARE * plain.rms_px else plain
 
 
-def _fit(views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics] = None) -> _Fit:
-    """Return the intrinsics that explain the views best, sought from a guess; None: plumb_bob, from OpenCV's own."""
-    return _fit_model(views, width_px, height_px, guess, PLUMB_BOB if guess is None else guess.model)
-
-
-def _fit_model(
-    views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics], model: str
+def _fit(
+    views: Sequence[BoardView], width_px: int, height_px: int, model: str, guess: Optional[Intrinsics] = None
 ) -> _Fit:
-    corners_m = list_board_corners().astype(np.float32)
+    """Return the intrinsics that explain the views best, sought from a guess; None: OpenCV's own."""
     if model == EQUIDISTANT:
-        return _fit_fisheye(views, width_px, height_px, guess)
-    # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
-    flags = (cv2.CALIB_RATIONAL_MODEL if model == RATIONAL else cv2.CALIB_FIX_K3) | (
-        0 if guess is None else cv2.CALIB_USE_INTRINSIC_GUESS
-    )
+        module, calibrate, kind = cv2.fisheye, cv2.fisheye.calibrate, "float64"
+        flags = cv2.fisheye.CALIB_RECOMPUTE_EXTRINSIC | cv2.fisheye.CALIB_FIX_SKEW
+    else:
+        module, calibrate, kind = cv2, cv2.calibrateCamera, "float32"
+        # k3 trades with k1 and k2: webcams whose field is below 90 degrees do without it.
+        flags = cv2.CALIB_RATIONAL_MODEL if model == RATIONAL else cv2.CALIB_FIX_K3
+    matrix, distortion = np.eye(3), np.zeros(MODELS[model][-1])
+    if guess is not None:
+        flags |= module.CALIB_USE_INTRINSIC_GUESS
+        matrix, distortion = guess.matrix.copy(), guess.distortion.copy()
+    corners_m = [list_board_corners()[view.ids] for view in views]
+    objects = [corners[:, None].astype(kind) for corners in corners_m]
+    pixels = [view.pixels[:, None].astype(kind) for view in views]
     try:
-        rms_px, matrix, distortion, turns, _, _, _, errors_px = cv2.calibrateCameraExtended(
-            [corners_m[view.ids] for view in views],
-            [view.pixels for view in views],
-            (width_px, height_px),
-            None if guess is None else guess.matrix.copy(),
-            None if guess is None else guess.distortion.copy(),
-            flags=flags,
+        rms_px, matrix, distortion, turns, shifts = calibrate(
+            objects, pixels, (width_px, height_px), matrix, distortion, flags=flags
         )
     except cv2.error as error:
-        raise CalibrationError(f"no lens explains these images: {str(error).strip().splitlines()[-1]}") from None
+        raise CalibrationError(f"no lens explains these images: {one_line(error)}") from None
     if not np.isfinite(matrix).all() or not math.isfinite(rms_px):
         raise CalibrationError("no lens explains these images: take them again")
-    lens = Intrinsics(
-        width_px, height_px, matrix, np.asarray(distortion, dtype=float).ravel()[: MODELS[model][-1]], model
-    )
-    tilts_rad = np.array([math.acos(min(abs(cv2.Rodrigues(turn)[0][2, 2]), 1.0)) for turn in turns])
-    return _Fit(lens, float(rms_px), np.asarray(errors_px).ravel(), tilts_rad)
-
-
-def _fit_fisheye(views: Sequence[BoardView], width_px: int, height_px: int, guess: Optional[Intrinsics]) -> _Fit:
-    corners_m = list_board_corners()
-    objects = [corners_m[view.ids].reshape(-1, 1, 3).astype(float) for view in views]
-    pixels = [view.pixels.reshape(-1, 1, 2).astype(float) for view in views]
-    flags = cv2.fisheye.CALIB_RECOMPUTE_EXTRINSIC | cv2.fisheye.CALIB_FIX_SKEW
-    flags |= 0 if guess is None else cv2.fisheye.CALIB_USE_INTRINSIC_GUESS
-    matrix = np.eye(3) if guess is None else guess.matrix.copy()
-    distortion = np.zeros((4, 1)) if guess is None else guess.distortion.reshape(4, 1).copy()
-    try:
-        rms_px, matrix, distortion, turns, shifts = cv2.fisheye.calibrate(
-            objects, pixels, (width_px, height_px), matrix, distortion, flags=flags, criteria=_CRITERIA
-        )
-    except cv2.error as error:
-        raise CalibrationError(f"no fisheye lens explains these images: {one_line(error)}") from None
-    lens = Intrinsics(width_px, height_px, matrix, distortion.ravel(), EQUIDISTANT)
-    seen = [cv2.fisheye.projectPoints(*part, matrix, distortion)[0] for part in zip(objects, turns, shifts)]
-    errors_px = np.array([np.sqrt(((here - there) ** 2).sum(axis=2).mean()) for here, there in zip(seen, pixels)])
-    tilts_rad = np.array([math.acos(min(abs(cv2.Rodrigues(turn)[0][2, 2]), 1.0)) for turn in turns])
-    return _Fit(lens, float(np.sqrt((errors_px**2).mean())), errors_px, tilts_rad)
+    lens = Intrinsics(width_px, height_px, matrix, distortion.ravel()[: MODELS[model][-1]], model)
+    errors_px, tilts_rad = [], []
+    for view, corners, turn, shift_m in zip(views, corners_m, turns, shifts):
+        rotation = cv2.Rodrigues(turn)[0]
+        seen = Camera(lens, rotation, (-rotation.T @ shift_m).ravel()).project(corners)
+        errors_px.append(math.sqrt(((seen - view.pixels) ** 2).sum(axis=1).mean()))
+        tilts_rad.append(math.acos(min(abs(rotation[2, 2]), 1.0)))
+    return _Fit(lens, float(rms_px), np.array(errors_px), np.array(tilts_rad))
 
 
 def _measure_focal_error(views: Sequence[BoardView], fit: _Fit) -> float:
@@ -225,7 +198,7 @@ def _measure_focal_error(views: Sequence[BoardView], fit: _Fit) -> float:
     groups, focals_px = np.random.RandomState(0).permutation(len(views)) % JACKKNIFE_GROUPS, []
     for left_out in range(JACKKNIFE_GROUPS):
         others = [view for view, group in zip(views, groups) if group != left_out]
-        without = _fit(others, fit.lens.width_px, fit.lens.height_px, fit.lens)
+        without = _fit(others, fit.lens.width_px, fit.lens.height_px, fit.lens.model, fit.lens)
         focals_px.append(np.diagonal(without.lens.matrix)[:2])
     deviations = np.array(focals_px) / np.diagonal(fit.lens.matrix)[:2] - 1.0
     share = (JACKKNIFE_GROUPS - 1.0) / JACKKNIFE_GROUPS
@@ -234,8 +207,7 @@ def _measure_focal_error(views: Sequence[BoardView], fit: _Fit) -> float:
 
 def _list_empty_regions(views: Sequence[BoardView], width_px: int, height_px: int) -> List[str]:
     pixels = np.vstack([view.pixels for view in views])
-    size: Tuple[int, int] = (width_px, height_px)
-    columns, rows = np.clip((3.0 * pixels / size).astype(int), 0, 2).T
+    columns, rows = np.clip((3.0 * pixels / (width_px, height_px)).astype(int), 0, 2).T
     return [
         name
         for row, names in enumerate(REGIONS)
@@ -249,7 +221,7 @@ def load_lens(path: str) -> Intrinsics:
     try:
         needed = ("image_width", "image_height", "camera_matrix", "distortion_coefficients")
         content = load_entries(path, "image_width: 640").mapping(None, needed)
-        width_px, height_px = (content[key].whole(-MAX_PX, MAX_PX) for key in needed[:2])
+        width_px, height_px = (content[key].whole(-(10**6), 10**6) for key in needed[:2])
         matrix, distortion = (content[key].mapping(None, ("data",))["data"].plain() for key in needed[2:])
         model = content["distortion_model"].text() if "distortion_model" in content else "plumb_bob"
         return Intrinsics.from_camera_info(width_px, height_px, matrix, model, distortion)

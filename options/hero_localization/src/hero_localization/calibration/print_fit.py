@@ -11,8 +11,9 @@ from typing import List, Sequence
 import cv2
 import numpy as np
 
+from ..camera.camera_model import Camera
 from ..prints.tag_images import draw_tag
-from ..tracking.tag_corners import TagCorners
+from ..tracking.tag_pose import TagCorners, TagLayout, fit_squares
 
 SAMPLES = 4
 """Along each side of a pixel."""
@@ -20,6 +21,9 @@ CELL_TEXELS = 16
 MARGIN_CELLS = 2
 """Margin of white around the print, of which SEEN_CELLS are compared."""
 SEEN_CELLS = 0.7
+
+MAX_SIZE_ERROR_PX = 0.04
+"""Twice the standard deviation of a size. A tag of 25 px whose height is wrong by 5 mm differs by 0.06 px."""
 
 ROUNDS, MIN_GAIN = 20, 1e-4
 FIRST_BLUR_PX = 0.8
@@ -31,6 +35,27 @@ LOW, HIGH = np.array((0.9, 0.3, 1.0, 30.0, 0.4)), np.array((1.1, 4.0, 200.0, 255
 def refine_corners(gray: np.ndarray, tags: Sequence[TagCorners], family: str) -> List[TagCorners]:
     """Return tags of an image (H, W), 8 bit, with corners in true distance from their centers."""
     return [_refine(gray, tag, draw_tag(family, tag.tag_id)) for tag in tags]
+
+
+def estimate_height(
+    camera: Camera, gray: np.ndarray, tag_id: int, tags: Sequence[TagCorners], layout: TagLayout, family: str
+) -> float:
+    """Return a robot's tag's height above the floor (m), by its size beside that of reference tags in an image (H, W).
+
+    All are printed alike: the errors of printer and tape measure are the same in both. The layout's height where they
+    differ by less than the image can tell, or are not both seen well within it.
+    """
+    chosen = [tag for tag in tags if tag.tag_id == tag_id] + [tag for tag in tags if tag.tag_id in layout.references]
+    refined = [new for new, tag in zip(refine_corners(gray, chosen, family), chosen) if new is not tag]
+    if [tag.tag_id == tag_id for tag in refined[:2]] != [True, False]:
+        return layout.height_m
+    heights_m = np.array([layout.height_m] + [0.0] * (len(refined) - 1))
+    own_m, *others_m = (fit.size_m for fit in fit_squares(camera, refined, heights_m))
+    share = own_m / layout.size_m * layout.reference_size_m / float(np.median(others_m))
+    if abs(share - 1.0) * refined[0].side_px < MAX_SIZE_ERROR_PX:
+        return layout.height_m
+    from_camera_m = float(camera.position_m[2]) - layout.height_m
+    return layout.height_m + from_camera_m - from_camera_m / share
 
 
 class _Print:

@@ -41,14 +41,12 @@ _DELAY_STEP_S = 0.005
 
 
 class RobotCalibration(NamedTuple):
-    """The tag on its robot, and the camera's stamps.
+    """The tag on its robot, and the camera's stamps; what speaks against using them.
 
-    Attributes:
-        mount: pose of the tag in base_link; yaw of its print's upper edge.
-        delay_s: the poses were true this long before their stamps.
-        delay_error_s: standard deviation of the delay.
-        rms_m: how far the poses lie from those of the drive with such a tag.
-        problems: what speaks against using it; empty: it is good.
+    mount: pose of the tag in base_link; yaw of its print's upper edge.
+    delay_s, delay_error_s: the poses were true this long before their stamps; standard deviation of that.
+    rms_m: how far the poses lie from those of the drive with such a tag.
+    height_m: of the tag, by its size; nan before that is measured.
     """
 
     mount: Pose
@@ -56,14 +54,11 @@ class RobotCalibration(NamedTuple):
     delay_error_s: float
     rms_m: float
     problems: List[str]
+    height_m: float = math.nan
 
 
 def calibrate_robot(seen: Sequence[Tuple[float, Pose]], odometry: Sequence[Tuple[float, Pose]]) -> RobotCalibration:
-    """Return how the tag sits.
-
-    Args:
-        seen: stamps (s) and poses of the tag itself, as fitted to its corners, in `map`.
-        odometry: stamps (s) and poses of /hero_N/odom.
+    """Return how the tag sits, by stamps (s) and poses of the tag itself, in `map`, and of /hero_N/odom.
 
     Raises: CalibrationError if the tag was hardly seen, or the robot did not turn or drive far enough.
     """

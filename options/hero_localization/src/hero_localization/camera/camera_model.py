@@ -1,12 +1,13 @@
-"""Projection between arena and pixels of a calibrated camera. Pure.
+"""Projection between arena and pixels of a calibrated camera. Pure but for OpenCV.
 
 Pixels are OpenCV's: u right, v down, the center of the first pixel is (0, 0). The optical frame is REP 103's: x right,
 y down, z forward. Lenses are those of sensor_msgs/CameraInfo: `plumb_bob`, `rational_polynomial`, and `equidistant`
 (fisheye). Source: OpenCV, Camera Calibration and 3D Reconstruction; Fisheye camera model.
 """
 
-from typing import NamedTuple, Sequence, Tuple, Union
+from typing import NamedTuple, Optional, Sequence, Union
 
+import cv2
 import numpy as np
 
 from hero_node import shorten
@@ -19,15 +20,8 @@ MAX_SIZE_PX = 20_000
 PLUMB_BOB, RATIONAL, EQUIDISTANT = "plumb_bob", "rational_polynomial", "equidistant"
 MODELS = {PLUMB_BOB: (0, 4, 5), RATIONAL: (8,), EQUIDISTANT: (4,)}
 """Models of lenses, and how many numbers their distortion has."""
-_FISHEYE = "fisheye"
-"""Another name of the last."""
-
-MAX_ANGLE_RAD = 1.48
-"""Limit of the angle from the optical axis: rays at right angles to it have no x / z."""
-
-_MAX_ROUNDS = 50
-_ROUNDING = 1e-10
-"""Normalized image coordinates: a ten millionth of a pixel."""
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 50, 1e-10)
+"""Rounds, and error in normalized image coordinates: a ten millionth of a pixel."""
 
 
 class Intrinsics(NamedTuple):
@@ -57,9 +51,9 @@ class Intrinsics(NamedTuple):
         if values.shape != (9,) or not np.isfinite(values).all() or values[0] <= 0.0 or values[4] <= 0.0:
             raise ValueError(f"this camera is not calibrated: K is {list(values)}")
         distortion = np.asarray(d, dtype=float).reshape(-1)
-        if not distortion.any() and len(distortion) in MODELS[PLUMB_BOB] and model not in (EQUIDISTANT, _FISHEYE):
+        model = EQUIDISTANT if model == "fisheye" else model
+        if not distortion.any() and len(distortion) in MODELS[PLUMB_BOB] and model != EQUIDISTANT:
             model = PLUMB_BOB
-        model = EQUIDISTANT if model == _FISHEYE else model
         if len(distortion) not in MODELS.get(model, ()):
             known = ", ".join("%s (%s numbers)" % (name, counts[-1]) for name, counts in MODELS.items())
             raise ValueError(f"a lens of the model {model!r} with {len(distortion)} numbers; known are: {known}")
@@ -79,9 +73,7 @@ class Intrinsics(NamedTuple):
 
     def distort(self, rays: np.ndarray) -> np.ndarray:
         """Return the pixels (..., 2) of rays (..., 2): x / z and y / z in the optical frame."""
-        bend = _bend_fisheye if self.model == EQUIDISTANT else _bend
-        bent = bend(np.asarray(rays, dtype=float), self.distortion)
-        return bent @ self.matrix[:2, :2].T + self.matrix[:2, 2]
+        return self._bend(np.asarray(rays, dtype=float)) @ self.matrix[:2, :2].T + self.matrix[:2, 2]
 
     def undistort(self, pixels: np.ndarray) -> np.ndarray:
         """Return the rays (N, 2) of pixels (N, 2): x / z and y / z in the optical frame.
@@ -94,64 +86,26 @@ class Intrinsics(NamedTuple):
         bent_y = (v - center_v) / focal_v
         bent = np.column_stack(((u - center_u - skew * bent_y) / focal_u, bent_y))
         if self.model == EQUIDISTANT:
-            return _straighten_fisheye(bent, self.distortion)
-        rays = bent.copy()
-        error = np.full(rays.shape, np.inf)
-        with np.errstate(over="ignore", invalid="ignore"):  # where nothing converges
-            for _ in range(_MAX_ROUNDS):
-                seen = _bend(rays, self.distortion)
-                error = bent - seen
-                if self.model == RATIONAL:  # wide ones compress the rim, where plain steps are too short
-                    error = error * (np.hypot(*rays.T) / np.maximum(np.hypot(*seen.T), 1e-15))[:, None]
-                rays = rays + error
-                if not (np.abs(error) > _ROUNDING).any():
-                    break
-        rays[~(np.abs(error) < 1e-6).all(axis=1)] = np.nan
+            rays = cv2.fisheye.undistortPoints(bent[:, None], np.eye(3), self.distortion)[:, 0]
+        else:
+            undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made them one
+            still = np.eye(3)
+            rays = undistort(bent[:, None], still, self.distortion, R=still, P=still, criteria=_CRITERIA)[:, 0]
+        with np.errstate(over="ignore", invalid="ignore"):
+            rays[~(np.abs(self._bend(rays) - bent) < 1e-6).all(axis=1)] = np.nan
         return rays
 
-
-def _bend(rays: np.ndarray, distortion: np.ndarray) -> np.ndarray:
-    k1, k2, p1, p2, k3, *rational = distortion
-    x, y = rays[..., 0], rays[..., 1]
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    if rational:
-        k4, k5, k6 = rational
-        radial = radial / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-    bent_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    bent_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-    return np.stack((bent_x, bent_y), axis=-1)
-
-
-def _bend_fisheye(rays: np.ndarray, distortion: np.ndarray) -> np.ndarray:
-    radius = np.maximum(np.hypot(rays[..., :1], rays[..., 1:]), 1e-12)
-    angle_rad = np.arctan(radius)
-    bent: np.ndarray = rays * (_bend_angle(angle_rad, distortion)[0] / radius)
-    return bent
-
-
-def _straighten_fisheye(bent: np.ndarray, distortion: np.ndarray) -> np.ndarray:
-    """Return the rays (N, 2) that a fisheye lens bends to these; nan beyond MAX_ANGLE_RAD."""
-    bent_rad = np.maximum(np.hypot(bent[:, :1], bent[:, 1:]), 1e-12)
-    angle_rad = np.minimum(bent_rad, MAX_ANGLE_RAD)
-    for _ in range(_MAX_ROUNDS):  # Newton's method
-        found_rad, slope = _bend_angle(angle_rad, distortion)
-        step_rad = (found_rad - bent_rad) / np.maximum(slope, 0.1)
-        angle_rad = np.clip(angle_rad - step_rad, 0.0, MAX_ANGLE_RAD)
-        if not (np.abs(step_rad) > _ROUNDING).any():
-            break
-    rays = bent * (np.tan(angle_rad) / bent_rad)
-    rays[(np.abs(_bend_angle(angle_rad, distortion)[0] - bent_rad) > 1e-6).ravel()] = np.nan
-    return rays
-
-
-def _bend_angle(angle_rad: np.ndarray, distortion: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the radius in the image of angles from the axis, per focal length, and its derivative."""
-    powers = np.array((1.0, *distortion))
-    orders = np.arange(1, 11, 2)
-    radius = sum(share * angle_rad**order for share, order in zip(powers, orders))
-    slope = sum(share * order * angle_rad ** (order - 1) for share, order in zip(powers, orders))
-    return np.asarray(radius), np.asarray(slope)
+    def _bend(self, rays: np.ndarray) -> np.ndarray:
+        """Return rays (..., 2) as the lens bends them; not by projectPoints, which computes all derivatives too."""
+        if self.model == EQUIDISTANT:
+            return cv2.fisheye.distortPoints(rays.reshape(-1, 1, 2), np.eye(3), self.distortion).reshape(rays.shape)
+        k1, k2, p1, p2, k3, k4, k5, k6 = (*self.distortion, 0.0, 0.0, 0.0)[:8]
+        x, y = rays[..., 0], rays[..., 1]
+        r2 = x * x + y * y
+        radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        bent_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        bent_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        return np.stack((bent_x, bent_y), axis=-1)
 
 
 class Camera(NamedTuple):
@@ -180,3 +134,18 @@ class Camera(NamedTuple):
             distance = (height_m - self.position_m[2]) / directions[:, 2]
         distance[~(distance > 0.0)] = np.nan
         return self.position_m[:2] + distance[:, None] * directions[:, :2]
+
+
+def solve_camera(
+    lens: Intrinsics, pixels: np.ndarray, points_m: np.ndarray, start: Optional[Camera] = None
+) -> Optional[Camera]:
+    """Return the camera that sees points (N, 3) in `map` at pixels (N, 2), sought from start; None if there is none."""
+    guess = () if start is None else (cv2.Rodrigues(start.rotation)[0], -start.rotation @ start.position_m, True)
+    try:  # by rays, as solvePnP does not know all models of lenses
+        is_found, turn, shift_m = cv2.solvePnP(points_m, lens.undistort(pixels), np.eye(3), None, *guess)
+    except cv2.error:
+        return None
+    if not (is_found and np.isfinite(turn).all() and np.isfinite(shift_m).all()):
+        return None
+    rotation = cv2.Rodrigues(turn)[0]
+    return Camera(lens, rotation, (-rotation.T @ shift_m).ravel())

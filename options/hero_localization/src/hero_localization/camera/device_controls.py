@@ -35,34 +35,24 @@ class DeviceControls(NamedTuple):
     power_line_hz: Optional[int] = None
 
 
-class ControlPort:
-    """The controls of one V4L2 device, which another program may be reading images from."""
+def call_control(path: str, request: int, control: int, value: int = 0) -> Optional[int]:
+    """Set or get a control of a V4L2 device, which another program may be reading images from; return its value.
 
-    def __init__(self, path: str) -> None:
-        self._path = path
-
-    def read(self, control: int) -> Optional[int]:
-        """Return its value; None if the camera has no such control."""
-        return self._call(GET_CONTROL, control, 0)
-
-    def write(self, control: int, value: int) -> None:
-        """Ask for a value; read() tells what became of it."""
-        self._call(SET_CONTROL, control, value)
-
-    def _call(self, request: int, control: int, value: int) -> Optional[int]:
-        data = bytearray(_CONTROL.pack(control, value))
+    None if the camera has no such control, or takes no such value.
+    """
+    data = bytearray(_CONTROL.pack(control, value))
+    try:
+        device = os.open(path, os.O_RDWR | os.O_NONBLOCK)
         try:
-            device = os.open(self._path, os.O_RDWR | os.O_NONBLOCK)
-            try:
-                fcntl.ioctl(device, request, data)
-            finally:
-                os.close(device)
-        except OSError:
-            return None
-        return int(_CONTROL.unpack(data)[1])
+            fcntl.ioctl(device, request, data)
+        finally:
+            os.close(device)
+    except OSError:
+        return None
+    return int(_CONTROL.unpack(data)[1])
 
 
-def apply_controls(controls: DeviceControls, port: ControlPort) -> List[str]:
+def apply_controls(controls: DeviceControls, path: str) -> List[str]:
     """Set what the camera file sets. Return what the camera did not take, and what it still changes by itself."""
     problems = []
     wanted: Dict[str, Dict[int, int]] = {}
@@ -77,16 +67,16 @@ def apply_controls(controls: DeviceControls, port: ControlPort) -> List[str]:
         wanted["power_line_hz"] = {POWER_LINE: POWER_LINES_HZ.index(controls.power_line_hz)}
     for key, values in wanted.items():
         for control, value in values.items():
-            port.write(control, value)
+            call_control(path, SET_CONTROL, control, value)
         control, value = list(values.items())[-1]
-        found = port.read(control)
+        found = call_control(path, GET_CONTROL, control)
         if found is None:
             problems.append(f"the camera has no {key} to set: take it out of the camera file")
         elif found != value:
             problems.append(f"{key}: the camera has {_scale(key, found)}, not {_scale(key, value)}")
-    if port.read(AUTO_EXPOSURE) in AUTO_EXPOSURE_ON:
+    if call_control(path, GET_CONTROL, AUTO_EXPOSURE) in AUTO_EXPOSURE_ON:
         problems.append("the camera changes its exposure by itself: set exposure_s, such as 0.008, in the camera file")
-    if port.read(AUTO_FOCUS):
+    if call_control(path, GET_CONTROL, AUTO_FOCUS):
         problems.append("the camera changes its focus by itself: set focus in the camera file, then calibrate the lens")
     return problems
 

@@ -18,23 +18,24 @@ from hero_node.ros import read_duration_clock_s
 
 from ..errors import FrameSourceError
 from .camera_model import Intrinsics
-from .device_controls import ControlPort, DeviceControls, apply_controls
+from .device_controls import DeviceControls, apply_controls
 
-_DEPTHS = {"mono8": 1, "8UC1": 1, "bgr8": 3, "8UC3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
-_TO_GRAY = {
-    "bgr8": cv2.COLOR_BGR2GRAY,
-    "8UC3": cv2.COLOR_BGR2GRAY,
-    "rgb8": cv2.COLOR_RGB2GRAY,
-    "bgra8": cv2.COLOR_BGRA2GRAY,
-    "rgba8": cv2.COLOR_RGBA2GRAY,
+_ENCODINGS = {
+    "mono8": (1, None),
+    "8UC1": (1, None),
+    "bgr8": (3, cv2.COLOR_BGR2GRAY),
+    "8UC3": (3, cv2.COLOR_BGR2GRAY),
+    "rgb8": (3, cv2.COLOR_RGB2GRAY),
+    "bgra8": (4, cv2.COLOR_BGRA2GRAY),
+    "rgba8": (4, cv2.COLOR_RGBA2GRAY),
 }
+"""Bytes of a pixel, and what makes it gray."""
 
 _DEVICES = "/dev/"
 _URL = "://"
 
 PLAUSIBLE_AGE_S = 5.0
 """V4L2 stamps its buffers by the clock that does not jump; a time that is further from it is of another clock."""
-
 
 MAX_FAILURES, HANG_S = 4, 1.0
 """Reads in a row without a whole image, or time of one read, that end a camera; a cable damages some images."""
@@ -126,27 +127,27 @@ class TopicSource(FrameSource):
         return Frame((header.stamp if header.stamp else rospy.get_rostime()).to_sec(), gray, header.seq)
 
     def _decode_image(self, message: Image) -> Optional[np.ndarray]:
-        channels = _DEPTHS.get(message.encoding)
-        size = message.step * message.height
-        if channels is None:
-            text = "images have the encoding %r, but must have one of %s"
-            self.problem = text % (message.encoding, ", ".join(_DEPTHS))
+        channels, code = _ENCODINGS.get(message.encoding, (0, None))
+        if not channels:
+            self.problem = (
+                f"images have the encoding {message.encoding!r}, but must have one of {', '.join(_ENCODINGS)}"
+            )
             return None
+        size = message.step * message.height
         if not 0 < message.width * channels <= message.step or not 0 < size <= len(message.data):
             text = "images of %d x %d pixels come with %d bytes: is the camera's driver in order?"
             self.problem = text % (message.width, message.height, len(message.data))
             return None
         rows = np.frombuffer(message.data, np.uint8, size).reshape(message.height, message.step)
         image = rows[:, : message.width * channels].reshape(message.height, message.width, channels)
-        code = _TO_GRAY.get(message.encoding)
         return image[:, :, 0] if code is None else cv2.cvtColor(image, code)
 
     def _decode_jpeg(self, message: CompressedImage) -> Optional[np.ndarray]:
         data = np.frombuffer(message.data, np.uint8)
         gray: Optional[np.ndarray] = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE) if len(data) else None
         if gray is None:
-            text = "compressed images of the format %r cannot be decoded: is the camera's driver in order?"
-            self.problem = text % message.format
+            text = f"compressed images of the format {message.format!r} cannot be decoded"
+            self.problem = text + ": is the camera's driver in order?"
         return gray
 
 
@@ -154,10 +155,7 @@ class DeviceSource(FrameSource):
     """A V4L2 device such as /dev/video0, or the URL of a network camera; opened again whenever it ends."""
 
     def __init__(self, path: str, size_px: Tuple[int, int], rate_hz: float, controls: DeviceControls) -> None:
-        """size_px: width and height to ask the device for.
-
-        Raises: FrameSourceError if it cannot be opened.
-        """
+        """size_px: width and height to ask the device for. Raises: FrameSourceError if it cannot be opened."""
         super().__init__()
         self._path, self._size_px, self._rate_hz, self._controls = path, size_px, rate_hz, controls
         self._capture = self._open()
@@ -188,7 +186,7 @@ class DeviceSource(FrameSource):
                 self._keep((rospy.get_time() - self._find_age(taken_s), image, number))
                 backoff_s, failures, self.problem = MIN_BACKOFF_S, 0, ""
                 if shape is None and self._path.startswith(_DEVICES):
-                    self.warning = "; ".join(apply_controls(self._controls, ControlPort(self._path)))
+                    self.warning = "; ".join(apply_controls(self._controls, self._path))
                 shape = image.shape
                 continue
             failures += 1
@@ -261,30 +259,24 @@ def _make_gray(image: np.ndarray) -> np.ndarray:
 
 
 def _open_capture(path: str, backend: int, reason: str) -> Any:
-    """Open a device or a video. Raises: FrameSourceError with this reason if OpenCV can open nothing there."""
-    _check_path(path)
+    """Open a device or a video. Raises: FrameSourceError with what OpenCV does not tell, or else with this reason."""
+    if _URL not in path:
+        is_device = path.startswith(_DEVICES)
+        if not os.path.exists(path):
+            raise FrameSourceError(f"{path} does not exist{'; ls /dev/video* lists cameras' if is_device else ''}")
+        mode = os.stat(path).st_mode
+        if stat.S_ISDIR(mode):
+            raise FrameSourceError(f"{path} is a folder, but must be a camera or a video")
+        if not (stat.S_ISCHR(mode) if is_device else stat.S_ISREG(mode)):  # a pipe would be waited for
+            kind = "a camera" if is_device else "a video file"
+            raise FrameSourceError(f"{path} is a pipe, socket or file of another kind, but must be {kind}")
+        if not os.access(path, os.R_OK):
+            remedy = ": sudo usermod -aG video $USER, and log in again" if is_device else ""
+            raise FrameSourceError(f"{path} may not be read by this user{remedy}")
     capture = cv2.VideoCapture(path, backend)
     if not capture.isOpened():
         raise FrameSourceError(f"{path} cannot be opened: {reason}")
     return capture
-
-
-def _check_path(path: str) -> None:
-    """Refuse what cannot be opened, by the reason, which OpenCV does not tell. Raises: FrameSourceError."""
-    if _URL in path:
-        return
-    is_device = path.startswith(_DEVICES)
-    if not os.path.exists(path):
-        raise FrameSourceError(f"{path} does not exist{'; ls /dev/video* lists cameras' if is_device else ''}")
-    mode = os.stat(path).st_mode
-    if stat.S_ISDIR(mode):
-        raise FrameSourceError(f"{path} is a folder, but must be a camera or a video")
-    if not (stat.S_ISCHR(mode) if is_device else stat.S_ISREG(mode)):  # a pipe would be waited for
-        kind = "a camera" if is_device else "a video file"
-        raise FrameSourceError(f"{path} is a pipe, socket or file of another kind, but must be {kind}")
-    if not os.access(path, os.R_OK):
-        remedy = ": sudo usermod -aG video $USER, and log in again" if is_device else ""
-        raise FrameSourceError(f"{path} may not be read by this user{remedy}")
 
 
 def open_source(image: str, device: str, size_px: str, rate_hz: float, controls: DeviceControls) -> FrameSource:

@@ -73,23 +73,25 @@ class OdometryHistory:
         """Add a reading of /hero_N/odom; one that is not newer than the last is left out."""
         if stamp_s <= self.newest_s:
             return
-        pose, distance_m, turned_rad, heading_rad, unobserved_s = transform_pose(self._offset, raw), 0.0, 0.0, 0.0, 0.0
-        if self._readings.newest is not None:
-            last, distance_m, turned_rad, heading_rad, unobserved_s = self._readings.newest
-            step_m, step_rad = measure_distance(last, pose), wrap_angle(pose.yaw_rad - last.yaw_rad)
-            elapsed_s = stamp_s - self.newest_s
-            if _is_jump(step_m, step_rad, 0.0 if elapsed_s > RESTART_S and _is_origin(raw) else elapsed_s):
-                self.jumps += 1
-                unobserved_s += elapsed_s
-                self._offset = find_frame(last, raw)
-                pose, step_rad = last, 0.0
-            counted_m = measure_distance(self._counted, pose)
-            if counted_m >= JITTER_M:
-                distance_m, self._counted = distance_m + counted_m, pose
-            turned_rad += abs(step_rad)
-            heading_rad += step_rad
-        else:
+        pose = transform_pose(self._offset, raw)
+        if self._readings.newest is None:
             self._counted = pose
+        last, distance_m, turned_rad, heading_rad, unobserved_s = self._readings.newest or Odometry(pose, 0.0, 0.0)
+        step_m, step_rad = measure_distance(last, pose), wrap_angle(pose.yaw_rad - last.yaw_rad)
+        elapsed_s = stamp_s - self.newest_s
+        is_origin = math.hypot(raw.x_m, raw.y_m) < JITTER_M and abs(raw.yaw_rad) < JITTER_RAD
+        limit_s = 0.0 if is_origin and elapsed_s > RESTART_S else elapsed_s
+        max_step_m, max_step_rad = MAX_SPEED_M_S * limit_s + JUMP_MARGIN_M, MAX_TURN_RAD_S * limit_s + JUMP_MARGIN_RAD
+        if step_m > max_step_m or abs(step_rad) > max_step_rad:
+            self.jumps += 1
+            unobserved_s += elapsed_s
+            self._offset = find_frame(last, raw)
+            pose, step_rad = last, 0.0
+        counted_m = measure_distance(self._counted, pose)
+        if counted_m >= JITTER_M:
+            distance_m, self._counted = distance_m + counted_m, pose
+        turned_rad += abs(step_rad)
+        heading_rad += step_rad
         self.raw_pose = raw
         self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad, unobserved_s))
 
@@ -116,14 +118,3 @@ class OdometryHistory:
 def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:
     sums = [before + share * (after - before) for before, after in zip(start[1:], end[1:])]
     return Odometry(interpolate_pose(start.pose, end.pose, share), *sums)
-
-
-def _is_origin(pose: Pose) -> bool:
-    return math.hypot(pose.x_m, pose.y_m) < JITTER_M and abs(pose.yaw_rad) < JITTER_RAD
-
-
-def _is_jump(step_m: float, step_rad: float, elapsed_s: float) -> bool:
-    return (
-        step_m > MAX_SPEED_M_S * elapsed_s + JUMP_MARGIN_M
-        or abs(step_rad) > MAX_TURN_RAD_S * elapsed_s + JUMP_MARGIN_RAD
-    )

@@ -52,11 +52,7 @@ class Outcome(enum.Enum):
 
 
 class PoseFilter:
-    """Estimate of one robot.
-
-    Attributes:
-        odometry: what the robot drove by its own readings.
-    """
+    """Estimate of one robot; odometry: what it drove by its own readings."""
 
     def __init__(self) -> None:
         self.odometry = OdometryHistory()

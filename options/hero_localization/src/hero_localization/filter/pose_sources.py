@@ -9,6 +9,7 @@ from typing import Dict, List, NamedTuple, Optional
 
 from hero_node import Pose, measure_distance, wrap_angle
 
+from .pose_filter import Outcome, PoseFilter
 from .pose_hypothesis import StampedPose
 
 DISAGREEING_POSES, DISAGREEING_S = 2, 0.1
@@ -22,14 +23,10 @@ NO_OFFSET = Pose(0.0, 0.0, 0.0)
 
 
 class Conflict(NamedTuple):
-    """Two sources that measure one robot at different places."""
+    """Two sources that measure one robot at different places: their names, in any order the same, and the remedy."""
 
-    name: str
-    """That of which the poses are outliers."""
-    other: str
-    """That of which the poses are used."""
-    off: Pose
-    """By how much they differ."""
+    key: str
+    text: str
 
 
 class _Source:
@@ -42,69 +39,59 @@ class _Source:
         self.off = NO_OFFSET
         """By how much the last outlier differs from the estimate."""
 
-    def disagrees(self, support: int) -> bool:
-        is_lasting = self.outliers >= DISAGREEING_POSES and self.measured_s - self.used_s >= DISAGREEING_S
-        return is_lasting or self.outliers >= max(1, support)
-
 
 class PoseSources:
     """The sources of one robot's measured poses."""
 
-    def __init__(self) -> None:
+    def __init__(self, pose_filter: PoseFilter) -> None:
+        """pose_filter: that of the robot."""
+        self._filter = pose_filter
         self._sources: Dict[str, _Source] = {}
 
-    def note_outlier(self, measurement: StampedPose, expected: Optional[Pose]) -> None:
-        """Take a pose that disagrees with the estimate, which expected the robot elsewhere."""
-        source = self._note(measurement)
+    def note(self, measurement: StampedPose, outcome: Outcome) -> Optional[Conflict]:
+        """Note what became of a pose of a source; return the conflict that this source has with another one."""
+        conflict = self.find_conflict() if outcome is Outcome.MOVED else None
+        source = self._sources.setdefault(measurement.source, _Source(measurement.source))
+        source.measured_s = max(source.measured_s, measurement.stamp_s)
+        oldest_s = max(other.measured_s for other in self._sources.values()) - KEPT_S
+        recent = {name: other for name, other in self._sources.items() if other.measured_s > oldest_s}
+        self._sources = {**recent, source.name: source}
+        if outcome is not Outcome.OUTLIER:
+            for other in [source] if outcome is Outcome.USED else self._sources.values():
+                other.outliers = 0  # of all, where the estimate is another one
+            source.used_s = max(source.used_s, measurement.stamp_s)
+            return conflict
         source.outliers += 1
         if source.outliers == 1:
             source.since_s = measurement.stamp_s
+        seen, expected = measurement.pose, self._filter.expect(measurement.stamp_s)
         if expected is not None:
-            seen = measurement.pose
             turn_rad = wrap_angle(seen.yaw_rad - expected.yaw_rad)
             source.off = Pose(seen.x_m - expected.x_m, seen.y_m - expected.y_m, turn_rad)
+        return self.find_conflict()
 
-    def note_used(self, measurement: StampedPose) -> None:
-        """Take a pose that corrected the estimate."""
-        source = self._note(measurement)
-        source.outliers = 0
-        source.used_s = max(source.used_s, measurement.stamp_s)
+    def _list_disagreeing(self) -> List[_Source]:
+        """Return sources whose poses contradict the estimate for a while, or as many as had confirmed it."""
+        return [
+            source
+            for source in self._sources.values()
+            if (source.outliers >= DISAGREEING_POSES and source.measured_s - source.used_s >= DISAGREEING_S)
+            or source.outliers >= max(1, self._filter.support)
+        ]
 
-    def begin_anew(self) -> None:
-        """Forget all outliers: the estimate is another one."""
-        for source in self._sources.values():
-            source.outliers = 0
-
-    def _note(self, measurement: StampedPose) -> _Source:
-        source = self._sources.setdefault(measurement.source, _Source(measurement.source))
-        source.measured_s = max(source.measured_s, measurement.stamp_s)
-        newest_s = max(other.measured_s for other in self._sources.values())
-        recent = {name: other for name, other in self._sources.items() if other.measured_s > newest_s - KEPT_S}
-        self._sources = {**recent, source.name: source}
-        return source
-
-    def _list_disagreeing(self, support: int) -> List[_Source]:
-        return [source for source in self._sources.values() if source.disagrees(support)]
-
-    def find_disagreement(self, support: int) -> Optional[Pose]:
-        """Return by how much measured poses differ from the estimate; None if they agree.
-
-        support: number of measured poses that confirmed the estimate.
-        """
-        offs = [source.off for source in self._list_disagreeing(support)]
+    def find_disagreement(self) -> Optional[Pose]:
+        """Return by how much poses are measured elsewhere, as while it is moved by hand; None if they agree."""
+        offs = [source.off for source in self._list_disagreeing()]
         return max(offs, key=lambda off: measure_distance(NO_OFFSET, off)) if offs else None
 
-    def find_conflict(self, support: int) -> Optional[Conflict]:
+    def find_conflict(self) -> Optional[Conflict]:
         """Return a source that disagrees while the poses of another one are used; None if there is none."""
-        for source in self._list_disagreeing(support):
+        for source in self._list_disagreeing():
             for other in self._sources.values():
                 if other.used_s >= source.since_s + DISAGREEING_S:
-                    return Conflict(source.name, other.name, source.off)
+                    off_mm = 1e3 * measure_distance(NO_OFFSET, source.off)
+                    off = f"{off_mm:.0f} mm and {math.degrees(abs(source.off.yaw_rad)):.0f} degrees"
+                    text = f"its poses from {source.name} are {off} off those from {other.name}"
+                    text += ": calibrate both in one frame, or end one"
+                    return Conflict(" ".join(sorted((source.name, other.name))), text)
         return None
-
-
-def describe_conflict(conflict: Conflict) -> str:
-    """Return the conflict and its remedy as text."""
-    off_m, off_deg = measure_distance(NO_OFFSET, conflict.off), math.degrees(abs(conflict.off.yaw_rad))
-    text = "its poses from %s are %.0f mm and %.0f degrees off those from %s: calibrate both in one frame, or end one"
-    return text % (conflict.name, 1e3 * off_m, off_deg, conflict.other)

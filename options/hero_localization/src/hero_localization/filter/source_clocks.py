@@ -55,18 +55,6 @@ MIN_EFFECT = 0.1
 """A comparison counts if a delay of START_SD_S would change it by this many standard deviations."""
 
 
-class Clock(NamedTuple):
-    """The clock of a source, which is off.
-
-    Attributes:
-        name: node that the poses come from.
-        text: by how much it is off, and the remedy.
-    """
-
-    name: str
-    text: str
-
-
 class _Sample(NamedTuple):
     source: int
     stamp_s: float
@@ -94,16 +82,15 @@ class SourceClocks:
         """SPAN_S apart, by robot and source: odometry of their time has not come yet."""
         self._due_s: Dict[Tuple[int, int], float] = {}
 
-    def list_off(self) -> List[Clock]:
-        """Return the clocks that are off."""
-        text = "poses from %s come with stamps %.0f ms %s%s: run chrony on all machines, or set its delay_s"
-        corrected = ", which is corrected" if self._slew else ""
-        clocks = []
+    def list_off(self) -> Dict[str, str]:
+        """Return by how much clocks are off, and the remedy, by the nodes that poses come from."""
+        off, corrected = {}, ", which is corrected" if self._slew else ""
         for source, delay_s in zip(self._sources, self._delays_s.tolist()):
             if source.is_off:
                 side = "late" if delay_s > 0.0 else "early"
-                clocks.append(Clock(source.name, text % (source.name, 1e3 * abs(delay_s), side, corrected)))
-        return clocks
+                text = f"poses from {source.name} come with stamps {1e3 * abs(delay_s):.0f} ms {side}{corrected}"
+                off[source.name] = text + ": run chrony on all machines, or set its delay_s"
+        return off
 
     def correct(self, measurement: StampedPose, now_s: float) -> StampedPose:
         """Return a measured pose with the time at which it was true, as far as that is known."""
@@ -135,12 +122,8 @@ class SourceClocks:
 
     def add(self, robot_id: int, measurement: StampedPose, odometry: OdometryHistory) -> None:
         """Take a measured pose with its own stamp; odometry: that of its robot."""
-        sample = _Sample(
-            self._find_source(measurement.source),
-            measurement.stamp_s,
-            measurement.pose,
-            np.diagonal(measurement.covariance),
-        )
+        stamp_s, pose, covariance = measurement[:3]
+        sample = _Sample(self._find_source(measurement.source), stamp_s, pose, np.diagonal(covariance))
         key = (robot_id, sample.source)
         if sample.stamp_s < self._due_s.get(key, -math.inf):
             return

@@ -15,8 +15,8 @@ from hero_node import Pose, TokenBucket, list_names, measure_distance, transform
 from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Outcome, PoseFilter, is_near
 from .pose_hypothesis import StampedPose
-from .pose_sources import DISAGREEING_S, NO_OFFSET, Conflict, PoseSources, describe_conflict
-from .source_clocks import Clock, SourceClocks
+from .pose_sources import DISAGREEING_S, NO_OFFSET, PoseSources
+from .source_clocks import SourceClocks
 
 LOST_S = 1.0
 """A robot whose pose was not measured for this long is lost: its pose follows its odometry alone."""
@@ -69,7 +69,6 @@ class LocalizedRobot(NamedTuple):
     odom_origin: Optional[Pose]
     """Pose of the frame hero_N/odom in map."""
     problem: str
-    """Problem as text; empty if there is none."""
 
 
 class _Robot:
@@ -81,7 +80,7 @@ class _Robot:
         self.is_lost = False
         self.untrusted_s = -math.inf
         """Stamp of the last image of a camera that moved; -inf if the robot was measured since."""
-        self.sources = PoseSources()
+        self.sources = PoseSources(self.filter)
         self.outliers = 0
         self.jumps = 0
         self.measured_s = -math.inf
@@ -92,23 +91,15 @@ class _Robot:
         self.heard_s = self.advanced_s = -math.inf
         """Times at which the last reading of odometry came, and the last one that was newer than those before."""
 
-    def find_disagreement(self) -> Optional[Pose]:
-        """Return by how much poses are measured elsewhere, as while it is moved by hand; None if they agree."""
-        return self.sources.find_disagreement(self.filter.support)
-
-    def find_conflict(self) -> Optional[Conflict]:
-        """Return two sources of its poses that contradict each other; None if they agree."""
-        return self.sources.find_conflict(self.filter.support)
-
 
 class SwarmLocalizer:
-    """Filters of all robots."""
+    """Filters of all robots; clocks: those of the sources of measured poses."""
 
     def __init__(self, is_correcting_clocks: bool = True) -> None:
-        self._clocks = SourceClocks(is_correcting_clocks)
+        self.clocks = SourceClocks(is_correcting_clocks)
         self._robots: Dict[int, _Robot] = {}
         self._now_s = -math.inf
-        self._loss_lines = _limit_loss_lines()
+        self._loss_lines = TokenBucket(LOSS_LINES, 1.0 / LOSS_PERIOD_S, 0.0)
         self._summed: Dict[str, int] = Counter()
         self._named_s: Dict[str, float] = {}
 
@@ -155,8 +146,8 @@ class SwarmLocalizer:
             robot.clock_offset_s = offset_s
             text = "poses from %s come with stamps %.1f s ahead, and are not used: do the clocks agree?"
             return lines + self._name(measurement.source, text % (measurement.source, offset_s))
-        self._clocks.add(robot_id, measurement, robot.filter.odometry)
-        measurement = self._clocks.correct(measurement, now_s)
+        self.clocks.add(robot_id, measurement, robot.filter.odometry)
+        measurement = self.clocks.correct(measurement, now_s)
         before = robot.filter.pose()
         used_s = robot.filter.used_s
         outcome = robot.filter.add_measurement(measurement)
@@ -186,10 +177,10 @@ class SwarmLocalizer:
         robot.measured_s = max(robot.measured_s, measurement.stamp_s)
         if is_late:
             return []
-        conflict = self._note_source(robot, measurement, outcome)
+        conflict = robot.sources.note(measurement, outcome)
         if outcome is Outcome.OUTLIER or conflict is not None:
             robot.outliers += outcome is Outcome.OUTLIER
-            return [] if conflict is None else self._name_conflict(robot_id, conflict)
+            return [] if conflict is None else self._name(conflict.key, "hero_%d: %s" % (robot_id, conflict.text))
         robot.outliers = 0
         was_lost, robot.untrusted_s = robot.is_lost, -math.inf
         # What comes late tells where a lost robot was; it would be lost again at once.
@@ -210,22 +201,6 @@ class SwarmLocalizer:
             return self._tell_loss(robot_id, line)
         return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
 
-    @staticmethod
-    def _note_source(robot: _Robot, measurement: StampedPose, outcome: Outcome) -> Optional[Conflict]:
-        """Note what became of a pose of a source; return the conflict that this source has with another one."""
-        if outcome is Outcome.OUTLIER:
-            robot.sources.note_outlier(measurement, robot.filter.expect(measurement.stamp_s))
-            return robot.find_conflict()
-        conflict = robot.find_conflict() if outcome is Outcome.MOVED else None
-        if outcome is not Outcome.USED:
-            robot.sources.begin_anew()
-        robot.sources.note_used(measurement)
-        return conflict
-
-    def _name_conflict(self, robot_id: int, conflict: Conflict) -> List[str]:
-        key = " ".join(sorted((conflict.name, conflict.other)))  # of all robots that both see
-        return self._name(key, "hero_%d: %s" % (robot_id, describe_conflict(conflict)))
-
     def distrust(self, stamp_s: float, robot_ids: Iterable[int], now_s: float) -> None:
         """Take robots as lost, without a line, until a pose is used again: the camera that sees them moved.
 
@@ -245,8 +220,8 @@ class SwarmLocalizer:
             text = "%d more lines on robots lost or found again: %s"
             lines.append(text % (sum(self._summed.values()), list_names(list(self._summed))))
             self._summed.clear()
-        for clock in self.list_clocks():
-            lines += self._name("clock " + clock.name, clock.text)
+        for name, text in self.clocks.list_off().items():
+            lines += self._name("clock " + name, text)
         for robot_id, robot in sorted(self._robots.items()):
             seen_s = max(robot.filter.used_s, robot.untrusted_s)
             if not robot.is_lost and -math.inf < seen_s < now_s - LOST_S:
@@ -260,8 +235,8 @@ class SwarmLocalizer:
         if back_s <= BACK_S:
             return []
         self._robots = {robot_id: _Robot() for robot_id in self._robots}
-        self._clocks.forget_poses()
-        self._loss_lines = _limit_loss_lines()
+        self.clocks.forget_poses()
+        self._loss_lines = TokenBucket(LOSS_LINES, 1.0 / LOSS_PERIOD_S, 0.0)
         return [f"time jumped back by {back_s:.1f} s: all robots are localized again"]
 
     def _tell_loss(self, robot_id: int, line: str) -> List[str]:
@@ -270,10 +245,6 @@ class SwarmLocalizer:
             return [line]
         self._summed["hero_%d" % robot_id] += 1
         return []
-
-    def list_clocks(self) -> List[Clock]:
-        """Return the clocks of sources that differ from odometry's by 10 ms or more."""
-        return self._clocks.list_off()
 
     def list_robots(self, now_s: float, is_extrapolating: bool = False) -> List[LocalizedRobot]:
         """Return what is known of all robots, in the order of their ids.
@@ -292,7 +263,7 @@ class SwarmLocalizer:
         return robot._replace(estimate=estimate._replace(stamp_s=now_s, pose=pose))
 
     def _describe(self, robot_id: int, robot: _Robot, now_s: float) -> LocalizedRobot:
-        estimate, off = robot.filter.estimate(), robot.find_disagreement()
+        estimate, off = robot.filter.estimate(), robot.sources.find_disagreement()
         state = RobotState.TRACKED
         if estimate is None:
             state = RobotState.UNKNOWN
@@ -322,9 +293,9 @@ class SwarmLocalizer:
             return "the camera that sees it moved: calibrate_camera arena"
         if robot.is_lost:
             return f"not measured for {now_s - robot.filter.used_s:.0f} s: is its tag occluded or out of view?"
-        conflict = robot.find_conflict()
+        conflict = robot.sources.find_conflict()
         if conflict is not None:
-            return describe_conflict(conflict)
+            return conflict.text
         error_rad = robot.heading.error_rad
         if error_rad is not None and abs(error_rad) > WRONG_HEADING_RAD:
             kind = "upside down" if is_upside_down(error_rad) else "turned"
@@ -333,10 +304,6 @@ class SwarmLocalizer:
         if robot.outliers:
             return "%d measured poses in a row disagree with its odometry" % robot.outliers
         return ""
-
-
-def _limit_loss_lines() -> TokenBucket:
-    return TokenBucket(LOSS_LINES, 1.0 / LOSS_PERIOD_S, 0.0)
 
 
 def _describe_offset(offset_s: float) -> str:

@@ -58,10 +58,7 @@ class OccupancyGrid:
     """
 
     def __init__(self, bounds_m: Tuple[float, float, float, float], cell_m: float = 0.01) -> None:
-        """bounds_m: x min, y min, x max, y max.
-
-        Raises: ValueError for bounds without an area.
-        """
+        """bounds_m: x min, y min, x max, y max. Raises: ValueError for bounds without an area."""
         x_min_m, y_min_m, x_max_m, y_max_m = bounds_m
         if not (x_max_m - x_min_m >= cell_m > 0.0 and y_max_m - y_min_m >= cell_m):
             raise ValueError(f"bounds must be x min, y min, x max, y max, not {bounds_m!r}")

@@ -24,14 +24,9 @@ class _Robot:
 
 
 class SwarmMap:
-    """The grid, and what waits to be put into it.
-
-    Attributes:
-        grid: the map.
-    """
+    """The grid, and what waits to be put into it."""
 
     def __init__(self, grid: OccupancyGrid) -> None:
-        """Fill grid."""
         self.grid = grid
         self._robots: Dict[int, _Robot] = {}
 

@@ -37,7 +37,10 @@ class LocalizationNode:
     def __init__(self, parameters: Dict[str, Any]) -> None:
         """Start with the robots of ~robots. Raises: ProgramError for a topic without {id}."""
         self._frame = str(parameters["frame"]).lstrip("/")
-        self._pose_topic = _check_topic(parameters["pose_topic"])
+        self._pose_topic = str(parameters["pose_topic"])
+        if "{id}" not in self._pose_topic:
+            text = '~pose_topic is %r, but must hold {id}, such as "/hero_{id}/measured_pose"'
+            raise ProgramError(text % self._pose_topic)
         self._pose_frame = str(parameters["pose_frame"]).lstrip("/") or self._frame
         self._covariance = make_covariance(parameters["position_sd_m"], parameters["heading_sd_rad"])
         self._chosen: Optional[List[int]] = parameters["robots"]
@@ -106,7 +109,7 @@ class LocalizationNode:
         self._call(self._localizer.find_lost)
         with self._lock:
             robots = self._localizer.list_robots(now_s, self._is_extrapolating)
-            clocks = self._localizer.list_clocks()
+            clocks = self._localizer.clocks.list_off()
         self._outputs.publish(robots)
         if not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
@@ -121,12 +124,6 @@ class LocalizationNode:
             for robot_id, seen_s in sorted(self._unknown_s.copy().items())
             if abs(now_s - seen_s) < UNKNOWN_S and robot_id not in self._inputs
         ]
-
-
-def _check_topic(topic: Any) -> str:
-    if "{id}" not in str(topic):
-        raise ProgramError('~pose_topic is %r, but must hold {id}, such as "/hero_{id}/measured_pose"' % (topic,))
-    return str(topic)
 
 
 SD_TEXT = "standard deviation, in x and y each, of poses that come without covariance; `track` tells its own"

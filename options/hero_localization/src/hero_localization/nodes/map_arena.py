@@ -7,15 +7,18 @@ rosservice call /map_arena/save                            writes ~file: map_ser
 
 import os
 import threading
+from contextlib import suppress
 from functools import partial
-from typing import Any, Dict, Optional
+from typing import Any, Dict
 
 import numpy as np
 import rospy
+import yaml
 from geometry_msgs.msg import Point, PoseArray, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import MapMetaData
 from nav_msgs.msg import OccupancyGrid as MapMessage
+from PIL import Image
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
@@ -24,15 +27,41 @@ from hero_client import Program, ProgramError, read_parameters
 from hero_client.values import front_first, is_plausible, read_ranges
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
+from hero_node.files import replace_file, write_file
 from hero_node.parameters import number, string
 
-from ..mapping.map_files import save_map
 from ..mapping.occupancy_grid import BEAMS, OccupancyGrid
 from ..mapping.swarm_map import SwarmMap
 
 STEP_HZ = 10.0
 PUBLISH_STEPS = 10
 """Steps between two publications: one second."""
+
+OCCUPIED, UNKNOWN, FREE = 0, 205, 254
+"""Gray of a pixel, as map_saver writes it. Source: wiki.ros.org/map_server."""
+
+OCCUPIED_SHARE, FREE_SHARE = 0.65, 0.196
+"""Thresholds between them, as map_saver writes them."""
+
+
+def save_map(path: str, grid: OccupancyGrid) -> str:
+    """Write the map to path, which ends in .yaml, and beside it the image; return the image's path. Raises: OSError."""
+    pixels = np.full(grid.log_odds.shape, UNKNOWN, dtype=np.uint8)
+    pixels[grid.free] = FREE
+    pixels[grid.occupied] = OCCUPIED
+    image = os.path.splitext(path)[0] + ".png"
+    with replace_file(image) as file:
+        Image.fromarray(pixels[::-1]).save(file, "PNG")  # the first row of an image is its upper one
+    content = {
+        "image": os.path.basename(image),
+        "resolution": grid.cell_m,
+        "origin": [*grid.origin_m, 0.0],
+        "negate": 0,
+        "occupied_thresh": OCCUPIED_SHARE,
+        "free_thresh": FREE_SHARE,
+    }
+    write_file(path, yaml.safe_dump(content, sort_keys=False).encode())
+    return image
 
 
 class MapNode:
@@ -43,7 +72,9 @@ class MapNode:
         self._grid = _make_grid(parameters["bounds_m"], parameters["cell_m"])
         self._map = SwarmMap(self._grid)
         self._lock = threading.Lock()  # inputs come on threads of rospy
-        self._path = _check_path(str(parameters["file"]))
+        self._path = os.path.abspath(os.path.expanduser(str(parameters["file"])))
+        if not self._path.endswith(".yaml"):
+            raise ProgramError(f"~file is {self._path!r}, but must end in .yaml; the image beside it in .png")
         self._frame = ""
         self._steps = 0
         self._scans: Dict[int, rospy.Subscriber] = {}
@@ -112,20 +143,11 @@ class MapNode:
         return TriggerResponse(True, f"{self._path} and {image}")
 
 
-def _check_path(path: str) -> str:
-    if not path.endswith(".yaml"):
-        raise ProgramError(f"~file is {path!r}, but must end in .yaml; the image beside it in .png")
-    return os.path.abspath(os.path.expanduser(path))
-
-
 def _make_grid(bounds: Any, cell_m: float) -> OccupancyGrid:
-    values: Optional[np.ndarray] = None
-    try:
+    with suppress(ValueError):  # no numbers, or no area
         values = np.array([float(word) for word in str(bounds).split()])
         if values.shape == (4,) and np.isfinite(values).all() and np.ptp(values) <= 100.0:
             return OccupancyGrid((values[0], values[1], values[2], values[3]), cell_m)
-    except ValueError:
-        pass  # no numbers, or no area
     raise ProgramError(f'~bounds_m is {bounds!r}, but must be "x_min y_min x_max y_max" in m, up to 100 m wide')
 
 

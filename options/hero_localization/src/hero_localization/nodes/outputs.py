@@ -1,7 +1,7 @@
 """Outputs to ROS: poses of robots in the common frame, as messages and on tf, and diagnostics."""
 
 import math
-from typing import Dict, Iterable, List, Sequence
+from typing import Dict, Iterable, List, Mapping, Sequence
 
 import numpy as np
 import rospy
@@ -13,7 +13,6 @@ from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
 
 from ..filter.pose_hypothesis import StampedPose
-from ..filter.source_clocks import Clock
 from ..filter.swarm_localizer import LocalizedRobot
 
 IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
@@ -77,12 +76,12 @@ class Outputs:
         return message
 
     def publish_diagnostics(
-        self, robots: Iterable[LocalizedRobot], unknown: Iterable[int], clocks: Iterable[Clock]
+        self, robots: Iterable[LocalizedRobot], unknown: Iterable[int], clocks: Mapping[str, str]
     ) -> None:
         """Publish the state of each robot, and warnings: tags of robots that no driver knows, clocks that are off."""
         text = "its tag is seen, but no driver knows the robot: is it on, and is tag %d its own?"
         statuses = [make_status("hero_%d" % robot_id, DiagnosticStatus.WARN, text % robot_id) for robot_id in unknown]
-        statuses += [make_status(f"clock of {clock.name}", DiagnosticStatus.WARN, clock.text) for clock in clocks]
+        statuses += [make_status(f"clock of {name}", DiagnosticStatus.WARN, clock) for name, clock in clocks.items()]
         for robot in robots:
             level = DiagnosticStatus.WARN if robot.problem else DiagnosticStatus.OK
             text = robot.problem or robot.state.name.lower()

@@ -1,8 +1,4 @@
-"""Program print_tags: makes a PDF of tags in true size, to print at 100 % and cut out.
-
-rosrun hero_localization print_tags --robots 0-9 --references 100-103
-rosrun hero_localization print_tags --board
-"""
+"""Program print_tags: makes a PDF of tags in true size, to print at 100 % and cut out."""
 
 import argparse
 import math
@@ -34,13 +30,9 @@ LINE = 0.4
 
 
 class Sheet(NamedTuple):
-    """One piece of paper to be cut out.
+    """One piece of paper to be cut out: a disc with a robot's number and front, or a square with marks at its middle.
 
-    Attributes:
-        tag_id: of its tag.
-        size_mm: side of the black square.
-        outer_mm: diameter of the disc, or side of the square, that is cut.
-        is_robot: a disc with the robot's number and front, or a square with marks at its middle.
+    size_mm: side of the black square; outer_mm: diameter or side of what is cut.
     """
 
     tag_id: int
@@ -148,10 +140,7 @@ def _open_page(paper_mm: Tuple[float, float]) -> Tuple[Any, Any]:
     for index in range(11):
         tick_mm = left_mm + index * RULER_MM / 10.0
         axes.plot(
-            (tick_mm, tick_mm),
-            (EDGE_MM, EDGE_MM + (4.0 if index % 5 == 0 else 2.0)),
-            color="black",
-            linewidth=LINE,
+            (tick_mm, tick_mm), (EDGE_MM, EDGE_MM + (4.0 if index % 5 == 0 else 2.0)), color="black", linewidth=LINE
         )
     text = f"Print at 100 % (no scaling): this line must measure {RULER_MM:g} mm"
     axes.text(width_mm / 2.0, EDGE_MM + 6.0, text, ha="center", va="bottom", fontsize=8)
@@ -189,15 +178,7 @@ def _draw_disc(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float) -
     tip = ((x_mm, y_mm + middle_mm + size_mm / 2.0), (x_mm - size_mm, y_mm + middle_mm - size_mm / 2.0))
     axes.add_patch(Polygon((*tip, (x_mm + size_mm, tip[1][1])), closed=True, color="black", linewidth=0.0))
     points = size_mm / MM_PER_INCH * 72.0
-    axes.text(
-        x_mm,
-        y_mm - middle_mm,
-        str(sheet.tag_id),
-        ha="center",
-        va="center",
-        fontsize=points,
-        fontweight="bold",
-    )
+    axes.text(x_mm, y_mm - middle_mm, str(sheet.tag_id), ha="center", va="center", fontsize=points, fontweight="bold")
 
 
 def _draw_square(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float) -> None:

@@ -15,13 +15,7 @@ REFERENCE_SIZE_M = 0.1
 
 
 class Family(NamedTuple):
-    """A family of tags.
-
-    Attributes:
-        dictionary: OpenCV's name for it.
-        cells: along each side, with the black border.
-        size: number of its tags.
-    """
+    """A family of so many tags (size), by OpenCV's name; cells: along each side, with the black border."""
 
     dictionary: str
     cells: int

@@ -15,14 +15,13 @@ from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import Arena
 
 from ..prints.tag_images import draw_tag
-from .view import CIRCLE, CameraOptions, PrintedTag, hand_outlines, list_rays, plane_homography, tag_corners
+from .view import CIRCLE, CameraOptions, PrintedTag, list_rays, plane_homography, tag_corners
 
-FLOOR, WALL, OBSTACLE, BODY, TOP, PAPER, SKIN = 150.0, 70.0, 60.0, 45.0, 205.0, 225.0, 185.0
+FLOOR, WALL, OBSTACLE, BODY, TOP, PAPER, SKIN, BLACK, WHITE = 150.0, 70.0, 60.0, 45.0, 205.0, 225.0, 185.0, 25.0, 225.0
 """Shades, of 255."""
-BLACK, WHITE = 25.0, 225.0
-"""Shades of a print."""
 
 WALL_HEIGHT_M = 0.05
+HAND_HEIGHT_M, HAND_RADIUS_M = 0.25, 0.06
 TEXEL_M = 0.0005
 FINE = 2
 """Prints are drawn this many times finer than they are kept: blurred, they need no more."""
@@ -47,12 +46,7 @@ class _Plate(NamedTuple):
 
 
 class CameraRenderer:
-    """Renders frames of one arena.
-
-    Attributes:
-        camera: its geometry.
-        options: as given.
-    """
+    """Renders frames of one arena."""
 
     def __init__(
         self,
@@ -178,10 +172,7 @@ class CameraRenderer:
         patch[:] = np.rint(patch * (1.0 - cover) + shade * self._light[top:bottom, left:right])
 
     def render(
-        self,
-        poses: np.ndarray,
-        speeds: Optional[np.ndarray] = None,
-        hand_m: Optional[Tuple[float, float]] = None,
+        self, poses: np.ndarray, speeds: Optional[np.ndarray] = None, hand_m: Optional[Tuple[float, float]] = None
     ) -> np.ndarray:
         """Return the next frame (H, W), gray, 8 bit.
 
@@ -199,8 +190,8 @@ class CameraRenderer:
             if index < len(poses):
                 self._draw_plate(image, plate, self._list_moments(poses[index], *moving[index]))
         if hand_m is not None:
-            for outline_m in hand_outlines(hand_m):
-                self._fill(image, self.camera.project(outline_m), SKIN)
+            outline_m = np.column_stack((hand_m + HAND_RADIUS_M * CIRCLE, np.full(len(CIRCLE), HAND_HEIGHT_M)))
+            self._fill(image, self.camera.project(outline_m), SKIN)
         if self._noise:
             down, right = self._random.randint(0, 64, 2)
             field = self._noise[self._random.randint(NOISE_FIELDS)]
@@ -218,11 +209,7 @@ class CameraRenderer:
         heading = pose[2] + angular_rad_s * times_s / 2.0
         moved = linear_m_s * times_s
         return np.column_stack(
-            (
-                pose[0] + moved * np.cos(heading),
-                pose[1] + moved * np.sin(heading),
-                pose[2] + angular_rad_s * times_s,
-            )
+            (pose[0] + moved * np.cos(heading), pose[1] + moved * np.sin(heading), pose[2] + angular_rad_s * times_s)
         )
 
 

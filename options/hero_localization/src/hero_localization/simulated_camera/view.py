@@ -3,7 +3,7 @@
 Frame `world` as in the arena. Pixels as in OpenCV: the center of the first one is (0, 0).
 """
 
-from typing import Iterator, List, NamedTuple, Tuple
+from typing import Iterator, NamedTuple, Tuple
 
 import cv2
 import numpy as np
@@ -16,11 +16,6 @@ from ..tracking.tag_pose import list_corners
 _ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 CIRCLE = np.column_stack((np.cos(_ANGLES_RAD), np.sin(_ANGLES_RAD)))
 """Points of the unit circle, (24, 2)."""
-
-HAND_HEIGHT_M = 0.25
-HAND_RADIUS_M = 0.06
-ARM_M = (0.08, 2.0)
-"""Width and length."""
 
 
 class CameraOptions(NamedTuple):
@@ -92,11 +87,7 @@ class PrintedTag(NamedTuple):
 def list_rays(lens: Intrinsics) -> np.ndarray:
     """Return the direction x / z, y / z of each pixel, (H, W, 2), single precision."""
     u, v = np.meshgrid(np.arange(lens.width_px, dtype=np.float32), np.arange(lens.height_px, dtype=np.float32))
-    pixels = np.dstack((u, v)).reshape(-1, 1, 2)
-    criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 1e-7)
-    undistort = getattr(cv2, "undistortPointsIter", cv2.undistortPoints)  # OpenCV 5 made them one
-    rays = undistort(pixels, lens.matrix, lens.distortion, R=np.eye(3), P=np.eye(3), criteria=criteria)
-    return rays.reshape(lens.height_px, lens.width_px, 2).astype(np.float32)
+    return lens.undistort(np.dstack((u, v))).reshape(lens.height_px, lens.width_px, 2).astype(np.float32)
 
 
 def plane_homography(camera: Camera, height_m: float) -> np.ndarray:
@@ -111,14 +102,3 @@ def tag_corners(tag: PrintedTag, poses: np.ndarray) -> np.ndarray:
     mount = Pose(tag.x_m, tag.y_m, tag.yaw_rad)
     tags = [transform_pose(Pose(*pose), mount) for pose in poses.tolist()]
     return np.array([list_corners(pose, tag.size_m, tag.height_m) for pose in tags])
-
-
-def hand_outlines(hand_m: Tuple[float, float]) -> List[np.ndarray]:
-    """Return the outlines (K, 3) of a hand over the place hand_m, and of the arm, which comes from below."""
-    width_m, length_m = ARM_M
-    sides_m = np.array(((-width_m / 2.0, 0.0), (width_m / 2.0, 0.0)))
-    arm_m = np.vstack((sides_m, sides_m[::-1] - (0.0, length_m)))
-    return [
-        np.column_stack((hand_m + outline_m, np.full(len(outline_m), HAND_HEIGHT_M)))
-        for outline_m in (HAND_RADIUS_M * CIRCLE, arm_m)
-    ]

@@ -12,8 +12,8 @@ import numpy as np
 
 from hero_node import Pose
 
-from ..camera.camera_model import Camera
-from .tag_corners import TagCorners
+from ..camera.camera_model import Camera, solve_camera
+from .tag_pose import TagCorners
 
 MIN_TAGS = 4
 PERIOD_S = 1.0
@@ -38,13 +38,11 @@ class _Fit(NamedTuple):
 
 
 class CameraShift:
-    """The pose of one camera as its reference tags show it.
+    """The calibrated camera, shifted as its reference tags show it.
 
-    Attributes:
-        camera: the calibrated one, shifted.
-        shift_m: by how much that moves the reference tag that it moves most.
-        rest_m: shift of the tags that is not corrected, rms.
-        wrong: tag that moved by itself, and by how much (m); None if there is none.
+    shift_m: by how much that moves the reference tag that it moves most.
+    rest_m: shift of the tags that is not corrected, rms.
+    wrong: tag that moved by itself, and by how much (m); None if there is none.
     """
 
     def __init__(self, camera: Camera, seen: Mapping[int, Pose]) -> None:
@@ -105,7 +103,8 @@ class CameraShift:
         shift_m = _measure_shift(self._calibrated, pixels, places_m)
         if shift_m <= STILL_M:
             return _Fit(self._calibrated, min(shift_m, EXPLAINED_M))
-        fitted = _fit_camera(self._calibrated, pixels, places_m)
+        points_m = np.column_stack((places_m, np.zeros(len(places_m))))
+        fitted = solve_camera(self._calibrated.lens, pixels, points_m, self._calibrated) or self._calibrated
         rest_m = _measure_shift(fitted, pixels, places_m)
         return _Fit(fitted if rest_m < max(EXPLAINED_SHARE * shift_m, EXPLAINED_M) else None, rest_m)
 
@@ -114,14 +113,3 @@ def _measure_shift(camera: Camera, pixels: np.ndarray, places_m: np.ndarray) -> 
     """Return how far a camera sees tags from their places, rms; inf if it does not see the floor there."""
     off_m = camera.intersect(pixels, 0.0) - places_m
     return float(np.sqrt((off_m**2).sum(axis=1).mean())) if np.isfinite(off_m).all() else math.inf
-
-
-def _fit_camera(camera: Camera, pixels: np.ndarray, places_m: np.ndarray) -> Camera:
-    """Return the camera, hardly moved, that sees the pixels at these places of the floor."""
-    points_m = np.column_stack((places_m, np.zeros(len(places_m))))
-    turn, shift_m = cv2.Rodrigues(camera.rotation)[0], (-camera.rotation @ camera.position_m).reshape(3, 1)
-    rays = np.ascontiguousarray(camera.lens.undistort(pixels))
-    # Of rays: the lens' own model need not be one of solvePnP's.
-    _, turn, shift_m = cv2.solvePnP(points_m, rays, np.eye(3), None, turn, shift_m, True, cv2.SOLVEPNP_ITERATIVE)
-    rotation = cv2.Rodrigues(turn)[0]
-    return Camera(camera.lens, rotation, (-rotation.T @ shift_m).ravel())

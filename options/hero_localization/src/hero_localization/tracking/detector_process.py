@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import DetectorError
 from .detectors import create_detector, create_fine_detectors
-from .tag_corners import TagCorners
+from .tag_pose import TagCorners
 from .tag_search import TagSearch
 
 ANSWER_S = 60.0
@@ -31,13 +31,7 @@ class DetectorProcess:
     """A TagSearch that runs in another process."""
 
     def __init__(
-        self,
-        backend: str,
-        family: str,
-        decimate: float,
-        width_px: int,
-        height_px: int,
-        smallest_px: float = math.inf,
+        self, backend: str, family: str, decimate: float, width_px: int, height_px: int, smallest_px: float = math.inf
     ) -> None:
         """Start the process; smallest_px: side of the smallest tag to be expected.
 

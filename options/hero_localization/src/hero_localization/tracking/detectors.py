@@ -7,14 +7,14 @@ python3-apriltag puts pixel centers at half integers and begins at the lower lef
 """
 
 from importlib.util import find_spec
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional, Tuple, Type, Union
 
 import cv2
 import numpy as np
 
 from ..errors import DetectorError
 from ..prints.tag_images import FAMILIES, draw_tag
-from .tag_corners import TagCorners
+from .tag_pose import TagCorners
 
 _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 """Minimum contrast of black and white, of 255: false detections of 16h5 in noise and floor textures stay below."""
@@ -27,13 +27,11 @@ EVEN_SHARE, MIN_SPAN = 0.15, 40
 
 
 class Look(NamedTuple):
-    """A preparation of images for what else is missed.
+    """A preparation of images for what else is missed: enlarged by a factor, then sharpened, then evened out.
 
-    Attributes:
-        enlarged: factor.
-        sharpening, radius_px: amount and radius of an unsharp mask: cells of 2 px are as wide as the blur of a webcam.
-        dark: shade, of 255, from which on ratios of shades count, as evened out by their neighborhood's: white in a
-            shadow may be darker than gray beside it. 0: shades stay as they are.
+    sharpening, radius_px: amount and radius of an unsharp mask: cells of 2 px are as wide as the blur of a webcam.
+    dark: shade, of 255, from which on ratios of shades count, as evened out by their neighborhood's: white in a shadow
+        may be darker than gray beside it. 0: shades stay as they are.
     """
 
     enlarged: int
@@ -61,7 +59,7 @@ class Look(NamedTuple):
         return evened
 
 
-FINE_LOOKS = (Look(1, 1.0, 1.0), Look(2, 3.0, 1.5), Look(2, 2.5, 1.0, 4.0), Look(2, 3.0, 2.0, 60.0))
+FINE_LOOKS = (Look(1, 1.0, 1.0), Look(2, 3.0, 1.5), Look(2, 2.5, 1.0, 4.0), Look(2, 6.0, 1.5, 40.0))
 """The last two for edges of shadows, without and with the gamma of a camera."""
 EVEN_BLUR_PX, EVEN_GAIN = 0.5, 1.2
 
@@ -72,20 +70,7 @@ MIN_MISTAKEN_TAGS = 3
 """Fewer may be noise."""
 
 
-class TagDetector:
-    """Detector of tags of one family."""
-
-    def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
-        """Return the tags in gray (H, W), 8 bit.
-
-        Args:
-            gray: an image, or a window of one.
-            origin: column and row of the window's first pixel in the image that corners refer to.
-        """
-        raise NotImplementedError
-
-
-class AprilTagDetector(TagDetector):
+class AprilTagDetector:
     """python3-apriltag, AprilTag 3's own detector: the more accurate one.
 
     It holds the GIL and takes SIGINT over while it detects: programs with other threads run it in its own process.
@@ -105,6 +90,7 @@ class AprilTagDetector(TagDetector):
         self._look = look
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
+        """Return the tags in gray (H, W), 8 bit: an image, or the window of one that begins at origin (column, row)."""
         shift, scale = np.array(origin) - 0.5, 1
         if gray.size > EVEN_FROM_PX:
             gray = _remove_noise(gray)
@@ -128,7 +114,7 @@ def _remove_noise(gray: np.ndarray) -> np.ndarray:
     return np.where(even, darkest, gray)
 
 
-class ArucoDetector(TagDetector):
+class ArucoDetector:
     """OpenCV's aruco, which always searches the whole image: decimate is not used."""
 
     def __init__(self, family: str, decimate: float) -> None:
@@ -157,6 +143,7 @@ class ArucoDetector(TagDetector):
         return -int(np.argmin(corners.sum(axis=1)))
 
     def detect(self, gray: np.ndarray, origin: Tuple[int, int] = (0, 0)) -> List[TagCorners]:
+        """Return the tags as AprilTagDetector.detect() does."""
         found, ids, _ = self._detect(np.ascontiguousarray(gray))
         if ids is None:
             return []
@@ -166,7 +153,8 @@ class ArucoDetector(TagDetector):
         ]
 
 
-BACKENDS: Dict[str, type] = {"apriltag": AprilTagDetector, "aruco": ArucoDetector}
+TagDetector = Union[AprilTagDetector, ArucoDetector]
+BACKENDS: Dict[str, Type[TagDetector]] = {"apriltag": AprilTagDetector, "aruco": ArucoDetector}
 
 DEFAULT_BACKEND = "apriltag" if find_spec("apriltag") else "aruco"
 """Debian 11 has no python3-apriltag that works."""

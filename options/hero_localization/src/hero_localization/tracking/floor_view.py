@@ -8,7 +8,7 @@ import numpy as np
 
 from ..camera.camera_model import Camera
 from ..errors import SettingsError
-from .tag_corners import TagCorners
+from .tag_pose import TagCorners
 
 MAX_SIDE_PX = 1280
 
@@ -26,9 +26,7 @@ _FOUND_BGR, _UNUSABLE_BGR = (0, 200, 0), (0, 0, 255)
 class FloorView:
     """A window onto the plane at one height: the tags' height, so that robots lie where their poses are.
 
-    Attributes:
-        camera: as given.
-        box_m: x min, y min, x max, y max of the view in map.
+    box_m: x min, y min, x max, y max of the view in map.
     """
 
     def __init__(self, camera: Camera, height_m: float) -> None:

@@ -14,7 +14,6 @@ from hero_node import Pose, find_frame
 
 from ..camera.camera_model import Camera
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
-from .tag_corners import TagCorners
 
 DEFAULT_HEIGHT_M = 0.076
 CENTERED = Pose(0.0, 0.0, 0.0)
@@ -26,6 +25,30 @@ SYSTEMATIC_M, SYSTEMATIC_RAD = 0.0007, 0.003
 
 MAX_SIZE_ERROR = 0.15
 """A tag whose size is off by a larger share is a false detection, or a print of another size."""
+
+
+class TagCorners(NamedTuple):
+    """A tag in an image."""
+
+    tag_id: int
+    corners: np.ndarray
+    """(4, 2) px: upper left, upper right, lower right, lower left of the upright print."""
+
+    @property
+    def center(self) -> np.ndarray:
+        """The crossing of the diagonals, (2,) px: the center of the print, whatever the perspective."""
+        (ax, ay), (bx, by), (cx, cy), (dx, dy) = self.corners.tolist()
+        area = (cx - ax) * (dy - by) - (cy - ay) * (dx - bx)
+        if abs(area) < 1e-9:
+            return self.corners.mean(axis=0)
+        share = ((bx - ax) * (dy - by) - (by - ay) * (dx - bx)) / area
+        return np.array((ax + share * (cx - ax), ay + share * (cy - ay)))
+
+    @property
+    def side_px(self) -> float:
+        """Side of a square of the same area."""
+        (ax, ay), (bx, by), (cx, cy), (dx, dy) = self.corners.tolist()
+        return math.sqrt(abs((cx - ax) * (dy - by) - (cy - ay) * (dx - bx)) / 2.0)
 
 
 class TagLayout(NamedTuple):
@@ -69,11 +92,9 @@ class TagLayout(NamedTuple):
 
 
 class TagPose(NamedTuple):
-    """The measured pose in `map` of a tag, or of the robot or object that wears it.
+    """The measured pose in `map` of a tag, or of the robot or object that wears it, and the tag's size as measured.
 
-    Attributes:
-        size_m: of the tag, as measured.
-        covariance: of x, y and yaw, (3, 3), m and rad.
+    covariance: of x, y and yaw, (3, 3), m and rad.
     """
 
     tag_id: int
@@ -83,15 +104,10 @@ class TagPose(NamedTuple):
 
 
 class Sightings(NamedTuple):
-    """Detections in one image.
+    """Detections in one image: of robots by number, of objects by name, of reference tags by id; and what is ignored.
 
-    Attributes:
-        robots: by number.
-        objects: by name.
-        references: by tag id.
-        unknown: ids of tags without a meaning.
-        doubled: ids of tags that appear more than once; ignored.
-        misshapen: measured by printed size of those that are too large or too small, by id; ignored.
+    unknown, doubled: ids of tags without a meaning, and of those that appear more than once.
+    misshapen: measured by printed size of tags that are too large or too small, by id.
     """
 
     robots: Dict[int, TagPose]

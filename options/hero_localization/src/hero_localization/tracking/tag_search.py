@@ -14,7 +14,7 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from .detectors import TagDetector
-from .tag_corners import TagCorners
+from .tag_pose import TagCorners
 
 FINE_BELOW_PX = 36.0
 """In an image at half its size, tags of less than this are missed with blur and gamma."""
@@ -179,12 +179,7 @@ class TagSearch:
         return frame.found
 
     def _look_for(
-        self,
-        frame: _Frame,
-        tag_id: int,
-        side_px: float,
-        windows: Sequence[Tuple[np.ndarray, float]],
-        missed_s: float,
+        self, frame: _Frame, tag_id: int, side_px: float, windows: Sequence[Tuple[np.ndarray, float]], missed_s: float
     ) -> None:
         """Search windows for a tag that was missed for this long: around places, seen so many seconds ago."""
         for index in self._choose_detectors(tag_id, frame.stamp_s, missed_s):

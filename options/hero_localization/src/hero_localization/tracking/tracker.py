@@ -12,8 +12,7 @@ from ..camera.camera_model import Camera
 from .camera_shift import CameraShift
 from .image_quality import ImageQuality
 from .settings import Settings
-from .tag_corners import TagCorners
-from .tag_pose import Sightings, find_smallest_side, locate
+from .tag_pose import Sightings, TagCorners, find_smallest_side, locate
 
 RATE_FRAMES = 30
 
@@ -49,13 +48,11 @@ SHIFTED_M, WRONG_M = 0.001, 0.002
 
 
 class Problem(NamedTuple):
-    """A problem that users should solve."""
+    """A problem of the camera, or of "tag 17", that users should solve; is_error: without that, poses are not right."""
 
     name: str
-    """Its subject: camera, or "tag 17"."""
     text: str
     is_error: bool
-    """True if poses are missing or wrong because of it."""
 
 
 class Tracker:
@@ -178,53 +175,51 @@ class Tracker:
     def list_problems(self) -> List[Problem]:
         """Return what is wrong with light, camera and tags."""
         newest_s = self._images[-1][0] if self._images else -math.inf
-        problems = []
+        problems: List[Problem] = []
+
+        def add(text: str, tag_id: Optional[int] = None, is_error: bool = False) -> None:
+            problems.append(Problem("camera" if tag_id is None else "tag %d" % tag_id, text, is_error))
+
         used_hz, sent_hz = self.rates_hz
         if used_hz < MIN_USED_SHARE * sent_hz and len(self._images) == RATE_FRAMES:
-            text = f"{self.describe_rate()} are used: this computer is busy, or too slow for more"
-            problems.append(Problem("camera", text, False))
+            add(f"{self.describe_rate()} are used: this computer is busy, or too slow for more")
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
         smallest_px = min(sides_px, default=self.smallest_px)
-        problems += [Problem("camera", *problem) for problem in self._quality.list_problems(smallest_px)]
+        for text, is_error in self._quality.list_problems(smallest_px):
+            add(text, is_error=is_error)
         if self._shift.shift_m > SHIFTED_M:
-            text = (
-                "the camera has moved by %.0f mm at the field's rim, which is corrected: calibrate the arena again soon"
-            )
-            problems.append(Problem("camera", text % (1e3 * self._shift.shift_m), False))
+            text = f"the camera has moved by {1e3 * self._shift.shift_m:.0f} mm at the field's rim, which is corrected"
+            add(text + ": calibrate the arena again soon")
         if smallest_px < MIN_SIDE_PX:
             text = "tags measure only %.0f px, less than %.0f: mount the camera lower, or print larger tags"
-            problems.append(Problem("camera", text % (smallest_px, MIN_SIDE_PX), False))
+            add(text % (smallest_px, MIN_SIDE_PX))
         missed = [
-            tag_id
+            str(tag_id)
             for tag_id, seen in sorted(self._expected.items())
             if len(seen) == EXPECTED_FRAMES and seen.count(False) > MAX_MISSED_SHARE * EXPECTED_FRAMES
         ]
         if missed:
             text = "tags %s are often missed where their robots are: occluded, too dark, too small, or removed?"
-            problems.append(Problem("camera", text % ", ".join(map(str, missed)), False))
+            add(text % ", ".join(missed))
         wrong_id, off_m = self._shift.wrong or (-1, 0.0)
         if WRONG_M < off_m <= MOVED_M:
             text = "this reference tag moved by %.0f mm, and does not count: put it back, or calibrate the arena again"
-            problems.append(Problem("tag %d" % wrong_id, text % (1e3 * off_m), False))
+            add(text % (1e3 * off_m), wrong_id)
         moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - MOVED_S]
-        missing = [tag_id for tag_id, seen_s in self._reference_seen_s.items() if seen_s < newest_s - MISSING_S]
         if moved and self.is_moved:
-            text = "reference tags are not where they were: the camera moved; calibrate the arena again"
-            problems.append(Problem("camera", text, True))
-        else:
-            for tag_id in moved:
-                text = "this reference tag moved: put it back, or calibrate the arena again"
-                problems.append(Problem("tag %d" % tag_id, text, False))
+            add("reference tags are not where they were: the camera moved; calibrate the arena again", is_error=True)
+        for tag_id in [] if self.is_moved else moved:
+            add("this reference tag moved: put it back, or calibrate the arena again", tag_id)
+        missing = sorted(tag_id for tag_id, at_s in self._reference_seen_s.items() if at_s < newest_s - MISSING_S)
         if len(missing) * 2 > len(self._reference_seen_s):
             text = "%d of %d reference tags are not seen: is there light enough, and did the camera move?"
-            problems.append(Problem("camera", text % (len(missing), len(self._reference_seen_s)), False))
+            add(text % (len(missing), len(self._reference_seen_s)))
         else:
-            for tag_id in sorted(missing):
-                text = "this reference tag is not seen: is it occluded, removed, or too dark?"
-                problems.append(Problem("tag %d" % tag_id, text, False))
+            for tag_id in missing:
+                add("this reference tag is not seen: is it occluded, removed, or too dark?", tag_id)
         for tag_id, (stamp_s, text) in sorted(self._tag_problems.items()):
             if abs(newest_s - stamp_s) <= KEPT_S:  # time goes back when a recording is played again
-                problems.append(Problem("tag %d" % tag_id, text, False))
+                add(text, tag_id)
         return problems
 
 
