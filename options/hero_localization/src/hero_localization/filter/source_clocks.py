@@ -6,7 +6,7 @@ delays of all sources joins this. Delays are relative to odometry, whose stamps 
 """
 
 import math
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -55,13 +55,6 @@ MIN_EFFECT = 0.1
 """A comparison counts if a delay of START_SD_S would change it by this many standard deviations."""
 
 
-class _Sample(NamedTuple):
-    source: int
-    stamp_s: float
-    pose: Pose
-    variances: np.ndarray
-
-
 class _Source:
     """One source, what is corrected of its delay, and when that was found."""
 
@@ -78,7 +71,7 @@ class SourceClocks:
         self._slew = SLEW if is_correcting else 0.0
         self._sources: List[_Source] = []
         self._delays_s, self._covariance = np.zeros(0), np.zeros((0, 0))
-        self._poses: Dict[Tuple[int, int], List[_Sample]] = {}
+        self._poses: Dict[Tuple[int, int], List[StampedPose]] = {}
         """SPAN_S apart, by robot and source: odometry of their time has not come yet."""
         self._due_s: Dict[Tuple[int, int], float] = {}
 
@@ -122,39 +115,39 @@ class SourceClocks:
 
     def add(self, robot_id: int, measurement: StampedPose, odometry: OdometryHistory) -> None:
         """Take a measured pose with its own stamp; odometry: that of its robot."""
-        stamp_s, pose, covariance = measurement[:3]
-        sample = _Sample(self._find_source(measurement.source), stamp_s, pose, np.diagonal(covariance))
-        key = (robot_id, sample.source)
-        if sample.stamp_s < self._due_s.get(key, -math.inf):
+        source, stamp_s = self._find_source(measurement.source), measurement.stamp_s
+        key = (robot_id, source)
+        if stamp_s < self._due_s.get(key, -math.inf):
             return
         poses = self._poses.setdefault(key, [])
-        if poses and abs(sample.stamp_s - poses[-1].stamp_s) > KEPT_S:
+        if poses and abs(stamp_s - poses[-1].stamp_s) > KEPT_S:
             poses.clear()  # after a pause, or a clock that was set back
-        if not poses or sample.stamp_s >= poses[-1].stamp_s + SPAN_S:
-            poses.append(sample)
+        if not poses or stamp_s >= poses[-1].stamp_s + SPAN_S:
+            poses.append(measurement)
             del poses[:-MAX_POSES]
-        reach_s = STEP_S[1] - self._delays_s.item(sample.source)
+        reach_s = STEP_S[1] - self._delays_s.item(source)
         if len(poses) < 2 or odometry.newest_s < poses[1].stamp_s + reach_s:
             return  # its odometry is not there yet
         first, second = poses[:2]
         del poses[0]
         self._compare(first, second, odometry)
-        for (robot, source), others in self._poses.items():
-            if robot == robot_id and source != sample.source and others:
+        for (robot, other), others in self._poses.items():
+            if robot == robot_id and other != source and others:
                 self._compare(others[0], second, odometry)
         wait_s = len(self._poses) / PAIRS_HZ - SPAN_S
         if wait_s > 0.0:
             poses.clear()
-            self._due_s[key] = sample.stamp_s + wait_s
+            self._due_s[key] = stamp_s + wait_s
 
-    def _compare(self, first: _Sample, second: _Sample, odometry: OdometryHistory) -> None:
+    def _compare(self, first: StampedPose, second: StampedPose, odometry: OdometryHistory) -> None:
         """Correct the delays by two poses of a robot."""
-        sources = sorted({first.source, second.source})
-        samples = [(sample, sample.stamp_s - self._delays_s.item(sample.source)) for sample in (first, second)]
+        both = [self._find_source(sample.source) for sample in (first, second)]
+        sources = sorted(set(both))
+        stamps_s = np.array((first.stamp_s, second.stamp_s)) - self._delays_s[both]
 
         def move(source: int, step_s: float) -> Optional[Pose]:
             """Return the motion by odometry if the delay of a source were larger."""
-            steps = [odometry.find(at_s - step_s * (sample.source == source)) for sample, at_s in samples]
+            steps = [odometry.find(at_s - step_s * (one == source)) for one, at_s in zip(both, stamps_s.tolist())]
             start, end = (None if step is None else step.pose for step in steps)
             return None if start is None or end is None else transform_pose(invert_pose(start), end)
 
@@ -169,8 +162,9 @@ class SourceClocks:
             effects[:, source] = np.divide(_subtract(late, early), 2.0 * step_s)
         assert counted is not None
         seen = transform_pose(invert_pose(first.pose), second.pose)
-        noise = first.variances + second.variances + (ODOMETRY_SHARE * np.array(counted)) ** 2
-        noise[:2] += first.variances[2] * (counted.x_m**2 + counted.y_m**2)
+        variances = [np.diagonal(sample.covariance) for sample in (first, second)]
+        noise = sum(variances) + (ODOMETRY_SHARE * np.array(counted)) ** 2
+        noise[:2] += variances[0][2] * (counted.x_m**2 + counted.y_m**2)
         if len(sources) > 1:
             noise += (BIAS_M**2, BIAS_M**2, BIAS_RAD**2)
         if not (np.abs(effects).max(axis=1) * START_SD_S > MIN_EFFECT * np.sqrt(noise)).any():

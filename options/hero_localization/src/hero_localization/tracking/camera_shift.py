@@ -5,7 +5,7 @@ all tags moved as a moved camera would show them, or all but one, its pose follo
 """
 
 import math
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import cv2
 import numpy as np
@@ -28,13 +28,6 @@ EXPLAINED_SHARE, EXPLAINED_M = 0.3, 0.00015
 
 STEP_SHARE = 0.4
 """Share of the rest of a shift that is corrected at once."""
-
-
-class _Fit(NamedTuple):
-    """The camera that sees reference tags best, None if that explains too little; their distances from it, rms."""
-
-    camera: Optional[Camera]
-    rest_m: float
 
 
 class CameraShift:
@@ -71,13 +64,13 @@ class CameraShift:
 
     def _follow(self, means: Mapping[int, np.ndarray]) -> None:
         ids = sorted(means)
-        fits: Dict[Optional[int], _Fit] = {}
+        fits: Dict[Optional[int], Tuple[float, Optional[Camera]]] = {}
         for left_out in [None, *ids] if len(ids) > MIN_TAGS else [None]:
             fits[left_out] = self._explain(*self._pair(means, left_out))
-            if fits[None].rest_m <= EXPLAINED_M:
+            if fits[None][0] <= EXPLAINED_M:
                 break
-        left_out = min(fits, key=lambda tag_id: fits[tag_id].rest_m)
-        moved, self.wrong = fits[left_out].camera, None
+        left_out = min(fits, key=lambda tag_id: fits[tag_id][0])
+        moved, self.wrong = fits[left_out][1], None
         if moved is None:
             moved, left_out = self.camera, None
         elif left_out is not None:
@@ -98,15 +91,15 @@ class CameraShift:
         pixels, places_m = (np.array([part[tag_id] for tag_id in kept]) for part in (means, self._places_m))
         return pixels, places_m
 
-    def _explain(self, pixels: np.ndarray, places_m: np.ndarray) -> _Fit:
-        """Return the camera, moved or not, that sees tags there."""
+    def _explain(self, pixels: np.ndarray, places_m: np.ndarray) -> Tuple[float, Optional[Camera]]:
+        """Return the rest of the shift, rms, and the camera, moved or not, with it; None: that explains too little."""
         shift_m = _measure_shift(self._calibrated, pixels, places_m)
         if shift_m <= STILL_M:
-            return _Fit(self._calibrated, min(shift_m, EXPLAINED_M))
+            return min(shift_m, EXPLAINED_M), self._calibrated
         points_m = np.column_stack((places_m, np.zeros(len(places_m))))
         fitted = solve_camera(self._calibrated.lens, pixels, points_m, self._calibrated) or self._calibrated
         rest_m = _measure_shift(fitted, pixels, places_m)
-        return _Fit(fitted if rest_m < max(EXPLAINED_SHARE * shift_m, EXPLAINED_M) else None, rest_m)
+        return rest_m, fitted if rest_m < max(EXPLAINED_SHARE * shift_m, EXPLAINED_M) else None
 
 
 def _measure_shift(camera: Camera, pixels: np.ndarray, places_m: np.ndarray) -> float:
