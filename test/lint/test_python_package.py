@@ -10,7 +10,7 @@ from catkin_pkg.package import parse_package
 
 import sources
 
-PACKAGES = ("hero_node", "hero_driver", "hero_client", "hero_sim", "hero_swarm", "hero_monitor", "hero_recording")
+PACKAGES = ("hero_node", "hero_driver", "hero_client", "hero_sim", "hero_swarm", "hero_recording")
 
 WITHOUT_ROS = """
 import sys
@@ -21,14 +21,11 @@ import hero_client, hero_driver, hero_node
 from hero_sim.stepped.swarm import StepSwarm
 from hero_swarm import fit
 from hero_swarm.experiments import runner
-from hero_monitor.live_view import LiveView
 from hero_recording import export, plot
 with StepSwarm(2, arena="maze") as swarm:
     for robot in swarm:
         robot.drive(0.1, 0.0)
-    view = LiveView(swarm.rows, range(2), port=0)
     swarm.sleep(1.0)
-    view.close()
     print(all(robot.pose.x_m > 0.03 for robot in swarm), sys.modules["hero_sim"].__file__)
 """
 

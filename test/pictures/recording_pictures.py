@@ -1,6 +1,6 @@
 """Makes the pictures of recordings and calibrations as their pages say, by the programs themselves: script/pictures.
 
-recording_paths (with speeds, delays, connections, errors): ten robots in a hotspot's network, of which one loses its
+recording_paths (with speeds, connections, errors): ten robots in a hotspot's network, of which one loses its
 power and one its connection. calibration_motors (with infrared): robots whose servos and sensors are off.
 """
 
@@ -65,12 +65,12 @@ def shrink(path):
 
 
 def record_ten(picture):
-    """Paths, speeds, delays, connections and errors."""
+    """Paths, speeds, connections and errors."""
     with RunningSuite(10, "arena:=obstacles", "wifi:=hotspot") as stage, tempfile.TemporaryDirectory() as folder:
         bag = record(stage, folder).rename(Path(folder) / "ten.bag")
         prefix = picture.with_name("recording")
         plot(bag, prefix, "--robots", "1 2 3 6", "--figures", "paths,speeds")
-        plot(bag, prefix, "--figures", "delays,connections,errors")
+        plot(bag, prefix, "--figures", "connections,errors")
     for path in prefix.parent.glob("recording_*.png"):
         shrink(path)
 

@@ -19,7 +19,6 @@ from .plots.observations import Observations, RobotObservations
 FIGURES = {
     "paths": "/hero_N/odom",
     "speeds": "/hero_N/odom",
-    "delays": "/hero_N/odom",
     "connections": "/hero_driver/robots",
     "errors": "/hero_N/odom or /hero_N/pose with /hero_N/ground_truth",
 }

@@ -238,7 +238,6 @@ def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_
     drawing = Figures(observe(path), START_S, START_S + 1.5, "fleet.bag")
     figures = {
         "speeds": drawing.draw_speeds(),
-        "delays": drawing.draw_delays(),
         "connections": drawing.draw_connections(),
         "errors": drawing.draw_errors(),
         "paths": drawing.draw_paths(),
@@ -248,9 +247,8 @@ def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_
         labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title())]
         assert any("(m" in label or "(s)" in label for label in labels), name
         assert "fleet.bag" in "".join(text.get_text() for text in figure.texts)
-    for name in ("delays", "connections"):
-        names = [label.get_text() for label in figures[name].axes[0].get_yticklabels()]
-        assert names == ["hero_%d" % number for number in range(count)]
+    names = [label.get_text() for label in figures["connections"].axes[0].get_yticklabels()]
+    assert names == ["hero_%d" % number for number in range(count)]
     numbers = {text.get_text() for text in figures["paths"].axes[0].texts}
     assert numbers == (set() if count == 1 else {str(number) for number in range(count)})
 
@@ -272,8 +270,8 @@ def test_plot_writes_png_files_beside_the_bag_and_prints_a_table(two_robots, cap
 
 @pytest.mark.slow
 def test_figures_can_be_chosen_and_written_as_pdf(two_robots, tmp_path, capsys):
-    run_plot(capsys, two_robots, "--format", "pdf", "--out", tmp_path / "my", "--figures", "paths,delays")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_delays.pdf", "my_paths.pdf"]
+    run_plot(capsys, two_robots, "--format", "pdf", "--out", tmp_path / "my", "--figures", "paths,speeds")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_paths.pdf", "my_speeds.pdf"]
     assert (tmp_path / "my_paths.pdf").read_bytes().startswith(b"%PDF")
 
 
@@ -292,34 +290,10 @@ def test_figures_for_which_a_topic_is_missing_are_named_with_it(tmp_path, capsys
     output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/odom"))
     assert "no figure of errors: nothing of /hero_N/odom or /hero_N/pose with /hero_N/ground_truth" in output
     output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/robots"))
-    assert output.count("no figure of") == 4
+    assert output.count("no figure of") == 3
     assert "part_connections.png" in output
     with pytest.raises(RecordingError, match=r"part\.bag: no figure of errors: nothing of /hero_N/odom"):
         run_plot(capsys, tmp_path / "part.bag", "--figures", "errors")
-
-
-@pytest.mark.parametrize(
-    ("kinds", "words"),
-    [
-        (("/odom", "/encoder"), "nothing on /hero_N/velocity_controller/cmd_vel"),
-        (("/odom", "/cmd_vel"), "nothing on /hero_N/encoder"),
-    ],
-)
-def test_an_empty_panel_names_the_topic_that_is_missing(kinds, words, tmp_path):
-    drawing = Figures(observe(write_parts(tmp_path / "part.bag", (0,), *kinds)), START_S, START_S + 3.0, "part.bag")
-    assert words in drawing.draw_delays().axes[1].texts[0].get_text()
-
-
-def test_a_recording_that_began_during_the_motion_says_when_to_begin(two_robots):
-    seen = observe(two_robots)
-    for robot in seen.robots.values():
-        first_s = robot.encoder.columns()[0][0] + 3.0
-        rows = [row for row in zip(*robot.encoder.columns()) if row[0] > first_s]
-        robot.encoder = type(robot.encoder)(3, 0)
-        for row in rows:
-            robot.encoder.add(*row)
-    axes = Figures(seen, START_S, START_S + 12.0, "two.bag").draw_delays().axes[1]
-    assert "start recording before\nthe program" in axes.texts[0].get_text()
 
 
 def test_all_obstacles_have_one_color_and_ground_truth_its_name(two_robots):

@@ -1,4 +1,4 @@
-"""Figures show the numbers of the recording: delays, states, gaps and errors at their robot, time and size."""
+"""Figures show the numbers of the recording: states, gaps and errors at their robot, time and size."""
 
 import math
 
@@ -28,36 +28,11 @@ def add_odometry(robot, times_s, delay_s=0.0):
         robot.ground_truth.add(START_S + time_s, START_S + time_s, x_m, 0.02, 0.1, 0.1, 0.0)
 
 
-def add_start(robot, start_s, delay_s, left, right):
-    """Add a command at start_s after which the wheels turn delay_s later, by so many ticks per reading."""
-    for time_s in np.arange(start_s - 3.0, start_s + 1.0, 0.02):
-        readings = max(0.0, round((time_s - start_s - delay_s) / 0.02, 3))
-        robot.encoder.add(START_S + time_s, left * readings, right * readings)
-    robot.commands.add(START_S + start_s, 0.1, 0.0)
-
-
 def draw(*robots):
     seen = Observations()
     for robot_id, robot in enumerate(robots):
         seen.robots[robot_id] = robot
     return Figures(seen, START_S, START_S + END_S, "test.bag")
-
-
-def test_each_robots_delays_are_drawn_in_its_row():
-    robots = [RobotObservations() for _ in range(3)]
-    add_odometry(robots[0], np.arange(0.0, 2.0, PERIOD_S), 0.03)
-    add_odometry(robots[2], np.arange(0.0, 2.0, PERIOD_S), 0.05)
-    for start_s, delay_s, robot_id, left, right in ((4.0, 0.1, 0, 3, 0), (9.0, 0.3, 0, 0, -3), (4.0, 0.2, 2, 3, 3)):
-        add_start(robots[robot_id], start_s, delay_s, left, right)
-    messages, motions = draw(*robots).draw_delays().axes
-    crosses = [line.get_xydata()[0] for line in messages.lines if line.get_marker() == "x"]
-    assert np.allclose(crosses, [(30.0, 0), (50.0, 2)], atol=0.1)
-    dots = np.concatenate([line.get_xydata() for line in motions.lines if line.get_marker() == "o"])
-    assert dots[:, 1].tolist() == [0, 0, 2]
-    assert dots[:, 0] == pytest.approx([120.0, 320.0, 220.0], abs=21.0)
-    bars = [line.get_xydata()[0] for line in motions.lines if line.get_marker() == "|"]
-    assert bars[0] == pytest.approx([np.median(dots[:2, 0]), 0.0])
-    assert motions.get_xlim()[0] == 0.0
 
 
 def test_states_and_gaps_are_drawn_at_their_times():
@@ -115,14 +90,14 @@ def make_driven(count):
     robots = [RobotObservations() for _ in range(count)]
     for number, robot in enumerate(robots):
         add_odometry(robot, np.arange(0.0, 4.0, PERIOD_S), 0.01 * number)
-        add_start(robot, 4.0, 0.1, 3, 3)
+        robot.commands.add(START_S + 4.0, 0.1, 0.0)
         robot.poses.add(START_S + 1.0, START_S + 1.0, 0.1, 0.025 + number, 0.1)
         robot.poses.add(START_S + 2.0, START_S + 2.0, 0.2, 0.025 + number, math.pi / 3.0)
         robot.states.append(StateReport(START_S, "ready", 0))
     return robots
 
 
-FIGURES = ("paths", "speeds", "delays", "connections", "errors")
+FIGURES = ("paths", "speeds", "connections", "errors")
 
 
 def draw_page(name, robots, duration_s=END_S):
@@ -137,7 +112,8 @@ def draw_page(name, robots, duration_s=END_S):
 def test_a_page_grows_with_its_robots():
     for name, count, height_in in (
         ("paths", 9, 8.0), ("errors", 9, 6.0), ("speeds", 3, 5.7), ("speeds", 9, 13.2),
-        ("delays", 1, 2.5), ("delays", 3, 2.5), ("delays", 4, 2.8), ("delays", 20, 7.6), ("connections", 21, 4.96),
+        ("connections", 1, 2.5), ("connections", 3, 2.5), ("connections", 4, 2.8), ("connections", 20, 7.6),
+        ("connections", 21, 4.96),
     ):  # fmt: skip
         robots = make_driven(1) + [RobotObservations() for _ in range(count - 1)]
         for robot in robots if name == "speeds" else ():
@@ -146,7 +122,7 @@ def test_a_page_grows_with_its_robots():
 
 
 @pytest.mark.parametrize(
-    ("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2), ("delays", 21), ("connections", 21)]
+    ("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2), ("connections", 21)]
 )
 def test_texts_of_a_page_lie_on_it_and_apart(name, count):
     figure = draw_page(name, make_driven(count))
@@ -162,7 +138,7 @@ def test_texts_of_a_page_lie_on_it_and_apart(name, count):
     tops = [axes.title.get_window_extent(renderer).y1 for axes in figure.axes]
     assert subtitle.get_window_extent(renderer).y0 >= max(tops) - 1
     assert {text.get_fontsize() for text in (subtitle, *(text for one in legends for text in one.get_texts()))} == {8.0}
-    if name in ("delays", "connections"):
+    if name == "connections":
         (ticks,) = [axes.get_yticklabels() for axes in figure.axes[:1]]
         assert [tick.get_text() for tick in ticks] == ["hero_%d" % number for number in range(count)]
         middles = [tick.get_window_extent(renderer).y0 for tick in ticks]
@@ -182,11 +158,6 @@ def test_every_figure_says_what_its_axes_are():
     assert labels["speeds"] == [
         ("linear (m/s)", "", "hero_0"), ("angular (rad/s)", "", ""), ("", "time (s)", "hero_1"), ("", "time (s)", "")
     ]  # fmt: skip
-    (messages, motions) = labels["delays"]
-    assert messages[:2] == (
-        "box 25 to 75 %, whiskers 1 to 99 %, cross: maximum", "message delay: arrival of odom minus its stamp (ms)"
-    )  # fmt: skip
-    assert motions[:2] == ("each dot is one start, bar: median", "command to motion of a robot at rest (ms)")
     assert labels["connections"] == [("", "time (s)", "")]
     heading = "heading error (degrees),\npositive: counter-clockwise"
     assert labels["errors"] == [
@@ -282,38 +253,3 @@ def test_speeds_are_drawn_beside_commands_up_to_eight_robots():
     untold[0].commands = type(untold[0].commands)(1, 2)
     assert "no commands recorded" in draw_page("speeds", untold).legends[0].get_texts()[1].get_text()
     assert draw_page("speeds", [RobotObservations()]) is None is draw_page("paths", [RobotObservations()])
-
-
-@pytest.mark.parametrize(
-    ("delays_s", "limits_ms", "ticks_ms"),
-    [
-        ((0.01, 0.02), (-5.0, 60.0), [0, 50]),
-        ((-0.1, 0.9), (-110.0, 1170.0), [-50, 0, 50, 100, 300, 1000]),
-        ((0.0, 9.0), (-5.0, 11700.0), [0, 50, 100, 300, 1000, 3000, 10000]),
-    ],
-)
-def test_the_scale_of_delays_holds_all_and_is_fine_below_a_tenth(delays_s, limits_ms, ticks_ms):
-    robot = RobotObservations()
-    for number, delay_s in enumerate(delays_s):
-        robot.odometry.add(START_S + number + delay_s, START_S + number, 0.0, 0.0, 0.0, 0.0, 0.0)
-    messages, motions = draw_page("delays", [robot]).axes
-    assert messages.get_xlim() == pytest.approx(limits_ms, abs=0.01)
-    assert messages.get_xticks().tolist() == ticks_ms and len(messages.xaxis.get_minorticklocs()) == 0
-    assert [label.get_text() for label in messages.get_xticklabels()] == [str(tick) for tick in ticks_ms]
-    scale = messages.xaxis.get_transform()
-    places = scale.transform(np.array([0.0, 50.0, 100.0, 1000.0]))
-    assert places[2] == pytest.approx(2.0 * places[1]) and places[3] - places[2] < places[2], "linear up to 100 ms"
-    (text,) = motions.texts
-    assert text.get_position() == (0.5, 0.5) and not len(motions.get_xticks())
-
-
-def test_a_box_of_delays_holds_the_middle_half():
-    robot = RobotObservations()
-    for number in range(101):
-        stamp_s = START_S + 0.01 * number
-        robot.odometry.add(stamp_s + 1e-3 * number, stamp_s, 0.0, 0.0, 0.0, 0.0, 0.0)
-    axes = draw_page("delays", [RobotObservations(), robot]).axes[0]
-    places = {tuple(np.round(line.get_xdata(), 1)) for line in axes.lines}
-    assert {(25.0, 1.0), (75.0, 99.0), (50.0, 50.0), (100.0,)} <= places
-    rows = [line.get_ydata() for line in axes.lines]
-    assert min(map(min, rows)) == pytest.approx(0.7) and max(map(max, rows)) == pytest.approx(1.3)

@@ -1,4 +1,4 @@
-"""Program show: replays one run of an experiment in RViz, on the monitor's map or in Foxglove, or writes it to a file.
+"""Program show: replays one run of an experiment in RViz and on the monitor's map, or writes it to a file.
 
 A run is computed again: seed and code give the same bytes, and nothing has to have been recorded.
 """
@@ -8,7 +8,6 @@ import sys
 from collections import deque
 from typing import Optional, Sequence
 
-from hero_node import import_optional
 from hero_node.parameters import within
 
 from .experiments.computing import set_up
@@ -28,8 +27,6 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     instead = parser.add_mutually_exclusive_group()
     instead.add_argument("--video", metavar="FILE", help="write an .mp4 or .gif instead, without ROS")
     instead.add_argument("--bag", metavar="FILE", help="write a bag instead, without ROS")
-    text = "show it in Foxglove instead, at ws://127.0.0.1:PORT/foxglove, without ROS (PORT: 8088)"
-    instead.add_argument("--foxglove", nargs="?", type=int, const=8088, metavar="PORT", help=text)
     return parser.parse_args(arguments)
 
 
@@ -54,7 +51,6 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     if about["code"] != hash_code(experiment.list_code()):
         text = "note: the results are of other code (%s), so this run may differ from theirs"
         print(text % about["code"], file=sys.stderr)
-    robot_ids = range(trial.poses.shape[1])
     print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
     if options.video:
         from .video import write_video
@@ -64,14 +60,9 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     elif options.bag:
         from hero_recording.step_recorder import StepRecorder
 
-        with StepRecorder(trial.rows, robot_ids, options.bag):
+        with StepRecorder(trial.rows, range(trial.poses.shape[1]), options.bag):
             deque(trial.run(experiment.time_s), maxlen=0)
         print(options.bag)
-    elif options.foxglove is not None:
-        live = import_optional("hero_monitor.live_view", "python3-tornado")
-        with live.LiveView(trial.rows, robot_ids, options.foxglove, options.speed) as view:
-            print("Foxglove: ws://127.0.0.1:%d/foxglove" % view.port, flush=True)
-            deque(trial.run(experiment.time_s), maxlen=0)
     else:
         from .ros.replay import replay
 

@@ -322,8 +322,7 @@ class LimitedServer(tornado.httpserver.HTTPServer):
 class Server:
     """The server, from its start to its end."""
 
-    def __init__(self, access: Access, limits: ClientLimits, actions: Optional[Actions], *routes: Route) -> None:
-        """actions: of pages; None: there are no pages, only the routes."""
+    def __init__(self, access: Access, limits: ClientLimits, actions: Actions, *routes: Route) -> None:
         # tornado logs each invalid request and cookie: any client could fill the disk.
         logging.getLogger("tornado.general").setLevel(logging.ERROR)
         self.pages: List[PageSocket] = []
@@ -334,13 +333,13 @@ class Server:
             "actions": actions,
             "pages": self.pages,
         }
-        page: List[Route] = [
+        served: List[Route] = [
+            *routes,
             (r"/live", PageSocket, {}),
             (r"/login", LoginHandler, {}),
             (r"/picture/([0-9]{1,9})", PictureHandler, {}),
             (r"/(.*)", FileHandler, {}),
         ]
-        served = [*routes, *(page if actions is not None else [])]
         application = tornado.web.Application(
             [(pattern, handler, {**shared, **values}) for pattern, handler, values in served],
             log_function=lambda handler: None,  # logs no request: a URL may contain a secret by mistake

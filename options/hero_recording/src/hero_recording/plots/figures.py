@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.scale import SymmetricalLogTransform
 
 from hero_client.values import BODY_RADIUS_M
 
@@ -26,8 +25,6 @@ LABELED = 3
 """Error curves with an id, of many robots."""
 
 NO_COMMANDS = "no commands recorded:\nnothing on /hero_N/velocity_controller/cmd_vel"
-
-DELAY_TICKS_MS = (-50, 0, 50, 100, 300, 1000, 3000, 10000)
 
 STYLE = {
     "font.size": 8.0,
@@ -216,65 +213,7 @@ class Figures:
         figure.legend(handles=handles, loc="upper right", ncol=2)
         return figure
 
-    # -- delays and connections ----------------------------------------------------------------------------
-
-    def draw_delays(self) -> Optional[Figure]:
-        """Draw the delays of messages, and those from a command to the motion."""
-        messages = {key: analysis.compute_message_delays(robot) * 1e3 for key, robot in self._robots.items()}
-        if not any(len(delays_ms) for delays_ms in messages.values()):
-            return None
-        figure, grid = self._begin(self._row_height, "Delays", 1, 2, sharey=True)
-        message_axes, motion_axes = grid[0]
-        for row, (robot_id, robot) in enumerate(self._robots.items()):
-            color = self._colors[robot_id]
-            if len(messages[robot_id]):
-                message_axes.boxplot(
-                    [messages[robot_id]], positions=[row], whis=(1, 99), vert=False, widths=0.6, showfliers=False,
-                    boxprops={"color": color}, whiskerprops={"color": color}, capprops={"color": color},
-                    medianprops={"color": "black"}, manage_ticks=False,
-                )  # fmt: skip
-                message_axes.plot(messages[robot_id].max(), row, "x", color=color)
-            motions = analysis.compute_motion_delays(robot) * 1e3
-            if len(motions):
-                motion_axes.plot(motions, np.full(len(motions), row), "o", color=color, alpha=0.5)
-                motion_axes.plot(np.median(motions), row, "|", color="black", markersize=_END["markersize"])
-        self._label_rows(message_axes)
-        message_axes.set_xlabel("message delay: arrival of odom minus its stamp (ms)")
-        message_axes.set_title("box 25 to 75 %, whiskers 1 to 99 %, cross: maximum")
-        # Most delays are some ms, the longest may be a second: the scale is linear up to 100 ms, then logarithmic.
-        # The scale symlog renamed its arguments in matplotlib 3.3, and ignored unknown ones before.
-        scale = SymmetricalLogTransform(10.0, 100.0, 2.0)
-        message_axes.set_xscale("function", functions=(scale.transform, scale.inverted().transform))
-        every = np.concatenate(list(messages.values()))
-        low, high = min(-5.0, every.min() * 1.1), max(60.0, every.max() * 1.3)
-        message_axes.set_xlim(low, high)
-        ticks = [tick for tick in DELAY_TICKS_MS if low <= tick <= high]
-        message_axes.set_xticks(ticks)
-        message_axes.set_xticklabels(["%d" % tick for tick in ticks])
-        message_axes.minorticks_off()
-        motion_axes.set_xlabel("command to motion of a robot at rest (ms)")
-        motion_axes.set_title("each dot is one start, bar: median")
-        if motion_axes.lines:
-            motion_axes.set_xlim(0.0, None)
-        else:
-            motion_axes.set_xticks([])
-            text = self._explain_no_motion()
-            motion_axes.text(0.5, 0.5, text, transform=motion_axes.transAxes, ha="center")
-        for axes in grid[0]:
-            axes.grid(axis="x")
-        return figure
-
-    def _explain_no_motion(self) -> str:
-        """Return why there is no delay from a command to a motion."""
-        if not any(len(robot.commands) for robot in self._robots.values()):
-            return NO_COMMANDS
-        if not any(len(robot.encoder) for robot in self._robots.values()):
-            return "no encoder readings recorded:\nnothing on /hero_N/encoder"
-        return (
-            "no start from rest was recorded: start recording before\n"
-            "the program, and let the program wait 2 s with its\n"
-            "topics open (a new topic is seen within a second)"
-        )
+    # -- connections -------------------------------------------------------------------------------------
 
     def draw_connections(self) -> Optional[Figure]:
         """Draw the state of each robot over time, and gaps in its odometry."""
