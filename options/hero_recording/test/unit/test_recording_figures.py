@@ -121,9 +121,7 @@ def test_a_page_grows_with_its_robots():
         assert draw_page(name, robots).get_size_inches() == pytest.approx((9.0, height_in)), (name, count)
 
 
-@pytest.mark.parametrize(
-    ("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2), ("connections", 21)]
-)
+@pytest.mark.parametrize(("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2), ("connections", 21)])
 def test_texts_of_a_page_lie_on_it_and_apart(name, count):
     figure = draw_page(name, make_driven(count))
     FigureCanvasAgg(figure).draw()

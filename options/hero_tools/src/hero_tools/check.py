@@ -9,7 +9,7 @@ Changes nothing. Ends within about 5 s whatever hangs; the exit status is 1 if a
 import argparse
 import json
 import os
-from typing import Dict, List, Optional, Sequence
+from typing import Dict, List, Sequence
 
 import rospy
 
@@ -19,12 +19,13 @@ from hero_node.ros import end_ros_node
 
 from .checkup import computer, graph, localization, network
 from .checkup.points import FAIL, OK, WARN, Finding, Point, run_points, warn
+from .hotspot import DRIVER_PORT
 
 TIMEOUT_S = 4.0  # of the points that run at once: those that need no ROS master, the node, those that need it
 LEAVE_TIMEOUT_S = 0.3
 
 
-def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
+def run_check(port: int) -> Dict[str, Finding]:
     """Return the findings by point."""
     addresses = network.read_addresses()
     own = addresses or []
@@ -32,7 +33,6 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
     points: Dict[str, Point] = {
         "python": computer.check_python,
         "packages": computer.check_packages,
-        "messages": computer.check_messages,
         "workspace": computer.check_workspace,
         "disk": computer.check_disk,
         "clock": computer.check_clock,
@@ -42,8 +42,7 @@ def run_check(port: int, interface: Optional[str]) -> Dict[str, Finding]:
         "ros_environment": lambda: graph.check_variables(addresses),
         "own_name": lambda: graph.check_own_name(own),
         "port": lambda: network.check_port(port, listeners),
-        "addresses": lambda: network.check_addresses(addresses, interface, port, list(listeners)),
-        "firewall": lambda: network.advise_firewall(interface or network.find_robot_interface(own), port),
+        "addresses": lambda: network.check_addresses(addresses, port, list(listeners)),
         "master": lambda: graph.check_master(own),
     }
     node = graph.OwnNode()
@@ -77,17 +76,14 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="check", description="Checks whether this PC can drive robots.")
     parser.add_argument("--json", action="store_true", help="print one line of JSON")
-    text = "TCP port that robots connect to (11411)"
-    parser.add_argument("--port", type=within(1, 65535, int), default=11411, metavar="PORT", help=text)
-    parser.add_argument(
-        "--interface", metavar="NAME", help="interface to the robots' network, such as wlan0 (default: the only one)"
-    )
+    text = "TCP port that robots connect to (%(default)s)"
+    parser.add_argument("--port", type=within(1, 65535, int), default=DRIVER_PORT, metavar="PORT", help=text)
     return parser.parse_args(arguments)
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the findings and return the exit status."""
-    findings = run_check(options.port, options.interface)
+    findings = run_check(options.port)
     failed = any(finding.state == FAIL for finding in findings.values())
     if options.json:
         points = [{"point": point, **finding._asdict()} for point, finding in findings.items()]

@@ -25,7 +25,7 @@ from hero_node.files import RobotNotes, read_calibrations
 from hero_node.parameters import within
 from hero_node.ros import Program
 
-from .fleet_rows import ORDERS, RobotRow, find_missing, sort_rows
+from .fleet_rows import RobotRow, find_missing, sort_rows
 from .fleet_table import format_json, format_table, format_title
 from .inventory import format_inventory, list_inventory, list_warnings
 
@@ -43,7 +43,7 @@ PRINT_PERIOD_S = 5.0  # without a terminal
 STOP_KEYS = (*STOP_ALL_KEYS, "s")
 """Those of teleop; s, which there stops the robots that it drives, is not advertised here."""
 
-KEYS_HELP = "q quit   Enter STOP ALL ROBOTS   r release them   o order"
+KEYS_HELP = "q quit   Enter STOP ALL ROBOTS   r release them"
 MAX_OPTION = 1e6
 
 
@@ -125,7 +125,6 @@ class FleetProgram:
         self._program = program
         self._options = options
         self._fleet = FleetListener()
-        self._order = ORDERS[0]
         self._end_s = math.inf if options.seconds is None else time.monotonic() + options.seconds
         self._rows: List[RobotRow] = []
 
@@ -136,7 +135,7 @@ class FleetProgram:
         return self._seconds_left() > 0.0 and self._program.running
 
     def _read(self) -> None:
-        self._rows = sort_rows(self._fleet.read_rows(time.monotonic()), self._order)
+        self._rows = sort_rows(self._fleet.read_rows(time.monotonic()))
 
     def _make_lines(self, width: int, height: int) -> List[str]:
         if self._fleet.report is None:
@@ -151,9 +150,7 @@ class FleetProgram:
 
     def _press(self, key: str) -> None:
         """Execute the command of a key."""
-        if key == "o":
-            self._order = ORDERS[(ORDERS.index(self._order) + 1) % len(ORDERS)]
-        elif key in STOP_KEYS or key == RELEASE_KEY:
+        if key in STOP_KEYS or key == RELEASE_KEY:
             self._fleet.drivers.request_stop(key in STOP_KEYS)
         elif key == "d":
             self._fleet.dismiss_gone()
@@ -225,9 +222,8 @@ class FleetProgram:
         size = shutil.get_terminal_size()
         left_s = self._seconds_left()
         ending = "" if left_s == math.inf else f"   ends in {left_s:.0f} s"
-        last = f"{KEYS_HELP} (now by {self._order}){ending}"
         stop = "" if status is None else paint(status.level, status.text[: size.columns])
-        return [*self._make_lines(size.columns, size.lines - 2), stop, last[: size.columns]]
+        return [*self._make_lines(size.columns, size.lines - 2), stop, (KEYS_HELP + ending)[: size.columns]]
 
     def check_expected(self) -> int:
         """Print which of the expected robots did not join or move, and return the exit status."""

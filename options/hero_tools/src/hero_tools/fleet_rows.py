@@ -1,14 +1,11 @@
 """Rows of the fleet's table: cells of each robot, order, and classification. Pure."""
 
-import math
 from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
 
 from hero_client.ros import RobotTrack
 from hero_client.values import STOP_STATES, name_state
 from hero_msgs.msg import Robot
 from hero_node.files import RobotNotes
-
-ORDERS = ("id", "state", "nearest")
 
 MOVED_M = 0.05
 """A distance that noise does not make: more than half of the robot's body."""
@@ -42,11 +39,6 @@ class RobotRow(NamedTuple):
         return STOP_STATES.get(self.robot.stop_state, str(self.robot.stop_state))
 
     @property
-    def nearest_m(self) -> float:
-        """The distance of the nearest obstacle; inf without one, -inf on contact."""
-        return self.track.nearest.range_m if self.track.nearest else math.inf
-
-    @property
     def is_heard(self) -> bool:
         """Return whether odometry and a scan have arrived."""
         return self.track.pose is not None and self.track.proximity_seen
@@ -57,12 +49,8 @@ class RobotRow(NamedTuple):
         return self.track.distance_m >= MOVED_M or self.track.turned_rad >= MOVED_RAD
 
 
-def sort_rows(rows: Sequence[RobotRow], order: str) -> List[RobotRow]:
-    """Return the rows in one of ORDERS; nearest is by the distance of the nearest obstacle."""
-    if order == "state":
-        return sorted(rows, key=lambda row: (row.robot.state == Robot.READY, row.state, row.robot.id))
-    if order == "nearest":
-        return sorted(rows, key=lambda row: (row.nearest_m, row.robot.id))
+def sort_rows(rows: Sequence[RobotRow]) -> List[RobotRow]:
+    """Return the rows by the robots' numbers, those without one last."""
     return sorted(rows, key=lambda row: (row.robot.id < 0, row.robot.id, row.name))
 
 

@@ -192,52 +192,28 @@ WIFI, LAN, DOCKER = (
 
 
 @pytest.mark.parametrize(
-    ("addresses", "interface"),
+    ("addresses", "listening", "state", "says"),
     [
-        ([LAN, WIFI], "wlan0"),
-        ([LAN, DOCKER], "eth0"),
-        ([LAN, Address("wlan0", "192.168.8.2")], None),
-        ([], None),
+        ([LAN, WIFI], [], OK, "10.42.0.1:11411"),
+        ([LAN, WIFI], ["0.0.0.0"], OK, "10.42.0.1:11411"),
+        ([LAN, WIFI], ["127.0.0.1"], WARN, "open on 127.0.0.1 only"),
+        ([LAN, WIFI], ["192.168.7.2"], WARN, "connect to one of these, port 11411: 192.168.7.2 (eth0)"),
+        ([LAN, WIFI], ["127.0.0.1", "10.42.0.1"], OK, "10.42.0.1:11411"),
+        ([LAN, WIFI], ["::"], OK, "192.168.7.2 (eth0), 10.42.0.1 (wlan0)"),
+        ([LAN], [], WARN, "192.168.7.2 (eth0)"),
+        ([], [], WARN, "no network"),
+        (None, [], WARN, "ip is missing"),
     ],
 )
-def test_the_robots_network_is_the_hotspot_or_the_only_one(addresses, interface):
-    assert network.find_robot_interface(addresses) == interface
-
-
-def test_the_firewall_commands_name_the_interface_and_the_port():
-    finding = network.advise_firewall("wlan0", 11412)
-    assert finding.remedy == (
-        "ufw: sudo ufw allow in on wlan0 to any port 11412 proto tcp",
-        "firewalld: sudo firewall-cmd --permanent --zone=$(firewall-cmd --get-zone-of-interface=wlan0)"
-        " --add-port=11412/tcp && sudo firewall-cmd --reload",
-    )
-    assert all("INTERFACE" in line for line in nonempty(network.advise_firewall(None, 11411).remedy))
-
-
-@pytest.mark.parametrize(
-    ("addresses", "wanted", "listening", "state", "says"),
-    [
-        ([LAN, WIFI], None, [], OK, "10.42.0.1:11411"),
-        ([LAN, WIFI], None, ["0.0.0.0"], OK, "10.42.0.1:11411"),
-        ([LAN, WIFI], None, ["127.0.0.1"], WARN, "open on 127.0.0.1 only"),
-        ([LAN, WIFI], None, ["192.168.7.2"], WARN, "connect to one of these, port 11411: 192.168.7.2 (eth0)"),
-        ([LAN, WIFI], None, ["127.0.0.1", "10.42.0.1"], OK, "10.42.0.1:11411"),
-        ([LAN, WIFI], None, ["::"], OK, "192.168.7.2 (eth0), 10.42.0.1 (wlan0)"),
-        ([LAN], None, [], WARN, "192.168.7.2 (eth0)"),
-        ([], None, [], WARN, "no network"),
-        ([LAN], "wlan0", [], FAIL, "wlan0 has no IPv4 address"),
-        (None, None, [], WARN, "ip is missing"),
-    ],
-)
-def test_addresses_that_robots_can_connect_to_are_listed(addresses, wanted, listening, state, says):
-    finding = network.check_addresses(addresses, wanted, 11411, listening)
+def test_addresses_that_robots_can_connect_to_are_listed(addresses, listening, state, says):
+    finding = network.check_addresses(addresses, 11411, listening)
     assert finding.state == state
     assert says in finding.text
     assert bool(finding.remedy) == (state != OK)
 
 
 def test_no_address_is_named_where_the_driver_does_not_listen():
-    finding = network.check_addresses([LAN, WIFI], None, 11411, ["127.0.0.1"])
+    finding = network.check_addresses([LAN, WIFI], 11411, ["127.0.0.1"])
     assert not any(entry.address in finding.text + " ".join(finding.remedy) for entry in (LAN, WIFI))
     assert "host:=0.0.0.0" in finding.remedy[0]
 
@@ -255,14 +231,6 @@ def test_only_addresses_of_this_pc_are_its_own():
     assert network.is_own("127.0.1.1", [])
     assert network.is_own("10.42.0.1", [WIFI])
     assert not network.is_own("10.42.0.2", [WIFI])
-
-
-def test_messages_of_another_layout_are_found(monkeypatch):
-    assert computer.check_messages().state == OK
-    monkeypatch.setitem(computer.FIRMWARE_MD5, "hero_msgs.msg.Motor", "0" * 32)
-    finding = computer.check_messages()
-    assert finding.state == FAIL
-    assert "hero_msgs.msg.Motor" in finding.text
 
 
 def test_packages_that_are_not_on_the_path_are_named(monkeypatch):

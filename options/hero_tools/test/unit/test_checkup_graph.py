@@ -179,19 +179,19 @@ def test_points_that_need_one_that_failed_are_skipped(monkeypatch, capsys):
     report = json.loads(capsys.readouterr().out)
     assert (
         report["ok"]
-        and len(report["points"]) == 20
+        and len(report["points"]) == 18
         and ran[1:] == [["node"], ["commands", "diagnostics", "return_path", "robots"]]
     )
     states["node"] = FAIL
-    findings = check.run_check(11411, None)
+    findings = check.run_check(11411)
     assert findings["robots"] == (WARN, "skipped: needs the point node", ())
     states["master"] = FAIL
     ran.clear()
-    findings = check.run_check(11411, None)
+    findings = check.run_check(11411)
     assert len(ran) == 1 and findings["node"].text == "skipped: needs the point master"
     assert findings["robots"].text == "skipped: needs the point node"
     assert check.run(check.parse_options([])) == 1
-    assert capsys.readouterr().out.splitlines()[-1] == "14 OK, 5 WARN, 1 FAIL"
+    assert capsys.readouterr().out.splitlines()[-1] == "12 OK, 5 WARN, 1 FAIL"
 
 
 def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):

@@ -150,11 +150,10 @@ def run_screen(world, monkeypatch, reads, **options):
     return world.start(**options).run_screen(Keyboard(world)), "".join(drawn)
 
 
-def test_keys_stop_release_order_and_quit(world, monkeypatch):
-    code, text = run_screen(world, monkeypatch, [["\r", "s", "r", "o"], ["x"], ["q"], ["\r"]])
+def test_keys_stop_release_and_quit(world, monkeypatch):
+    code, text = run_screen(world, monkeypatch, [["\r", "s", "r"], ["x"], ["q"], ["\r"]])
     assert code == 0 and world.requests == [True, True, False] and world.checked == [True]
     assert world.now_s == pytest.approx(100.0 + 3.0 * DRAW_PERIOD_S)
-    assert "(now by id)" in text and "(now by state)" in text and "(now by nearest)" not in text
     assert text.startswith(module.ENTER_SCREEN) and module.LEAVE_SCREEN in text
     code, text = run_screen(world, monkeypatch, [None])
     assert code == 0 and "1 of 1 robots ready" in text.partition(module.LEAVE_SCREEN)[2], "left on the terminal"

@@ -3,7 +3,6 @@
 import pytest
 
 from hero_client.ros import RobotTrack
-from hero_client.values import Obstacle
 from hero_msgs.msg import Robot
 from hero_node import Pose
 from hero_tools import fleet
@@ -49,15 +48,10 @@ def test_a_robot_that_did_not_join_or_move_is_named_with_the_reason(changes, wor
     assert words in missing[0]
 
 
-def test_rows_are_sorted_by_id_state_or_nearest_obstacle():
-    far = make_row(2, nearest=Obstacle(0.2, 0.0))
-    near = make_row(10, nearest=Obstacle(0.1, 0.0))
-    away = make_row(3, state=Robot.AWAY)
+def test_rows_are_sorted_by_id_those_without_one_last():
     nameless = make_row(-1, namespace="", address="10.42.0.9:4000")
-    rows = [near, nameless, away, far]
-    assert [row.robot.id for row in sort_rows(rows, "id")] == [2, 3, 10, -1]
-    assert next(row.robot.id for row in sort_rows(rows, "state")) == 3
-    assert [row.robot.id for row in sort_rows(rows, "nearest")][:2] == [10, 2]
+    rows = sort_rows([make_row(10), nameless, make_row(3, state=Robot.AWAY), make_row(2)])
+    assert [row.robot.id for row in rows] == [2, 3, 10, -1]
 
 
 @pytest.mark.parametrize(

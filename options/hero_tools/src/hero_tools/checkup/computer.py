@@ -1,4 +1,4 @@
-"""Python, packages, messages, disk, clock and battery of this PC."""
+"""Python, packages, disk, clock and battery of this PC."""
 
 import importlib.util
 import os
@@ -35,15 +35,6 @@ OPTIONS = (
     "hero_tools",
 )
 NEEDED_MODULES = ("rospy", "numpy", "yaml", "actionlib", "tf2_ros", "diagnostic_updater")
-FIRMWARE_MD5 = {
-    # as stock firmware v3.8 declares them; the services' as rosservice calls them
-    "hero_msgs.msg.Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
-    "hero_msgs.msg.Motor": "44d4249d207ce6a89de3d72080e4d0b5",
-    "hero_msgs.srv.SetIRCalibration": "fc55fd34ad2ef676815ba2e14521ac73",
-    "hero_msgs.srv.SetMotor": "07e32bced0fc14456815cdd097819b89",
-    "hero_msgs.srv.SetOdom": "4ed90569b1afd039b963e42a12637d2b",
-    "hero_msgs.srv.SetPID": "69c16eccc66fd6b477afb5e5500b4b47",
-}
 OLDEST_PYTHON = (3, 8)
 MODULES = {"python3-catkin-pkg": "catkin_pkg", "python3-opencv": "cv2", "python3-pil": "PIL"}
 """Modules of rosdep keys that are not called python3- and the module's name."""
@@ -132,24 +123,6 @@ def check_packages() -> Finding:
         )
     text = f"all of version {versions.pop()}, below {os.path.commonpath(paths)}"
     return ok(text + (", without " + ", ".join(missing) if missing else ""))
-
-
-def check_messages() -> Finding:
-    """Compare the built messages with those of the firmware."""
-    wrong = []
-    for name, md5 in FIRMWARE_MD5.items():
-        module, _, kind = name.rpartition(".")
-        try:
-            built = getattr(importlib.import_module(module), kind)._md5sum
-        except (ImportError, AttributeError) as error:
-            return fail(f"{name} is not built: {error}", "build the workspace: catkin build", SOURCE)
-        if built != md5:
-            wrong.append(f"{name} has md5 {built}, the firmware {md5}")
-    if wrong:
-        return fail(
-            "; ".join(wrong), "rebuild hero_msgs; another package of that name may hide it: rospack find hero_msgs"
-        )
-    return ok(f"{len(FIRMWARE_MD5)} types match those of firmware v3.8")
 
 
 def check_workspace() -> Finding:

@@ -176,6 +176,6 @@ def describe_report(driver: str, report: RobotArray) -> Tuple[str, List[str]]:
             lines.append(f"{name} at {robot.address} is {state}{error}")
     if not report.robots:
         is_local = is_loopback(report.listening.rpartition(":")[0])
-        general = "robots must be on, in this network, and connect to this PC (point addresses)"
+        general = "robots must be on and connect to this PC: point addresses, firewall (docs/network.md)"
         lines = [HOST_REMEDY if is_local else general]
     return text, lines

@@ -1,4 +1,4 @@
-"""Addresses that robots can connect to, the firewall, the program on the driver's port, names that resolve.
+"""Addresses that robots can connect to, the program on the driver's port, names that resolve.
 
 Read by ip(8) of iproute2 and from /proc: nothing is bound or connected.
 """
@@ -12,16 +12,13 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Set
 
 from hero_node import is_loopback
 
+from ..hotspot import ADDRESS
 from .points import Finding, ask_system, fail, ok, warn
-
-HOTSPOT_ADDRESS = "10.42.0.1"
-"""The address that robots connect to by default, and that NetworkManager gives a PC that shares a hotspot."""
 
 HOST_REMEDY = "host:=0.0.0.0 admits robots; without host:= the driver does, too, unless count:= is given"
 
 EVERYWHERE = {"0.0.0.0", "::", "*"}
 DRIVER = "hero_driver"
-VIRTUAL = ("docker", "veth", "virbr", "br-", "lxc", "tun", "tap", "podman", "vnet")
 
 
 class Address(NamedTuple):
@@ -44,23 +41,10 @@ def read_addresses() -> Optional[List[Address]]:
     ]
 
 
-def find_robot_interface(addresses: Sequence[Address]) -> Optional[str]:
-    """Return the interface to the robots' network: the hotspot's, else the only one that is real."""
-    for found in addresses:
-        if found.address == HOTSPOT_ADDRESS:
-            return found.interface
-    real = {found.interface for found in addresses if not found.interface.startswith(VIRTUAL)}
-    return real.pop() if len(real) == 1 else None
-
-
-def check_addresses(
-    addresses: Optional[Sequence[Address]], interface: Optional[str], port: int, listening: Sequence[str]
-) -> Finding:
+def check_addresses(addresses: Optional[Sequence[Address]], port: int, listening: Sequence[str]) -> Finding:
     """List the addresses that robots can connect to; listening: where a program listens on the port already."""
     if addresses is None:
         return warn("unknown: the command ip is missing", "sudo apt install iproute2")
-    if interface is not None and interface not in {found.interface for found in addresses}:
-        return fail(f"interface {interface} has no IPv4 address", "ip -4 address shows which have one")
     if listening and all(map(is_loopback, listening)):
         text = "port %d is open on %s only: simulated robots on this PC reach it, robots in the network do not"
         return warn(text % (port, ", ".join(listening)), HOST_REMEDY)
@@ -73,24 +57,13 @@ def check_addresses(
             "or join the robots' 2.4 GHz network",
         )
     listed = ", ".join(f"{found.address} ({found.interface})" for found in addresses)
-    if any(found.address == HOTSPOT_ADDRESS for found in addresses):
+    if any(found.address == ADDRESS for found in addresses):
         text = "robots connect to %s:%d by default, which is this PC; all: %s"
-        return ok(text % (HOTSPOT_ADDRESS, port, listed))
+        return ok(text % (ADDRESS, port, listed))
     return warn(
         "robots must be configured to connect to one of these, port %d: %s" % (port, listed),
-        f"rosrun hero_tools hotspot create gives this PC the default address, {HOTSPOT_ADDRESS}",
+        f"rosrun hero_tools hotspot create gives this PC the default address, {ADDRESS}",
         "or set the address on the robot's page (docs/network.md)",
-    )
-
-
-def advise_firewall(interface: Optional[str], port: int) -> Finding:
-    """Print the commands that admit robots; the rules themselves are not read."""
-    name = interface or "INTERFACE"
-    zone = f"--permanent --zone=$(firewall-cmd --get-zone-of-interface={name})"
-    return ok(
-        "not inspected; to admit robots on %s to port %d:" % (name, port),
-        "ufw: sudo ufw allow in on %s to any port %d proto tcp" % (name, port),
-        "firewalld: sudo firewall-cmd %s --add-port=%d/tcp && sudo firewall-cmd --reload" % (zone, port),
     )
 
 
