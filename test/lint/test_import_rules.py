@@ -19,7 +19,6 @@ SOCKET_OWNERS = (
     "hero_monitor.foxglove.endpoint",
     "hero_monitor.foxglove.topic_streams",
     "hero_monitor.serving.fair_stream",
-    "hero_monitor.serving.monotonic_loop",
     "hero_monitor.program",
 )
 

@@ -46,11 +46,10 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do: see main().
         import tornado.ioloop
 
-        from .foxglove.endpoint import FoxgloveEndpoint, TopicSource
+        from .foxglove.endpoint import FoxgloveEndpoint
         from .foxglove.hub import Publisher
         from .foxglove.ros_topics import RosTopics
-        from .serving.monotonic_loop import MonotonicLoop
-        from .serving.server import Actions, Server
+        from .serving.server import Actions, MonotonicLoop, Server
 
         self._parameters = parameters
         self._program = program
@@ -75,15 +74,15 @@ class Monitor:
             lambda page: self._enter(page.number),
             self._requests.receive,
             self._leave,
-            self._feed.picture.find_jpeg,
+            lambda: self._feed.picture.jpeg,
         )
         # The other half of the files is for ROS: some per robot.
         limits = ClientLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
-        topics = RosTopics(self._background)
-        source = TopicSource(topics.find_types, topics.want, topics.take)
         publisher = Publisher(self._enter, self._requests.publish, self._leave)
         self._foxglove = FoxgloveEndpoint(
-            source, parameters.foxglove_origins, publisher if parameters.foxglove_publish else None
+            RosTopics(self._background),
+            parameters.foxglove_origins,
+            publisher if parameters.foxglove_publish else None,
         )
         token = read_token(parameters.host, parameters.token_file)
         access = Access(token, list_host_names(parameters), self._lesson)

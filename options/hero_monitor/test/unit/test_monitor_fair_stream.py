@@ -11,7 +11,7 @@ from tornado.iostream import StreamClosedError
 
 from hero_monitor.serving import fair_stream as module
 from hero_monitor.serving.fair_stream import REST_FACTOR, REST_MAX_S, TURN_S, UNREAD_WRITES_MAX, FairStream
-from hero_monitor.serving.monotonic_loop import MonotonicLoop
+from hero_monitor.serving.server import MonotonicLoop
 
 
 class EndlessStream(FairStream):

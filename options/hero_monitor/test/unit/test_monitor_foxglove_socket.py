@@ -9,8 +9,9 @@ import tornado.httputil
 import tornado.web
 
 from hero_monitor.foxglove import endpoint as module
-from hero_monitor.foxglove.endpoint import CLIENTS_MAX, FoxgloveEndpoint, FoxgloveSocket, TopicSource
+from hero_monitor.foxglove.endpoint import CLIENTS_MAX, FoxgloveEndpoint, FoxgloveSocket
 from hero_monitor.foxglove.hub import Client, Publisher, TopicMessage, TopicType
+from hero_monitor.foxglove.ros_topics import RosTopics
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import TOKEN_BURST
@@ -42,7 +43,10 @@ def make_topics(monkeypatch):
         taken, made.messages = made.messages, []
         return taken
 
-    made.source = TopicSource(lambda: made.types, lambda topics: made.wanted.append(set(topics)) or made.is_done, take)
+    made.source = mock.create_autospec(RosTopics, instance=True)
+    made.source.find_types.side_effect = lambda: made.types
+    made.source.want.side_effect = lambda topics: made.wanted.append(set(topics)) or made.is_done
+    made.source.take.side_effect = take
     return made
 
 

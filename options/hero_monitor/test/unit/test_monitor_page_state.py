@@ -4,7 +4,6 @@ import json
 import math
 
 import pytest
-import rospy
 from geometry_msgs.msg import Point, Point32, Polygon, PolygonStamped
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import CompressedImage
@@ -13,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_monitor.control.requests import RequestError, read_request
 from hero_monitor.fleet_feed import drawings
-from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, JPEGS_KEPT, SILENT_S, CameraPicture
+from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
 from hero_monitor.fleet_feed.occupancy import MAX_CELLS, encode_grid
 from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_AT_ONCE,
@@ -166,33 +165,15 @@ def test_a_picture_lies_on_the_map_of_its_frame_and_elsewhere_beside_it():
     picture = CameraPicture()
     assert picture.describe("map", 0.0) is None
     picture.receive(CompressedImage(data=JPEG), 10.0)
-    assert picture.find_jpeg(1) == JPEG
-    assert picture.describe("map", 10.1) == {"number": 1, "box": None, "poses": {}}
+    assert picture.jpeg == JPEG
+    assert picture.describe("map", 10.1) == {"number": 1, "box": None}
     picture.receive(CompressedImage(data=JPEG), 10.15)  # sooner than pages fetch pictures
     picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
     picture.receive(CompressedImage(data=JPEG), 10.2)
-    assert picture.describe("map", 10.3) == {"number": 2, "box": [-1000, -500, 1000, 500], "poses": {}}
-    assert picture.describe("world", 10.3) == {"number": 2, "box": None, "poses": {}}
+    assert picture.describe("map", 10.3) == {"number": 2, "box": [-1000, -500, 1000, 500]}
+    assert picture.describe("world", 10.3) == {"number": 2, "box": None}
     picture.receive_outline(make_outline((0.0, 0.0), (math.nan, 1.0), (1.0, 1.0), (1e30, 0.0)))
-    assert picture.describe("map", 10.3) == {"number": 2, "box": None, "poses": {}}
-
-
-def test_robots_on_a_picture_are_where_they_were_when_it_was_taken():
-    picture = CameraPicture()
-    picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
-    for stamp_s in (100.0, 100.1, 100.2, 100.3):
-        picture.follow("hero_0", stamp_s, Pose(stamp_s - 100.0, 0.5, 3.0 if stamp_s < 100.15 else 3.2 - math.tau))
-        picture.follow("hero_1", stamp_s - 50.0, Pose(1.0, 1.0, 0.0))  # it is silent, or was switched off
-    image = CompressedImage(data=JPEG)
-    image.header.stamp = rospy.Time.from_sec(100.15)
-    picture.receive(image, 10.0)
-    assert picture.describe("map", 10.1)["poses"] == {"hero_0": [150, 500, 3100]}
-    image.header.stamp = rospy.Time.from_sec(100.35)  # newer than the poses: the newest counts
-    picture.receive(image, 10.3)
-    assert picture.describe("map", 10.3)["poses"]["hero_0"][0] == 300
-    image.header.stamp = rospy.Time.from_sec(101.0)
-    picture.receive(image, 10.6)
-    assert picture.describe("map", 10.6)["poses"] == {}
+    assert picture.describe("map", 10.3) == {"number": 2, "box": None}
 
 
 def test_a_picture_that_is_old_or_none_is_not_shown():
@@ -202,16 +183,7 @@ def test_a_picture_that_is_old_or_none_is_not_shown():
     assert picture.describe("map", 10.0) is None
     picture.receive(CompressedImage(data=JPEG), 10.0)
     assert picture.describe("map", 10.0 + SILENT_S + 0.1) is None
-    assert picture.find_jpeg(1) == b""
-
-
-def test_pictures_are_kept_for_pages_that_ask_late():
-    picture = CameraPicture()
-    for number in range(1, JPEGS_KEPT + 2):
-        picture.receive(CompressedImage(data=JPEG + bytes([number])), 10.0 + number)
-    assert picture.find_jpeg(1) == b""
-    assert picture.find_jpeg(2) == JPEG + b"\x02"
-    assert picture.find_jpeg(JPEGS_KEPT + 1) == JPEG + bytes([JPEGS_KEPT + 1])
+    assert picture.jpeg == b""
 
 
 def read(**fields):

@@ -95,10 +95,11 @@ def test_files_are_sent_with_their_types_and_no_others():
 
 
 def test_the_picture_is_for_those_who_are_logged_in():
-    actions = mock.Mock(find_picture={7: b"jpeg"}.get)
-    assert ask(PictureHandler, "7", actions=actions)[::2] == (200, "jpeg")
-    assert ask(PictureHandler, "7", actions=actions, token=TOKEN)[0] == 403
-    assert ask(PictureHandler, "8", actions=actions)[0] == 404
+    actions = mock.Mock(find_picture=lambda: b"jpeg")
+    assert ask(PictureHandler, actions=actions)[::2] == (200, "jpeg")
+    assert ask(PictureHandler, actions=actions, token=TOKEN)[0] == 403
+    actions.find_picture = bytes
+    assert ask(PictureHandler, actions=actions)[0] == 404
 
 
 RIGHT = json.dumps({"token": TOKEN})

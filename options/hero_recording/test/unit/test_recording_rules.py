@@ -21,8 +21,7 @@ from hero_recording.bags.topics import Message
 from hero_recording.errors import RecordingError
 from hero_recording.plots import analysis
 from hero_recording.plots.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, REPORT_GAP_S, SAME_TIME_S, STANDSTILL_S
-from hero_recording.plots.observations import Observations, Origin, RobotObservations, StateReport
-from hero_recording.plots.series import MAX_VALUE
+from hero_recording.plots.observations import MAX_VALUE, Observations, Origin, RobotObservations, StateReport
 from hero_recording.record import CHECK_PERIOD_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
 from hero_recording.step_recorder import StepRecorder
 from hero_sim.stepped import LATCHED, StepSwarm

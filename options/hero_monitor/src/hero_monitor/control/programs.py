@@ -17,7 +17,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Sequence
+from typing import IO, Any, Callable, Dict, List, Optional, Sequence
 
 import roslib.packages
 
@@ -40,7 +40,6 @@ SIZE_PERIOD_S = 1.0
 
 LAST_BYTES = 2000
 """End of what a program has printed: the end tells why it failed."""
-
 
 DESCRIBE_TIMEOUT_S = 60.0
 
@@ -92,32 +91,33 @@ class ChildProcess:
 
     def run(self, command: Sequence[str]) -> None:
         """Run a command until its end, and keep why it failed."""
-        patience_s = PATIENCE_S.get(self.program, USUAL_PATIENCE_S)
         with tempfile.TemporaryFile() as output:
-            process = subprocess.Popen(
-                [sys.executable, "-m", guard.__name__, str(patience_s), *command],
-                stdin=self._guard_end,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
-            os.close(self._guard_end)
-            code = None
-            while code is None:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    code = process.wait(SIZE_PERIOD_S)
-                if self.folder is not None:
-                    if not self.bytes:  # the recorder takes seconds to start
-                        self.start_s = time.monotonic()
-                    self.bytes = measure(self.folder)
+            process = self._spawn(command, output)
+            code = self._wait_for(process)
             # A guard that was killed leaves its program behind.
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
-            output.seek(max(0, output.seek(0, os.SEEK_END) - LAST_BYTES))
-            lines = output.read().decode("utf-8", "replace").split("\n")
-        if code != 0 and not self.is_ending:
-            last = next((line for line in reversed(lines) if line.strip()), "")
-            self.failure = make_printable(last.strip() or "ended with status %d" % code)
+            if code != 0 and not self.is_ending:
+                self.failure = read_last_line(output) or "ended with status %d" % code
+
+    def _spawn(self, command: Sequence[str], output: IO[bytes]) -> "subprocess.Popen[bytes]":
+        patience_s = PATIENCE_S.get(self.program, USUAL_PATIENCE_S)
+        guarded = [sys.executable, "-m", guard.__name__, str(patience_s), *command]
+        process = subprocess.Popen(
+            guarded, stdin=self._guard_end, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
+        )
+        os.close(self._guard_end)
+        return process
+
+    def _wait_for(self, process: "subprocess.Popen[bytes]") -> int:
+        """Return the exit status; meanwhile measure the recording."""
+        while True:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                return process.wait(SIZE_PERIOD_S)
+            if self.folder is not None:
+                if not self.bytes:  # the recorder takes seconds to start
+                    self.start_s = time.monotonic()
+                self.bytes = measure(self.folder)
 
     def beat(self) -> None:
         """Tell the guard that the monitor runs."""
@@ -130,6 +130,12 @@ class ChildProcess:
         if not self.is_ending:
             self.is_ending, self.end_s = True, time.monotonic()
             os.close(self._monitor_end)
+
+
+def read_last_line(output: IO[bytes]) -> str:
+    """Return the last line that a program has printed, made printable; empty without one."""
+    output.seek(max(0, output.seek(0, os.SEEK_END) - LAST_BYTES))
+    return make_printable(output.read().decode("utf-8", "replace").strip().rpartition("\n")[2].strip())
 
 
 def measure(folder: Path) -> int:

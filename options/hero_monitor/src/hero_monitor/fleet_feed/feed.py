@@ -355,7 +355,6 @@ class FleetFeed:
             odom = None if feed is None else feed.listener.track.pose
             if robot.state != RobotPose.UNKNOWN and odom is not None and is_plausible(pose):
                 poses[name] = pose, odom
-                self.picture.follow(name, robot.stamp.to_sec(), pose)
         self.placement.localize(report.header.frame_id, poses)
 
     def _put_robots(self) -> None:

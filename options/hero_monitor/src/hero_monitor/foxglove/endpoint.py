@@ -1,7 +1,7 @@
 """The WebSocket /foxglove: one connection per client, with the access rules of the page."""
 
 import contextlib
-from typing import Any, Awaitable, Callable, Dict, FrozenSet, List, NamedTuple, Optional, Sequence, Set, Union
+from typing import TYPE_CHECKING, Any, Awaitable, FrozenSet, List, Optional, Sequence, Set, Union
 
 import tornado.ioloop
 import tornado.iostream
@@ -10,22 +10,16 @@ import tornado.websocket
 
 from ..serving.lesson import VIEWER, User
 from ..serving.server import BaseHandler, PageSocket, Route
-from .hub import Client, Hub, Publisher, TopicMessage, TopicType
+from .hub import Client, Hub, Publisher
 from .protocol import SUBPROTOCOLS
+
+if TYPE_CHECKING:
+    from .ros_topics import RosTopics
 
 CLIENTS_MAX = 10
 FLUSH_PERIOD_S = 0.02
 MAX_REQUEST_LENGTH = 1_000_000
 """A subscription to each of ten thousand topics."""
-
-
-class TopicSource(NamedTuple):
-    """Source of topics for the endpoint (RosTopics); all return at once."""
-
-    find_types: Callable[[], Dict[str, TopicType]]
-    want: Callable[[Set[str]], bool]
-    """Takes the topics whose messages take() is to return; returns whether those, and no others, are received."""
-    take: Callable[[], List[TopicMessage]]
 
 
 class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
@@ -108,7 +102,7 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 class FoxgloveEndpoint:
     """All clients; topics are looked up and subscribed to only while there is one."""
 
-    def __init__(self, source: TopicSource, origins: Sequence[str], publisher: Optional[Publisher] = None) -> None:
+    def __init__(self, source: "RosTopics", origins: Sequence[str], publisher: Optional[Publisher] = None) -> None:
         """origins: of other servers whose pages may connect; publisher: takes messages, None: clients only read."""
         self.hub = Hub(publisher)
         self._source = source

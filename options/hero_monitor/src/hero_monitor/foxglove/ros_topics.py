@@ -70,7 +70,7 @@ class RosTopics:
         self._types = types
 
     def want(self, topics: Set[str]) -> bool:
-        """Read these topics from now on; return whether all are connected to. Returns at once."""
+        """Have take() return messages of these topics from now on; return whether all are connected to, at once."""
         opening = {node: future for node, future in self._opening.items() if not future.done()}
         has_news = topics != self._wanted or len(opening) < len(self._opening)
         self._wanted, self._opening = topics, opening

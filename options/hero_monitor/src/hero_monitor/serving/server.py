@@ -18,6 +18,7 @@ import tornado.httpserver
 import tornado.ioloop
 import tornado.iostream
 import tornado.netutil
+import tornado.platform.asyncio
 import tornado.web
 import tornado.websocket
 
@@ -82,7 +83,7 @@ class Actions(NamedTuple):
     receive: Callable[["PageSocket", Union[str, bytes]], None]
     close_page: Callable[[int], None]
     """Takes the page's number."""
-    find_picture: Callable[[int], bytes]
+    find_picture: Callable[[], bytes]
 
 
 Route = Tuple[str, Any, Dict[str, Any]]
@@ -175,13 +176,13 @@ class FileHandler(BaseHandler):
 
 
 class PictureHandler(BaseHandler):
-    """A picture of the camera by its number, for browsers that are logged in."""
+    """The camera's picture, for browsers that are logged in."""
 
-    def get(self, number: str) -> None:
-        """Send the picture."""
+    def get(self) -> None:
+        """Send the newest one."""
         if not self.is_logged_in:
             raise tornado.web.HTTPError(403)
-        picture = self.actions.find_picture(int(number))
+        picture = self.actions.find_picture()
         if not picture:
             raise tornado.web.HTTPError(404)
         self.set_header("Content-Type", "image/jpeg")
@@ -300,6 +301,14 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
             self.send(self._waiting.popleft())
 
 
+class MonotonicLoop(tornado.platform.asyncio.AsyncIOLoop):
+    """tornado's loop, which becomes that of this thread. By the PC's clock, timers would pause when it is set back."""
+
+    def time(self) -> float:
+        """Return the time by which timers run, in s."""
+        return time.monotonic()
+
+
 def choose_served(pages: List[PageSocket]) -> List[PageSocket]:
     """Return at most PAGES_MAX: first those that can be seen, in the order in which they came."""
     return sorted(pages, key=lambda page: page.is_idle)[:PAGES_MAX]
@@ -337,7 +346,7 @@ class Server:
             *routes,
             (r"/live", PageSocket, {}),
             (r"/login", LoginHandler, {}),
-            (r"/picture/([0-9]{1,9})", PictureHandler, {}),
+            (r"/picture/[0-9]{1,9}", PictureHandler, {}),
             (r"/(.*)", FileHandler, {}),
         ]
         application = tornado.web.Application(

@@ -7,8 +7,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .observations import Origin, RobotObservations, StateReport
-from .series import Series
+from .observations import Origin, RobotObservations, Series, StateReport
 
 STANDSTILL_S = 0.5
 """A robot whose wheels have not turned for this long is at rest."""

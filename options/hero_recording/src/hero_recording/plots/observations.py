@@ -4,8 +4,11 @@ Times are the recorder's, seconds since 1970; stamps are the robot's clock, whic
 """
 
 import math
+from array import array
 from collections import defaultdict
 from typing import Any, DefaultDict, Iterable, List, NamedTuple, Optional, Set, Tuple
+
+import numpy as np
 
 from hero_node import pose_of, yaw_of
 
@@ -18,11 +21,43 @@ from ..bags.topics import (
     is_arena_topic,
     is_fleet_topic,
 )
-from .series import Series
 
 KINDS = ("odometry", "ground_truth", "pose", "encoder", "velocity_command", "position_command")
 CUBE, CYLINDER = 1, 3
 """Types of visualization_msgs/Marker that walls and round obstacles are drawn with."""
+
+
+MAX_VALUE = 1e6
+
+
+class Series:
+    """Rows of numbers, compactly: first times, then values.
+
+    Attributes:
+        skipped: rows that were refused because a value is not finite, or beyond what a robot can measure.
+    """
+
+    def __init__(self, times: int, values: int) -> None:
+        """Start empty; times and values are the numbers of columns."""
+        self.skipped = 0
+        self._times = times
+        self._width = times + values
+        self._numbers = array("d")
+
+    def __len__(self) -> int:
+        return len(self._numbers) // self._width
+
+    def add(self, *row: float) -> None:
+        """Add a row, unless a value is absurd: a single one would set the scale of a whole figure."""
+        if all(abs(value) <= MAX_VALUE for value in row[self._times :]):
+            self._numbers.extend(row)
+        else:
+            self.skipped += 1
+
+    def columns(self) -> np.ndarray:
+        """Return the numbers (columns, rows); add() must not follow."""
+        numbers = np.frombuffer(self._numbers) if self._numbers else np.zeros(0)
+        return numbers.reshape(-1, self._width).T
 
 
 class Origin(NamedTuple):

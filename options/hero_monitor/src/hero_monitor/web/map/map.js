@@ -82,12 +82,10 @@ export class FleetMap {
     this.draw();
   }
 
-  /** Poses as drawn: simulated robots where they are; on a picture, those of the moment when it was taken. */
+  /** Poses as drawn: simulated robots where they are. */
   get poses() {
     const { poses, ground_truth } = this.state;
-    const drawn = { ...poses };
-    for (const name in poses) if (ground_truth[name]) drawn[name] = ground_truth[name];
-    return this.picture.box ? { ...drawn, ...this.picture.poses } : drawn;
+    return Object.fromEntries(Object.entries(poses).map(([name, pose]) => [name, ground_truth[name] ?? pose]));
   }
 
   // ------------------------------------------------------------ pointer

@@ -9,9 +9,8 @@ export class CameraPicture {
   constructor(redraw) {
     this.redraw = redraw;
     this.box = null; // of the picture on the map, mm; null: it is shown in a panel, or not at all
-    this.poses = {}; // of robots when it was taken
     this.image = null;
-    this.wanted = null; // as the monitor describes it: number, box on the map, poses
+    this.wanted = null; // as the monitor describes it: number, box on the map
     this.number = null;
     this.fetching = false;
   }
@@ -30,12 +29,12 @@ export class CameraPicture {
     if (this.fetching) return;
     this.fetching = true;
     while (this.wanted !== null && this.wanted.number !== this.number) {
-      const { number, box, poses } = this.wanted;
+      const { number, box } = this.wanted;
       const image = make("img", { src: `picture/${number}` });
       const isThere = await image.decode().then(() => true, () => false);
       this.number = number;
       if (!isThere || this.wanted === null) continue;
-      [this.image, this.box, this.poses] = [image, box, poses];
+      [this.image, this.box] = [image, box];
       this.place();
     }
     this.fetching = false;
