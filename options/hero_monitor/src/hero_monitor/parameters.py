@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, List, Optional, Sequence
 
 from hero_node import ProgramError, is_loopback
-from hero_node.parameters import Parameter, declare, find_declared, flag, make_error, number, whole_number
+from hero_node.parameters import Parameter, declare, find_declared, flag, make_error, number, string, whole_number
 from hero_node.ros import read_parameters
 
 from .serving.access import TOKEN_LENGTH_MIN
@@ -17,10 +17,6 @@ TOKEN_REMEDY = (
     "write one into a file that only you can read, and name it with token_file:=FILE: "
     "(umask 077; python3 -c 'import secrets; print(secrets.token_urlsafe())' > FILE)"
 )
-
-
-def _read_text(name: str, value: Any) -> str:
-    return str(value)
 
 
 def _read_host(name: str, value: Any) -> str:
@@ -39,13 +35,13 @@ class Parameters:
 
     host: str = declare(Parameter("127.0.0.1", _read_host))
     port: int = declare(whole_number(8088, 0, 65535))
-    token_file: str = declare(Parameter("", _read_text))
+    token_file: str = declare(string(""))
     host_names: Sequence[str] = declare(Parameter("", _read_words))
     control: bool = declare(flag(False))
     rate_hz: float = declare(number(10.0, 1.0, 30.0, "Hz"))
-    map_frame: str = declare(Parameter("world", _read_text))
-    record_folder: str = declare(Parameter("~/hero_recordings", _read_text))
-    behavior_folder: str = declare(Parameter("~/hero_behaviors", _read_text))
+    map_frame: str = declare(string("world"))
+    record_folder: str = declare(string("~/hero_recordings"))
+    behavior_folder: str = declare(string("~/hero_behaviors"))
     foxglove_origins: Sequence[str] = declare(Parameter("", _read_words))
     foxglove_publish: bool = declare(flag(False))
     classroom: bool = declare(flag(False))

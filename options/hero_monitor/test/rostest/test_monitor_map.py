@@ -225,7 +225,7 @@ class MapTest(unittest.TestCase):
         # The view fits the robot and, to its left, its ghost.
         wait_for(lambda: self.measure_robot() > 0.6, self.measure_robot)
         self.page.save("monitor_ghost.png")
-        self.assertEqual(self.page.facts()["odometry error"], "2250 mm")
+        wait_for(lambda: self.page.facts().get("odometry error") == "2250 mm", self.page.facts)
         simulator.close()
         wait_for(lambda: 0.4 < self.measure_robot() < 0.6, self.measure_robot)
         self.page.click("#ghosts")

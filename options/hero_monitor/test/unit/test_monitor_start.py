@@ -73,8 +73,8 @@ def test_parameters_are_checked_and_name_this_pc(monkeypatch):
 
 def test_a_token_of_any_characters_is_compared_and_names_without_case():
     access = Access("geheim-äöü-1234567", ["PC.lab."])
-    assert access.admits_token("geheim-äöü-1234567") and not access.admits_token("geheim-äöü-1234568")
-    assert not access.admits_token("\ud800") and access.admits_host("pc.LAB") and not access.admits_host("pc")
+    assert access.find_key("geheim-äöü-1234567") and not access.find_key("geheim-äöü-1234568")
+    assert not access.find_key("\ud800") and access.admits_host("pc.LAB") and not access.admits_host("pc")
 
 
 class Socket(PageSocket):

@@ -6,7 +6,7 @@ What is written is in OUT.part until it is complete.
 import argparse
 import os
 import shutil
-from typing import Optional, Sequence, Set
+from typing import Optional, Sequence
 
 from hero_node.files import read_fleet_file
 from hero_node.parameters import robot_ids_option
@@ -40,12 +40,14 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     return options
 
 
-def write_tables(bags: BagSet, robot_ids: Optional[Set[int]], kinds: Set[str], files: CsvFiles) -> None:
-    """Write all rows of these robots and kinds. Raises: RecordingError if there are none."""
+def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str:
+    """Write tables into a new folder and return what was written. Raises: RecordingError, also if that is nothing."""
+    write = None if options.format == CSV else load_writer(options.format)
+    files = CsvFiles(folder)
 
     def receive(message: Message) -> None:
         for robot_id, kind, row in read_rows(*message):
-            if kind in kinds and (robot_ids is None or robot_id in robot_ids):
+            if kind in options.tables and (options.robots is None or robot_id in options.robots):
                 files.add(robot_id, kind, row)
 
     bags.read(is_exported, receive)
@@ -55,13 +57,6 @@ def write_tables(bags: BagSet, robot_ids: Optional[Set[int]], kinds: Set[str], f
             "%s: nothing of these robots and tables in it; its topics: %s"
             % (", ".join(bags.paths), bags.describe_topics())
         )
-
-
-def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str:
-    """Write tables into a new folder and return what was written. Raises: RecordingError."""
-    write = None if options.format == CSV else load_writer(options.format)
-    files = CsvFiles(folder)
-    write_tables(bags, None if options.robots is None else set(options.robots), set(options.tables), files)
     if write:
         for robot_id, kind in files.rows:
             convert_csv(files.path(robot_id, kind), "." + options.format, write)

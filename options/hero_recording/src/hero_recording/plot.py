@@ -113,12 +113,10 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
         "COMMAND TO MOTION": f"{np.median(motion_delays_ms):.0f} ms" if len(motion_delays_ms) else "-",
         "RECONNECTS": "%d" % robot.states[-1].reconnects if robot.states else "-",
         "FINAL ERROR": error,
-        "LOCALIZATION RMS": "-" if localization is None else f"{1000.0 * _compute_rms(localization.position_m):.1f} mm",
+        "LOCALIZATION RMS": "-"
+        if localization is None
+        else f"{1000.0 * np.sqrt(np.mean(localization.position_m**2)):.1f} mm",
     }
-
-
-def _compute_rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:

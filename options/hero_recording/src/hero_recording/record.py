@@ -179,7 +179,7 @@ def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str])
         command += ["--max-splits", str(options.max_files)]
     if options.compression != "none":
         command.append("--" + options.compression)
-    return [*command, *make_patterns(options.robots, options.raw, options.topics), *recorder_arguments]
+    return [*command, *make_patterns(options.robots, options.topics), *recorder_arguments]
 
 
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
@@ -190,7 +190,6 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("--name", default="hero", help="prefix of the file names, NAME_DATE_0.bag (hero)")
     add("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     add("--topics", default="", help="more topics: regular expressions separated by spaces")
-    add("--raw", action="store_true", help="record odom_raw, laser and laser_enable too")
     add("--split-mb", type=within(1, 100_000, int), default=256, metavar="MB", help="size of a file (256)")
     add("--max-files", type=within(0, 10_000, int), default=0, metavar="N", help="keep only the newest N (0: all)")
     add("--min-free-mb", type=within(0.0, 1e9), default=1000.0, metavar="MB", help="stop below this (1000)")

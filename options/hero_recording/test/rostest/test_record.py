@@ -141,7 +141,7 @@ class RecordTest(unittest.TestCase):
 
     def check_programs(self, bags):
         """Let the other programs of this package read the bags."""
-        calls = ("plot", "--figures", "paths,delays", "--out", "drawn"), ("export", "--out", "tables")
+        calls = ("plot", "--figures", "paths,connections", "--out", "drawn"), ("export", "--out", "tables")
         processes = [
             self.start(find_program("hero_recording", name), *arguments, *bags, cwd=self.folder)
             for name, *arguments in calls

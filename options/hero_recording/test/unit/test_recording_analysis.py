@@ -42,7 +42,7 @@ def two_robots(tmp_path_factory):
 
 
 def test_robots_that_join_later_are_recorded_and_other_topics_are_not():
-    patterns = make_patterns(None, False, ["/mine"])
+    patterns = make_patterns(None, ["/mine"])
 
     def is_recorded(topic):
         return any(re.fullmatch(pattern, topic) for pattern in patterns)
@@ -89,8 +89,8 @@ def test_reports_of_all_drivers_are_read():
 
 
 def test_patterns_for_some_robots_match_no_others():
-    pattern = make_patterns([1, 12], True, [])[0]
-    assert re.fullmatch(pattern, "/hero_12/laser")
+    pattern = make_patterns([1, 12], [])[0]
+    assert re.fullmatch(pattern, "/hero_12/led")
     assert not re.fullmatch(pattern, "/hero_2/odom")
     assert not re.fullmatch(pattern, "/hero_112/odom")
 

@@ -25,7 +25,7 @@ def test_a_declared_topic_is_recorded_and_has_a_table():
     declare_tables([BATTERY, MOOD])
     assert is_exported("/hero_3/power/battery", "std_msgs/Float32")
     assert not is_exported("/hero_3/power/battery", "std_msgs/Int32"), "of another program"
-    assert "|power/battery|mood)" in make_patterns(None, False, ())[0]
+    assert "|power/battery|mood)" in make_patterns(None, ())[0]
     assert list(tables.TABLES["battery"]) == ["battery_V"] and "mood" in tables.TEXT_COLUMNS
     rows = read_rows("/hero_3/power/battery", "std_msgs/Float32", SimpleNamespace(data=3.7), 12.0)
     assert rows == [(3, "battery", (12.0, 3.7))]

@@ -33,14 +33,14 @@ def test_a_wrong_option_is_refused_with_its_name_and_value(option, value, words,
 
 
 def test_remappings_are_the_recorders(monkeypatch, tmp_path):
-    words = ["--raw", "__name:=my_record", "--name=a", "/tf:=/other", f"--folder={tmp_path}"]
+    words = ["--seconds=3", "__name:=my_record", "--name=a", "/tf:=/other", f"--folder={tmp_path}"]
     monkeypatch.setattr(sys, "argv", ["record", *words])
     monkeypatch.setattr(record, "check_master", lambda: None)
     ran = []
     monkeypatch.setattr(record.Recording, "run", lambda recording: ran.append(recording))
     monkeypatch.setattr(record.roslib.packages, "find_node", lambda package, name: ["/opt/record"])
     record.main()
-    assert ran[0]._options.raw and ran[0]._options.name == "a"
+    assert ran[0]._options.seconds == 3.0 and ran[0]._options.name == "a"
     assert ran[0]._command[-2:] == ["__name:=my_record", "/tf:=/other"]
 
 

@@ -38,7 +38,6 @@ def run_check(port: int) -> Dict[str, Finding]:
         "clock": computer.check_clock,
         "battery": computer.check_battery,
         "camera": localization.check_camera,
-        "tags": localization.check_detectors,
         "ros_environment": lambda: graph.check_variables(addresses),
         "own_name": lambda: graph.check_own_name(own),
         "port": lambda: network.check_port(port, listeners),

@@ -3,8 +3,7 @@
     rosrun hero_tools fleet                  a table like top, redrawn in place
     rosrun hero_tools fleet --once --json    the fleet as one line of JSON, for scripts
 
-Only listens, except for two keys that ask all drivers to stop and to release all robots. Messages of robots are decoded
-only when the table is drawn, which keeps fifty robots cheap. Only worker threads wait for the ROS master.
+Messages of robots are decoded only when the table is drawn. Only worker threads wait for the ROS master.
 """
 
 import argparse

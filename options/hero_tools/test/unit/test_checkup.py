@@ -123,8 +123,8 @@ def test_two_packages_of_one_name_in_a_workspace_are_named(tmp_path, monkeypatch
 
 
 def test_a_package_that_hides_one_of_the_suite_is_named(monkeypatch):
-    foreign = SimpleNamespace(version="0.0.0", author="me", rosdeps=[])
-    own = SimpleNamespace(version="0.3.0", author=computer.AUTHOR, rosdeps=[])
+    foreign = SimpleNamespace(version="0.0.0", author="me")
+    own = SimpleNamespace(version="0.3.0", author=computer.AUTHOR)
     finder = SimpleNamespace(
         get_path=lambda name: "/ws/src/" + name,
         get_manifest=lambda name: foreign if name == "hero_tutorial" else own,
@@ -135,19 +135,22 @@ def test_a_package_that_hides_one_of_the_suite_is_named(monkeypatch):
     assert "/ws/src/hero_tutorial is another package of the name hero_tutorial" in finding.text
 
 
-def test_a_module_that_a_package_declares_and_is_missing_is_named(monkeypatch):
-    keys = [SimpleNamespace(name=name) for name in ("rospy", "python3-no-such", "python3-yaml")]
-    manifests = {"hero_swarm": SimpleNamespace(rosdeps=keys)}
+@pytest.mark.parametrize(("package", "state"), [("hero_swarm", WARN), ("hero_driver", FAIL)])
+def test_a_module_that_a_package_declares_and_is_missing_is_named(monkeypatch, tmp_path, package, state):
+    keys = "".join(f"<exec_depend>{key}</exec_depend>" for key in ("rospy", "python3-no-such", "python3-yaml"))
+    head = f"<name>{package}</name><version>0.3.0</version><description>d</description><license>BSD</license>"
+    maintainer = '<maintainer email="a@b.example">a</maintainer>'
+    (tmp_path / "package.xml").write_text(f'<package format="3">{head}{maintainer}{keys}</package>')
 
-    def get_manifest(name):
-        if name not in manifests:
+    def get_path(name):
+        if name != package:
             raise computer.rospkg.ResourceNotFound(name)
-        return manifests[name]
+        return str(tmp_path)
 
-    monkeypatch.setattr(computer.rospkg, "RosPack", lambda: SimpleNamespace(get_manifest=get_manifest))
-    assert computer.find_lacking_modules() == {"no-such": ["hero_swarm"]}
+    monkeypatch.setattr(computer.rospkg, "RosPack", lambda: SimpleNamespace(get_path=get_path))
+    assert computer.find_lacking_modules() == {"no-such": [package]}
     finding = computer.check_python()
-    assert finding.state == WARN and "lacks no-such (for hero_swarm)" in finding.text
+    assert finding.state == state and f"lacks no-such (for {package})" in finding.text
 
 
 def test_modules_of_all_declared_packages_are_found_by_their_names():
@@ -255,22 +258,6 @@ def test_a_camera_that_this_user_may_not_open_is_named(tmp_path, monkeypatch):
     finding = localization.check_camera(pattern)
     assert finding.state == WARN
     assert finding.text.endswith("may not open %s" % (tmp_path / "video1"))
-
-
-@pytest.mark.parametrize(
-    ("installed", "state", "says"),
-    [
-        (("cv2", "apriltag"), OK, "detectors apriltag and aruco"),
-        (("cv2",), WARN, "detector aruco (OpenCV) only"),
-        (("apriltag",), WARN, "OpenCV is missing"),
-    ],
-)
-def test_the_installed_detectors_of_tags_are_named(installed, state, says, monkeypatch):
-    monkeypatch.setattr(localization.importlib.util, "find_spec", lambda name: name if name in installed else None)
-    finding = localization.check_detectors()
-    assert finding.state == state
-    assert says in finding.text
-    assert bool(finding.remedy) == (state != OK)
 
 
 def test_what_tracker_and_filter_report_is_told():

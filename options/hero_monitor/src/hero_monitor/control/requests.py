@@ -77,11 +77,10 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
 }
 """Requests of a page by its field "do", with the fields that it needs and their checks.
 
-stop: stop all robots. release: release them. drive: a button is held; velocity in m/s and rad/s, and the clock as heard
-when it was pressed. end_drive: it is let go. stop_some: end what drives these robots, and stop them. goal: a pose on
-the map in m; yaw (rad) may be added. start: a program of offers.OFFERS, with values for its fields. end: a program, by
-its number. record: begin or end the recording. dismiss: list robots that are gone no longer. code: make a code for
-the drivers of these robots. withdraw: such a code. show: whether the page is visible, and shows the camera's picture.
+drive: a button is held; velocity in m/s and rad/s, and the clock as heard when it was pressed. end_drive: it is let go.
+stop_some: end what drives these robots, and stop them. goal: a pose on the map in m; yaw (rad) may be added. start: a
+program of offers.OFFERS, with values for its fields. dismiss: list robots that are gone no longer. code: make a code
+for the drivers of these robots. show: whether the page is visible, and shows the camera's picture.
 """
 
 

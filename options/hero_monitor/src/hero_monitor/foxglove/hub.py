@@ -8,16 +8,7 @@ from hero_node import shorten
 from hero_node.parameters import is_whole_number
 
 from ..serving.lesson import TEACHER, User
-from .protocol import (
-    WARNING,
-    Channel,
-    encode_message,
-    make_advertise,
-    make_server_info,
-    make_status,
-    make_unadvertise,
-    read_message,
-)
+from .protocol import WARNING, Channel, describe_channel, encode_message, read_message
 
 QUEUE_BYTES_MAX = 4_000_000
 """Queue limit of one client: about a second of a large swarm with a camera's images."""
@@ -62,6 +53,14 @@ class Client:
         self._queued_bytes = 0
         self._has_dropped = False
 
+    def send(self, operation: str, **fields: Any) -> None:
+        """Send a text of the protocol."""
+        self.send_text(json.dumps({"op": operation, **fields}))
+
+    def warn(self, text: str) -> None:
+        """Send a line for the users of the client."""
+        self.send("status", level=WARNING, message=text)
+
     def put(self, subscription: int, message: TopicMessage) -> None:
         """Queue a message for a subscription."""
         frame = encode_message(subscription, message.time_ns, message.content)
@@ -71,7 +70,7 @@ class Client:
             self._queued_bytes -= len(self._queue.popleft())
             if not self._has_dropped:
                 self._has_dropped = True
-                self.send_text(make_status(WARNING, "this client is slower than its topics: old messages are dropped"))
+                self.warn("this client is slower than its topics: old messages are dropped")
 
     def take(self) -> List[bytes]:
         """Return all frames that wait, oldest first, and forget them."""
@@ -114,9 +113,11 @@ class Hub:
     def add(self, client: Client) -> None:
         """Greet a client."""
         self.clients.add(client)
-        client.send_text(make_server_info(self.takes_messages))
+        capabilities = ["clientPublish"] if self.takes_messages else []
+        info = {"name": "hero_monitor", "metadata": {}, "supportedEncodings": ["ros1"], "capabilities": capabilities}
+        client.send("serverInfo", **info)
         if self._channels:
-            client.send_text(make_advertise(self._channels.values()))
+            client.send("advertise", channels=list(map(describe_channel, self._channels.values())))
         if self._publisher is not None:
             self._publisher.open_client(client.number)
 
@@ -127,7 +128,7 @@ class Hub:
         self.clients.discard(client)
 
     def update_topics(self, topics: Dict[str, TopicType]) -> None:
-        """ProgramDescription the topics that appeared, and withdraw those that vanished or changed their type."""
+        """Offer the topics that appeared, and withdraw those that vanished or changed their type."""
         gone = [known for known in self._channels.values() if topics.get(known.topic) != (known.type, known.definition)]
         for channel in gone:
             del self._channels[channel.topic]
@@ -140,14 +141,11 @@ class Hub:
             new.append(Channel(self._next_id, topic, *topics[topic]))
             self._channels[topic] = new[-1]
             self._next_id += 1
-        if gone:
-            self._tell_all(make_unadvertise(channel.id for channel in gone))
-        if new:
-            self._tell_all(make_advertise(new))
-
-    def _tell_all(self, text: str) -> None:
         for client in self.clients:
-            client.send_text(text)
+            if gone:
+                client.send("unadvertise", channelIds=sorted(channel.id for channel in gone))
+            if new:
+                client.send("advertise", channels=list(map(describe_channel, new)))
 
     def receive(self, client: Client, message: Union[str, bytes]) -> None:
         """Carry out a client's request, or tell it why not."""
@@ -159,7 +157,7 @@ class Hub:
             except (ValueError, TypeError, KeyError, RecursionError) as error:
                 refusal = f"invalid request: {type(error).__name__}"
         if refusal:
-            client.send_text(make_status(WARNING, refusal))
+            client.warn(refusal)
 
     def _carry_out(self, client: Client, request: Any) -> str:
         """Carry out a request as the protocol names its fields; return why not, empty if it is done.

@@ -1,11 +1,10 @@
-"""Texts and frames of the Foxglove WebSocket protocol, version 1, as far as a server of topics needs them. Pure.
+"""Channels and frames of the Foxglove WebSocket protocol, version 1, as far as a server of topics needs them. Pure.
 
 Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 """
 
-import json
 import struct
-from typing import Iterable, NamedTuple, Tuple
+from typing import Any, Dict, NamedTuple, Tuple
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 """Both carry the messages below."""
@@ -29,36 +28,10 @@ class Channel(NamedTuple):
     definition: str
 
 
-def make_server_info(takes_messages: bool) -> str:
-    """Return the greeting; clients never call services."""
-    info = {"op": "serverInfo", "name": "hero_monitor", "metadata": {}, "supportedEncodings": ["ros1"]}
-    return json.dumps({**info, "capabilities": ["clientPublish"] if takes_messages else []})
-
-
-def make_advertise(channels: Iterable[Channel]) -> str:
-    """Return the text that offers channels."""
-    offers = [
-        {
-            "id": channel.id,
-            "topic": channel.topic,
-            "encoding": "ros1",
-            "schemaName": channel.type,
-            "schema": channel.definition,
-            "schemaEncoding": "ros1msg",
-        }
-        for channel in channels
-    ]
-    return json.dumps({"op": "advertise", "channels": offers})
-
-
-def make_unadvertise(ids: Iterable[int]) -> str:
-    """Return the text that withdraws channels."""
-    return json.dumps({"op": "unadvertise", "channelIds": sorted(ids)})
-
-
-def make_status(level: int, text: str) -> str:
-    """Return a line for the users of a client."""
-    return json.dumps({"op": "status", "level": level, "message": text})
+def describe_channel(channel: Channel) -> Dict[str, Any]:
+    """Return a channel as servers advertise it."""
+    names = {"id": channel.id, "topic": channel.topic, "schemaName": channel.type, "schema": channel.definition}
+    return {**names, "encoding": "ros1", "schemaEncoding": "ros1msg"}
 
 
 def encode_message(subscription: int, time_ns: int, content: bytes) -> bytes:

@@ -51,7 +51,9 @@ class Access:
 
     def find_key(self, secret: str) -> str:
         """Return what the cookie of a user holds who gives this secret; empty if it is wrong."""
-        if self.admits_token(secret):
+        # JSON may hold halves of surrogate pairs, which strict UTF-8 refuses.
+        given = secret.encode("utf-8", "surrogatepass")
+        if self._token is not None and hmac.compare_digest(given, self._token.encode("utf-8")):
             return TOKEN_KEY
         is_code = self.lesson is not None and self.lesson.find(secret) is not None
         return secret.replace(" ", "") if is_code else ""
@@ -63,10 +65,3 @@ class Access:
         key, _, name = (cookie or "").partition(" ")
         role = TEACHER if key == TOKEN_KEY else self.lesson.find(key) if self.lesson else None
         return None if role is None else User(name, role)
-
-    def admits_token(self, token: str) -> bool:
-        """Return whether this is the token."""
-        if self._token is None:
-            return False
-        # JSON may hold halves of surrogate pairs, which strict UTF-8 refuses.
-        return hmac.compare_digest(token.encode("utf-8", "surrogatepass"), self._token.encode("utf-8"))

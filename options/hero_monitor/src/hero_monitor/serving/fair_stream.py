@@ -64,6 +64,5 @@ class FairStream(tornado.iostream.IOStream):
             writing.add_done_callback(self._count_read)
         return writing
 
-    def _count_read(self, writing: Any) -> None:
-        del writing
+    def _count_read(self, _writing: Any) -> None:
         self._unread_writes -= 1

@@ -30,9 +30,6 @@ def declare_topics(topics: Iterable[ExtraTopic]) -> None:
     ROBOT_TOPICS.update((topic.topic, (topic.name, topic.type)) for topic in topics)
 
 
-RAW_ROBOT_TOPICS = ("odom_raw", "laser", "laser_enable")
-"""The robot's own messages, from which the driver makes odom and proximity."""
-
 FLEET_TYPE = "hero_msgs/RobotArray"
 STATIC_TRANSFORMS_TOPIC = "/tf_static"
 TRANSFORMS_TYPES = ("tf2_msgs/TFMessage", "tf/tfMessage")
@@ -66,11 +63,10 @@ class Message(NamedTuple):
     """When the recorder received it, since 1970."""
 
 
-def make_patterns(robot_ids: Optional[Sequence[int]], with_raw: bool, extra: Sequence[str]) -> List[str]:
+def make_patterns(robot_ids: Optional[Sequence[int]], extra: Sequence[str]) -> List[str]:
     """Return the regular expressions of the topics to record; robot_ids None: all robots, including later ones."""
     robots = r"[0-9]+" if robot_ids is None else f"({'|'.join(map(str, robot_ids))})"
-    names = [*ROBOT_TOPICS, *(RAW_ROBOT_TOPICS if with_raw else ())]
-    return [f"/hero_{robots}/({'|'.join(names)})", *SHARED_PATTERNS, *extra]
+    return [f"/hero_{robots}/({'|'.join(ROBOT_TOPICS)})", *SHARED_PATTERNS, *extra]
 
 
 def find_robot_topic(topic: str, message_type: str) -> Optional[Tuple[int, str]]:

@@ -101,9 +101,6 @@ class Figures:
         if handles:
             axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0))
 
-    def _since_start(self, times_s: Any) -> Any:
-        return times_s - self._start_s
-
     def _label_rows(self, axes: Axes) -> None:
         """Give each robot a row, the first one on top."""
         axes.set_ylim(len(self._robots) - 0.4, -0.6)
@@ -196,9 +193,9 @@ class Figures:
             arrival_s, _, _, _, _, *speeds = robot.odometry.columns()
             command_s, *commands = analysis.end_commands(*robot.commands.columns())
             for axes, measured, commanded in zip(row, speeds, commands):
-                axes.step(self._since_start(command_s), commanded, where="post", color=_GRAY)
+                axes.step(command_s - self._start_s, commanded, where="post", color=_GRAY)
                 times_s, values = analysis.break_at_gaps(arrival_s, measured)
-                axes.plot(self._since_start(times_s), values, color=self._colors[robot_id])
+                axes.plot(times_s - self._start_s, values, color=self._colors[robot_id])
                 self._set_time_axis(axes)
             row[0].set_ylabel("hero_%d" % robot_id, fontweight="bold")
         for axes, text in zip(grid[0], ("linear (m/s)", "angular (rad/s)")):
@@ -217,19 +214,17 @@ class Figures:
 
     def draw_connections(self) -> Optional[Figure]:
         """Draw the state of each robot over time, and gaps in its odometry."""
-        if not any(robot.states or len(robot.odometry) for robot in self._robots.values()):
+        if not any(robot.states for robot in self._robots.values()):
             return None
         figure, grid = self._begin(self._row_height, "Connections")
         axes = grid[0][0]
         for row, robot in enumerate(self._robots.values()):
             for span in analysis.find_spans(robot.states):
                 width_s, color = max(0.02, span.end_s - span.start_s), STATE_COLORS.get(span.state, _GRAY)
-                axes.barh(row, width_s, left=self._since_start(span.start_s), height=0.7, color=color)
-            times_s = self._since_start(robot.odometry.columns()[0])
+                axes.barh(row, width_s, left=span.start_s - self._start_s, height=0.7, color=color)
+            times_s = robot.odometry.columns()[0] - self._start_s
             for start_s, end_s in analysis.find_gaps(times_s):
                 axes.hlines(row, start_s, end_s, color="white", linewidth=2.5)
-            if not robot.states and len(times_s):
-                axes.hlines(row, times_s[0], times_s[-1], color=_GRAY)
         self._label_rows(axes)
         axes.set_xlim(0.0, self._duration_s)
         axes.set_xlabel("time (s)")
@@ -237,9 +232,6 @@ class Figures:
         handles = [patches.Patch(color=STATE_COLORS[key], label=key) for key in STATE_COLORS if key in seen]
         gap = f"no odom for\nmore than {analysis.ODOMETRY_GAP_S:g} s"
         handles.append(patches.Patch(facecolor="white", edgecolor=_GRAY, label=gap))
-        if not seen:
-            text = "the driver's reports (/hero_driver/robots) were not recorded: lines show odometry"
-            axes.set_title(text)
         self._add_legend(axes, handles, with_robots=False)
         return figure
 
@@ -276,9 +268,9 @@ class Figures:
         """Draw a curve for each robot; without a legend, with the ids of the largest at their ends."""
         ranked = sorted(values, key=lambda key: abs(float(values[key][-1])))
         for key in [] if self._has_legend else ranked[-LABELED:]:
-            end = (self._since_start(times_s[key][-1]), values[key][-1])
+            end = (times_s[key][-1] - self._start_s, values[key][-1])
             axes.annotate(str(key), end, textcoords="offset points", xytext=(3, -2), annotation_clip=False)
         for key, curve in values.items():
             curve_s, curve = analysis.break_at_gaps(times_s[key], curve)
-            axes.plot(self._since_start(curve_s), curve, color=self._colors[key])
+            axes.plot(curve_s - self._start_s, curve, color=self._colors[key])
         self._set_time_axis(axes)

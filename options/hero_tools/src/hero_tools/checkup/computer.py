@@ -34,10 +34,14 @@ OPTIONS = (
     "hero_swarm",
     "hero_tools",
 )
-NEEDED_MODULES = ("rospy", "numpy", "yaml", "actionlib", "tf2_ros", "diagnostic_updater")
 OLDEST_PYTHON = (3, 8)
-MODULES = {"python3-catkin-pkg": "catkin_pkg", "python3-opencv": "cv2", "python3-pil": "PIL"}
-"""Modules of rosdep keys that are not called python3- and the module's name."""
+MODULES = {
+    "python3-catkin-pkg": "catkin_pkg",
+    "python3-opencv": "cv2",
+    "python3-pil": "PIL",
+    **{name: name for name in ("rospy", "actionlib", "tf2_ros", "diagnostic_updater")},
+}
+"""Modules of dependencies that are not called python3- and the module's name."""
 
 AUTHOR = "HeRo suite maintainers"
 LOW_DISK_GB, FULL_DISK_GB = 2.0, 0.2
@@ -51,24 +55,11 @@ def check_python() -> Finding:
     version = platform.python_version()
     if sys.version_info < OLDEST_PYTHON:
         return fail(f"Python {version}; 3.8 or newer is needed", "use a newer system")
-    missing = []
-    for name in NEEDED_MODULES:
-        try:
-            importlib.import_module(name)
-        except ImportError:
-            missing.append(name)
-    if missing:
-        return fail(
-            f"Python {version} ({sys.executable}) lacks {', '.join(missing)}",
-            INSTALL,
-        )
     lacking = find_lacking_modules()
     if lacking:
-        return warn(
-            f"Python {version} ({sys.executable}) lacks "
-            + ", ".join(f"{module} (for {', '.join(packages)})" for module, packages in lacking.items()),
-            INSTALL,
-        )
+        listed = ", ".join(f"{module} (for {', '.join(packages)})" for module, packages in lacking.items())
+        tell = fail if set(CORE).intersection(*lacking.values()) else warn
+        return tell(f"Python {version} ({sys.executable}) lacks {listed}", INSTALL)
     text = f"Python {version} ({sys.executable}) has all modules"
     other = shutil.which("python3")
     if other and os.path.realpath(other) != os.path.realpath(sys.executable):
@@ -87,12 +78,12 @@ def find_lacking_modules() -> Dict[str, List[str]]:
     finder, lacking = rospkg.RosPack(), {}  # type: rospkg.RosPack, Dict[str, List[str]]
     for name in CORE + OPTIONS:
         try:
-            keys = [key.name for key in finder.get_manifest(name).rosdeps]
+            needed = parse_package(finder.get_path(name)).exec_depends
         except rospkg.ResourceNotFound:
             continue
-        for key in keys:
-            module = MODULES.get(key, key[len("python3-") :])
-            if key.startswith("python3-") and not importlib.util.find_spec(module):
+        for key in {dependency.name for dependency in needed}:
+            module = MODULES.get(key, key[len("python3-") :] if key.startswith("python3-") else "")
+            if module and not importlib.util.find_spec(module):
                 lacking.setdefault(module, []).append(name)
     return lacking
 

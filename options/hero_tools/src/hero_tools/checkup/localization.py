@@ -1,7 +1,6 @@
-"""A camera device, a detector of tags, and what drivers and the nodes of hero_localization report of themselves."""
+"""A camera device, and what drivers and the nodes of hero_localization report of themselves."""
 
 import glob
-import importlib.util
 import os
 from typing import Dict, List, Sequence
 
@@ -32,18 +31,6 @@ def check_camera(pattern: str = "/dev/video*") -> Finding:
         text = f"this user may not open {', '.join(closed)}"
         return warn(text, "sudo usermod -aG video $USER, and log in again")
     return ok(", ".join(devices))
-
-
-def check_detectors() -> Finding:
-    """Check which detectors of tags are installed."""
-    if importlib.util.find_spec("cv2") is None:
-        return warn("OpenCV is missing: robots cannot be found by their tags", "sudo apt install python3-opencv")
-    if importlib.util.find_spec("apriltag") is None:
-        return warn(
-            "detector aruco (OpenCV) only, which is less accurate: write 'detector: aruco' into the camera's file",
-            "sudo apt install python3-apriltag",
-        )
-    return ok("detectors apriltag and aruco (OpenCV)")
 
 
 def check_nodes() -> Finding:
