@@ -58,7 +58,6 @@ ROOMS = {
     "hero_localization.calibration": {"errors", "prints", "camera", "tracking", "filter"},
     "hero_localization.simulated_camera": {"errors", "prints", "camera", "tracking"},
     "hero_recording.bags": {"errors"},
-    "hero_recording.formats": {"bags", "errors"},
     "hero_recording.plots": {"bags"},
     "hero_swarm.behaviors": {"behavior", "learning", "machines", "sensors", "sources"},
     "hero_swarm.design": {"behavior", "behaviors", "experiments", "learning", "machines", "sources"},

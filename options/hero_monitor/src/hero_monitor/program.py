@@ -5,7 +5,6 @@
 Everything runs on tornado's thread, except what may block (background).
 """
 
-import platform
 from typing import Any, Dict, Set
 
 import rospy
@@ -24,7 +23,7 @@ from .page_requests import PageRequests
 from .parameters import Parameters, list_host_names, load_parameters, read_token
 from .serving.access import Access
 from .serving.client_limits import CONNECTIONS_MAX, ClientLimits
-from .serving.invitation import Invitation
+from .serving.invitation import Invitation, make_link
 from .serving.lesson import TEACHER, Lesson
 
 LINGER_S = 10.0
@@ -112,11 +111,8 @@ class Monitor:
         if self._lesson is not None:
             self._invitation = Invitation(wanted.host, port, self._lesson.class_code)
             rospy.loginfo("class code %s, or %s", self._lesson.class_code, self._invitation.link)
-        host = f"[{wanted.host}]" if ":" in wanted.host else wanted.host
-        if wanted.host in ("0.0.0.0", "::"):
-            host = platform.node()
         hint = "" if wanted.control else " (view only; control:=true allows driving)"
-        rospy.loginfo("fleet monitor: http://%s:%d%s", host, port, hint)
+        rospy.loginfo("fleet monitor: %s%s", make_link(wanted.host, port), hint)
         self._end_check.start()
         if wanted.control:
             finding = self._background.submit(self._find_programs)

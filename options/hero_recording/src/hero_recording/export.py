@@ -1,4 +1,4 @@
-"""Program export: writes recordings as tables, a folder per robot and a file per message type, or as a ROS 2 bag.
+"""Program export: writes recordings as tables, a folder per robot and a file per message type.
 
 What is written is in OUT.part until it is complete.
 """
@@ -15,29 +15,22 @@ from .bags.bag_set import BagSet
 from .bags.tables import TABLES, declare_tables, is_exported, read_rows
 from .bags.topics import Message
 from .errors import RecordingError, explain_write_errors
-from .formats.bag_files import write_ros2
-from .formats.table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
+from .table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
 from .options import list_of
 
 PART_SUFFIX = ".part"
 
-ROS2 = "ros2"
-
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(prog="export", description="Export recordings to tables or ROS 2 bags.")
+    parser = argparse.ArgumentParser(prog="export", description="Export recordings to tables.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
     parser.add_argument("--out", metavar="PATH", help="output path (the first bag's name); must not exist")
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
     parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)
-    text = "csv, npz, parquet: tables; ros2: a bag with every message (%(default)s)"
-    parser.add_argument("--format", choices=[*TABLE_FORMATS, ROS2], default=CSV, help=text)
-    options = parser.parse_args(arguments)
-    if options.format == ROS2 and (options.robots is not None or options.tables != list(TABLES)):
-        parser.error("--robots and --tables choose tables, but --format ros2 copies every message")
-    return options
+    parser.add_argument("--format", choices=TABLE_FORMATS, default=CSV, help="of the files (%(default)s)")
+    return parser.parse_args(arguments)
 
 
 def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str:
@@ -69,8 +62,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     declare_tables(read_fleet_file().topics)
     options = parse_options(arguments)
     bags = BagSet(options.bags)
-    suffix = "_ros2" if options.format == ROS2 else ""
-    out = os.path.abspath(options.out or os.path.splitext(bags.paths[0])[0] + suffix)
+    out = os.path.abspath(options.out or os.path.splitext(bags.paths[0])[0])
     if os.path.exists(out):
         raise RecordingError(f"{out} exists already; move it away or choose another --out")
     part = out + PART_SUFFIX
@@ -78,10 +70,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         os.makedirs(part)
     incomplete = os.path.join(part, os.path.basename(out))
     try:
-        if options.format == ROS2:
-            written = "%d messages" % write_ros2(bags, incomplete)
-        else:
-            written = export_tables(bags, options, incomplete)
+        written = export_tables(bags, options, incomplete)
         os.rename(incomplete, out)
     finally:
         shutil.rmtree(part, ignore_errors=True)

@@ -93,7 +93,7 @@ def test_an_interrupted_export_leaves_nothing_behind(bag, tmp_path, capsys, monk
 
 
 def test_all_buffered_rows_are_written(bag, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("hero_recording.formats.table_files.BATCH_ROWS", 10)
+    monkeypatch.setattr("hero_recording.table_files.BATCH_ROWS", 10)
     output = run_export(capsys, bag, "--out", tmp_path / "out", "--tables", "odometry")
     assert output.endswith("2 robots, 2 tables, 234 rows\n")
     assert len(read_csv(tmp_path / "out" / "hero_0" / "odometry.csv")) == 117
@@ -133,29 +133,8 @@ def test_parquet_tables_hold_all_rows_and_columns(bag, tmp_path, capsys):
     assert table.column_names[:3] == ["time_s", "stamp_s", "x_m"]
 
 
-@pytest.mark.option("rosbags.rosbag2")
-def test_a_ros_2_bag_holds_as_many_messages_of_each_topic(bag, tmp_path, capsys):
-    from rosbags import rosbag2
-
-    if not hasattr(rosbag2, "StoragePlugin"):
-        pytest.skip("rosbags is older than 0.10")
-    run_export(capsys, bag, "--out", tmp_path / "out", "--format", "ros2")
-    with rosbag.Bag(str(bag)) as recorded:
-        counts = {topic: info.message_count for topic, info in recorded.get_type_and_topic_info().topics.items()}
-    with rosbag2.Reader(tmp_path / "out") as reader:
-        assert {topic: info.msgcount for topic, info in reader.topics.items()} == counts
-
-
-@pytest.mark.parametrize(("kind", "package"), [("parquet", "pyarrow"), ("ros2", "rosbags")])
-def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, monkeypatch, kind, package):
-    for module in ("pyarrow", "rosbags.rosbag2"):
-        monkeypatch.setitem(sys.modules, module, None)
-    with pytest.raises(ProgramError, match="pip install '%s" % package):
-        run_export(capsys, bag, "--out", tmp_path / "out", "--format", kind)
+def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ProgramError, match="pip install 'pyarrow"):
+        run_export(capsys, bag, "--out", tmp_path / "out", "--format", "parquet")
     assert not list(tmp_path.iterdir())
-
-
-def test_a_choice_of_robots_is_refused_where_every_message_is_copied(bag, capsys):
-    with pytest.raises(SystemExit):
-        export.parse_options([str(bag), "--format", "ros2", "--robots", "3"])
-    assert "--robots and --tables choose tables" in capsys.readouterr().err

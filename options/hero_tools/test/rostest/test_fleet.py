@@ -93,8 +93,6 @@ class FleetTest(unittest.TestCase):
         table.wait_for(b"2 of 2 robots ready")
         table.wait_for(b"hero_1")
         table.wait_for(b"\x1b[?1049h")
-        table.press(b"o")
-        table.wait_for(b"now by state")
         table.press(b"q")
         self.assertEqual(table.wait_for_end(), 0)
         table.wait_for(b"\x1b[?1049l")

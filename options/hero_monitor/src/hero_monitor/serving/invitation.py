@@ -17,13 +17,19 @@ class Invitation:
 
     def __init__(self, host: str, port: int, code: str) -> None:
         self._code = code
-        self._page = f"http://{find_address() if host in ('0.0.0.0', '::') else host}:{port}/"
+        self._page = make_link(host, port)
         self.link = f"{self._page}#{code}"
         self._rows = make_qr_rows(self.link)
 
     def describe(self) -> Dict[str, Any]:
         """Return what pages of teachers show."""
         return {"code": self._code, "link": self._page, "qr": self._rows}
+
+
+def make_link(host: str, port: int) -> str:
+    """Return the address of the page of a server that listens on a host's address."""
+    name = find_address() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+    return f"http://{name}:{port}/"
 
 
 def find_address() -> str:

@@ -11,8 +11,8 @@ import numpy as np
 
 from hero_node import import_optional
 
-from ..bags.tables import TABLES, TEXT_COLUMNS, Row
-from ..errors import explain_write_errors
+from .bags.tables import TABLES, TEXT_COLUMNS, Row
+from .errors import explain_write_errors
 
 BATCH_ROWS = 4096
 """Buffered rows of a table: 8 numbers take some 0.8 MB."""

@@ -1,1 +1,0 @@
-"""The files that export writes: tables per robot, or a ROS 2 bag."""
