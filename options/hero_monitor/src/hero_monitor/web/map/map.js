@@ -26,8 +26,7 @@ export class FleetMap {
     Object.assign(this, { state, choose, connection });
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
-    const ghosts = localStorage.getItem("ghosts") === "true";
-    this.shows = { trails: true, beams: true, names: true, ghosts, picture: false };
+    this.shows = { trails: true, beams: true, names: true, ghosts: false, picture: false };
     this.picture = new CameraPicture(() => this.update({}));
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
@@ -60,7 +59,6 @@ export class FleetMap {
   toggle(name) {
     this.shows[name] = !this.shows[name];
     setPressed(element(name), this.shows[name]);
-    if (name === "ghosts") localStorage.setItem("ghosts", String(this.shows.ghosts));
     this.requestShown();
     this.picture.show(this.shows.picture, this.state.picture);
     if (name === "ghosts" && !this.pinned) this.fit();
@@ -228,9 +226,8 @@ export class FleetMap {
     const places = []; // that are to be seen
     const add = (pose, box) => places.push(...listCorners(pose, box));
     const surround = ([x, y], reach) => places.push([x - reach, y - reach], [x + reach, y + reach]);
-    for (const drawn of [replay, this.poses, this.shows.ghosts ? poses : {}]) {
-      for (const pose of Object.values(drawn)) if (pose) surround(pose, 150);
-    }
+    const drawn = [replay, this.poses, this.shows.ghosts ? poses : {}].flatMap((shown) => Object.values(shown));
+    for (const pose of drawn) if (pose) surround(pose, 150);
     for (const [x, y, yaw, length, width] of arena.boxes) add([x, y, yaw], [-length / 2, -width / 2, length / 2, width / 2]);
     for (const [x, y, radius] of arena.circles) surround([x, y], radius);
     for (const { lines = [], isBeam } of drawings) if (!isBeam) for (const place of lines.flat()) surround(place, 60);
