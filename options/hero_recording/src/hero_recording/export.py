@@ -15,8 +15,8 @@ from .bags.bag_set import BagSet
 from .bags.tables import TABLES, declare_tables, is_exported, read_rows
 from .bags.topics import Message
 from .errors import RecordingError, explain_write_errors
-from .table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
 from .options import list_of
+from .table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
 
 PART_SUFFIX = ".part"
 
