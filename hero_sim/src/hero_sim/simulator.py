@@ -158,7 +158,8 @@ class Simulator(LinkHandler):
                 self.swarm.robots[index].receive_bytes(now_ms, down)
             if index in self._congested and not radio.is_congested(now_ms):
                 self._congested.discard(index)
-                self.writing_resumed(index)
+                if not self.link.has_unsent(index):
+                    self.writing_resumed(index)
             if not radio.is_carrying:
                 self._carrying.discard(index)
 
@@ -247,6 +248,8 @@ class Simulator(LinkHandler):
         self.swarm.reschedule(index)
 
     def writing_resumed(self, index: int) -> None:
+        if index in self._congested:
+            return  # its channel still blocks it
         self.swarm.robots[index].unblock_writing(self.swarm.now_ms)
         self.swarm.reschedule(index)
 

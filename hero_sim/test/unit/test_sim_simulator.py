@@ -175,3 +175,22 @@ def test_a_robot_that_crashed_restarts_and_is_named(bench):
     simulator.serve_robot(0)
     assert lines == ["hero_0 crashed: the server sent id 99; the robot restarts"]
     assert robot.is_on and robot.crash_reason is None and ("abandon", 0) in link.calls
+
+
+def test_a_robot_blocked_by_its_channel_and_its_link_waits_for_both(bench):
+    simulator, _, link, _ = bench("--wifi", "router")
+    resumed, unsent = [], [True, False]
+    simulator.swarm.robots[0].unblock_writing = resumed.append
+    link.has_unsent = lambda index: unsent[0]
+    for has_unsent in unsent[:]:
+        unsent[0] = has_unsent
+        simulator._send_up(0, [bytes(1000)])
+        if not has_unsent:
+            simulator.writing_resumed(0)
+        assert resumed == [], "the channel blocks it"
+        simulator.swarm.now_ms += 10000
+        simulator._carry(simulator.swarm.now_ms)
+        if has_unsent:
+            assert resumed == [], "the link blocks it"
+            simulator.writing_resumed(0)
+        assert resumed.pop() == simulator.swarm.now_ms

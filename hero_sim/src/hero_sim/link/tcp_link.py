@@ -175,6 +175,11 @@ class TcpLink:
             self._lose(connection, error.strerror or str(error))
             return None
 
+    def has_unsent(self, index: int) -> bool:
+        """Return whether bytes of a robot wait for the system to take them."""
+        connection = self._find_open(index)
+        return connection is not None and bool(connection.unsent)
+
     def drop_unsent(self, index: int) -> None:
         """Drop what could not be sent, as a write that ran into its time limit does."""
         connection = self._find_open(index)
