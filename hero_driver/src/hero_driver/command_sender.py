@@ -8,7 +8,7 @@ from .rosserial.errors import RosserialError
 from .transport.event_loop import CallLater
 
 SILENCE_LIMIT_S = 0.5
-"""A robot that has been silent for this long gets motion when it sends again; 0.1 s are common on Wi-Fi."""
+"""A robot silent for this long gets motion only when it sends again; pauses of 0.1 s are common on Wi-Fi."""
 
 
 class CommandSender:

@@ -54,7 +54,7 @@ REGISTRAR_QUEUE_LENGTH = 20000
 """Topics that may wait for the ROS master: 200 robots of 24 topics that come, leave and come again."""
 
 SWITCH_INTERVAL_S = 0.001
-"""Time limit of other threads on the GIL while the thread of the sockets waits; Python's 5 ms delayed robots."""
+"""Time limit of other threads on the GIL while the thread of the sockets waits; Python's 5 ms delay robots."""
 
 REPORT_CHECK_S = 0.1
 

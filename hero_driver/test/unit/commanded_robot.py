@@ -93,7 +93,7 @@ class CommandedRobot:
             loop=None,
             log=SimpleNamespace(log_throttled=lambda level, key, text: self.lines.append(text)),
             transforms=SimpleNamespace(add=None),
-            registrar=SimpleNamespace(submit=lambda job, **_: True),  # nothing is registered with a master
+            registrar=SimpleNamespace(submit=lambda job, always=False: True),  # nothing is registered with a master
             corrections=CorrectionSettings(),
             commands=CommandSettings(allow_self_tuning=True, command_max_age_s=10.0),
             max_names=100,

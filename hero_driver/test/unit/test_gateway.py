@@ -47,9 +47,9 @@ class Driver:
             SimpleNamespace(call_later=lambda delay_s, call: None, call_soon=lambda call: None),
             SimpleNamespace(
                 log=lambda level, text: self.lines.append(text),
-                log_throttled=lambda level, key, text, *_, **__: self.lines.append(text),
+                log_throttled=lambda level, key, text, robot="", host="": self.lines.append(text),
             ),
-            SimpleNamespace(submit=lambda job, **_: True),  # nothing is registered with a master
+            SimpleNamespace(submit=lambda job, always=False: True),  # nothing is registered with a master
             "/hero_driver",
             lambda: int(self.now_s * 1e9),
             lambda: None,

@@ -66,7 +66,7 @@ class Driver:
             read_config(parameters),
             loop,
             log,
-            SimpleNamespace(submit=lambda job, **options: True),
+            SimpleNamespace(submit=lambda job, always=False: True),
             "/hero_driver",
             lambda: int(self.now_s * 1e9),
             self.note_change,
@@ -75,7 +75,7 @@ class Driver:
     def note_change(self):
         self.changes += 1
 
-    def log_throttled(self, level, key, text, *others, **more):
+    def log_throttled(self, level, key, text, robot="", host=""):
         self.lines.append((level, text))
         self.keys.append(key)
 
@@ -427,7 +427,7 @@ def test_what_a_robot_takes_has_an_id_once_its_layout_is_registered(driver):
     bridge._registrar = SimpleNamespace(submit=lambda job, **options: jobs.append(job) or True)
     bridge._loop = SimpleNamespace(call_soon=lambda call: call())
     usable = [True, True, False]
-    bridge._endpoints.subscribe = lambda *_: usable.pop(0)
+    bridge._endpoints.subscribe = lambda name, layout, make_subscriber: usable.pop(0)
     name = "/hero_0/note"
     for md5sum, before, after in (("a" * 32, 150, 150), ("b" * 32, None, 150), ("c" * 32, None, None)):
         bridge.declare(make_topic(name, TopicKind.SUBSCRIBER, md5sum), name)
@@ -494,7 +494,7 @@ def test_calls_of_services_fail_with_the_reason_when_the_robot_leaves(driver):
     bridge._services = {"/hero_0/a": SimpleNamespace(fail=reasons.append)}
     bridge.detach("silent for 6.1 s")
     assert reasons == ["silent for 6.1 s"]
-    bridge._registrar = SimpleNamespace(submit=lambda job, **options: True)
+    bridge._registrar = SimpleNamespace(submit=lambda job, always=False: True)
     for _ in range(2):
         bridge.close()
     assert reasons == ["silent for 6.1 s", "the robot left"] and not bridge._publishers

@@ -23,7 +23,8 @@ NOW_S = 1000.0
 class Publisher:
     """Takes messages as rospy does: as bytes."""
 
-    def __init__(self, *_, **__):
+    def __init__(self, name, message_class, queue_size, latch):
+        assert (name, message_class, latch) == ("~robots", RobotArray, True) and queue_size
         self.published = []
 
     def publish(self, message):

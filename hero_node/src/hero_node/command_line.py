@@ -27,7 +27,7 @@ OUTPUT_ERRORS = (errno.EPIPE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 
 
 def run(main: Callable[[], Optional[int]], *errors: Type[Exception]) -> NoReturn:
-    """Call main and end the process with its exit status (None: 0); a HeroError, or one of errors, is a line and 1."""
+    """Call main and end the process with its exit status (None: 0); a HeroError, or one of errors, prints a line: 1."""
     sys.exit(call(main, *errors))
 
 

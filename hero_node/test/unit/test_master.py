@@ -40,7 +40,7 @@ def test_an_address_of_a_master_is_taken_as_it_is(monkeypatch, uri):
 
 @pytest.mark.parametrize("uri", ["http://localhost:99999", "http://a..b:1", "x"])
 def test_a_node_without_an_address_does_not_run(monkeypatch, uri):
-    monkeypatch.setattr(master, "ask_master", lambda *arguments: uri)
+    monkeypatch.setattr(master, "ask_master", lambda method, name: {"lookupNode": uri}[method])
     assert find_running_node("robot") == ""
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from hero_node.errors import NodeError
 from hero_node.ros import master_watch
-from hero_node.ros.master import MasterRefusalError
+from hero_node.ros.master import LimitedTransport, MasterRefusalError
 from hero_node.ros.master_watch import MasterWatch
 
 OWN = [("registerPublisher", "/odom"), ("registerSubscriber", "/led"), ("registerService", "/node/get_loggers")]
@@ -44,6 +44,10 @@ class Master:
     def publisherUpdate(self, _, topic, publishers):  # noqa: N802 - of the ROS Slave API
         self.updates.append((topic, publishers))
 
+    def connect(self, uri, transport):
+        assert uri == "http://node" and isinstance(transport, LimitedTransport)
+        return self
+
     def __enter__(self):
         return self
 
@@ -62,7 +66,7 @@ def master(monkeypatch):
     monkeypatch.setattr(master_watch, "ask_master", made.ask)
     monkeypatch.setattr(master_watch, "get_topic_manager", lambda: topics)
     monkeypatch.setattr(master_watch, "get_service_manager", lambda: services)
-    monkeypatch.setattr(master_watch.xmlrpc.client, "ServerProxy", lambda *_, **__: made)
+    monkeypatch.setattr(master_watch.xmlrpc.client, "ServerProxy", made.connect)
     monkeypatch.setattr(master_watch.rospy, "get_node_uri", lambda: "http://node")
     monkeypatch.setattr(master_watch.rospy, "resolve_name", lambda name: name.replace("~", "/node/"))
     return made

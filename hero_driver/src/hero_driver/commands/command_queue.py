@@ -94,7 +94,7 @@ class CommandQueue:
         return commands
 
     def due_in_s(self, motion_may_go: bool, now_s: float) -> Optional[float]:
-        """Return in how many s to call take() again, None: nothing waits; motion_may_go: if its time has come."""
+        """Return the time (s) until the next take(), None if nothing waits; motion_may_go: the robot takes motion."""
         if self._is_idle:
             return None
         if self._waiting:
@@ -109,7 +109,7 @@ class CommandQueue:
         return due_s if motion_may_go or due_s is None else max(RETRY_S, due_s)
 
     def _is_behind_a_stop(self, name: str, shaper: VelocityShaper) -> bool:
-        """Return whether motion waits for an older stop of another topic; newer zeros would hold it up for ever."""
+        """Return whether motion has to wait for an older stop of another topic, but not for a stream of newer zeros."""
         if len(self._shapers) == 1 or not shaper.has_motion:
             return False
         return any(

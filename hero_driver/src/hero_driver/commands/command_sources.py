@@ -70,7 +70,7 @@ class CommandSource:
             self._intervals_s.append(interval_s)
 
     def forgive_pause(self, pause_s: float, now_s: float) -> None:
-        """Do not count a pause of the driver as silence; once between two commands, so that hangs are noticed."""
+        """Do not count a pause of the driver as silence, but once between two commands: programs do hang."""
         if not self._was_forgiven:
             self._was_forgiven = True
             self.commanded_s = min(self.commanded_s + pause_s, now_s)
@@ -145,7 +145,7 @@ class CommandSources:
                 commander.forgive_pause(pause_s, now_s)
 
     def is_zero_missed(self, now_s: float) -> bool:
-        """Return, once, whether the wheels show that the robot missed a zero: after a hang its firmware drops them."""
+        """Return, once, whether the wheels show that the robot missed a zero, which its firmware drops after a hang."""
         if self._zero is None or now_s - self._zero.now_s < ZERO_SHOWS_S:
             return False
         wheels, is_heard = self._wheels, self._wheels.readings > self._zero.readings
@@ -153,7 +153,7 @@ class CommandSources:
         return wheels.readings > 0 and not (is_heard and wheels.still_readings >= STILL_READINGS)
 
     def find_silent(self, silence_s: float, now_s: float) -> Optional[CommandSource]:
-        """Return a program that moves the robot and has fallen silent, without pauses of the driver; or None."""
+        """Return a program that moves the robot and has fallen silent, or None; pauses of the driver do not count."""
         self._forgive_pause(now_s)
         self._looked_s = now_s
         for commander in self._by_topic.values():

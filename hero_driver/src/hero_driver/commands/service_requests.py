@@ -1,6 +1,6 @@
 """Checks service requests before they reach a robot, which checks nothing itself. Pure: bytes in, words out.
 
-The firmware prints them into 100 bytes (VelocityControl.ino:209) and keeps them in flash, over reboots.
+The firmware prints values into 100 bytes (VelocityControl.ino:209), and stores them in its flash.
 """
 
 import math

@@ -26,7 +26,7 @@ class CorrectionSettings:
     """Wheels, and accuracy of odometry."""
 
     wheel_diameter_m: float = declare(number(WHEEL_DIAMETER_M, 0.001, 1.0, "m", "diameter of a wheel, except HeRo+'s"))
-    wheel_separation_m: float = declare(number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "their distance, except HeRo+'s"))
+    wheel_separation_m: float = declare(number(WHEEL_SEPARATION_M, 0.001, 1.0, "m", "wheel separation, except HeRo+'s"))
     ticks_per_turn: float = declare(number(TICKS_PER_TURN, 1.0, 1e6, "", "encoder ticks per turn, except HeRo+'s"))
     calibration_folder: str = declare(
         string("~/hero_calibration", "folder of calibrate's hero_N.yaml, whose wheels replace those above; empty: none")

@@ -10,7 +10,7 @@ from hero_node.parameters import Parameter, declare, make_error, whole_number
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
 
 GARBAGE_BURST_LENGTH = 65536
-"""Bytes outside of packets that one address may send at once: a robot that reconnects leaves below 1 kB."""
+"""Bytes outside of packets that one address may send at once: a truncated packet has less than 1 kB."""
 
 GARBAGE_PER_S = 16384.0
 """Bytes outside of packets that one address may send per second after that."""
@@ -43,7 +43,7 @@ class AdmissionLimits:
     max_connections_per_address: int = declare(whole_number(400, 1, 5000, "", "connections per address"))
     max_unidentified: int = declare(whole_number(200, 1, 5000, "", "connections that have not identified themselves"))
     max_packets_per_s: int = declare(whole_number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211"))
-    max_bytes_per_s: int = declare(whole_number(2000000, 1000, 100000000, "bytes/s", "of each; stock robots: 44051"))
+    max_bytes_per_s: int = declare(whole_number(2000000, 1000, 100000000, "bytes/s", "per robot; stock: 44051"))
 
 
 class Admission:
@@ -99,7 +99,7 @@ class Admission:
         self._unidentified.remove(connection)
 
     def admit_new_robot(self, host: str, now_s: float) -> Optional[str]:
-        """Count a robot of host that is not known yet, which costs calls to the master; return why it has to wait."""
+        """Count a new robot of host, which costs calls to the master; return why it has to wait, or None."""
         if self._new_robots.take(host, 1.0, now_s):
             return None
         return "more than %d new robots from one address, and %g more per second" % (

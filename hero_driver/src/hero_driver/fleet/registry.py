@@ -2,7 +2,7 @@
 
 A robot is known by its namespace, with one connection that counts. A second one from the same address is the robot
 after a power cycle and takes over; from another address, while the first one is there or within its grace period, it
-is a second robot with the same id and has to wait. One that was never there with the known one is that elsewhere.
+is a second robot with the same id and has to wait. Two that were never there at the same time are one robot.
 """
 
 import enum
@@ -141,7 +141,7 @@ class FleetRegistry:
 
     @staticmethod
     def is_reserved(record: RobotRecord, host: str) -> bool:
-        """Return whether one of host may not have the id: the known robot was heard after another was refused."""
+        """Return whether the id is kept from host: the known robot was heard after one from there was refused."""
         refused_s = record.rivals.get(host)
         return refused_s is not None and record.last_heard_s > refused_s
 

@@ -18,7 +18,7 @@ ROBOT_LINES_MAX = 20
 """Different messages about one robot at once, and in each THROTTLE_S after that."""
 
 HOST_LINES_MAX = 300
-"""Lines about what comes from one address, likewise; a hundred simulated robots that join are a hundred lines."""
+"""Likewise lines about one address: a hundred simulated robots that join at once are a hundred lines."""
 
 
 class LogRelay:

@@ -33,7 +33,7 @@ READ_LENGTH = 4096
 """Read at once from one publisher: 78 velocities, so that one that floods does not delay the robots."""
 
 BACKLOG_LENGTH = 262144
-"""Read at once from a publisher of motion without a rate: the sockets' second of commands would outlast its end."""
+"""Read at once from a publisher of motion that is ahead: its sockets hold commands for more than a second."""
 
 MESSAGE_LENGTH_MAX = 1 << 20
 """A robot takes messages of 4 kB; a publisher that announces more than this does not speak TCPROS."""

@@ -59,7 +59,7 @@ class Owner(Protocol):
 
 
 class RobotCommands:
-    """The commands of all programs to one robot: the queue of those that wait, and how many it was refused.
+    """The commands of all programs to one robot: the queue of those that wait, and how many were refused.
 
     Attributes:
         fault: what is wrong with how the robot is commanded now; empty if nothing is.

@@ -21,7 +21,7 @@ HANG_WAIT_S = 1.0
 """Grace after a call's time limit: the thread of the sockets hangs if it has not answered by then."""
 
 LATE_ANSWER_S = 30.0
-"""A later answer never comes: robots that are silent for 6 s are disconnected, others answer within 0.1 s."""
+"""A later answer never comes: silent robots are disconnected after 6 s, others answer within 0.1 s."""
 
 
 class _Call:

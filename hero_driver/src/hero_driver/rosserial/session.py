@@ -21,7 +21,7 @@ REQUEST_INTERVAL_S = 1.5
 """Time between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
 
 TIME_WITHOUT_TOPICS_S = 0.2
-"""Time limit for topics after a time request (node_handle.h:301); without them a new request is the cure."""
+"""Time limit for topics after a time request, which they follow at once (node_handle.h:301), or never."""
 
 REPEAT_INTERVAL_S = 0.5
 """Time between two requests for topics when a peer proves that it runs but declared nothing."""

@@ -31,7 +31,7 @@ LISTEN_BACKLOG = 256
 """A whole swarm reconnects within 51 ms when the driver is restarted (ArduinoTcpHardware.h:99)."""
 
 POLL_INTERVAL_S = 0.05
-"""Period of the handler's polls, each for every other connection: one timer for all, as each costs a turn."""
+"""Period of poll(), and of poll_link() for every other connection: one timer for all, as each costs a turn."""
 
 PAUSE_S = 1.0
 """Time from one turn of the loop to the next, s, beyond which the driver or its PC was suspended, or too busy."""

@@ -9,10 +9,10 @@ import termios
 from typing import Any, Callable, Deque, NamedTuple, Optional, Protocol
 
 READ_LENGTH = 4096
-"""Read at once from one robot: two bursts, which delay the others by 1 ms at most, however wrong they are."""
+"""Read at once from one robot: two bursts, or garbage that takes 1 ms, which delays the others by no more."""
 
 UNSENT_MAX = 65536
-"""Bytes that wait for a peer that does not read: no robot, which gets commands after it has taken the last."""
+"""Bytes that may wait for a peer that does not read; a robot gets commands only after it has taken the last."""
 
 _INT = struct.Struct("i")
 
@@ -42,7 +42,7 @@ def find_socket_address(address: Address, flags: int = 0) -> Any:
 
 
 class LinkHandler:
-    """Callbacks of the transport, always on the loop's thread; none does anything here."""
+    """Callbacks of the transport, always on the loop's thread; here they do nothing."""
 
     def open_link(self, link: "Link") -> Optional[str]:
         """A connection is open; return a reason to refuse it, or None."""
