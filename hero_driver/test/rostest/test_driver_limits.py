@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Who is let in, and how much one robot may send."""
+"""Who is let in, how much one robot may send, and what goes on while the ROS master hangs."""
 
 import http.client
 import resource
@@ -8,17 +8,19 @@ import xmlrpc.client
 import rosgraph
 import rospy
 import rostest
+from std_msgs.msg import ColorRGBA
 
 from hero_driver.rosserial import packets
 from hero_msgs.msg import Encoder, Robot
 from hero_test import stock_messages
-from hero_test.driver_case import OwnDriverCase, Recorder
+from hero_test.driver_case import OwnDriverCase, Recorder, make_publisher, wait_packets, wait_payloads
 from hero_test.fake_robot import (
     PUB,
     STOCK_DECLARATIONS,
     TIME_PACKET,
     Declaration,
 )
+from hero_test.processes import suspended
 from hero_test.stock_messages import STRING_MD5
 from hero_test.waiting import wait_for
 
@@ -113,6 +115,35 @@ class TestDriverLimits(OwnDriverCase):
         driver.wait_line("hero_2: I am here")
         driver.fleet.wait("/hero_1", Robot.READY, "dropped lines", lambda e: e.dropped_messages > 0)
         self.assertLess(len(driver.find_lines("hero_1: line")), 600)
+
+    def assert_time_is_answered(self, robot):
+        count = len(robot.payloads_with_id(packets.ID_TIME))
+        robot.send_bytes(TIME_PACKET)
+        wait_packets(robot, packets.ID_TIME, count + 1)
+
+    def send_encoder(self, robot, ticks):
+        robot.send("encoder", stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks))
+
+    def test_a_hanging_master_affects_no_connected_program(self):
+        driver = self.start()
+        robot = self.dial(driver, 1)
+        encoders = Recorder("/hero_1/encoder", Encoder)
+        light = make_publisher("/hero_1/led", ColorRGBA)
+        with suspended(rosgraph.Master("/test").getPid()):
+            newcomer = self.dial(driver, 2, ready=False)
+            wait_for(lambda: newcomer.requests, "a request for the newcomer's topics")
+            for count in range(1, 4):
+                self.send_encoder(robot, float(count))
+                self.send_encoder(newcomer, float(count))
+                encoders.wait_count(count)
+                light.publish(ColorRGBA(float(count), 0.0, 0.0, 0.0))
+                wait_payloads(robot, "led", count)
+                for each in (robot, newcomer):
+                    self.assert_time_is_answered(each)
+            driver.fleet.wait("/hero_2", Robot.READY)
+        late = Recorder("/hero_2/encoder", Encoder)
+        self.send_encoder(newcomer, 9.0)
+        self.assertEqual(late.wait_count(1)[0].left_ticks, 9.0)
 
 
 if __name__ == "__main__":

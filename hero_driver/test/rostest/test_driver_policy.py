@@ -68,25 +68,6 @@ class TestDriverPolicy(OwnDriverCase):
         driver.wait_line("hero_5: topic '/hero_5/measured_pose' refused: robots do not send it")
         self.assertEqual(list_publishers("/hero_5/measured_pose"), [])
 
-    def test_names_that_are_no_names_are_refused_and_cannot_forge_log_lines(self):
-        evil = [
-            Declaration(PUB, 140, "/hero_3/\x1b[2Jred\nFATAL forged", "std_msgs/String", STRING_MD5),
-            Declaration(PUB, 141, "/hero_3//odom", "std_msgs/String", STRING_MD5),
-            Declaration(PUB, 142, "/hero_3/" + "x" * 500, "std_msgs/String", STRING_MD5),
-            Declaration(PUB, 143, "/hero_3/type", "../../etc/passwd", STRING_MD5),
-            Declaration(PUB, 144, "/hero_3/md5", "std_msgs/String", "*"),
-            Declaration(PUB, 145, "/hero_3/\xff\xfe", "std_msgs/String", STRING_MD5),
-        ]
-        driver = self.share()
-        self.dial(driver, 3, declarations=[*STOCK_DECLARATIONS, *evil])
-        for text in ("not a ROS name", "more than 128", "package/Type", "hexadecimal"):
-            driver.wait_line("hero_3: topic .* refused: .*" + text)
-        self.assertEqual(driver.find_lines("^FATAL forged|\x1b\\[2J"), [])
-        self.assertEqual(
-            [name for name in list_driver_topics("/hero_3", driver.node) if name.split("/")[2] in ("type", "md5")],
-            [],
-        )
-
     def test_a_wrong_md5_and_an_unknown_type_give_one_clear_error_each(self):
         changed = [
             entry._replace(md5sum=WRONG_MD5)

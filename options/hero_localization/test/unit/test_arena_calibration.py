@@ -359,8 +359,8 @@ def tape(random, sd_m, wrong=None, scale=1.0):
 
 @pytest.mark.slow
 def test_a_tape_of_2_mm_leaves_no_tag_out_that_is_right():
-    found = [calibrate_arena(LENS, see_all(), tape(np.random.RandomState(seed), 0.002)) for seed in range(20)]
-    assert sum(bool(result.left_out) for result in found) <= 3
+    found = [calibrate_arena(LENS, see_all(), tape(np.random.RandomState(seed), 0.002)) for seed in range(8)]
+    assert sum(bool(result.left_out) for result in found) <= 1
     assert np.median([result.sd_m for result in found]) > 0.001
 
 
@@ -370,7 +370,7 @@ def test_standard_deviation_is_that_of_places_in_the_field(sd_m):
     true_m2, told_m2 = [], []
     x, y = np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(-0.5, 0.5, 3))
     points_m = np.column_stack((x.ravel(), y.ravel(), np.full(x.size, 0.076)))
-    for seed in range(20):
+    for seed in range(10):
         found = calibrate_arena(LENS, see_all(), tape(np.random.RandomState(seed), sd_m))
         off_m = found.camera.intersect(CAMERA.project(points_m), 0.076) - points_m[:, :2]
         true_m2.append((off_m**2).mean())

@@ -90,7 +90,7 @@ def test_a_false_start_is_corrected(rates_hz):
 @pytest.mark.parametrize("rates_hz", CAMERAS)
 def test_outliers_of_single_images_move_no_robot(rates_hz):
     for seed in range(DRAWS):
-        for now_s, pose_filter, outcome in nonempty(follow(seed, rates_hz, lambda _: (0.4, 0.2, -1.0), 4.0, false=0.1)):
+        for now_s, pose_filter, outcome in nonempty(follow(seed, rates_hz, lambda _: (0.4, 0.2, -1.0), 3.0, false=0.1)):
             if now_s > 1.5:  # the first pose may be false, too
                 assert outcome is not Outcome.MOVED, seed
                 assert measure_distance(pose_filter.pose(), Pose(0.4, 0.2, -1.0)) < 0.003, seed

@@ -51,6 +51,8 @@ def test_tags_on_paper_have_their_true_size_and_place(family, cells):
         assert tag.side_px / DOTS_PER_MM == pytest.approx(sheet.size_mm, abs=0.3)
         assert tag.center / DOTS_PER_MM == pytest.approx((x_mm, 297.0 - y_mm), abs=0.3)
         assert tag.corners[0, 1] < tag.corners[3, 1] - 100.0, "upright, as the triangle shows"
+    ruler = np.nonzero(image[-round((12.0 + 0.02) * DOTS_PER_MM) - 1] < 200)[0]
+    assert (ruler[-1] - ruler[0]) / DOTS_PER_MM == pytest.approx(100.0, abs=0.5)
 
 
 def test_pieces_lie_on_the_page_and_apart():
@@ -77,22 +79,12 @@ def test_papers_have_their_sizes():
 
 
 @pytest.mark.slow
-def test_ruler_is_100_mm_long():
-    (page,) = list_pages("--robots", "1")
-    image = scan(print_tags.draw_page(page, "36h11", A4_MM))
-    row = image[-round((12.0 + 0.02) * DOTS_PER_MM) - 1]
-    dark = np.nonzero(row < 200)[0]
-    assert (dark[-1] - dark[0]) / DOTS_PER_MM == pytest.approx(100.0, abs=0.5)
-
-
-@pytest.mark.slow
 def test_board_on_paper_is_that_of_the_lens_calibration():
-    for paper_mm in print_tags.PAPERS_MM.values():
-        view = find_board(scan(print_tags.draw_board_page(paper_mm)))
-        assert len(view.ids) == (COLUMNS - 1) * (ROWS - 1)
-        places = view.pixels[np.argsort(view.ids)].reshape(ROWS - 1, COLUMNS - 1, 2)
-        along_mm = np.linalg.norm(places[:, -1] - places[:, 0], axis=1) / DOTS_PER_MM
-        assert along_mm == pytest.approx(1e3 * SQUARE_M * (COLUMNS - 2), abs=0.2)
+    view = find_board(scan(print_tags.draw_board_page(print_tags.PAPERS_MM["letter"])))
+    assert len(view.ids) == (COLUMNS - 1) * (ROWS - 1)
+    places = view.pixels[np.argsort(view.ids)].reshape(ROWS - 1, COLUMNS - 1, 2)
+    along_mm = np.linalg.norm(places[:, -1] - places[:, 0], axis=1) / DOTS_PER_MM
+    assert along_mm == pytest.approx(1e3 * SQUARE_M * (COLUMNS - 2), abs=0.2)
 
 
 @pytest.mark.slow

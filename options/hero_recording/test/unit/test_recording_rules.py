@@ -85,7 +85,7 @@ def test_the_delay_of_a_motion_counts_from_the_first_command_at_rest():
         for command in commands:
             robot.commands.add(*command)
         assert analysis.compute_motion_delays(robot) == pytest.approx(expected_s, abs=PERIOD_S)
-    jerked = turn_wheels(5.001, moves=False, moved=4.0)
+    jerked = turn_wheels(5.001, moves=False, moved=2.0)
     jerked.commands.add(5.0, 0.1, 0.0)
     assert analysis.compute_motion_delays(jerked) == pytest.approx([0.032]), "moved in its first reading, then no more"
     jerked.encoder = RobotObservations().encoder
@@ -356,6 +356,7 @@ def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
     recording.run("--min-free-mb", "1.024")
     assert ("--min-space", "100k") in list(zip(recording.commands[1], recording.commands[1][1:]))
     assert "--lz4" in recording.commands[1] and "--max-splits" not in recording.commands[1]
+    assert record.parse_options(["--repair", "a.bag.active", "b.bag.active"]).repair == ["a.bag.active", "b.bag.active"]
     assert record.format_size(999_900_000) == "999.9 MB" and record.format_size(1e9) == "1.0 GB"
 
 
