@@ -1,4 +1,4 @@
-"""Twenty good robots at stock rates beside one misbehaving peer at a time: the robots lose nothing."""
+"""Good robots at stock rates beside one misbehaving peer at a time: the robots lose nothing."""
 
 import sys
 import time
@@ -21,7 +21,8 @@ from hero_test import stock_messages
 from hero_test.fake_robot import FakeRobot
 from hero_test.waiting import wait_for
 
-GOOD_ROBOTS = 20
+GOOD_ROBOTS = 8, 20
+"""In the short form and in the long one."""
 REGISTRATIONS_S = 600.0
 """A ROS master that hardly gets to run has hundreds of topics of a misbehaving peer to take down."""
 
@@ -47,9 +48,10 @@ BAD_PEERS = {
 
 
 class Scene:
-    """A driver, twenty good robots, a listener to all of them, a commander and bad peers, each a process of its own."""
+    """A driver, good robots, a listener to all of them, a commander and bad peers, each a process of its own."""
 
-    def __init__(self, driver, peers, listener, swarm, commander):
+    def __init__(self, count, driver, peers, listener, swarm, commander):
+        self.count = count
         self.driver = driver
         self.peers = peers
         self.listener = listener
@@ -60,7 +62,7 @@ class Scene:
 
     def hear(self, seconds):
         """Return when the good robots have been heard for about so long since the last window."""
-        count = int(seconds * 2 * GOOD_ROBOTS / emulated_swarm.BURST_PERIOD_S)
+        count = int(seconds * 2 * self.count / emulated_swarm.BURST_PERIOD_S)
         wait_for(lambda: self.listener.ask("count") >= count, "%d messages" % count)
 
     def end_window(self):
@@ -71,10 +73,11 @@ class Scene:
 
 
 @pytest.fixture(scope="module")
-def scene(master):
+def scene(master, effort):
     from hero_test.driver_case import DriverProcess
 
-    robots = ["--count", str(GOOD_ROBOTS)]
+    count = effort.choose(*GOOD_ROBOTS)
+    robots = ["--count", str(count)]
     with DriverProcess({"grace_s": 1.0}, name="isolating_driver") as driver:
         port = str(driver.address[1])
         path = {"PYTHONPATH": ":".join(sys.path)}
@@ -82,7 +85,7 @@ def scene(master):
             "listener.py", *robots
         ) as listener, Program(sys.executable, str(BENCH / "ros_load.py"), "command", *robots) as commander:
             listener.read()
-            wait_until_commanded(GOOD_ROBOTS)
+            wait_until_commanded(count)
             with Program(
                 sys.executable,
                 str(BENCH / "emulated_swarm.py"),
@@ -92,10 +95,10 @@ def scene(master):
                 "100000",
                 *robots,
             ) as swarm:
-                started = Scene(driver, peers, listener, swarm, commander)
+                started = Scene(count, driver, peers, listener, swarm, commander)
                 wait_for(lambda: not listener.ask("silent"), "all robots at the listener")
                 wait_for(
-                    lambda: count_robots_names(driver) == EMULATED_NAMES * GOOD_ROBOTS,
+                    lambda: count_robots_names(driver) == EMULATED_NAMES * count,
                     "all topics of all robots",
                 )
                 yield started
@@ -152,7 +155,7 @@ def test_a_misbehaving_peer_costs_other_robots_no_message(scene, effort, record,
     if effort.is_long:
         lost += f"; p99 {window['p99_ms']:.1f} ms, without it {scene.quiet_p99_ms:.1f} ms"
         lost += f"; a new robot joined in {joined_s:.1f} s; at worst {worst}; after it {growth}"
-    record("one of 21 peers " + BAD_PEERS[kind], 1, 1, lost)
+    record("one of %d peers %s" % (scene.count + 1, BAD_PEERS[kind]), 1, 1, lost)
 
 
 def test_all_robots_stayed_and_every_transform_arrived(scene, record):
@@ -166,9 +169,10 @@ def test_all_robots_stayed_and_every_transform_arrived(scene, record):
     received = {stamp_s for stamp_s, _ in sent["commands_s"]}
     missing = [stamp_s for stamp_s in commanded if stamp_s not in received]
     record(
-        "all of the above: 20 robots stayed, %d transforms and %d commands" % (sent["transforms"], len(commanded)),
-        GOOD_ROBOTS,
-        GOOD_ROBOTS - sent["thrown_out"],
+        "all of the above: %d robots stayed, %d transforms and %d commands"
+        % (scene.count, sent["transforms"], len(commanded)),
+        scene.count,
+        scene.count - sent["thrown_out"],
         "%d transforms, %d commands whose place a newer one took"
         % (sent["transforms"] - scene.transforms, len(missing)),
     )
