@@ -113,14 +113,15 @@ def sense_binary(poses: np.ndarray, sensor: Binary, random: Optional[Any] = None
         # The tangents to a body span an angle whose sine is its radius over the distance of its center.
         if sensor.half_angle_rad == 0.0:
             touched = (np.abs(left_m) < BODY_RADIUS_M) & (ahead_m > 0.0)
-            depth_m = np.sqrt(np.maximum(BODY_RADIUS_M * BODY_RADIUS_M - left_m * left_m, 0.0))
-            gap_m = ahead_m - depth_m
         else:
-            distance_m = np.sqrt(square_m2)
-            spread_rad = np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(distance_m, 1e-9), 1.0))
+            spread_rad = np.arcsin(np.minimum(BODY_RADIUS_M / np.maximum(np.sqrt(square_m2), 1e-9), 1.0))
             touched = np.abs(np.arctan2(left_m, ahead_m)) < sensor.half_angle_rad + spread_rad
-            gap_m = distance_m - BODY_RADIUS_M
-        touched &= gap_m <= sensor.range_m
+        if sensor.range_m < math.inf:  # most sensors have no limit, and all pairs of robots are computed
+            if sensor.half_angle_rad == 0.0:
+                gap_m = ahead_m - np.sqrt(np.maximum(BODY_RADIUS_M * BODY_RADIUS_M - left_m * left_m, 0.0))
+            else:
+                gap_m = np.sqrt(square_m2) - BODY_RADIUS_M
+            touched &= gap_m <= sensor.range_m
         touched |= square_m2 <= BODY_RADIUS_M * BODY_RADIUS_M
     robots = poses.shape[1]
     touched[:, np.arange(robots), np.arange(robots)] = False

@@ -164,7 +164,7 @@ class Contacts:
             ground_m, self._separations_m, _MARGIN_M, begun, self._reach_m, self._gap_m, self._ends, self._numbers,
             self._contacts, self._bodies, self._obstacles, members, *self._spare,
         ):  # fmt: skip
-            self._make_room(self._contacts.shape[2])
+            self._make_room(self._contacts.shape[2] + 1)
 
     def _move_together(self, ground_m: np.ndarray) -> None:
         """Do what move_worlds() does, with arrays over the robots of all worlds."""

@@ -39,24 +39,30 @@ def scatter(
     half_m = np.array((width_m, height_m)) / 2.0 - BODY_RADIUS_M
     poses = np.empty((robots, 3))
     placed = 0
-    for _ in range(_MAX_TRIES):
-        if placed == robots:
-            return poses
-        x_share, y_share, turn = 2.0 * random.random_sample(3) - 1.0
-        place_m = half_m * (x_share, y_share)
-        apart_m2 = ((poses[:placed, :2] - place_m) ** 2).sum(axis=1).min(initial=np.inf)
-        if apart_m2 > (2.0 * BODY_RADIUS_M + gap_m) ** 2 and is_clear(place_m, arena):
-            poses[placed] = (*place_m, math.pi * turn)
-            placed += 1
+    for _ in range(0, _MAX_TRIES, robots):
+        shares = 2.0 * random.random_sample((robots, 3)) - 1.0
+        places_m = half_m * shares[:, :2]
+        clear = is_clear(places_m, arena)
+        for place_m, turn in zip(places_m[clear], shares[clear, 2]):
+            if ((poses[:placed, :2] - place_m) ** 2).sum(axis=1).min(initial=np.inf) > (
+                2.0 * BODY_RADIUS_M + gap_m
+            ) ** 2:
+                poses[placed] = (*place_m, math.pi * turn)
+                placed += 1
+                if placed == robots:
+                    return poses
     raise ValueError("%d robots find no place in %g m x %g m of arena %s" % (robots, width_m, height_m, arena.name))
 
 
-def is_clear(place_m: np.ndarray, arena: Arena, overlap_m: float = _ROUNDED_M) -> bool:
-    """Return whether a robot at place_m (2,) is inside the arena's bounds and clear of all that it holds."""
+def is_clear(places_m: np.ndarray, arena: Arena, overlap_m: float = _ROUNDED_M) -> np.ndarray:
+    """Return whether a robot at each of places_m (P, 2) is inside the arena's bounds and clear of all that it holds."""
     low_m, high_m = arena.bounds_m[:2] - _ROUNDED_M, arena.bounds_m[2:] + _ROUNDED_M
-    inside = (place_m >= low_m).all() and (place_m <= high_m).all()
-    pose = Pose(float(place_m[0]), float(place_m[1]), 0.0)
-    return bool(inside and is_free(pose, (), arena, BODY_RADIUS_M - overlap_m))
+    radius_m = BODY_RADIUS_M - overlap_m
+    clear: np.ndarray = ((places_m >= low_m) & (places_m <= high_m)).all(axis=1)
+    clear &= measure_clearance(places_m, arena) >= radius_m
+    if arena.objects:
+        clear[clear] = [is_free(Pose(*place_m, 0.0), (), arena, radius_m) for place_m in places_m[clear].tolist()]
+    return clear
 
 
 def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedBody]:

@@ -69,7 +69,7 @@ def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:
 def _check_clear(poses: np.ndarray, arena: Arena, names: Sequence[str]) -> None:
     """Raises: ValueError for a robot in a wall, in an object, or outside of the arena."""
     for (x_m, y_m), name in zip(poses[:, :2], names):
-        if not is_clear(np.array((x_m, y_m)), arena, _MAX_OVERLAP_M):
+        if not is_clear(np.array([(x_m, y_m)]), arena, _MAX_OVERLAP_M)[0]:
             text = "%s at (%.3g, %.3g) is in a wall or an object of arena %s, or outside of it"
             raise ValueError(text % (name, x_m, y_m, arena.name))
 
