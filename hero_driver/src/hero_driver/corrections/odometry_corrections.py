@@ -82,7 +82,7 @@ class OdometryCorrector:
 
     def expect_readings(self) -> None:
         """The robot has declared its encoder."""
-        self._readings = self._readings or 0
+        self._readings = 0
 
     def receive_odometry(self, name: str, sink: Sink, payload: bytes, stamp_ns: int, arrival_ns: int) -> None:
         """Take the robot's own odometry, which begins with a header of this stamp; sink takes the corrected one."""
@@ -110,12 +110,12 @@ class OdometryCorrector:
         else:
             self._refuse("tf", "")
 
-    def receive_encoder(self, payload: bytes, arrival_ns: int) -> bool:
-        """Take a reading of the encoder; return whether it is one."""
+    def receive_encoder(self, payload: bytes, arrival_ns: int) -> Optional[int]:
+        """Take a reading of the encoder; return its stamp (ns), None if it is none."""
         reading = message_layouts.read_encoder(payload)
         if reading is None:
             self._refuse("encoder", f"{len(payload)} bytes")
-            return False
+            return None
         stamp_ns, left_ticks, right_ticks = reading
         self.wheels.read_ticks(left_ticks, right_ticks)
         self._encoder_stamp_ns = stamp_ns
@@ -131,7 +131,7 @@ class OdometryCorrector:
             self._packed_pose = self._pack_pose()
         if self._waiting:
             self._release()
-        return True
+        return stamp_ns
 
     def _release(self) -> None:
         waiting, self._waiting = self._waiting, []

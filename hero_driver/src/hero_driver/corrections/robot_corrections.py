@@ -80,8 +80,8 @@ class RobotCorrections:
 
     def note_encoder(self, md5sum: str) -> None:
         """The robot declares an Encoder message of this md5, which tells its model."""
-        if self.models.note_encoder(md5sum):
-            self.odometry.ticks.change_wheels(self.models.find_geometry())
+        self.models.note_encoder(md5sum)
+        self.odometry.ticks.change_wheels(self.models.find_geometry())
 
     def list_outputs(self, name: str, message_type: str) -> Sequence[TypedTopic]:
         """Return the topics that the messages of the topic called name become; none for TRANSFORMS."""
@@ -107,6 +107,9 @@ class RobotCorrections:
         if stamp_ns is None:
             self._refuse(name[len(self._namespace) + 1 :], f"{len(payload)} bytes")
             return
+        self._restamp(name, sink, payload, stamp_ns, arrival_ns)
+
+    def _restamp(self, name: str, sink: Sink, payload: bytes, stamp_ns: int, arrival_ns: int) -> None:
         stamp_ns = self.stamps.correct(name, stamp_ns, arrival_ns)
         sink.publish(message_layouts.restamp(payload, self.stamps.count(name), stamp_ns))
 
@@ -145,8 +148,9 @@ class RobotCorrections:
         self.odometry.receive_odometry(name, sink, payload, stamp_ns, arrival_ns)
 
     def _correct_encoder(self, name: str, sink: Sink, payload: bytes, arrival_ns: int) -> None:
-        if self.odometry.receive_encoder(payload, arrival_ns) and sink.is_wanted:
-            self._correct_stamped(name, sink, payload, arrival_ns)
+        stamp_ns = self.odometry.receive_encoder(payload, arrival_ns)
+        if stamp_ns is not None and sink.is_wanted:
+            self._restamp(name, sink, payload, stamp_ns, arrival_ns)
 
 
 class Route(NamedTuple):

@@ -30,12 +30,11 @@ class ModelWatch:
         """A new connection begins."""
         self._is_declared = self._has_distance = False
 
-    def note_encoder(self, md5sum: str) -> bool:
-        """The robot declares an Encoder message of this md5; return whether its model is another one now."""
-        before, self.model = self.model, HERO_PLUS if md5sum == PLUS_ENCODER_MD5 else STOCK
+    def note_encoder(self, md5sum: str) -> None:
+        """The robot declares an Encoder message of this md5."""
+        self.model = HERO_PLUS if md5sum == PLUS_ENCODER_MD5 else STOCK
         self._former = [*self._former[-1:], self.model]
         self._is_declared = True
-        return self.model != before
 
     def find_geometry(self) -> WheelGeometry:
         """Return the robot's wheels."""

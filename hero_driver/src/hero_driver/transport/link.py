@@ -154,16 +154,15 @@ class Link:
         self.received_length += len(data)
         return data
 
-    def flush(self) -> bool:
-        """Write what is left over; return whether nothing is left."""
+    def flush(self) -> None:
+        """Write what is left over, as far as the socket takes it."""
         while self._unsent:
             remainder = self._write(self._unsent[0])
             self._unsent_length -= len(self._unsent[0]) - len(remainder)
             if remainder:
                 self._unsent[0] = remainder
-                return False
+                return
             self._unsent.popleft()
-        return True
 
     def discard(self) -> None:
         """Close the socket itself; only the loop calls this."""
