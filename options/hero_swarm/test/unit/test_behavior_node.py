@@ -132,6 +132,20 @@ def test_walls_are_followed_live_with_their_metric(stage, given):
     assert text.text == f"wall_following {stage.sent['~metric'][-1].data:.2f}"
 
 
+def test_a_controller_senses_the_floor_of_the_arena_that_it_names(stage, tmp_path):
+    (tmp_path / "arena.yaml").write_text(
+        "bounds_m: [-2, -2, 2, 2]\nareas: [{name: all, rectangle_m: [-2, -2, 2, 2], color: 0}]\n"
+    )
+    path = tmp_path / "a.controller"
+    path.write_text(
+        "arena: arena.yaml\nstates:\n- {name: a, do: stop, next: [{to: b, when: black floor, probability: 1}]}\n"
+        "- {name: b, do: stop}\n"
+    )
+    stage.start(str(path))
+    stage.run(0.5)
+    assert stage.node.control.memory[0].tolist() == [1] * 6 and not stage.warnings
+
+
 def test_a_robot_whose_pose_is_old_stops_alone_and_is_named(stage):
     stage.start("wheel_genome")
     stage.run(4.0)

@@ -168,7 +168,7 @@ class BehaviorNode:
 
 
 PARAMETERS = {
-    "behavior": string("aggregation", "a built-in behavior, FILE.py, or FILE.py:Class"),
+    "behavior": string("aggregation", "a built-in behavior, FILE.py, FILE.py:Class, or FILE.controller"),
     "parameters": {},
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),

@@ -159,6 +159,16 @@ def test_a_trial_is_filtered_between_decisions_and_counts_limits(tmp_path):
     assert trial.safety.calls == trial.safety.limited_calls == 241, "the last one, at 12 s, for the metrics alone"
 
 
+def test_metrics_of_a_trial_keep_what_they_count(tmp_path):
+    file = tmp_path / "count.py"
+    file.write_text(
+        "import numpy as np\n\n\ndef seconds(state):\n    state.kept['seconds'] = state.kept.get('seconds', 0) + 1\n"
+        "    return np.full(len(state.poses), state.kept['seconds'])\n"
+    )
+    trial, _, _ = drive(FILE.split("metrics")[0].replace("12", "3") + f"metrics: ['{file}:seconds']\n")
+    assert trial.list_values() == (4.0,), "at 0, 1, 2 and 3 s"
+
+
 def test_what_a_behavior_raises_in_a_trial_is_one_line_with_its_place(tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(
