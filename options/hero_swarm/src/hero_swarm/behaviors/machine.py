@@ -12,11 +12,10 @@ from .clearance import keep_clear
 
 EXPLORATION, STOP = map(list(DO).index, ("exploration", "stop"))
 FIXED, COUNT, INVERTED = map(list(WHEN).index, ("fixed probability", "neighbor count", "inverted neighbor count"))
+# Of the behaviors in DO: to the light, and to neighbors.
 LIGHT, NEAR = np.array([[0.0, 0.0, 1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0, -1.0]])
-"""Directions of the behaviors in DO: to the light, and to neighbors."""
 
-BLACK, WHITE = 0.25, 0.75
-"""The floor is black below, white above, and gray between."""
+BLACK, WHITE = 0.25, 0.75  # the floor is gray between
 
 _COLORS = np.array([(0, 0, 1), (1, 0, 0), (0, 1, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1)], dtype=float)
 

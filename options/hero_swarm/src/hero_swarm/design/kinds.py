@@ -131,6 +131,7 @@ def plan_numbers(mission: Mission) -> Kind:
         return kind(**decode(genomes[0]))
 
     def dump(genome: np.ndarray, arena: str, remark: str) -> bytes:
-        return replace_values(remark, {"arena": arena, "behavior": cell.behavior, "numbers": decode(genome)}).encode()
+        name = cell.behavior if experiment.locate(cell.behavior) == cell.behavior else f"../{cell.behavior}"
+        return replace_values(remark, {"arena": arena, "behavior": name, "numbers": decode(genome)}).encode()
 
     return Kind(genes, make, dump, is_stacked=False)

@@ -78,9 +78,8 @@ def design(options: Any, mission: Mission, kind: Kind, stem: str, workers: Any) 
     number, own = int(stem.rpartition("_")[2]), {"": repr(mission.content).encode()}
     code = hash_code({**own, **experiment.sources.list_contents(folder, ())})
     about = "%s with %d runs, seed %d, code %s" % (options.method, options.budget, options.seed, code)
-    arena = experiment.cells[0].settings.get("arena", "")
-    if os.path.isfile(os.path.join(folder, arena)):
-        arena = os.path.relpath(os.path.join(folder, arena), os.path.dirname(stem))
+    arena = experiment.cells[0].settings.get("arena", "empty")
+    arena = os.path.join("..", arena) if os.path.isfile(os.path.join(folder, arena)) else arena
     try:
         with hold_file(path):
             if options.fresh:
@@ -91,12 +90,13 @@ def design(options: Any, mission: Mission, kind: Kind, stem: str, workers: Any) 
                 found = METHODS[options.method][1](evaluate, kind.genes, options.budget, random)
     except BlockingIOError:
         raise ExperimentError(f"{path}: another program adds to it: wait for its end") from None
-    for old in glob.glob(stem + "_*"):
+    for old in glob.glob(f"{stem}_[1-{FINALISTS}]{kind.ending}") if options.fresh else ():
         os.remove(old)
     for rank, genome in enumerate(found[:FINALISTS], 1):
         file = f"{stem}_{rank}{kind.ending}"
-        write_file(file, kind.dump(genome, arena, f"# Designed by {about}\n"))
-        draw(file)
+        if not os.path.exists(file):  # it may have been edited
+            write_file(file, kind.dump(genome, arena, f"# Designed by {about}\n"))
+            draw(file)
 
 
 def compare(options: Any, mission: Mission, folder: str, finalists: Sequence[str]) -> str:

@@ -34,9 +34,11 @@ class Controller(NamedTuple):
 
 def read_controller(path: str, content: bytes) -> Controller:
     """Return what a file holds. Raises: EntryError with path and line. YamlError."""
-    given = read_entries(decode_text(content), path, _EXAMPLE).mapping(("arena", *Controller._fields, "tree"))
-    if sum(name in given for name in ("states", "tree", "behavior")) != 1:
+    root = read_entries(decode_text(content), path, _EXAMPLE)
+    kinds = [kind for kind in ("states", "tree", "behavior") if kind in root.mapping()]
+    if len(kinds) != 1:
         raise EntryError(f"{path}: needs states, a tree or a behavior, such as {_EXAMPLE}")
+    given = root.mapping(("arena", *kinds, *(["numbers"] if kinds == ["behavior"] else [])))
     arena = given["arena"].text() if "arena" in given else ""
     arena = arena if not arena or arena in SHIPPED else os.path.join(os.path.dirname(path), arena)
     if "behavior" in given:

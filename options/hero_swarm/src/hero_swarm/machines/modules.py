@@ -21,11 +21,9 @@ WHEN: Kinds = {**dict.fromkeys(_SHARES, ("probability",)), **dict.fromkeys(_COUN
 WHOLE_LIMITS = {"turn_steps": (1, 100), "neighbors": (0, 10)}
 LIMITS = {"gain": (1.0, 5.0), "probability": (0.0, 1.0), "steepness": (0.0, 20.0), **WHOLE_LIMITS}
 
-MAX_NEXT = 4
-"""Transitions of a state, and children of a tree."""
+MAX_NEXT = 4  # transitions of a state, and children of a tree
 
-State = Dict[str, Any]
-"""{name, do, numbers, next: [{to, when, numbers}]}"""
+State = Dict[str, Any]  # {name, do, numbers, next: [{to, when, numbers}]}
 
 
 def stack(machines: Sequence[List[State]]) -> Dict[str, np.ndarray]:

@@ -122,6 +122,10 @@ def test_a_mission_becomes_controllers_that_are_compared(path, capsys, monkeypat
         Path("own.controller").write_text(text)  # a baseline that was edited is run again, by itself
         program.compare(program.parse_options(options), mission, "m_chocolate", [best])
         assert "own.controller" in Path("m_chocolate_simulated/runs.csv").read_text()
+    Path("robots.errors").write_text("friction=0\n")
+    program.compare(program.parse_options([*options, "--errors", "robots.errors"]), mission, "m_chocolate", [best])
+    text = Path("m_chocolate_pseudo_reality.yaml").read_text()
+    assert "errors: robots.errors" in text and "wifi: router" in text and "world" not in text
 
 
 def test_a_killed_design_goes_on_to_the_same_bytes(path, light, capsys):
@@ -144,6 +148,27 @@ def test_a_killed_design_goes_on_to_the_same_bytes(path, light, capsys):
         program.main(options)
         assert read_all("m_chocolate") == whole
     capsys.readouterr()
+
+
+def test_a_controller_that_was_edited_stays_until_fresh(path, light):
+    options, file = ["m.yaml", "--budget", "200"], Path("m_chocolate/design_1_1.controller")
+    program.main(options)
+    designed = file.read_text()
+    file.write_text("states: [{name: rest, do: stop}]\n")
+    program.main(options)
+    assert file.read_text() == "states: [{name: rest, do: stop}]\n"
+    program.main([*options, "--fresh"])
+    assert file.read_text() == designed
+
+
+def test_a_behavior_of_a_file_is_found_from_the_folder_of_designs(path, light):
+    pytest.importorskip("cmaes")
+    own = "class Own(Dispersion):\n    pass\n"
+    Path("own.py").write_text("from hero_swarm.behaviors.spacing import Dispersion\n\n\n" + own)
+    path.write_text(MISSION.replace("arena: arena.yaml\n", "") + "behavior: own.py:Own\n")
+    program.main(["m.yaml", "--method", "cma", "--budget", "250"])
+    behavior = find_behavior("m_cma/design_1_1.controller")
+    assert behavior.__name__ == "Own" and behavior.arena == "empty" and behavior.spacing_m != 0.5
 
 
 def test_parts_share_out_the_designs(path, light, capsys):
@@ -225,6 +250,7 @@ def test_cma_designs_the_numbers_of_a_behavior(path, light, monkeypatch):
     pytest.importorskip("cmaes")
     program.main(["m.yaml", "--method", "cma", "--budget", "400"])
     behavior = find_behavior("m_cma/design_1_1.controller")()
+    assert behavior.arena == "m_cma/../arena.yaml"
     assert behavior.spacing_m < 0.2 and behavior.near.range_m != 1.0, "a falling metric is made small"
 
 
