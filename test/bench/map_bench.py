@@ -23,8 +23,7 @@ from hero_client.controllers import AvoidanceLaw, WanderLaw
 from hero_examples.explore import Explorer, explore_together
 from hero_examples.random_walk import Walker
 from hero_examples.swarm_go_to import STEP_HZ, Formation
-from hero_localization.mapping.occupancy_grid import OccupancyGrid
-from hero_localization.mapping.swarm_map import SwarmMap
+from hero_localization.mapping.occupancy_grid import OccupancyGrid, SwarmMap
 from hero_localization.stepped_localization import StepLocalization
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena

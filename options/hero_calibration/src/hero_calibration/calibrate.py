@@ -14,10 +14,8 @@ from hero_node.ros import Program
 
 from .calibration import DEFAULT_PARTS, ENDED, INFRARED, PARTS, WHEELS, calibrate_parts
 from .errors import CalibrationError, EndedError
-from .procedures.restore import load_calibrations, restore
 from .robots.ros_probe import RosSession, find_robots
-from .status import describe_status, find_missing
-from .store import make_folder
+from .store import describe_status, find_missing, load_calibrations, make_folder, restore
 
 RESTORE, STATUS = "restore", "status"
 

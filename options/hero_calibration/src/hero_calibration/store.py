@@ -1,12 +1,19 @@
-"""Keeps the calibration of a robot in a YAML file, from which it can be restored. Pure but for the files."""
+"""Calibrations of robots in YAML files: kept, rated, listed, and written into the robots again. Knows no ROS."""
 
+import math
 import os
 from contextlib import suppress
+from statistics import median
+from typing import Dict, List, NamedTuple, Optional, Sequence
 
+from hero_node import say
 from hero_node.files import (
     PREVIOUS,
+    SETTINGS,
     CalibrationFileError,
+    Calibrations,
     KeptCalibration,
+    list_files,
     lock_file,
     read_calibration,
     read_text,
@@ -15,6 +22,19 @@ from hero_node.files import (
 )
 
 from .errors import CalibrationError
+from .robots.probe import Probe
+from .robots.session import Session
+
+KEYS = {
+    "motors": "motor_centers_us",
+    "velocity": "velocity_gains",
+    "infrared": "infrared_counts_m2",
+    "wheels": "wheels_m",
+}
+"""Parts of a calibration, each with the key that a file holds after it."""
+
+WORSE = 2.0
+"""A result that exceeds the median of all robots by this factor is worse than the rest."""
 
 
 def name_file(folder: str, robot_id: int) -> str:
@@ -51,3 +71,86 @@ def save(path: str, calibration: KeptCalibration) -> None:
             write_file(path, replace_values(text, content).encode())
     except OSError as error:
         raise CalibrationError(f"{path} cannot be written: {error.strerror}") from error
+
+
+class Quality(NamedTuple):
+    """Errors that are left: of velocity, as a share; of ranges, m. None where they are not known."""
+
+    velocity: Optional[float]
+    range_m: Optional[float]
+
+
+def rate(kept: KeptCalibration) -> Quality:
+    """Return how good a calibration is."""
+    velocity = kept.values.get("velocity_errors", [math.nan, math.nan])[1]
+    ranges = [abs(error_m) for error_m in kept.values.get("range_errors_after_m", []) if not math.isnan(error_m)]
+    return Quality(None if math.isnan(velocity) else velocity, max(ranges, default=None))
+
+
+def find_missing(found: Dict[str, KeptCalibration], robot_ids: Sequence[int], parts: Sequence[str]) -> List[int]:
+    """Return the robots that lack a part."""
+    kept = {number: found.get("hero_%d" % number) for number in robot_ids}
+    return [
+        number for number, one in kept.items() if one is None or any(KEYS[part] not in one.values for part in parts)
+    ]
+
+
+def describe_status(calibrations: Calibrations) -> List[str]:
+    """Return a table of all robots with a file, and a line for each file that cannot be used."""
+    found = sorted(calibrations.found.values(), key=lambda kept: kept.robot_id)
+    qualities = [rate(kept) for kept in found]
+    limits = [_find_limit([quality[index] for quality in qualities]) for index in range(len(Quality._fields))]
+    lines = ["%-10s %-20s %-34s %-9s %s" % ("ROBOT", "DATE", "PARTS", "VELOCITY", "RANGE")]
+    for kept, quality in zip(found, qualities):
+        parts = ", ".join(part for part, key in KEYS.items() if key in kept.values) or "none"
+        velocity = "-" if quality.velocity is None else f"{100 * quality.velocity:.1f} %"
+        range_text = "-" if quality.range_m is None else f"{1000 * quality.range_m:.0f} mm"
+        is_worse = any(value is not None and value > limit for value, limit in zip(quality, limits))
+        line = "%-10s %-20s %-34s %-9s %-6s" % ("hero_%d" % kept.robot_id, kept.date, parts, velocity, range_text)
+        lines.append((line + (" worse than the rest" if is_worse else "")).rstrip())
+    return lines + [f"{name}: {problem}" for name, problem in sorted(calibrations.problems.items())]
+
+
+def _find_limit(values: Sequence[Optional[float]]) -> float:
+    known = [value for value in values if value is not None]
+    return WORSE * median(known) if len(known) > 2 else math.inf
+
+
+def load_calibrations(
+    folder: str, files: Sequence[str], robot_ids: Optional[Sequence[int]]
+) -> Dict[int, KeptCalibration]:
+    """Return the calibrations of robots (None: all) in files (none: all of folder), by id.
+
+    Raises: CalibrationFileError for a wrong file. CalibrationError for two files of one robot, or none at all.
+    """
+    calibrations: Dict[int, KeptCalibration] = {}
+    for path in files or list_files(folder):
+        calibration = read_calibration(path)
+        if robot_ids is not None and calibration.robot_id not in robot_ids:
+            continue
+        if calibration.robot_id in calibrations:
+            raise CalibrationError("more than one file is for hero_%d; name only one of them" % calibration.robot_id)
+        calibrations[calibration.robot_id] = calibration
+    if not calibrations:
+        raise CalibrationError("no calibration of these robots in %s" % (", ".join(files) or folder))
+    return calibrations
+
+
+def restore(session: Session, calibrations: Dict[int, KeptCalibration]) -> int:
+    """Write calibrations into the robots of session; return the exit code."""
+    written: Dict[int, List[str]] = {probe.robot_id: [] for probe in session.probes}
+
+    def write(probe: Probe) -> None:
+        values = calibrations[probe.robot_id].values
+        for key in SETTINGS:
+            if key in values:
+                probe.write(key, values[key])
+                written[probe.robot_id].append(key)
+
+    session.for_each("restore", write)
+    for probe in session.probes:
+        keys = ", ".join(written[probe.robot_id]) or "nothing"
+        date = calibrations[probe.robot_id].date or "an unknown day"
+        failure = f"FAILED: {probe.failure}; " if probe.failure else ""
+        say(f"{probe.name}: {failure}restored {keys} of {date}")
+    return 1 if any(probe.failure for probe in session.probes) else 0

@@ -15,8 +15,8 @@ from hero_calibration.models.step_response import ANGULAR_RAD_S, STEP_M_S
 from hero_calibration.procedures.infrared import calibrate_infrared
 from hero_calibration.procedures.motors import MotorResult, calibrate_motors
 from hero_calibration.procedures.placement import place_robots
-from hero_calibration.procedures.restore import restore
 from hero_calibration.procedures.velocity import VelocityResult, calibrate_velocity
+from hero_calibration.store import restore
 from hero_client.values import BODY_RADIUS_M
 from hero_node.files import KeptCalibration, read_calibration
 from hero_sim.link.wifi import PROFILES, Radio

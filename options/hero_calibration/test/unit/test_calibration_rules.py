@@ -15,7 +15,7 @@ from hero_calibration.models import infrared_model as model
 from hero_calibration.models.encoder_readings import TICK_M, make_readings
 from hero_calibration.models.infrared_model import Facing
 from hero_calibration.models.step_response import DEFAULT_GAINS, NOMINAL_GAIN_M_S_US, Response, choose_gains, find_best
-from hero_calibration.procedures import restore, wheels
+from hero_calibration.procedures import wheels
 from hero_calibration.procedures.infrared import InfraredResult
 from hero_calibration.procedures.motors import MotorResult
 from hero_calibration.procedures.placement import place_robots
@@ -332,19 +332,19 @@ def test_kept_calibrations_are_restored_robot_by_robot(tmp_path, capsys):
     for number, gains in ((0, [1.0, 2.0, 0.1] * 2), (1, [3.0, 4.0, 0.1] * 2)):
         values = {"velocity_gains": gains, "wheels_m": [0.05, 0.05, 0.06]}
         store.save(store.name_file(str(tmp_path), number), KeptCalibration(number, "2026-01-01", values))
-    found = restore.load_calibrations(str(tmp_path), [], [1])
-    assert list(found) == [1] and list(restore.load_calibrations(str(tmp_path), [], None)) == [0, 1]
+    found = store.load_calibrations(str(tmp_path), [], [1])
+    assert list(found) == [1] and list(store.load_calibrations(str(tmp_path), [], None)) == [0, 1]
     session = FakeSession(2)
-    assert restore.restore(session, restore.load_calibrations(str(tmp_path), [], None)) == 0
+    assert store.restore(session, store.load_calibrations(str(tmp_path), [], None)) == 0
     assert session.probes[1].sent == [("velocity_gains", [3.0, 4.0, 0.1] * 2)], "what is measured only is not written"
     assert "hero_0: restored velocity_gains of 2026-01-01" in capsys.readouterr().out
     path = store.name_file(str(tmp_path), 0)
     with pytest.raises(CalibrationError, match="more than one file is for hero_0"):
-        restore.load_calibrations("", [path, path], None)
+        store.load_calibrations("", [path, path], None)
     with pytest.raises(CalibrationError, match="no calibration of these robots in %s" % tmp_path):
-        restore.load_calibrations(str(tmp_path), [], [7])
+        store.load_calibrations(str(tmp_path), [], [7])
     session.probes[0].write = lambda key, values: (_ for _ in ()).throw(CalibrationError("no answer"))
-    assert restore.restore(session, restore.load_calibrations(str(tmp_path), [], None)) == 1
+    assert store.restore(session, store.load_calibrations(str(tmp_path), [], None)) == 1
     assert "hero_0: FAILED: restore: no answer; restored nothing" in capsys.readouterr().out
 
 

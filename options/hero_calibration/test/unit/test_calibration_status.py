@@ -2,7 +2,7 @@
 
 import math
 
-from hero_calibration.status import describe_status, find_missing, rate
+from hero_calibration.store import describe_status, find_missing, rate
 from hero_node.files import Calibrations, KeptCalibration
 
 

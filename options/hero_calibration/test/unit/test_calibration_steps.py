@@ -228,21 +228,22 @@ def test_pulses_are_swept_up_and_down_at_their_times(monkeypatch):
 
 
 def test_a_robot_that_fails_while_gains_are_tried_is_left_with_the_best(monkeypatch):
-    session, rounds = FakeSession(2), []
+    session, rounds, results = FakeSession(2), [], {}
 
     def test(session):
         rounds.append(session.now_s)
         if len(rounds) == 4:
             session.probes[1].failure = "velocity: too few readings"
         error = 0.1 if len(rounds) == 2 else 0.3  # the first gains that are tried are the best
-        response = step_response.Response(error, 0.0, 0.5, ())
+        response = step_response.Response(error, 0.0, ())
         return {probe.robot_id: [response] * 2 for probe in session.active}
 
     monkeypatch.setattr(velocity, "_test", test)
-    assert list(velocity.calibrate_velocity(session, {})) == [0]
+    velocity.calibrate_velocity(session, {}, results)
     for probe in nonempty(session.probes):
         written = [command for command in probe.sent if command[0] == "velocity_gains"]
         assert len(written) > 3 and written[-1] == written[0] != written[1], probe.robot_id
+        assert results[probe.robot_id].to_file()["velocity_gains"] == written[-1][1], "what it holds is kept"
 
 
 def test_a_velocity_test_turns_to_each_side_for_its_time(monkeypatch):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_detectors import photograph
 
-from hero_localization.tracking.image_quality import ImageQuality
+from hero_localization.tracking.tracker import ImageQuality
 
 
 def list_texts(noise=0.0, **conditions):

@@ -10,20 +10,18 @@ cv2 = pytest.importorskip("cv2")
 
 from hero_localization.errors import SettingsError  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402 - without OpenCV there is no camera
-from hero_localization.simulated_camera.lab_setup import (  # noqa: E402
-    describe_references,
-    hang_above,
-    list_references,
-    write_camera_file,
-)
 from hero_localization.simulated_camera.renderer import CameraRenderer  # noqa: E402
-from hero_localization.simulated_camera.view import (  # noqa: E402
+from hero_localization.simulated_camera.view import (  # noqa: E402  # noqa: E402
     CameraOptions,
     PrintedTag,
+    describe_references,
+    hang_above,
     list_frames,
     list_rays,
+    list_references,
     plane_homography,
     tag_corners,
+    write_camera_file,
 )
 from hero_localization.tracking import settings as camera_file  # noqa: E402
 from hero_sim.world import build_default, load_arena  # noqa: E402

@@ -7,8 +7,7 @@ import pytest
 import yaml
 from PIL import Image
 
-from hero_localization.mapping.occupancy_grid import OccupancyGrid
-from hero_localization.mapping.swarm_map import SwarmMap
+from hero_localization.mapping.occupancy_grid import OccupancyGrid, SwarmMap
 from hero_localization.nodes.map_arena import save_map
 from hero_node import Pose
 from hero_sim.world import load_arena, measure_clearance

@@ -26,13 +26,12 @@ PAUSE_STEPS = 0.35
 class Readings(NamedTuple):
     """Readings of one robot in order.
 
-    Attributes:
-        times_s: ROS time; good to some hundredths of a second, and not strictly rising (N).
-        counts: number of each reading; numbers of lost readings are left out (N).
-        left_ticks, right_ticks: as the robot counts them (N).
-        step_s: time from one count to the next.
-        heard_s: time of arrival, in ROS time (N).
-        is_even: whether no pause separates a reading from the next (N - 1).
+    times_s: ROS time; good to some hundredths of a second, and not strictly rising (N).
+    counts: number of each reading; numbers of lost readings are left out (N).
+    left_ticks, right_ticks: as the robot counts them (N).
+    step_s: time from one count to the next.
+    heard_s: time of arrival, in ROS time (N).
+    is_even: whether no pause separates a reading from the next (N - 1).
     """
 
     times_s: np.ndarray

@@ -29,11 +29,10 @@ STALE_S = 3.0
 class Probe(ABC):
     """One robot. Times are those of the session's clock.
 
-    Attributes:
-        robot_id, name: 3, "hero_3".
-        model: as its driver reports it.
-        failure: why it takes no further part, as text; None while it does.
-        pose: the newest one by odometry.
+    robot_id, name: 3, "hero_3".
+    model: as its driver reports it.
+    failure: why it takes no further part, as text; None while it does.
+    pose: the newest one by odometry.
     """
 
     def __init__(self, robot_id: int, model: str = "hero") -> None:

@@ -61,12 +61,11 @@ class Frame(NamedTuple):
 class FrameSource:
     """Live images of a camera: only the newest is kept, and only images that are polled are decoded.
 
-    Attributes:
-        lens: the intrinsics in camera_info; None without it.
-        lens_problem: why they cannot be used; empty if they can, or there are none.
-        problem: why there are no usable images, for users; empty if there are.
-        warning: what may spoil images that come, for users; empty if nothing is known.
-        arrived_s: when the newest image came; before, when the source was opened.
+    lens: the intrinsics in camera_info; None without it.
+    lens_problem: why they cannot be used; empty if they can, or there are none.
+    problem: why there are no usable images, for users; empty if there are.
+    warning: what may spoil images that come, for users; empty if nothing is known.
+    arrived_s: when the newest image came; before, when the source was opened.
     """
 
     def __init__(self) -> None:

@@ -51,9 +51,8 @@ class Odometry(NamedTuple):
 class OdometryHistory:
     """Odometry increment of a robot.
 
-    Attributes:
-        jumps: how often the robot's odometry jumped, by a restart or because a program set it.
-        raw_pose: the newest reading itself, in hero_N/odom; None before the first.
+    jumps: how often the robot's odometry jumped, by a restart or because a program set it.
+    raw_pose: the newest reading itself, in hero_N/odom; None before the first.
     """
 
     def __init__(self) -> None:

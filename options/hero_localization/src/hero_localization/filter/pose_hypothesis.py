@@ -82,9 +82,8 @@ class _Step(NamedTuple):
 class Hypothesis:
     """Estimates of one robot, each from the one before by odometry and a measured pose.
 
-    Attributes:
-        support: number of measured poses that agree with it, less those that a caller counts against it.
-        first_s: stamp of the first of them.
+    support: number of measured poses that agree with it, less those that a caller counts against it.
+    first_s: stamp of the first of them.
     """
 
     def __init__(self, odometry: OdometryHistory, first: StampedPose) -> None:

@@ -5,12 +5,13 @@ most likely at the middle of the cone. Source: S. Thrun, W. Burgard, D. Fox, Pro
 """
 
 import math
-from typing import Sequence, Tuple
+from collections import deque
+from typing import Deque, Dict, Sequence, Tuple
 
 import numpy as np
 from scipy import ndimage
 
-from hero_client.values import BODY_RADIUS_M, MIN_RANGE_M
+from hero_client.values import BODY_RADIUS_M, MIN_RANGE_M, StampedHistory, interpolate_pose
 from hero_node import Pose
 
 BEAMS = 8
@@ -47,14 +48,17 @@ MIN_FRONTIER_CELLS = 5
 OTHERS_MARGIN_M = 0.03
 """Ranges that end this near another robot's body are that robot."""
 
+KEPT_S = 2.0
+MAX_WAITING = 20
+"""Scans of a robot that wait for its pose: four seconds of them."""
+
 
 class OccupancyGrid:
     """Log-odds of the cells of a rectangle, and what follows from them.
 
-    Attributes:
-        cell_m: side of a cell.
-        origin_m: x, y of the lower left corner of cell [0, 0].
-        log_odds: (rows, columns), row by y and column by x; 0: not known, positive: occupied.
+    cell_m: side of a cell.
+    origin_m: x, y of the lower left corner of cell [0, 0].
+    log_odds: (rows, columns), row by y and column by x; 0: not known, positive: occupied.
     """
 
     def __init__(self, bounds_m: Tuple[float, float, float, float], cell_m: float = 0.01) -> None:
@@ -187,3 +191,41 @@ def _widen(cells: np.ndarray) -> np.ndarray:
     wide[:, 1:] |= rows[:, :-1]
     wide[:, :-1] |= rows[:, 1:]
     return wide
+
+
+class _Robot:
+    """One robot's poses, and its scans for which no pose has come yet."""
+
+    def __init__(self) -> None:
+        self.poses: StampedHistory[Pose] = StampedHistory(KEPT_S, interpolate_pose)
+        self.scans: Deque[Tuple[float, Sequence[float]]] = deque(maxlen=MAX_WAITING)
+
+
+class SwarmMap:
+    """The grid, and what waits to be put into it."""
+
+    def __init__(self, grid: OccupancyGrid) -> None:
+        self.grid = grid
+        self._robots: Dict[int, _Robot] = {}
+
+    def add_pose(self, robot_id: int, stamp_s: float, pose: Pose) -> None:
+        """Take a robot's pose in map."""
+        self._robots.setdefault(robot_id, _Robot()).poses.add(stamp_s, pose)
+
+    def add_ranges(self, robot_id: int, stamp_s: float, ranges_m: Sequence[float]) -> None:
+        """Take a robot's ranges: see OccupancyGrid.add_scan()."""
+        self._robots.setdefault(robot_id, _Robot()).scans.append((stamp_s, ranges_m))
+
+    def update(self) -> int:
+        """Put the scans into the grid whose poses are known by now; return how many."""
+        count = 0
+        for robot in self._robots.values():
+            while robot.scans and robot.scans[0][0] <= robot.poses.newest_s:
+                stamp_s, ranges_m = robot.scans.popleft()
+                pose = robot.poses.find(stamp_s)
+                if pose is not None:
+                    others = [other.poses.find(stamp_s) for other in self._robots.values() if other is not robot]
+                    places_m = np.array([other[:2] for other in others if other is not None]).reshape(-1, 2)
+                    self.grid.add_scan(pose, ranges_m, places_m)
+                    count += 1
+        return count

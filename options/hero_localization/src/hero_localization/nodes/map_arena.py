@@ -30,8 +30,7 @@ from hero_node import Pose
 from hero_node.files import replace_file, write_file
 from hero_node.parameters import number, string
 
-from ..mapping.occupancy_grid import BEAMS, OccupancyGrid
-from ..mapping.swarm_map import SwarmMap
+from ..mapping.occupancy_grid import BEAMS, OccupancyGrid, SwarmMap
 
 STEP_HZ = 10.0
 PUBLISH_STEPS = 10

@@ -23,9 +23,17 @@ from hero_sim.world import Arena, build_default, load_arena
 
 from ..errors import SettingsError
 from ..prints.tag_images import FAMILIES
-from .lab_setup import describe_references, find_first_reference, hang_above, list_references, write_camera_file
 from .renderer import CameraRenderer
-from .view import CameraOptions, PrintedTag, list_frames
+from .view import (
+    CameraOptions,
+    PrintedTag,
+    describe_references,
+    find_first_reference,
+    hang_above,
+    list_frames,
+    list_references,
+    write_camera_file,
+)
 
 PROGRAM = "simulated_camera"
 NODE = "camera"

@@ -33,10 +33,9 @@ _SHIFT = 4
 class _Plate(NamedTuple):
     """A flat image with a tag in its middle.
 
-    Attributes:
-        texture: shade times cover, and cover (0 to 1) of each texel, (T, T, 2), single precision.
-        to_texel: turns a place on the robot (x, y, 1; m) into a texel, (3, 3).
-        reach_m: how far from the tag's center the image reaches.
+    texture: shade times cover, and cover (0 to 1) of each texel, (T, T, 2), single precision.
+    to_texel: turns a place on the robot (x, y, 1; m) into a texel, (3, 3).
+    reach_m: how far from the tag's center the image reaches.
     """
 
     tag: PrintedTag
@@ -176,10 +175,9 @@ class CameraRenderer:
     ) -> np.ndarray:
         """Return the next frame (H, W), gray, 8 bit.
 
-        Args:
-            poses: true poses (N, 3) at the middle of the exposure.
-            speeds: linear (m/s) and angular speed (rad/s), (N, 2); None: all stand.
-            hand_m: a hand reaches into the image, over this place.
+        poses: true poses (N, 3) at the middle of the exposure.
+        speeds: linear (m/s) and angular speed (rad/s), (N, 2); None: all stand.
+        hand_m: a hand reaches into the image, over this place.
         """
         poses = np.asarray(poses, dtype=float).reshape(-1, 3)
         moving = np.zeros((len(poses), 2)) if speeds is None else np.asarray(speeds, dtype=float)

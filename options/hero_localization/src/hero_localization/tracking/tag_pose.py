@@ -54,14 +54,13 @@ class TagCorners(NamedTuple):
 class TagLayout(NamedTuple):
     """Meaning of each tag. An id is looked up among references, objects, robots, in this order.
 
-    Attributes:
-        tag_robots: robots whose tag has another id, by the tag's id. All others wear the tag of their own id, so that
-            each tag without another meaning is a robot's.
-        mounts: poses of tags in base_link of their robot or object, by the tag's id; all others are centered.
-        objects: names, by the tag's id.
-        references: poses in `map` of tags on the floor, by id. Yaws are those of the print's upper edge.
-        size_m, height_m: side of the black square of robots' and objects' tags, and their height above the floor.
-        reference_size_m: side of the black square of reference tags.
+    tag_robots: robots whose tag has another id, by the tag's id. All others wear the tag of their own id, so that
+        each tag without another meaning is a robot's.
+    mounts: poses of tags in base_link of their robot or object, by the tag's id; all others are centered.
+    objects: names, by the tag's id.
+    references: poses in `map` of tags on the floor, by id. Yaws are those of the print's upper edge.
+    size_m, height_m: side of the black square of robots' and objects' tags, and their height above the floor.
+    reference_size_m: side of the black square of reference tags.
     """
 
     tag_robots: Mapping[int, int] = {}

@@ -147,11 +147,10 @@ class TagSearch:
     ) -> List[TagCorners]:
         """Return the tags found in the next frame; an id that appears twice is returned twice.
 
-        Args:
-            gray: (H, W), 8 bit.
-            stamp_s: when it was taken.
-            expected: pixels where the centers of tags should be, by id, from what is known of their robots' motion;
-                others are looked for where they were.
+        gray: (H, W), 8 bit.
+        stamp_s: when it was taken.
+        expected: pixels where the centers of tags should be, by id, from what is known of their robots' motion;
+            others are looked for where they were.
         """
         if self._previous_s is not None and stamp_s < self._previous_s - KEPT_S:
             # Time went back, as when a recording is replayed: stamps tell no more for how long a tag is lost.
