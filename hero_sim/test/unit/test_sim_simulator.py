@@ -182,7 +182,7 @@ def test_a_robot_blocked_by_its_channel_and_its_link_waits_for_both(bench):
     resumed, unsent = [], [True, False]
     simulator.swarm.robots[0].unblock_writing = resumed.append
     link.has_unsent = lambda index: unsent[0]
-    for has_unsent in unsent[:]:
+    for has_unsent in (True, False):
         unsent[0] = has_unsent
         simulator._send_up(0, [bytes(1000)])
         if not has_unsent:
