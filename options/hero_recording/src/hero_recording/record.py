@@ -13,6 +13,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import suppress
 from typing import Dict, List, Optional, Sequence, Set
@@ -92,11 +93,19 @@ class Recording:
             )
         )
         start_s = time.monotonic()
-        # Its stdout names every topic that it subscribes to; warnings and errors go to stderr.
+        # It names every topic that it subscribes to, on stdout and on /rosout; warnings and errors remain.
+        with tempfile.NamedTemporaryFile(suffix=".config") as logging:
+            logging.write(b"log4j.logger.ros=WARN\n")
+            logging.flush()
+            self._record(start_s, {**os.environ, "ROSCONSOLE_CONFIG_FILE": logging.name})
+
+    def _record(self, start_s: float, environment: Dict[str, str]) -> None:
+        """Run the recorder from start to end. Raises: RecordingError."""
         recorder = subprocess.Popen(
             self._command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
+            env=environment,
             preexec_fn=_end_with_parent,  # noqa: PLW1509 - this program has no other thread
         )
         reason = None

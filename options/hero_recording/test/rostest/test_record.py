@@ -107,10 +107,12 @@ class RecordTest(unittest.TestCase):
         self.assertEqual(self.files("*.active"), [], output)
         for name in bags:
             self.assertIn(os.path.join(self.folder, name), output)
-        topics = set()
+        topics, lines = set(), []
         for name in bags:
             with rosbag.Bag(os.path.join(self.folder, name)) as bag:
                 topics |= set(bag.get_type_and_topic_info().topics)
+                lines += [line.msg for _, line, _ in bag.read_messages(["/rosout"])]
+        self.assertFalse([line for line in lines if "Subscribing" in line], "the recorder does not flood the log")
         for topic in ROBOT_TOPICS:
             self.assertIn("/hero_0/" + topic, topics)
             self.assertIn("/hero_7/" + topic, topics)

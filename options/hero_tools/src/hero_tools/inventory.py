@@ -18,7 +18,7 @@ COLUMNS = (
 LOW_SHARE = 0.8
 """Share of the usual run time from which a robot is to be charged."""
 
-VERSIONS = ("model", "firmware", "hardware", "config")
+VERSIONS = ("firmware", "hardware", "config")
 
 
 def list_inventory(
@@ -33,19 +33,19 @@ def list_inventory(
 
 
 def _make_row(number: int, row: Any, notes: RobotNotes, kept: Any) -> Dict[str, Any]:
-    known = {"state": "ABSENT", **dict.fromkeys((*VERSIONS, "address"), ""), "uptime_s": None}
+    known = {"state": "ABSENT", **dict.fromkeys(("model", *VERSIONS, "address"), ""), "uptime_s": None}
     if row is not None:
         robot = row.robot
         known = {"state": row.state, "address": robot.address, "uptime_s": round(robot.uptime.to_sec())}
-        known.update((name, getattr(robot, name)) for name in VERSIONS)
+        known.update((name, getattr(robot, name)) for name in ("model", *VERSIONS))
     errors = kept.values.get("velocity_errors", (None, None)) if kept else (None, None)
     calibration = {"calibrated": kept.date if kept else "", "velocity_error": errors[1]}
     values = {"id": number, **known, **notes._asdict(), **calibration}
     return {name: values[name] for name in COLUMNS}
 
 
-def list_warnings(inventory: Sequence[Mapping[str, Any]], run_time_h: float) -> List[str]:
-    """Return a line for each version that differs between robots, and for each robot that has run for long."""
+def list_differences(inventory: Sequence[Mapping[str, Any]]) -> List[str]:
+    """Return a line for each version that differs between robots."""
     lines = []
     for name in VERSIONS:
         owners: Dict[str, List[str]] = {}
@@ -55,6 +55,12 @@ def list_warnings(inventory: Sequence[Mapping[str, Any]], run_time_h: float) -> 
         if len(owners) > 1:
             parts = (f"{value} ({', '.join(ids)})" for value, ids in sorted(owners.items()))
             lines.append(f"{name} differs: {'; '.join(parts)}")
+    return lines
+
+
+def list_warnings(inventory: Sequence[Mapping[str, Any]], run_time_h: float) -> List[str]:
+    """Return the versions that differ, and a line for each robot that has run for long."""
+    lines = list_differences(inventory)
     for row in inventory:
         hours = (row["uptime_s"] or 0) / 3600.0
         if run_time_h and hours >= LOW_SHARE * run_time_h:

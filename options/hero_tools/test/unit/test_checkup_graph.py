@@ -97,6 +97,9 @@ def test_robots_that_cannot_be_driven_are_told_with_their_remedy():
         "all robots are stopped before the driver's start; to release them: rosservice call /lab/stop false",
         "/hero_1 at a is AWAY",
     ]
+    report = make_report(Robot.READY, Robot.READY)
+    report.robots[1].firmware = "v3.7"
+    assert describe_report("/lab", report)[1] == ["firmware differs: v3.7 (1); v3.8 (0)"]
     report = make_report(Robot.READY)
     report.gone = [Robot(id=number) for number in (7, 3)]
     text, lines = describe_report("/lab", report)

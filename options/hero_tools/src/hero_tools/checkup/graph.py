@@ -20,6 +20,7 @@ from hero_msgs.msg import Robot, RobotArray
 from hero_node import NodeError, is_loopback
 from hero_node.ros import ask_master, read_master_uri
 
+from ..inventory import VERSIONS, list_differences
 from .network import HOST_REMEDY, Address, find_source_address, is_own, resolve
 from .points import Finding, fail, ok, wait_until, warn
 
@@ -160,7 +161,7 @@ def describe_report(driver: str, report: RobotArray) -> Tuple[str, List[str]]:
     versions = sorted({robot.firmware for robot in ready if robot.firmware})
     if versions:
         text += ", firmware " + ", ".join(versions)
-    lines = []
+    lines = list_differences([{"id": robot.id, **{name: getattr(robot, name) for name in VERSIONS}} for robot in ready])
     if report.stopped:
         origin = describe_stop_origin(report, time.time())
         lines.append(
