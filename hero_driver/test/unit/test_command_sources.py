@@ -434,8 +434,8 @@ def test_wheels_that_do_not_turn_for_five_seconds_of_commands_are_told():
     wheels = WheelMotion()
     sources = CommandSources(wheels)
 
-    def command(moves, now_s, ticks=0.0):
-        sources.note_command(VELOCITY, VELOCITY, None, "/mine", moves, now_s)
+    def command(moves, now_s, ticks=0.0, topic=VELOCITY):
+        sources.note_command(topic, topic, None, "/mine", moves, now_s)
         wheels.read_ticks(ticks, ticks)
         return sources.find_fault(now_s)
 
@@ -446,6 +446,12 @@ def test_wheels_that_do_not_turn_for_five_seconds_of_commands_are_told():
     assert not any(told[:-1])
     assert "have not turned for 5 s, although /mine commands it" in told[-1]
     assert command(True, now_s + 6.0, ticks=9.0) == ""
+    for reading in range(2 * STUCK_READINGS):
+        wheels.read_ticks(9.0, 9.0)
+        told = sources.find_fault(now_s + 6.0 + reading / 29.0)
+    assert told == "", "after one command, which the robot ends by itself"
+    for reading in range(2 * STUCK_READINGS):
+        assert command(True, now_s + 20.0 + reading / 29.0, 9.0, MOTORS) == "", "pulses may be those of rest"
 
 
 def test_a_loop_that_does_not_sleep_is_told_while_it_runs():

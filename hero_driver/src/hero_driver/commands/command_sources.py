@@ -166,7 +166,11 @@ class CommandSources:
         if not 0.0 <= now_s - self._counted_s < COUNT_PERIOD_S:
             self._rate_hz = self._commands / max(now_s - self._counted_s, COUNT_PERIOD_S)
             self._commands, self._counted_s = 0, now_s
-        if not self.are_moving:
+        # Motor pulses near a servo's center turn no wheel; after its last command the robot stops by itself.
+        if not any(
+            source.moves and now_s - source.commanded_s < MAX_WATCHDOG_S and source.source.endswith("cmd_vel")
+            for source in self._by_topic.values()
+        ):
             self._resting_readings = self._wheels.readings
         still_readings = min(self._wheels.still_readings, self._wheels.readings - self._resting_readings)
         if self._rate_hz <= RATE_MAX_HZ and still_readings < STUCK_READINGS:

@@ -18,8 +18,6 @@ from .errors import RecordingError, explain_write_errors
 from .options import list_of
 from .table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
 
-PART_SUFFIX = ".part"
-
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
@@ -65,7 +63,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     out = os.path.abspath(options.out or os.path.splitext(bags.paths[0])[0])
     if os.path.exists(out):
         raise RecordingError(f"{out} exists already; move it away or choose another --out")
-    part = out + PART_SUFFIX
+    part = out + ".part"
     with explain_write_errors(part):
         os.makedirs(part)
     incomplete = os.path.join(part, os.path.basename(out))

@@ -210,8 +210,6 @@ def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
     assert computer.check_python().state == OK
     monkeypatch.setattr(computer.shutil, "which", lambda name: sys.executable)
     assert computer.check_python().state == OK
-    monkeypatch.setattr(computer, "OLDEST_PYTHON", (9, 0))
-    assert "3.8 or newer is needed" in computer.check_python().text
     finder = SimpleNamespace(
         get_path=lambda name: "/ws/" + name,
         get_manifest=lambda name: SimpleNamespace(version=name.rpartition("_")[2], author=computer.AUTHOR),

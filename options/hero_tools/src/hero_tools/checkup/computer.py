@@ -34,7 +34,6 @@ OPTIONS = (
     "hero_swarm",
     "hero_tools",
 )
-OLDEST_PYTHON = (3, 8)
 MODULES = {
     "python3-catkin-pkg": "catkin_pkg",
     "python3-opencv": "cv2",
@@ -53,8 +52,6 @@ SOURCE = "source the workspace in this terminal: source devel/setup.bash"
 def check_python() -> Finding:
     """Check this interpreter, its modules, and the python3 that is first on PATH."""
     version = platform.python_version()
-    if sys.version_info < OLDEST_PYTHON:
-        return fail(f"Python {version}; 3.8 or newer is needed", "use a newer system")
     lacking = find_lacking_modules()
     if lacking:
         listed = ", ".join(f"{module} (for {', '.join(packages)})" for module, packages in lacking.items())
