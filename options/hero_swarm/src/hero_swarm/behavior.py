@@ -94,18 +94,16 @@ class Sensed:
         self.poses = lock(poses.reshape(-1, 3).copy())
         self.is_known = lock(np.isfinite(self.poses).all(axis=1))
         self.numbers = lock(np.tile(np.arange(self.count), worlds))
-        self._readings = {name: _lock_reading(reading) for name, reading in readings.items()}
+        self._readings = {
+            name: type(reading)(*map(lock, reading)) if isinstance(reading, tuple) else lock(reading)
+            for name, reading in readings.items()
+        }
 
     def __getattr__(self, name: str) -> Any:
         try:
             return self.__dict__["_readings"][name]
         except KeyError:
             raise AttributeError(f"the behavior has no sensor {name!r}") from None
-
-
-def _lock_reading(reading: Any) -> Any:
-    """Return what a sensor gives, an array or a named tuple of arrays, read-only."""
-    return type(reading)(*map(lock, reading)) if isinstance(reading, tuple) else lock(reading)
 
 
 class Behavior:

@@ -18,9 +18,6 @@ from .behaviors import find_behavior, list_classes, list_names
 from .machines.machine_file import ENDING
 from .sources import Sources
 
-_TITLES = {"formation": "formation by distances"}
-"""Titles other than the name without underscores."""
-
 
 def main() -> None:
     """Run the program."""
@@ -66,5 +63,4 @@ def _describe(name: str, behavior: str, kind: Type[Behavior]) -> Dict[str, Any]:
         for key, setting in kind.settings.items()
     ]
     sentence = (inspect.getdoc(kind) or "").partition("\n")[0]
-    title = _TITLES.get(name, name.replace("_", " "))
-    return {"behavior": behavior, "title": title, "sentence": sentence, "fields": fields}
+    return {"behavior": behavior, "title": name.replace("_", " "), "sentence": sentence, "fields": fields}

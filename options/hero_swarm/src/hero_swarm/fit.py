@@ -61,16 +61,15 @@ def _read_tables(path: str) -> Dict[Tuple[int, str], Rows]:
             is_within = bag.start_s - MAX_CLOCK_ERROR_S <= row[0] <= bag.end_s + MAX_CLOCK_ERROR_S
             (tables if is_within else wrong).setdefault((robot_id, kind), []).append(row)
 
-    bag.read(_is_wanted, receive)
+    def is_wanted(topic: str, message_type: str) -> bool:
+        found = find_robot_topic(topic, message_type)
+        return topic == POSES_TOPIC or (found is not None and found[1] in (*PLACES, *COMMANDS))
+
+    bag.read(is_wanted, receive)
     for (robot_id, kind), rows in sorted(wrong.items()):
         text = "%s: hero_%d: left out %d of %s with stamps outside of the recording, such as %+.0f s from its start"
         print(text % (path, robot_id, len(rows), kind, rows[0][0] - bag.start_s), file=sys.stderr)
     return tables
-
-
-def _is_wanted(topic: str, message_type: str) -> bool:
-    found = find_robot_topic(topic, message_type)
-    return topic == POSES_TOPIC or (found is not None and found[1] in (*PLACES, *COMMANDS))
 
 
 def _list_rows(message: Message) -> Iterator[Tuple[int, str, Tuple[float, ...]]]:

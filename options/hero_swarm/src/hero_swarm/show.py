@@ -13,7 +13,6 @@ from hero_node.parameters import within
 from .experiments.computing import set_up
 from .experiments.computing.code_version import hash_code
 from .experiments.errors import ExperimentError
-from .experiments.experiment_file import Cell, Experiment
 from .experiments.results_folder import read_results
 
 
@@ -30,18 +29,14 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _choose_cell(experiment: Experiment, number: int) -> Cell:
-    if not 1 <= number <= len(experiment.cells):
-        known = "; ".join("%d: %s" % item for item in enumerate((cell.label for cell in experiment.cells), 1))
-        raise ExperimentError("--cell %d: must be one of %s" % (number, known))
-    return experiment.cells[number - 1]
-
-
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Replay the run that options name. Raises: ExperimentError."""
     options = parse_options(arguments)
     _, experiment, about = read_results(options.folder)
-    cell = _choose_cell(experiment, options.cell)
+    if not 1 <= options.cell <= len(experiment.cells):
+        known = "; ".join("%d: %s" % item for item in enumerate((cell.label for cell in experiment.cells), 1))
+        raise ExperimentError("--cell %d: must be one of %s" % (options.cell, known))
+    cell = experiment.cells[options.cell - 1]
     seed = experiment.seeds[0] if options.seed is None else options.seed
     if seed not in experiment.seeds:
         raise ExperimentError(

@@ -89,14 +89,6 @@ def scatter_objects(arena: Arena, robots: np.ndarray, seed: int) -> List[PushedB
     return placed
 
 
-def _build_radios(wifi: str, seeds: Sequence[int], robots: int) -> List[Radio]:
-    """Return the Wi-Fi of each robot; none where it is ideal."""
-    if wifi == "ideal":
-        return []
-    drawn = ([derive_seed(seed, f"radio {robot}") for robot in range(robots)] for seed in seeds)
-    return [radio for own in drawn for radio in build_network(*parse_wifi(wifi), own)]
-
-
 class Trial:
     """One behavior on W worlds with N robots each.
 
@@ -138,9 +130,11 @@ class Trial:
                 [scatter(robots, width_m, height_m, seed, arena=room) for seed, room in zip(seeds, rooms)]
             )
         self.behavior = behavior
-        self.rows = RobotRows(
-            place_worlds(arena, starts, seeds, errors, objects, known_errors), _build_radios(wifi, seeds, robots)
-        )
+        radios: List[Radio] = []
+        for seed in seeds if wifi != "ideal" else ():
+            drawn = [derive_seed(seed, f"radio {robot}") for robot in range(robots)]
+            radios += build_network(*parse_wifi(wifi), drawn)
+        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects, known_errors), radios)
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
         self.poses, self.velocities = lock(np.array(starts)), lock(np.zeros_like(starts))
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)

@@ -85,7 +85,7 @@ def test_of_the_allowed_velocities_the_nearest_is_found():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.0, 5.0, 100.0, 1e300])
+@pytest.mark.parametrize("factor", [1.0, 5.0, 1e300])
 def test_no_wanted_speed_makes_robots_touch_or_leave_the_fence(factor):
     names = ["hero_plus" if number % 3 == 1 else "hero" for number in range(8)]
     swarm = StepSwarm(8, seed=2, model=["%s,robot=%d" % (name, number) for number, name in enumerate(names)])
@@ -95,7 +95,7 @@ def test_no_wanted_speed_makes_robots_touch_or_leave_the_fence(factor):
     safe.set_models([MODELS[name] for name in names])
     radii_m, rows_of_all = np.array(safe.radii_m), np.arange(8)
     nearest_m, farthest_m = np.inf, -np.inf
-    for _ in range(400):
+    for _ in range(250):
         poses = rows.world.poses.copy()
         nearest_m = min(nearest_m, (measure_distances(poses[None, :, :2])[0] - radii_m[:, None] - radii_m).min())
         farthest_m = max(farthest_m, (np.abs(poses[:, :2]).max(axis=1) + radii_m - half_m).max())
@@ -150,7 +150,7 @@ def leave_together(rate_hz, delay_s, direction=1.0):
     return min(nearest_m) - 2.0 * BODY_RADIUS_M, max(farthest_m) + BODY_RADIUS_M - 0.7
 
 
-@pytest.mark.parametrize("rate_hz", [1.0, 3.0, 20.0])
+@pytest.mark.parametrize("rate_hz", [1.0, 20.0])
 def test_behaviors_that_decide_seldom_are_filtered_as_often_as_others(rate_hz):
     gap_m, outside_m = leave_together(rate_hz, 0.0)
     assert gap_m > 0.0 and outside_m < 0.0
@@ -163,7 +163,7 @@ def test_robots_that_spin_and_back_away_do_not_drift_through_the_fence():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay_s", [0.1, 0.2, 0.3, 0.5])
+@pytest.mark.parametrize("delay_s", [0.2, 0.5])
 def test_robots_whose_poses_are_old_neither_touch_nor_leave_the_fence(delay_s):
     for rate_hz in (1.0, 20.0):
         gap_m, outside_m = leave_together(rate_hz, delay_s)

@@ -16,7 +16,7 @@ from hero_sim.link import parse_wifi
 from hero_sim.world import KINDS, SHIPPED
 
 from ..metrics import FALLING
-from ..metrics.own import MetricNames, is_own
+from ..metrics.own import is_own, list_names
 from ..sources import Sources
 from .errors import ExperimentError
 from .worlds import NOMINAL, WORLDS
@@ -43,7 +43,6 @@ ERROR_KEYS = tuple("errors." + key for key in KINDS)
 OBJECTS = ("arena", "scattered")
 """Places of the objects at the start: as in the arena, or drawn from each seed."""
 TESTS = ("wilcoxon",)
-METRIC_NAMES = MetricNames()
 _REQUIRED = ("time_s", "seeds", "metrics")
 _KEYS = (
     "behavior", "vary", "world", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record",
@@ -384,7 +383,7 @@ def _parse_seeds(entry: Entry) -> range:
 
 def _parse_bound(entry: Entry) -> Bound:
     """Return the bound of a mapping such as {dispersion_ratio: 1.15} or {order: ">= 0.9"}."""
-    name, value = entry.single(METRIC_NAMES)
+    name, value = entry.single(list_names(entry.value))
     if is_own(name) and not isinstance(value.value, str):
         value.refuse('a text such as "<= 1.15" or ">= 0.95", as the metric is your own')
     if not isinstance(value.value, str):
@@ -401,13 +400,13 @@ def _parse_bound(entry: Entry) -> Bound:
 
 def _parse_metric(entry: Entry) -> Metric:
     if not isinstance(entry.value, dict):
-        name = entry.choice(METRIC_NAMES)
+        name = entry.choice(list_names(entry.value))
         return Metric(_name_column(name), name)
     kind, inner = entry.single(("time_until", "mean_of_last_s"))
     if kind == "time_until":
         bound = _parse_bound(inner)
         return Metric(f"time_until_{_name_column(bound.metric)}_{bound.value:g}_s", bound.metric, bound=bound)
-    name, value = inner.single(METRIC_NAMES)
+    name, value = inner.single(list_names(inner.value))
     last_s = value.number(1.0, MAX_TIME_S, "s")
     return Metric(f"{_name_column(name)}_mean_of_last_{last_s:g}_s", name, last_s)
 

@@ -23,14 +23,6 @@ from .results_folder import ABOUT, SIMULATED, ResultsFolder, format_table, read_
 EXPERIMENT, RUNS, FILES, SUITE = "experiment", "runs.csv", "files", "suite"
 
 
-def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(prog="pack", description="Pack an experiment with its table and all its files.")
-    parser.add_argument("folder", metavar="FOLDER", help="folder with the results of run")
-    parser.add_argument("--out", metavar="FILE", help="of the pack (FOLDER.tar.gz)")
-    return parser.parse_args(arguments)
-
-
 def collect(path: str) -> Dict[str, bytes]:
     """Return the files of the pack by their names. Raises: ExperimentError if the results cannot be computed again."""
     text, experiment, about = read_results(path)
@@ -61,7 +53,10 @@ def collect(path: str) -> Dict[str, bytes]:
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Write the pack. Raises: ExperimentError."""
-    options = parse_options(arguments)
+    parser = argparse.ArgumentParser(prog="pack", description="Pack an experiment with its table and all its files.")
+    parser.add_argument("folder", metavar="FOLDER", help="folder with the results of run")
+    parser.add_argument("--out", metavar="FILE", help="of the pack (FOLDER.tar.gz)")
+    options = parser.parse_args(arguments)
     contents = collect(options.folder)
     out = options.out or os.path.normpath(options.folder) + ".tar.gz"
     with name_file(out), tarfile.open(out, "w:gz") as pack:

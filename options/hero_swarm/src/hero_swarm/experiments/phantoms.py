@@ -34,17 +34,14 @@ _FIRST_LINE = "# Made by `rosrun hero_swarm phantoms %s`, and made anew by it.\n
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="phantoms", description="Score a result in worlds with other assumptions.")
-    parser.add_argument(
-        "what", metavar="EXPERIMENT.yaml|BEHAVIOR", help="an experiment's file, or a behavior as in one"
-    )
-    parser.add_argument("--seeds", type=within(2, 10_000, int), default=10, help="runs of each cell (%(default)s)")
-    parser.add_argument("--robots", type=within(1, 1000, int), default=20, help="of a behavior (%(default)s)")
-    parser.add_argument("--time", type=within(1.0, 86_400.0), default=120.0, metavar="S", help="of a run (%(default)s)")
-    parser.add_argument("--arena", help="of a behavior: empty, box, ... or a file (an open plane)")
-    parser.add_argument(
-        "--jobs", type=within(1, 1024, int), default=os.cpu_count() or 1, help="processes (%(default)s)"
-    )
-    parser.add_argument("--fresh", action="store_true", help="compute all runs anew")
+    add, cores = parser.add_argument, os.cpu_count() or 1
+    add("what", metavar="EXPERIMENT.yaml|BEHAVIOR", help="an experiment's file, or a behavior as in one")
+    add("--seeds", type=within(2, 10_000, int), default=10, help="runs of each cell (%(default)s)")
+    add("--robots", type=within(1, 1000, int), default=20, help="of a behavior (%(default)s)")
+    add("--time", type=within(1.0, 86_400.0), default=120.0, metavar="S", help="of a run (%(default)s)")
+    add("--arena", help="of a behavior: empty, box, ... or a file (an open plane)")
+    add("--jobs", type=within(1, 1024, int), default=cores, help="processes (%(default)s)")
+    add("--fresh", action="store_true", help="compute all runs anew")
     return parser.parse_args(arguments)
 
 
@@ -95,18 +92,15 @@ def find_shares(experiment: Experiment, values: np.ndarray) -> Dict[str, float]:
         values = score(metric.source, values)
     worlds = np.array([cell.varied["world"] for cell in experiment.cells])
     medians = {world: float(np.nanmedian(values[worlds == world])) for world in WORLDS}
-    nominal = medians[NOMINAL]
-    return {world: _divide(*((nominal, own) if metric.falls else (own, nominal))) for world, own in medians.items()}
+    shares = {}
+    for world, own in medians.items():
+        part, whole = (medians[NOMINAL], own) if metric.falls else (own, medians[NOMINAL])
+        shares[world] = max(0.0, part / whole) if math.isfinite(part) and whole else math.nan
+    return shares
 
 
 def _has_chance(metric: Metric) -> bool:
     return metric.bound is None and metric.source in CHANCE
-
-
-def _divide(part: float, whole: float) -> float:
-    if not math.isfinite(part) or whole == 0.0:
-        return math.nan
-    return max(0.0, part / whole)
 
 
 def describe(shares: Mapping[str, float], metric: Metric) -> str:

@@ -16,14 +16,6 @@ from .results import load
 from .results_folder import REAL, SIMULATED, ResultsFolder, read_results
 
 
-def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(prog="report", description="Medians, intervals and plots of an experiment.")
-    parser.add_argument("folder", metavar="FOLDER", help="folder with the results of run")
-    parser.add_argument("--series", metavar="FILE", help="write the metrics over time to a .csv or .parquet, too")
-    return parser.parse_args(arguments)
-
-
 def write_report(path: str) -> None:
     """Write table, summary and page of the results in a folder, and print them. Raises: ExperimentError."""
     text, experiment, about = read_results(path)
@@ -58,7 +50,10 @@ def _write_figures(folder: str, figures: Mapping[str, Figure]) -> None:
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
-    options = parse_options(arguments)
+    parser = argparse.ArgumentParser(prog="report", description="Medians, intervals and plots of an experiment.")
+    parser.add_argument("folder", metavar="FOLDER", help="folder with the results of run")
+    parser.add_argument("--series", metavar="FILE", help="write the metrics over time to a .csv or .parquet, too")
+    options = parser.parse_args(arguments)
     write_report(options.folder)
     if options.series:
         load(options.folder).write_table(options.series)

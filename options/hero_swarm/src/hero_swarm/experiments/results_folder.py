@@ -226,7 +226,9 @@ class ResultsFolder:
         digest, kind = self._cells[runs[0].cell], runs[0].kind
         seeds = [run.seed for run in runs]
         lines: List[Dict[str, Any]] = [{"cell": digest, "code": self._code, "kind": kind}]
-        lines += [{"seed": run.seed, "values": list(map(_encode, run.values)), "remark": run.remark} for run in runs]
+        for run in runs:
+            values = [value if math.isfinite(value) else repr(value) for value in run.values]  # JSON has no infinity
+            lines.append({"seed": run.seed, "values": values, "remark": run.remark})
         name = self._name_batch(digest, seeds, self._code, kind)
         content = "".join(json.dumps(line) + "\n" for line in lines)
         if kind == REAL and os.path.exists(os.path.join(self._batches, name)):
@@ -332,8 +334,3 @@ def format_csv(rows: Iterable[Sequence[Any]]) -> str:
     output = io.StringIO()
     csv.writer(output, lineterminator="\n").writerows(rows)
     return output.getvalue()
-
-
-def _encode(value: float) -> Any:
-    """Return value for JSON, which has no infinity."""
-    return value if math.isfinite(value) else repr(value)

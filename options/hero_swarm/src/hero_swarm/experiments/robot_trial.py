@@ -32,6 +32,7 @@ class StartDrive:
 
     Attributes:
         done: all robots are in their places, and turned.
+        lateness: of its steps and poses.
     """
 
     def __init__(self, places: np.ndarray, body_radius_m: float = BODY_RADIUS_M) -> None:
@@ -40,6 +41,7 @@ class StartDrive:
         self._goals = [Pose(*place) for place in places.tolist()]
         law = AvoidanceLaw(body_m=body_radius_m)
         self._controller = SwarmGoToController([goal[:2] for goal in self._goals], law, PERIOD_S, seed=0)
+        self.lateness = self._controller.lateness
         self._steps_at_rest = 0
 
     def step(

@@ -55,42 +55,27 @@ def _parse_executor(text: str) -> str:
 
 def add_engine_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that say where runs are computed."""
-    parser.add_argument(
-        "--jobs", type=within(1, 1024, int), default=os.cpu_count() or 1, help="worker processes (%(default)s)"
-    )
-    parser.add_argument(
-        "--executor",
-        type=_parse_executor,
-        metavar="dask:ADDRESS",
-        help="a Dask cluster: tls://HOST:PORT, tcp://127.0.0.1:PORT, or scheduler file",
-    )
-    parser.add_argument("--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts")
+    add, cores = parser.add_argument, os.cpu_count() or 1
+    add("--jobs", type=within(1, 1024, int), default=cores, help="worker processes (%(default)s)")
+    text = "a Dask cluster: tls://HOST:PORT, tcp://127.0.0.1:PORT, or scheduler file"
+    add("--executor", type=_parse_executor, metavar="dask:ADDRESS", help=text)
+    add("--part", type=_parse_part, default=(1, 1), metavar="K/N", help="only the K-th of N parts")
 
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog="run", description="Run an experiment: all seeds of all cells.")
-    parser.add_argument("file", metavar="EXPERIMENT.yaml", help="experiment file")
-    parser.add_argument("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
-    parser.add_argument(
-        "--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (about 10 s of work)"
-    )
+    add = parser.add_argument
+    add("file", metavar="EXPERIMENT.yaml", help="experiment file")
+    add("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
+    add("--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (about 10 s of work)")
     add_engine_options(parser)
-    parser.add_argument(
-        "--robots", type=explicit_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9"
-    )
-    parser.add_argument("--frame", default="map", help="of robots' poses: of localize (map), or world in the simulator")
-    parser.add_argument(
-        "--calibration",
-        metavar="FOLDER",
-        default="~/hero_calibration",
-        help="of `calibrate`: robots whose motors are calibrated are driven by pulses, if the behavior wants it",
-    )
-    parser.add_argument(
-        "--fresh",
-        action="store_true",
-        help="delete earlier simulated runs in the folder; with --robots set trials on robots aside instead",
-    )
+    add("--robots", type=explicit_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9")
+    add("--frame", default="map", help="of robots' poses: of localize (map), or world in the simulator")
+    text = "of `calibrate`: robots whose motors are calibrated are driven by pulses, if the behavior wants it"
+    add("--calibration", metavar="FOLDER", default="~/hero_calibration", help=text)
+    text = "delete earlier simulated runs in the folder; with --robots set trials on robots aside instead"
+    add("--fresh", action="store_true", help=text)
     return parser.parse_args(arguments)
 
 
@@ -163,10 +148,7 @@ def open_folder(options: argparse.Namespace) -> Iterator[Tuple[Experiment, Resul
 
 
 def run_experiment(options: argparse.Namespace) -> str:
-    """Run what is missing; return a line for users.
-
-    Raises: ExperimentError.
-    """
+    """Run what is missing; return a line for users. Raises: ExperimentError."""
     with open_folder(options) as (experiment, folder, runs):
         return _run_missing(options, experiment, folder, runs)
 

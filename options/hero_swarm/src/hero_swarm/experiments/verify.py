@@ -15,14 +15,6 @@ from .errors import ExperimentError
 from .pack import EXPERIMENT, FILES, RUNS, SUITE
 
 
-def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
-    """Read the command line."""
-    parser = argparse.ArgumentParser(prog="verify", description="Compute the table of a pack again, and compare it.")
-    parser.add_argument("file", metavar="PACK.tar.gz", help="a file of pack")
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="worker processes (%(default)s)")
-    return parser.parse_args(arguments)
-
-
 def unpack(path: str, folder: str) -> None:
     """Write the files of a pack into a folder. Raises: ExperimentError for what is no pack."""
     try:
@@ -48,7 +40,10 @@ def _read(*names: str) -> str:
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Compute the table, and compare. Raises: ExperimentError if it differs."""
-    options = parse_options(arguments)
+    parser = argparse.ArgumentParser(prog="verify", description="Compute the table of a pack again, and compare it.")
+    parser.add_argument("file", metavar="PACK.tar.gz", help="a file of pack")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="worker processes (%(default)s)")
+    options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as created:
         folder = os.path.realpath(created)
         unpack(options.file, folder)

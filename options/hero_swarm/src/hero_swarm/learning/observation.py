@@ -59,13 +59,10 @@ class Observation(NamedTuple):
         for column, values in enumerate((near.forward_m, near.left_m)):
             others[:, : nearest.shape[1], column] = np.take_along_axis(values, nearest, axis=1) / self.range_m
         rays = np.maximum(rim_m / MAX_RIM_RANGE_M, 0.0)
-        more = [_flatten(getattr(sensed, name), len(x_m)) for name in sorted(self.sensors)]
-        columns = np.hstack((rays, own, others.reshape(len(x_m), -1), *more))
-        return np.clip(np.nan_to_num(columns, posinf=1.0, neginf=-1.0), -1.0, 1.0).astype(np.float32)
-
-
-def _flatten(reading: Any, robots: int) -> np.ndarray:
-    """Return the arrays with a row for each robot, but whole numbers, side by side (R, K)."""
-    arrays = reading if isinstance(reading, tuple) else (reading,)
-    wanted = [array for array in arrays if array.dtype.kind in "bf" and array.shape[:1] == (robots,)]
-    return np.hstack([array.reshape(robots, -1).astype(float) for array in wanted])
+        columns = [rays, own, others.reshape(len(x_m), -1)]
+        for name in sorted(self.sensors):
+            reading = getattr(sensed, name)
+            for array in reading if isinstance(reading, tuple) else (reading,):
+                if array.dtype.kind in "bf" and array.shape[:1] == x_m.shape:
+                    columns.append(array.reshape(len(x_m), -1).astype(float))
+        return np.clip(np.nan_to_num(np.hstack(columns), posinf=1.0, neginf=-1.0), -1.0, 1.0).astype(np.float32)

@@ -1,6 +1,6 @@
 """Metrics of users, named FILE.py:FUNCTION: functions of a State that return one number for each world. Pure."""
 
-from typing import Any, Collection, Iterator, NamedTuple, Optional
+from typing import Any, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -42,17 +42,10 @@ class State(NamedTuple):
         return array.reshape(self.poses.shape[:2] + array.shape[1:])
 
 
-class MetricNames(Collection[str]):
-    """The names that a metric may have: of built-in ones, and FILE.py:FUNCTION."""
-
-    def __contains__(self, name: Any) -> bool:
-        return name in METRICS or is_own(str(name))
-
-    def __iter__(self) -> Iterator[str]:
-        return iter((*METRICS, "FILE.py:FUNCTION"))
-
-    def __len__(self) -> int:
-        return len(METRICS) + 1
+def list_names(given: Any) -> Tuple[str, ...]:
+    """Return the names that a metric may have: of built-in ones, and FILE.py:FUNCTION if given is, or names, some."""
+    own = filter(is_own, map(str, given if isinstance(given, dict) else (given,)))
+    return (*METRICS, "FILE.py:FUNCTION", *own)
 
 
 def is_own(name: str) -> bool:

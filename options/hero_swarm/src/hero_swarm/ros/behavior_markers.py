@@ -22,11 +22,6 @@ _FREE_COLOR, _SEEN_COLOR = ColorRGBA(0.4, 0.6, 1.0, 0.5), ColorRGBA(1.0, 0.3, 0.
 _TEXT_COLOR = ColorRGBA(0.9, 0.5, 0.0, 1.0)
 
 
-def _has_places(behavior: Behavior, name: str, sensed: Sensed) -> bool:
-    """Return whether a sensor looks along a beam, or tells where others are."""
-    return isinstance(behavior.sensors()[name], (Binary, Sight)) or hasattr(getattr(sensed, name), "forward_m")
-
-
 class BehaviorMarkers:
     """The markers of one behavior in one frame."""
 
@@ -37,8 +32,11 @@ class BehaviorMarkers:
 
     def draw(self, poses: np.ndarray, sensed: Sensed, value: float) -> List[Marker]:
         """Return all markers for poses (R, 3), NaN for unknown ones but not for all, and the metric's value."""
-        shown = [name for name in self._behavior.sensors() if _has_places(self._behavior, name, sensed)]
-        beams = [self._draw_sensor(name, poses, sensed) for name in shown]
+        # Of sensors that look along a beam, or tell where others are.
+        beams = [
+            self._draw_sensor(name, poses, sensed) for name, sensor in self._behavior.sensors().items()
+            if isinstance(sensor, (Binary, Sight)) or hasattr(getattr(sensed, name), "forward_m")
+        ]  # fmt: skip
         text = self._make_marker("metric", Marker.TEXT_VIEW_FACING)
         text.text, text.scale.z, text.color = f"{self._behavior.metric} {value:.2f}", 0.045, _TEXT_COLOR
         x_m, y_m = float(np.nanmean(poses[:, 0])), float(np.nanmax(poses[:, 1])) + TEXT_GAP_M

@@ -16,7 +16,7 @@ from hero_client.swarm import open_swarm
 from hero_client.values import BODY_RADIUS_M, PlacedObjects
 from hero_node.parameters import choice, number, robot_ids, string, whole_number
 from hero_node.ros import read_duration_clock_s
-from hero_sim.world import Arena, build_default, load_arena
+from hero_sim.world import build_default, load_arena
 
 from ..behavior import Behavior, Objects, Random
 from ..behaviors import make_behavior
@@ -62,13 +62,6 @@ def _make_filter(parameters: Any) -> SafetyFilter:
     return SafetyFilter(mode, fence_m)
 
 
-def _find_arena(name: str, simulated: int) -> Optional[Arena]:
-    """Return the arena of a name or file; without one, that of this many simulated robots, None on others."""
-    if name:
-        return load_arena(name)
-    return build_default(simulated) if simulated else None
-
-
 class BehaviorNode:
     """One behavior on one swarm.
 
@@ -85,14 +78,14 @@ class BehaviorNode:
         ids = [robot.robot_id for robot in swarm]
         self._source = PoseSource(ids, self._frame)
         are_needed = any(isinstance(sensor, Objects) for sensor in self.behavior.sensors().values())
-        topic, radius_m = parameters["objects_topic"], parameters["object_radius_m"]
-        self._objects = ObjectSource(self._frame, topic, radius_m, are_needed)
+        self._objects = ObjectSource(self._frame, parameters["object_radius_m"], are_needed)
         self._filter = _make_filter(parameters)
         self._others = OtherRobots(ids, self._frame) if self._filter.mode == ROBOTS else None
         folder, simulated = parameters["calibration_folder"], parameters["simulated"]
         self._commands = WheelCommands(swarm, self.behavior.drive, folder, simulated)
         random, readings = Random([parameters["seed"]], len(ids)), OwnReadings(swarm, self.behavior.sensors())
-        self._arena = _find_arena(parameters["arena"] or self.behavior.arena, simulated)
+        arena = parameters["arena"] or self.behavior.arena
+        self._arena = load_arena(arena) if arena else build_default(simulated) if simulated else None
         self.control = Control(self.behavior, random, self._filter, robots=readings, arena=self._arena)
         self._start_s = read_duration_clock_s()
         self._last: Optional[Tuple[float, np.ndarray]] = None
@@ -128,17 +121,17 @@ class BehaviorNode:
         elif self._others and self._others.describe_missing():
             self._source.warn(self._others.describe_missing())
         elif self._filter.is_limited.any():
-            self._source.warn(self._describe_limit(int(self._filter.is_limited[0].argmax())))
+            row = int(self._filter.is_limited[0].argmax())
+            text = (
+                "the behavior asks %s for %.3g m/s and %.3g rad/s, more than it can drive: it drives this curve slower"
+            )
+            self._source.warn(text % (self._swarm.robots[row].name, *self.control.wanted[:, row]))
         if not self.control.has_decided:
             return
         self._show_colors()
         if time.monotonic() >= self._next_show_s and is_known.any():
             self._next_show_s = time.monotonic() + SHOW_PERIOD_S
             self._show(now_s, poses, things)
-
-    def _describe_limit(self, row: int) -> str:
-        text = "the behavior asks %s for %.3g m/s and %.3g rad/s, more than it can drive: it drives this curve slower"
-        return text % (self._swarm.robots[row].name, *self.control.wanted[:, row])
 
     def _show(self, now_s: float, poses: np.ndarray, things: PlacedObjects) -> None:
         """Publish the metric of the robots whose poses are known, and what RViz and the monitor draw."""
@@ -173,7 +166,6 @@ PARAMETERS = {
     "robots": robot_ids("all", "ids; all: those that have joined a driver"),
     "frame": string("map", "frame of the poses: that of localize, or `world` for the simulator's ground truth"),
     "arena": string("", "a name or file of the simulator, for Floor, Light, Pheromone and wall_following"),
-    "objects_topic": string("", "hero_msgs/ObjectPoses; empty: of hero_sim for the frame world, of track else"),
     "object_radius_m": number(0.05, 0.001, 5.0, "m", "of the circle around an object"),
     "safety": choice("off", MODES, "safety filter: off, fence, or fence and robots"),
     "fence": string("", "x min, y min, x max, y max of the fence, m"),

@@ -95,11 +95,11 @@ class ObjectSource:
         are_needed: whether the behavior can do nothing without one.
     """
 
-    def __init__(self, frame: str, topic: str, radius_m: float, are_needed: bool) -> None:
-        """Subscribe to the topic; empty: that of the frame's source. radius_m: of the circle around each object."""
+    def __init__(self, frame: str, radius_m: float, are_needed: bool) -> None:
+        """Subscribe to the topic of the frame's source. radius_m: of the circle around each object."""
         self.are_needed = are_needed
         self._frame, self._radius_m = frame, radius_m
-        self._topic = topic or ("/hero_sim/objects" if frame == SIMULATOR_FRAME else "/track/objects")
+        self._topic = "/hero_sim/objects" if frame == SIMULATOR_FRAME else "/track/objects"
         self._known: Dict[str, Tuple[float, float, float]] = {}  # replaced as a whole by rospy's thread
         rospy.Subscriber(self._topic, ObjectPoses, self._receive, queue_size=1, tcp_nodelay=True)
 

@@ -56,7 +56,7 @@ def run_on_robots(
     done = 0
     with Program("experiment") as program, Swarm(ids) as swarm:
         source = PoseSource(ids, frame)
-        objects = ObjectSource(frame, "", OBJECT_RADIUS_M, are_needed=False)
+        objects = ObjectSource(frame, OBJECT_RADIUS_M, are_needed=False)
         others = OtherRobots(ids, frame)
         for cell_index, seed in missing:
             cell = experiment.cells[cell_index]
@@ -102,6 +102,9 @@ def _drive_to_starts(program: Program, swarm: Swarm, starts: np.ndarray, source:
             swarm.report_missing(missing)
             poses, ages_s = source.read()
             poses[[missing[robot.name] is not None for robot in swarm]] = np.nan
+            late = drive.lateness.take_warning() or source.describe_missing()
+            if late:
+                source.warn(late)
             speeds = drive.step(poses, [robot.fresh_proximity() for robot in swarm], swarm.now_s, ages_s.tolist())
             for robot, speed in zip(swarm, speeds.T.tolist()):
                 robot.check_not_stopped()

@@ -15,19 +15,19 @@ from ..behavior import PULSES
 from ..wheel_pulses import find_pulses, list_dead_zones
 
 
-def _read_dead_zones(folder: str) -> Dict[str, List[float]]:
-    """Return the dead zones in the files of `calibrate`; files that cannot be used are logged."""
+def _find_dead_zones(folder: str, simulated: int) -> Dict[str, List[float]]:
+    """Return the dead zones of the files of `calibrate`; files that cannot be used are logged.
+
+    Those of the robots of `hero_sim --count SIMULATED` are as `calibrate motors` would find them.
+    """
+    edges_us = list_dead_zones(StepSwarm(simulated).rows.world.errors).tolist() if simulated else []
+    found = {"hero_%d" % number: own for number, own in enumerate(edges_us)}
     calibrations = read_calibrations(folder)
     for problem in calibrations.problems.values():
         rospy.logwarn("a calibration is not used: %s", problem)
-    key = "dead_zones_us"
-    return {name: kept.values[key] for name, kept in calibrations.found.items() if key in kept.values}
-
-
-def _list_simulated(count: int) -> Dict[str, List[float]]:
-    """Return the dead zones of the robots of `hero_sim --count COUNT`, as `calibrate motors` would find them."""
-    edges_us = list_dead_zones(StepSwarm(count).rows.world.errors) if count else np.empty((0, 4))
-    return {"hero_%d" % number: found for number, found in enumerate(edges_us.tolist())}
+    for name, kept in calibrations.found.items():
+        found[name] = kept.values.get("dead_zones_us", found.get(name))
+    return {name: own for name, own in found.items() if own}
 
 
 class WheelCommands:
@@ -43,7 +43,7 @@ class WheelCommands:
         self._dead_zones_us: Optional[np.ndarray] = None
         if drive != PULSES:
             return
-        found = {**_list_simulated(simulated), **_read_dead_zones(folder)}
+        found = _find_dead_zones(folder, simulated)
         names = ["hero_%d" % robot.robot_id for robot in swarm]
         missing = [name for name in names if name not in found]
         if missing:

@@ -22,7 +22,7 @@ start: {kind: circle, gap_m: 0.1}
 arena: ../field.yaml
 time_s: 3
 seeds: {from: 5, count: 3}
-metrics: [dispersion, lib/own.py:farthest, {time_until: {dispersion_ratio: 1.0}}]
+metrics: [lib/own.py:farthest, {time_until: {dispersion_ratio: 1.0}}]
 until: {lib/own.py:farthest: ">= 0.25"}
 record: {hz: 2}
 compare: {metric: farthest, between: speed_m_s}
@@ -90,7 +90,7 @@ def test_the_index_names_the_file_and_place_of_each_run(folder):
     assert named == list(itertools.product(range(1, 5), (5, 6, 7)))
     results = load(str(folder))
     for row in nonempty(rows):
-        own = np.load(str(folder / row["metrics"]))[:, int(row["run"]), 2]
+        own = np.load(str(folder / row["metrics"]))[:, int(row["run"]), 1]
         np.testing.assert_array_equal(own, results.series["farthest"][int(row["cell"]) - 1, int(row["seed"]) - 5])
         assert np.load(str(folder / row["poses"])).shape[1] in (1, 2)
 
@@ -102,7 +102,6 @@ def test_the_table_over_time_has_a_row_for_each_run_and_second(folder, tmp_path,
         "robots",
         "seed",
         "time_s",
-        "dispersion",
         "dispersion_ratio",
         "farthest",
     ]

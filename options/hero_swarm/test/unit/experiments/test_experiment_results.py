@@ -367,7 +367,7 @@ def test_a_process_whose_sources_differ_or_change_computes_nothing(monkeypatch):
     code_version.check_suite(suite)
     with pytest.raises(ExperimentError, match="has other code of the suite .*update it and start again"):
         code_version.check_suite("0ther")
-    monkeypatch.setattr(code_version, "_hash_packages", lambda: "changed")
+    monkeypatch.setattr(code_version, "_digest", lambda contents: "changed")
     with pytest.raises(ExperimentError, match="other code of the suite .changed, not %s" % suite):
         code_version.check_suite(suite)
 

@@ -59,16 +59,16 @@ def finished(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", [["--batch", "1"], ["--batch", "2", "--jobs", "2"]])
-def test_the_table_has_the_same_bytes_for_all_batches_and_jobs(finished, options, tmp_path):
-    folder = run(write(tmp_path), *options)
+@pytest.mark.usefixtures("workers")
+def test_the_table_has_the_same_bytes_for_all_batches_and_jobs(finished, tmp_path):
+    folder = run(write(tmp_path), "--batch", "2", "--jobs", "2")
     assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
 
 
 @pytest.mark.slow
 def test_parts_together_give_the_same_bytes(finished, tmp_path):
     path = write(tmp_path)
-    for part in ("2/3", "1/3", "3/3"):
+    for part in ("2/2", "1/2"):
         assert not (path.with_suffix("") / "runs.csv").exists()
         folder = run(path, "--part", part)
     assert (folder / "runs.csv").read_bytes() == (finished / "runs.csv").read_bytes()
@@ -269,6 +269,7 @@ def write_own(folder):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("workers")
 def test_files_that_are_edited_during_a_run_change_none_of_its_rows(tmp_path, monkeypatch):
     undisturbed, path = run(write_own(tmp_path / "a")), write_own(tmp_path / "b")
     write_batch = runner.ResultsFolder.write_batch

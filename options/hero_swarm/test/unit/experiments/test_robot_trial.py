@@ -129,6 +129,7 @@ def test_robots_drive_to_their_starts_slower_while_poses_are_old():
     for age_s in (0.0, 0.5, 1.0):
         drive = StartDrive(STARTS + (0.5, 0.0, 0.0))
         speeds_m_s.append(drive.step(STARTS, None, 100.0, np.full(3, age_s))[0].max())
+        assert (age_s > 0.0) == bool(drive.lateness.take_warning())
     usual_m_s, slow_m_s, stopped_m_s = speeds_m_s
     assert 0.0 < slow_m_s < 0.5 * usual_m_s and stopped_m_s == 0.0
 

@@ -98,7 +98,7 @@ def run(monkeypatch, tmp_path, models):
 def test_robots_of_each_model_keep_as_far_apart_from_body_to_body(monkeypatch, tmp_path):
     radius_m, plus_radius_m = (MODELS[name].body_radius_m for name in ("hero", "hero_plus"))
     stock_m = run(monkeypatch, tmp_path, []).min() - 2.0 * radius_m
-    for plus in ((4,), (5,), (4, 5)):
+    for plus in ((4,), (4, 5)):
         distances_m = run(monkeypatch, tmp_path, ["hero_plus,robot=%d" % number for number in plus])
         bodies_m = len(plus) * plus_radius_m + (2 - len(plus)) * radius_m
-        assert distances_m.min() - bodies_m == pytest.approx(stock_m, abs=0.01), plus
+        assert distances_m.min() - bodies_m == pytest.approx(stock_m, abs=0.015), plus  # of 23 mm that a HeRo+ is wider

@@ -51,10 +51,7 @@ one_at_a_time = threading.RLock()
 
 
 def load_checked(experiment: Experiment) -> None:
-    """Build the first run of all cells that differ in it, to report errors before anything runs.
-
-    Raises: ExperimentError.
-    """
+    """Build the first run of all cells that differ in it, to report errors before anything runs: ExperimentError."""
     check_parameters(experiment)
     built = set()
     for cell in tqdm(experiment.cells, "checking", unit=" cells", leave=False, disable=None, file=sys.stderr):
@@ -168,12 +165,10 @@ def _write_metrics(path: str, series: np.ndarray, ends: List[int]) -> None:
 def take_values(experiment: Experiment, series: np.ndarray) -> Tuple[float, ...]:
     """Return the values of the columns from the samples (T, metrics) of one run."""
     names = list_sources(experiment)
-    return tuple(_take(metric, names, series) for metric in experiment.metrics)
+    return tuple(_take(metric, series[:, names.index(metric.source)]) for metric in experiment.metrics)
 
 
-def _take(metric: Metric, names: Sequence[str], series: np.ndarray) -> float:
-    """Return the value of a column from the samples (T, metrics) of one run."""
-    values = series[:, names.index(metric.source)]
+def _take(metric: Metric, values: np.ndarray) -> float:
     if metric.bound is not None:
         held = metric.bound.holds(values).nonzero()[0]
         return float(held[0] * SAMPLE_S) if len(held) else math.inf

@@ -2,7 +2,7 @@
 
 import os
 from contextlib import contextmanager
-from typing import Any, Iterator, NamedTuple, Sequence
+from typing import Iterator, NamedTuple, Sequence
 
 import numpy as np
 
@@ -11,10 +11,10 @@ from hero_sim.world import Arena, load_arena, read_known
 
 from ...behavior import Behavior, Objects
 from ...behaviors import find_behavior
-from ...trial import OPEN, Trial
+from ...trial import OPEN, Trial, scatter_objects
 from ..errors import ExperimentError
 from ..experiment_file import ERROR_KEYS, ERRORS, Cell, Experiment
-from .starts import place_all, place_objects
+from .starts import place_all
 
 
 class CellSetup(NamedTuple):
@@ -38,16 +38,20 @@ class CellSetup(NamedTuple):
         """Return worlds with these seeds, at their start. Raises: ExperimentError with the line of what is wrong."""
         experiment, settings = self.experiment, self.cell.settings
         starts = self.place_robots(seeds)
+        objects = None  # as they are in the arena
         with _at(experiment, "objects"):
-            objects = place_objects(settings.get("objects", "arena"), self.arena, starts, seeds)
+            if settings.get("objects", "arena") != "arena":
+                objects = [scatter_objects(self.arena, poses, seed) for poses, seed in zip(starts, seeds)]
         with _at(experiment, "errors"):
             file = experiment.list_files(self.cell).get("errors")
             known = read_known(file, range(settings["robots"]), experiment.sources.read) if file else []
             known += ["%s=%r" % (name.partition(".")[2], settings[name]) for name in ERROR_KEYS if name in settings]
             delay_s, wifi = settings.get("delay_s", 0.0), settings.get("wifi", "ideal")
+            scale = settings.get("errors", "default")  # a number, or a name; a file is put over usual differences
+            scale = ERRORS.get(scale, ERRORS["default"]) if isinstance(scale, str) else scale
             return Trial(
                 self.behavior, self.arena, settings["robots"], seeds, starts=starts, objects=objects,
-                errors=_find_scale(settings.get("errors", "default")), known_errors=known, delay_s=delay_s, wifi=wifi,
+                errors=scale, known_errors=known, delay_s=delay_s, wifi=wifi,
             )  # fmt: skip
 
 
@@ -88,11 +92,6 @@ def check_parameters(experiment: Experiment) -> None:
             if name not in known:
                 text = "%s: %s has no parameter %r; there are %s"
                 raise ExperimentError(text % (experiment.places[name], whose, name, ", ".join(known)))
-
-
-def _find_scale(errors: Any) -> float:
-    """Return by how much robots differ: a number, or a name; a file is put over usual differences."""
-    return ERRORS.get(errors, ERRORS["default"]) if isinstance(errors, str) else float(errors)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ import sys
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Dict, Mapping
+from typing import Dict, Mapping
 
 import numpy as np
 
@@ -23,22 +23,20 @@ _SUFFIXES = (".py", ".yaml")
 
 def hash_code(own: Mapping[str, bytes]) -> str:
     """Return a digest of all sources that a run may use; own: contents of the user's files, by name."""
-    digest = hashlib.sha256(hash_suite().encode())
-    for name, content in sorted(own.items()):
-        _add_file(digest, name, content)
-    return digest.hexdigest()[:16]
+    return _digest(dict(sorted(own.items())), hash_suite())
 
 
 @lru_cache(maxsize=None)
 def hash_suite() -> str:
     """Return a digest of the suite's sources, as they were when this process asked first."""
-    return _hash_packages()
+    return _digest(list_suite())
 
 
-def _hash_packages() -> str:
-    digest = hashlib.sha256()
-    for name, content in list_suite().items():
-        _add_file(digest, name, content)
+def _digest(contents: Mapping[str, bytes], begin: str = "") -> str:
+    digest = hashlib.sha256(begin.encode())
+    for name, content in contents.items():
+        digest.update(f"{name} {len(content)}\n".encode())
+        digest.update(content)
     return digest.hexdigest()[:16]
 
 
@@ -49,13 +47,10 @@ def list_suite() -> Dict[str, bytes]:
         folders = map(Path, import_module(package).__path__)
         # In a devel space of catkin, the first folder holds but an __init__.py that leads to the second one.
         folder = next(folder for folder in folders if {path.name for path in folder.glob("*.py")} > {"__init__.py"})
-        for path in sorted(filter(_is_source, folder.rglob("*"))):
-            contents[f"{package}/{path.relative_to(folder)}"] = path.read_bytes()
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in _SUFFIXES and "__pycache__" not in path.parts:
+                contents[f"{package}/{path.relative_to(folder)}"] = path.read_bytes()
     return contents
-
-
-def _is_source(path: Path) -> bool:
-    return path.suffix in _SUFFIXES and "__pycache__" not in path.parts
 
 
 def check_suite(suite: str) -> None:
@@ -63,15 +58,10 @@ def check_suite(suite: str) -> None:
 
     Raises: ExperimentError.
     """
-    for own in (hash_suite(), _hash_packages()):  # what it imports later comes from the disk
+    for own in (hash_suite(), _digest(list_suite())):  # what it imports later comes from the disk
         if own != suite:
             text = "%s has other code of the suite (%s, not %s) than this run began with: update it and start again"
             raise ExperimentError(text % (platform.node(), own, suite))
-
-
-def _add_file(digest: Any, name: str, content: bytes) -> None:
-    digest.update(f"{name} {len(content)}\n".encode())
-    digest.update(content)
 
 
 def describe_machine() -> Dict[str, str]:

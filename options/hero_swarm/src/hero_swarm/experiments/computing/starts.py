@@ -1,7 +1,7 @@
 """Start poses of a run, which depend on seed and number alone. Pure but for a file."""
 
 import math
-from typing import Callable, List, Optional, Sequence
+from typing import Callable, Sequence
 
 import numpy as np
 
@@ -9,11 +9,11 @@ from hero_client.values import BODY_RADIUS_M, MAX_POSITION_M, is_plausible
 from hero_node import Pose, shorten
 from hero_node.files import decode_text, read_file
 from hero_sim.errors import OptionError
-from hero_sim.world import Arena, PushedBody, place_robots
+from hero_sim.world import Arena, place_robots
 
 from ...behavior import derive_seed
 from ...metrics.graphs import measure_distances
-from ...trial import is_clear, scatter, scatter_objects
+from ...trial import is_clear, scatter
 from ..errors import ExperimentError
 from ..experiment_file import Start
 
@@ -37,21 +37,6 @@ def place_all(
         return np.array([_place(start, arena, robots, seed) for seed in seeds])
     except (OptionError, ValueError) as error:
         raise ExperimentError(f"start: {error}") from error
-
-
-def place_objects(
-    where: str, arena: Arena, starts: np.ndarray, seeds: Sequence[int]
-) -> Optional[List[List[PushedBody]]]:
-    """Return the objects of one world for each seed, with robots at starts (W, N, 3); None: as they are in the arena.
-
-    Raises: ExperimentError if they find no place.
-    """
-    if where == "arena":
-        return None
-    try:
-        return [scatter_objects(arena, poses, seed) for poses, seed in zip(starts, seeds)]
-    except ValueError as error:
-        raise ExperimentError(f"objects: {error}") from error
 
 
 def _place(start: Start, arena: Arena, robots: int, seed: int) -> np.ndarray:

@@ -125,10 +125,7 @@ def draw_runs(
 def draw_over_time(
     metric: str, unit: str, labels: Sequence[str], times_s: np.ndarray, values: Sequence[np.ndarray]
 ) -> Figure:
-    """Draw the median and the middle half of the runs of each cell.
-
-    values: (T, runs) of each cell, nan after a run's end.
-    """
+    """Draw the median and the middle half of each cell's runs, values (T, runs), nan after a run's end."""
     figure, axes = _begin(3.6)
     for index, (label, runs) in enumerate(zip(labels, values)):
         style = _choose_style(index)

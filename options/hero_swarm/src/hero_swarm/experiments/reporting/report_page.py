@@ -6,7 +6,7 @@ from typing import List, Mapping, Sequence
 from matplotlib.figure import Figure
 
 from .figures import MAP, OVER_TIME, to_svg
-from .summary import Report, Summary, describe_method, format_comparison, format_interval
+from .summary import Report, describe_method, format_comparison, format_interval
 
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222 }
@@ -26,7 +26,9 @@ def draw_page(report: Report, figures: Mapping[str, Figure], text: str, about: M
     parts.append("<p>Each point is a run; large points are medians, with 95 % intervals.</p>")
     for name, summaries in report.summaries.items():
         own = [figures[key] for key in (name, name + MAP) if key in figures]
-        parts += [f"<h2>{html.escape(name)}</h2>", *map(to_svg, own), _list_summaries(summaries)]
+        rows = [(cell.label, str(len(runs)), format_interval(interval)) for cell, runs, interval in summaries]
+        parts += [f"<h2>{html.escape(name)}</h2>", *map(to_svg, own)]
+        parts.append(_table(("cell", "runs", "median (95 % interval)"), rows))
     over_time = [figure for name, figure in figures.items() if name.endswith(OVER_TIME)]
     if over_time:
         parts.append("<h2>Over time</h2><p>Median of each cell, and the middle half of its runs.</p>")
@@ -38,11 +40,6 @@ def draw_page(report: Report, figures: Mapping[str, Figure], text: str, about: M
     title = html.escape(experiment.behavior)
     head = '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>%s</title><style>%s</style></head><body>'
     return head % (title, _STYLE) + "\n".join(parts) + "</body></html>\n"
-
-
-def _list_summaries(summaries: Sequence[Summary]) -> str:
-    rows = [(cell.label, str(len(runs)), format_interval(interval)) for cell, runs, interval in summaries]
-    return _table(("cell", "runs", "median (95 % interval)"), rows)
 
 
 def _list_comparisons(report: Report) -> List[str]:

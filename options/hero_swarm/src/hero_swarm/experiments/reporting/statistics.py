@@ -91,16 +91,11 @@ def compare_pairs(first: Sequence[float], second: Sequence[float]) -> Comparison
     differences = theirs - ours
     if not np.isfinite(differences).all():
         raise ExperimentError("a value that is not finite cannot be compared: compare another metric, or longer runs")
+    unequal, p_value = differences[differences != 0.0], 1.0
+    if len(unequal):
+        p_value = float(import_optional("scipy.stats", "python3-scipy").wilcoxon(unequal).pvalue)
     delta = cliffs_delta(ours.tolist(), theirs.tolist())
-    return Comparison(len(differences), bootstrap_median(differences), _signed_rank(differences), delta)
-
-
-def _signed_rank(differences: np.ndarray) -> float:
-    """Return the two-sided p-value of Wilcoxon's signed-rank test; pairs without a difference do not count."""
-    unequal = differences[differences != 0.0]
-    if not len(unequal):
-        return 1.0
-    return float(import_optional("scipy.stats", "python3-scipy").wilcoxon(unequal).pvalue)
+    return Comparison(len(differences), bootstrap_median(differences), p_value, delta)
 
 
 def correct_by_holm(p_values: Sequence[float]) -> Tuple[float, ...]:

@@ -1,0 +1,28 @@
+"""Experiments compute their batches in this process: a worker process costs two seconds of CPU to start."""
+
+import pickle
+from concurrent.futures import Executor, Future
+
+import pytest
+
+from hero_swarm.experiments.computing import engines
+
+
+class InProcess(Executor):
+    """Takes tasks as a worker process does, as copies."""
+
+    def submit(self, function, *arguments):
+        future = Future()
+        future.set_result(function(*pickle.loads(pickle.dumps(arguments))))
+        return future
+
+
+@pytest.fixture(autouse=True)
+def compute_in_this_process(request, monkeypatch):
+    if "workers" not in request.fixturenames:
+        monkeypatch.setattr(engines, "open_pool", lambda jobs: InProcess())
+
+
+@pytest.fixture(name="workers")
+def use_worker_processes():
+    """For tests of what only processes show."""
