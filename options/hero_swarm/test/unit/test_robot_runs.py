@@ -1,6 +1,7 @@
 """One trial on robots in virtual time: it lasts as long as its experiment says, by a time that nobody sets."""
 
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -92,3 +93,12 @@ def test_a_trial_that_ends_early_says_when(stage):
     assert stage.drive() and stage.remark in ("stopped at 1.0 s", "stopped at 1.1 s")
     stage.lost, stage.stop_s = "has gone", np.inf
     assert stage.drive() and stage.remark == "lost hero_3 at 0.0 s: has gone"
+
+
+def test_robots_drive_to_their_starts_as_wide_as_the_widest(stage, monkeypatch):
+    start_drive = mock.create_autospec(robot_runs.StartDrive, return_value=SimpleNamespace(done=True))
+    monkeypatch.setattr(robot_runs, "StartDrive", start_drive)
+    stage.max_body_radius_m, starts = 0.06, np.zeros((1, 3))
+    robot_runs._drive_to_starts(stage, stage, starts, stage, "seed 1")
+    start_drive.assert_called_once_with(starts, 0.06)
+    assert stage.stops == 1
