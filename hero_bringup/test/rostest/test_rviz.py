@@ -13,7 +13,7 @@ import rostest
 from geometry_msgs.msg import PointStamped, PoseStamped, Twist
 from std_msgs.msg import ColorRGBA
 
-from hero_description.rviz_config import ABOVE_PIXELS_PER_M, GOAL_TOPIC, POINT_TOPIC
+from hero_description.goal_choice import GOAL_TOPIC, POINT_TOPIC
 from hero_test.screens.virtual_screen import MISSING, VirtualScreen
 from hero_test.waiting import wait_for
 from hero_test.watches.swarm_watch import SwarmWatch
@@ -23,6 +23,7 @@ NEAR_M = 0.015
 LIGHTS = {0: (1.0, 0.0, 0.0), 1: (0.0, 1.0, 0.0), 2: (0.0, 0.0, 1.0)}
 BRIGHT, DIM = 110, 60
 BLOB_PIXELS_MIN = 8
+PIXELS_PER_M = 300  # displays.yaml
 SIDE_M = 1.6  # of the walls in square_arena.yaml
 WALL_SHARE = 0.8  # the side panels are 0.7 as wide as a wall is long
 WALL_PIXELS = 4
@@ -40,7 +41,7 @@ def find_blob(picture, color):
 def find_walls(picture, side_m):
     """Return the middle (right, down) of a square of gray walls, None if it is not there."""
     gray = (np.ptp(picture.astype(int), axis=2) < 12) & (picture.mean(axis=2) < 190) & (picture.mean(axis=2) > 60)
-    length = side_m * ABOVE_PIXELS_PER_M
+    length = side_m * PIXELS_PER_M
     middle = []
     for axis in (0, 1):
         lines = np.flatnonzero(gray.sum(axis=axis) > WALL_SHARE * length)
@@ -88,7 +89,7 @@ class RvizTest(unittest.TestCase):
         middle = find_walls(self.picture, side_m=SIDE_M)
         if middle is None:
             return None
-        reach = int(SIDE_M / 2 * ABOVE_PIXELS_PER_M)
+        reach = int(SIDE_M / 2 * PIXELS_PER_M)
         left, top = int(middle[0]) - reach, int(middle[1]) - reach
         inside = self.picture[top : top + 2 * reach, left : left + 2 * reach]
         errors = {}
@@ -96,8 +97,8 @@ class RvizTest(unittest.TestCase):
             blob = find_blob(inside, color)
             if blob is None:
                 return None
-            x_m = (left + blob[0] - middle[0]) / ABOVE_PIXELS_PER_M
-            y_m = (middle[1] - top - blob[1]) / ABOVE_PIXELS_PER_M
+            x_m = (left + blob[0] - middle[0]) / PIXELS_PER_M
+            y_m = (middle[1] - top - blob[1]) / PIXELS_PER_M
             errors[robot_id] = float(np.hypot(*(np.array([x_m, y_m]) - self.watch.pose(robot_id)[:2])))
         return errors
 

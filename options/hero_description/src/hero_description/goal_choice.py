@@ -19,7 +19,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from hero_node.parameters import Parameter, parse_explicit_ids
 from hero_node.ros import Program, read_parameters
 
-from .rviz_config import CHOICE_TOPIC, GOAL_TOPIC, POINT_TOPIC
+# As in displays.yaml.
+CHOICE_TOPIC = "/hero_choice/chosen"
+POINT_TOPIC = "/hero_choice/point"
+GOAL_TOPIC = "/hero_choice/goal"
 
 LISTEN_S = 0.5
 """Time of listening to /tf after a click; reading a swarm's /tf all the time would cost too much."""

@@ -16,7 +16,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 from hero_node.parameters import Parameter, parse_explicit_ids
 from hero_node.ros import Program, read_parameters
 
-from .rviz_config import LIGHTS_TOPIC, TRUE, color_of, read_ids
+from .rviz_config import TRUE, color_of, read_ids
+
+LIGHTS_TOPIC = "/hero_lights"
 
 LIGHT_S = 15.0
 """The firmware switches the light off this long after the last command (LEDStatus.ino:76)."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hero_description.rviz_config import GOAL_TOPIC, POINT_TOPIC, color_of, make_config, make_robot_displays
+from hero_description.rviz_config import color_of, make_config
 
 TOPIC_KEYS = ("TF Prefix", "Topic", "Marker Topic", "Image Topic")
 
@@ -94,7 +94,8 @@ def test_robots_have_their_names_and_rings_in_the_color_of_their_paths():
     name, ring = lights.make_identity(7)
     assert name.text == "hero_7" and name.header.frame_id == ring.header.frame_id == "hero_7/base_link"
     assert len(ring.points) == lights.RING_POINTS
-    path = make_robot_displays("hero_7", False, "hero_7")[1]["Shape"]["Color"]
+    displays = yaml.safe_load(make_config(["hero_7"]))["Visualization Manager"]["Displays"]
+    (path,) = [display["Shape"]["Color"] for display in displays if display["Name"] == "hero_7 path"]
     assert path == "; ".join("%d" % (255 * part) for part in (ring.color.r, ring.color.g, ring.color.b))
     assert len({color_of(robot_id) for robot_id in range(100)}) == 100
 
@@ -124,10 +125,12 @@ def test_rviz_displays_a_hero_plus_by_its_own_model_with_its_range():
 
 
 def test_rviz_has_tools_to_choose_a_robot_and_send_it_a_goal():
-    tools = yaml.safe_load(make_config(["hero_0"], "world"))["Visualization Manager"]["Tools"]
-    topics = {tool["Class"]: tool.get("Topic") for tool in tools}
-    assert topics["rviz/PublishPoint"] == POINT_TOPIC
-    assert topics["rviz/SetGoal"] == GOAL_TOPIC
+    goal_choice = pytest.importorskip("hero_description.goal_choice", reason="imports rospy")
+    manager = yaml.safe_load(make_config(["hero_0"], "world"))["Visualization Manager"]
+    topics = {tool["Class"]: tool.get("Topic") for tool in manager["Tools"]}
+    assert topics["rviz/PublishPoint"] == goal_choice.POINT_TOPIC
+    assert topics["rviz/SetGoal"] == goal_choice.GOAL_TOPIC
+    assert goal_choice.CHOICE_TOPIC in {display.get("Marker Topic") for display in manager["Displays"]}
 
 
 def test_the_view_above_looks_straight_down():

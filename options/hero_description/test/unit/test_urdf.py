@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from hero_description.hero_plus import make_hero_plus
-
 URDF = Path(__file__).resolve().parents[2] / "urdf" / "hero.urdf"
 MASS_KG = 0.156  # one robot on the scales, with battery
 
@@ -73,7 +71,8 @@ def test_inertias_are_possible(robot):
 
 
 def test_hero_plus_has_its_own_wheels_and_a_bump_shield():
-    plus = ElementTree.fromstring(make_hero_plus(URDF.read_text()))
+    rviz = pytest.importorskip("hero_description.rviz", reason="imports rospy")
+    plus = ElementTree.fromstring(rviz.make_hero_plus(URDF.read_text()))
     origins = {joint.get("name"): joint.find("origin").get("xyz") for joint in plus.findall("joint")}
     assert origins["left_wheel_joint"] == "0 0.0325 0.01548" and origins["right_wheel_joint"] == "0 -0.0325 0.01548"
     radii = [cylinder.get("radius") for cylinder in plus.iter("cylinder")]
