@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Sets the odometry of a robot to zero."""
 
-import contextlib
 import sys
 
 import rospy
@@ -22,5 +21,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

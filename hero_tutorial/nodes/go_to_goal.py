@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Drives a robot to a goal in its odometry frame with a unicycle controller, then logs "arrived" and exits."""
 
-import contextlib
 import math
 
 import rospy
@@ -70,5 +69,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

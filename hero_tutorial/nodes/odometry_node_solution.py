@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Publishes every tenth pose of odom as a nav_msgs/Path on path."""
 
-import contextlib
-
 import rospy
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
@@ -27,5 +25,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

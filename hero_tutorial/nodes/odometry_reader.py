@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Logs a robot's pose estimate once a second."""
 
-import contextlib
 import math
 
 import rospy
@@ -24,5 +23,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

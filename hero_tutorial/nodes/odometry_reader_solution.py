@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Logs once a second how far a robot has driven, along its path and in a straight line from the start."""
 
-import contextlib
 import math
 
 import rospy
@@ -32,5 +31,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

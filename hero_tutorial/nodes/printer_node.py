@@ -15,6 +15,5 @@ def main():
 
 
 if __name__ == "__main__":
-    # Ctrl-C during rate.sleep(), or while no ROS master answers
-    with contextlib.suppress(rospy.ROSInterruptException, rospy.ROSInitException):
+    with contextlib.suppress(rospy.ROSInterruptException):  # Ctrl-C during rate.sleep()
         main()

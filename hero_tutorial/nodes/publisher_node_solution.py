@@ -21,5 +21,5 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInterruptException, rospy.ROSInitException):
+    with contextlib.suppress(rospy.ROSInterruptException):
         main()

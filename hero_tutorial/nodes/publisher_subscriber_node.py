@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Doubles each number received on publisher_node_example and publishes it on publisher_subscriber."""
 
-import contextlib
-
 import rospy
 from std_msgs.msg import Int32
 
@@ -20,5 +18,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

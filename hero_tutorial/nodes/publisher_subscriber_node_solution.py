@@ -2,7 +2,6 @@
 """Publishes the mean of the last ten numbers of publisher_node_example on mean_of_ten."""
 
 import collections
-import contextlib
 
 import rospy
 from std_msgs.msg import Float32, Int32
@@ -23,5 +22,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """Random walk: drive forward while nothing is near, otherwise turn on the spot until the path is clear."""
 
-import contextlib
 import random
 
 import rospy
@@ -49,5 +48,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Sets the robot's LED from its sensors: red while something is near, otherwise green."""
 
-import contextlib
-
 import rospy
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import ColorRGBA
@@ -26,5 +24,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Logs every number received on publisher_node_example."""
 
-import contextlib
-
 import rospy
 from std_msgs.msg import Int32
 
@@ -18,5 +16,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()

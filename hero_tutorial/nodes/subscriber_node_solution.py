@@ -1,8 +1,6 @@
 #!/usr/bin/env python3
 """Logs once a second how many numbers were received on publisher_node_example, and how many are missing."""
 
-import contextlib
-
 import rospy
 from std_msgs.msg import Int32
 
@@ -28,5 +26,4 @@ def main():
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(rospy.ROSInitException):  # Ctrl-C while no ROS master answers
-        main()
+    main()
