@@ -48,6 +48,7 @@ def list_members(module, node, seen=()):
     members = [item for item in node.body if isinstance(item, ast.FunctionDef) and not item.name.startswith("_")]
     names = {*seen, *(item.name for item in members)}
     for base in node.bases:
+        base = base.value if isinstance(base, ast.Subscript) else base  # BaseSwarm[Robot]
         found = find_definition(module, ast.unparse(base)) if isinstance(base, ast.Name) else None
         if found:
             inherited = list_members(*found, names)

@@ -20,9 +20,9 @@ from running_suite import RunningSuite
 from hero_client import CommonFrame, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers import AvoidanceLaw, WanderLaw
-from hero_examples.explore import Explorer, explore_together
-from hero_examples.random_walk import Walker
-from hero_examples.swarm_go_to import STEP_HZ, Formation
+from hero_examples.driving.random_walk import Walker
+from hero_examples.swarm.explore import Explorer, explore_together
+from hero_examples.swarm.swarm_go_to import STEP_HZ, Formation
 from hero_localization.mapping.occupancy_grid import OccupancyGrid, SwarmMap
 from hero_localization.stepped_localization import StepLocalization
 from hero_sim.stepped import StepSwarm
@@ -46,7 +46,7 @@ def measure_formation(shape, frame, seed):
         swarm.sleep(SETTLE_S)
         goals = place_formation({"shape": shape, "spacing_m": SPACING_M[shape]}, ROBOTS, law.min_spacing_m)
         goals = [goals[index] for index in assign_goals([robot.true_pose[:2] for robot in swarm], goals)]
-        formation = Formation(swarm, CommonFrame(frame), goals, law, seed)
+        formation = Formation(swarm, CommonFrame(frame), goals, law)
         took_s = math.inf
         try:
             for time_s in swarm.rate(STEP_HZ):

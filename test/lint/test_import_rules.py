@@ -83,7 +83,6 @@ PURE_ROOMS = (
     "hero_client.controllers",
     "hero_client.robots",
     "hero_client.apps.formations",
-    "hero_client.apps.goals",
     "hero_monitor.foxglove.hub",
     "hero_monitor.foxglove.protocol",
     "hero_node.files.calibration_file",

@@ -232,8 +232,9 @@ def test_launch_arguments_are_documented_there_and_in_the_readme():
 
 def find_parameters(package, program):
     """Return the names of the parameters that a program reads; none if these are not written where it begins."""
-    path = PACKAGES[package] / "src" / package / f"{program}.py" if package in PACKAGES else None
-    if path is None or not path.exists():
+    folder = PACKAGES[package] / "src" / package if package in PACKAGES else None
+    path = next(folder.rglob(f"{program}.py"), None) if folder else None
+    if path is None:
         return set()
     calls = [node for node in sources.walk(path) if isinstance(node, ast.Call)]
     tables = [call.args[0] for call in calls if getattr(call.func, "id", "") == "read_parameters"]

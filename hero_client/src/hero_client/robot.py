@@ -7,8 +7,7 @@
         robot.turn(1.57)
         print(robot.pose, robot.nearest())
 
-Uses only topics and services under /hero_N, the same for simulated and real robots. All that needs no ROS is in
-BaseRobot, which robots that are stepped in process (hero_sim.stepped) share.
+All that needs no ROS is in BaseRobot, which robots that are stepped in process (hero_sim.stepped) share.
 """
 
 import atexit

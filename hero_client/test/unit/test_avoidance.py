@@ -28,12 +28,12 @@ def look(**beams):
     return ranges
 
 
-def test_sectors_of_more_beams_end_at_the_same_angles():
-    for index, sector in {0: 1, 1: 0, 3: 0, 4: None, 12: None, 13: 2, 15: 2}.items():
-        ranges = [INF] * 16
+def test_a_sector_that_is_not_known_counts_as_an_obstacle():
+    assert split_sectors([0.2, 0.3, INF, INF, INF, INF, INF, 0.1]) == (0.3, 0.2, 0.1)
+    for index, sector in ((0, 1), (1, 0), (7, 2)):
+        ranges = [INF] * 8
         ranges[index] = math.nan
         assert [seen == 0.0 for seen in split_sectors(ranges)] == [one == sector for one in range(3)]
-    assert split_sectors([0.2, 0.3, INF, INF, INF, INF, INF, 0.1]) == (0.3, 0.2, 0.1)
 
 
 def test_the_drift_of_a_wanderer_is_a_walk_within_its_limit():

@@ -4,6 +4,7 @@ import itertools
 import math
 import random
 
+import numpy as np
 import pytest
 
 from hero_client.apps.formations import FormationError, assign_goals, place_formation
@@ -21,6 +22,23 @@ def test_goals_are_assigned_with_the_least_sum_of_squares():
 
         least_m2 = min(map(cost_m2, itertools.permutations(range(5), 4)))
         assert cost_m2(assign_goals(starts, goals)) == pytest.approx(least_m2)
+
+
+def test_no_two_of_a_hundred_robots_would_do_better_with_swapped_goals():
+    rng = np.random.RandomState(1)
+    starts, goals = rng.uniform(-2.0, 2.0, (100, 2)), rng.uniform(-2.0, 2.0, (120, 2))
+    order = assign_goals(starts.tolist(), goals.tolist())
+    assert len(set(order)) == 100
+    apart_m, towards_m = (points[:, None] - points for points in (starts, goals[order]))
+    assert (apart_m * towards_m).sum(axis=2).min() > -1e-6, "as of paths that do not meet (CAPT)"
+    free = sorted(set(range(120)) - set(order))
+    to_free_m = np.hypot(*(starts[:, None] - goals[free]).transpose(2, 0, 1))
+    assert (to_free_m > np.hypot(*(starts - goals[order]).T)[:, None] - 1e-9).all()
+
+
+def test_robots_and_goals_on_one_point_are_assigned():
+    assert sorted(assign_goals([(0.0, 0.0)] * 3, [(1.0, 1.0)] * 3)) == [0, 1, 2]
+    assert assign_goals([], [(1.0, 1.0)]) == []
 
 
 def test_paths_to_assigned_goals_do_not_cross():

@@ -6,7 +6,16 @@ import random
 import pytest
 
 from hero_client.controllers.go_to_goal import FREE_S, PROGRESS_S, Goal, GoToGoalController
-from hero_client.controllers.motion import BLOCKED_S, FROZEN_S, MAX_STEP_S, SETTLE_S, STALL_S, MotionController, State
+from hero_client.controllers.motion import (
+    BLOCKED_S,
+    DEFAULT_TIMEOUT_S,
+    FROZEN_S,
+    MAX_STEP_S,
+    SETTLE_S,
+    STALL_S,
+    MotionController,
+    State,
+)
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose, Velocity, transform_pose
@@ -164,10 +173,10 @@ def test_straight_and_turn_slow_down_to_their_least_speeds():
         controller = ForwardController(1.0, 0.0, 0.1)
         controller.step(Pose(0.0, 0.0, 3.0), None, 0.0)
         assert controller.step(Pose(0.0, 0.0, 3.0 + off_rad), None, 0.1).angular_rad_s == pytest.approx(turn_rad_s)
-    turning = TurnController(4.0, 0.0, 1.0, timeout_s=1.0)
+    turning = TurnController(4.0, -DEFAULT_TIMEOUT_S, 1.0)
     for index in range(12):
-        turning.step(Pose(0.0, 0.0, math.remainder(3.0 + 0.1 * index, math.tau)), None, STEP_S * index)
-    assert turning.reason == "not there after 1 s, 3.00 rad are left"
+        turning.step(Pose(0.0, 0.0, math.remainder(3.0 + 0.1 * index, math.tau)), None, STEP_S * (index - 10))
+    assert turning.reason == "not there after 120 s, 3.00 rad are left"
 
 
 def test_another_goal_on_the_way_has_its_own_time_and_place():

@@ -56,7 +56,7 @@ def swap(count, radius_m, seed):
     poses = [Pose(radius_m * math.cos(a), radius_m * math.sin(a), rng.uniform(-math.pi, math.pi)) for a in angles]
     goals = [(-pose.x_m, -pose.y_m) for pose in poses]
     bodies = [Body(pose) for pose in poses]
-    steering = SwarmGoToController(goals, AvoidanceLaw(), STEP_S, seed)
+    steering = SwarmGoToController(goals, AvoidanceLaw(), STEP_S)
     min_distance_m = math.inf
     for _ in range(1500):
         commands = steering.step([body.pose for body in bodies])

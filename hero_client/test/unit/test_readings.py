@@ -63,7 +63,7 @@ def test_an_invalid_scan_has_no_ranges(message):
 
 def test_ranges_begin_at_the_front_and_go_counter_clockwise():
     assert front_first(make_scan([0, 1, 2, 3, 4, 5, 6, 7])) == [4, 5, 6, 7, 0, 1, 2, 3]
-    assert front_first(make_scan([])) == []
+    assert front_first(make_scan([])) == front_first(make_scan([0.1] * 7)) == front_first(make_scan([0.1] * 16)) == []
 
 
 def test_too_close_is_zero_and_invalid_stays_invalid():

@@ -10,7 +10,7 @@ import rospy
 from sensor_msgs.msg import LaserScan
 
 from hero_client.ros import frames, localized_poses, robot_topics, ros_link
-from hero_client.ros.frames import FrameListener
+from hero_client.ros.frames import find_origin
 from hero_client.ros.localized_poses import PoseListener
 from hero_client.ros.robot_topics import CommandTopic, NewestMessages
 from hero_client.ros.ros_link import RosLink, ThreadMotion
@@ -93,7 +93,6 @@ def test_a_light_waits_for_the_driver_at_the_start_only(monkeypatch, time):
 
 def test_a_transform_is_waited_for_until_its_time_is_out(time, monkeypatch):
     monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(50))
-    listener = FrameListener.__new__(FrameListener)
     found = SimpleNamespace(
         translation=SimpleNamespace(x=1.0, y=2.0), rotation=SimpleNamespace(x=0.0, y=0.0, z=1.0, w=0.0)
     )
@@ -106,18 +105,18 @@ def test_a_transform_is_waited_for_until_its_time_is_out(time, monkeypatch):
         return SimpleNamespace(transform=found, header=SimpleNamespace(stamp=stamped))
 
     stamped = rospy.Time(50.9)
-    listener._buffer = SimpleNamespace(lookup_transform=look_up)
+    monkeypatch.setattr(frames, "listen", lambda: SimpleNamespace(lookup_transform=look_up))
     with pytest.raises(FrameError, match=r"no transform from hero_0/odom to map \(not there\): start"):
-        listener.find_origin("hero_0/odom", "map", 0.0)
+        find_origin("hero_0/odom", "map", 0.0)
     assert len(asked) == 1 and time.now_s == 100.0
     with pytest.raises(FrameError):
-        listener.find_origin("hero_0/odom", "map", 0.5)
+        find_origin("hero_0/odom", "map", 0.5)
     assert time.now_s == pytest.approx(100.5, abs=0.021)
-    assert listener.find_origin("hero_0/odom", "map", 2.0) == pytest.approx((1.0, 2.0, math.pi))
+    assert find_origin("hero_0/odom", "map", 2.0) == pytest.approx((1.0, 2.0, math.pi))
     assert asked[0] == ("map", "hero_0/odom")
     stamped = rospy.Time(3650)
     with pytest.raises(StaleDataError, match="from map to hero_0/odom is stamped 3600.0 s ahead"):
-        listener.find_origin("hero_0/odom", "map", 2.0)
+        find_origin("hero_0/odom", "map", 2.0)
 
 
 def test_a_pose_of_localize_is_waited_for_if_localize_runs(time):

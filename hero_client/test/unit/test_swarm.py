@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from linkless_robot import FakeSwarm
 
-from hero_client.robots.common_frame import POLL_HZ, CommonFrame
+from hero_client.robots.common_frame import CommonFrame
 from hero_client.robots.group import wait_for_all
-from hero_client.robots.swarm_base import FIRST_REPORT_S, REPORT_PERIOD_S
+from hero_client.robots.swarm_base import FIRST_REPORT_S, POLL_HZ, REPORT_PERIOD_S
 from hero_client.values.errors import FrameError, GoalError, RobotNotReadyError, StaleDataError, StoppedError
 from hero_client.values.readings import NOT_CALIBRATED
+from hero_client.values.robot_constants import MODELS
 from hero_node import Pose, ProgramError, Velocity
 from hero_node.texts import NAMES_SHOWN
 from hero_test.nonempty import nonempty
@@ -34,7 +35,7 @@ def test_robots_are_taken_by_their_numbers():
 
 
 def test_arrays_have_a_row_for_each_robot_and_nan_where_data_are_old():
-    swarm = FakeSwarm(0, 1, 2)
+    swarm = FakeSwarm(9, 2, 4)
     swarm.sleep(3.0)
     for row, link in enumerate(swarm.links):
         link.pose, link.velocity, link.ranges = Pose(row, 2.0, 0.1), Velocity(0.1 * row, 1.0), [0.1 + row] * 8
@@ -45,7 +46,7 @@ def test_arrays_have_a_row_for_each_robot_and_nan_where_data_are_old():
     for array, columns in ((swarm.pose_array, 3), (swarm.velocity_array, 2), (swarm.proximity_array, 8)):
         assert array.shape == (3, columns) and np.isnan(array[1]).all()
     swarm.links[1].localized = Pose(0.5, 0.6, 0.7)
-    assert swarm.poses[1] == (0.5, 0.6, 0.7) and list(swarm.poses) == [0, 1, 2]
+    assert swarm.poses[2] == (0.5, 0.6, 0.7) and list(swarm.poses) == [9, 2, 4]
 
 
 def test_first_data_of_a_swarm_are_waited_for():
@@ -61,7 +62,7 @@ def test_first_data_of_a_swarm_are_waited_for():
 
 
 def test_a_command_goes_to_all_robots():
-    swarm = FakeSwarm(0, 1)
+    swarm = FakeSwarm(5, 2)
     swarm.drive(0.1, 0.2)
     swarm.led("red")
     swarm.blink("blue", 2.0)
@@ -88,14 +89,14 @@ def test_motions_of_all_robots_run_at_once():
 
 
 def test_errors_of_all_robots_are_told():
-    swarm = FakeSwarm(0, 1, 2)
+    swarm = FakeSwarm(8, 4, 6)
     for link in swarm.links[1:]:
         link.ready_s = math.inf
-    with pytest.raises(GoalError, match=r"hero_1 is not ready after 2 s: .*; hero_2 is not ready"):
+    with pytest.raises(GoalError, match=r"hero_4 is not ready after 2 s: .*; hero_6 is not ready"):
         swarm.go_to(0.1, 0.0)
     assert swarm.links[0].pose.x_m == pytest.approx(0.1, abs=0.01), "the others reach their goals"
     swarm.links[2].ready_s = 0.0
-    with pytest.raises(RobotNotReadyError, match="^hero_1 is not ready after 2 s: nothing subscribes"):
+    with pytest.raises(RobotNotReadyError, match="^hero_4 is not ready after 2 s: nothing subscribes"):
         swarm.turn(0.2)
     broken = SimpleNamespace(exception=lambda: KeyError("ours"))
     with pytest.raises(KeyError):
@@ -104,8 +105,9 @@ def test_errors_of_all_robots_are_told():
 
 @pytest.mark.slow
 def test_robots_cross_without_touching_and_those_without_a_goal_stay():
-    swarm = FakeSwarm(0, 1, 2)
-    swarm.go_to({0: (0.0, 0.5), 1: (0.0, 0.0)}, frame="world", tolerance_m=0.02)
+    swarm = FakeSwarm(7, 3, 12)
+    swarm.links[2].model = MODELS["hero_plus"]
+    swarm.go_to({7: (0.0, 0.5), 3: (0.0, 0.0)}, frame="world", tolerance_m=0.02)
     for link, place in nonempty(zip(swarm.links, ((0.0, 0.5), (0.0, -0.5), (0.0, 0.0)))):
         assert link.pose[:2] == pytest.approx(place, abs=0.02), "each in its own odometry"
         assert link.velocity == (0.0, 0.0)
@@ -120,6 +122,9 @@ def test_goals_too_near_to_each_other_or_to_a_robot_that_stays_are_refused():
     ):
         with pytest.raises(GoalError, match=says):
             swarm.go_to_each(goals, frame="world")
+    swarm.links[2].model = MODELS["hero_plus"]
+    with pytest.raises(GoalError, match="hero_0 and hero_1 are 0.220 m apart: robots need 0.224 m"):
+        swarm.go_to_each({0: (0.3, 0.0), 1: (0.3, 0.22)}, frame="world")
     swarm.links[2].origin = Pose(0.1, 0.5, 0.0)  # beside hero_1, and both stay
     swarm.go_to_each({0: (0.1, 0.0)}, frame="world", tolerance_m=0.02)
     with pytest.raises(TypeError, match=r"the goal of hero_0 must be \(x m, y m\)"):
@@ -177,12 +182,12 @@ def test_without_poses_go_to_each_stops_at_once_and_ends_after_two_seconds():
 
 
 def test_robots_that_cannot_see_drive_by_their_poses_and_are_named():
-    swarm = FakeSwarm(0, 1, 2)
+    swarm = FakeSwarm(3, 8, 5)
     swarm.links[1].ranges = swarm.links[2].ranges = [math.nan] * 8
-    swarm.go_to_each({0: (0.2, 0.0), 1: (0.2, 0.5)}, frame="world", tolerance_m=0.02)
+    swarm.go_to_each({3: (0.2, 0.0), 8: (0.2, 0.5)}, frame="world", tolerance_m=0.02)
     assert [link.warned for link in swarm.links] == [
         [],
-        ["hero_1 does not see what is in its way: " + NOT_CALIBRATED],
+        ["hero_8 drives by its pose alone: " + NOT_CALIBRATED],
         [],
     ], "the last one rests"
 
@@ -239,9 +244,9 @@ def test_poses_in_one_frame_are_waited_for_and_their_absence_told():
         swarm.links[1].localized = None if swarm.now_s > 104.0 else swarm.links[1].localized
 
     swarm._clock.joined.append(SimpleNamespace(advance=measure_later))
-    assert frame.wait_for_poses(swarm, swarm) == [(0.0, 0.0, 0.0), (0.0, 0.5, 0.0)]
+    assert swarm.wait_for_poses(frame) == [(0.0, 0.0, 0.0), (0.0, 0.5, 0.0)]
     assert swarm.now_s == pytest.approx(104.0, abs=1.01 / POLL_HZ)
     assert [text for _, _, text in swarm.logged] == ["hero_1: waiting: was never measured"]
     swarm._clock.is_to_continue = False
     with pytest.raises(ProgramError, match="ended before all robots were there"):
-        frame.wait_for_poses(swarm, swarm)
+        swarm.wait_for_poses(frame)

@@ -14,7 +14,6 @@ from hero_client.controllers.swarm_go_to import (
     PATIENCE_S,
     PROGRESS_M,
     SwarmGoToController,
-    _Jam,
 )
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose
@@ -25,7 +24,7 @@ HERE = Pose(0.0, 0.0, 0.0)
 
 
 def make(*goals, **options):
-    return SwarmGoToController(goals, LAW, STEP_S, 0, **options)
+    return SwarmGoToController(goals, LAW, STEP_S, **options)
 
 
 def test_all_stop_while_one_pose_is_not_known_and_no_speed_follows_from_it():
@@ -47,38 +46,42 @@ def test_a_robot_that_comes_fast_is_avoided_by_its_measured_speed():
         assert (command.linear_m_s < 0.075) == is_avoided
 
 
-def test_a_robot_wants_straight_to_its_goal_but_for_a_nudge():
-    controller = make((1.0, 0.0), (0.0, 3.0))
+def test_a_robot_wants_straight_to_its_goal_but_for_a_nudge(monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "hero_client.controllers.swarm_go_to.avoid_sensed",
+        lambda yaws_rad, ranges, wanted, law: (asked.append(wanted), avoid_sensed(yaws_rad, ranges, wanted, law))[1],
+    )
     for distance_m, speed_m_s in ((1.0, 0.08), (0.1, 0.08), (0.05, 0.04)):
-        turns_rad = []
-        for _ in range(200):
-            wanted = controller._want((distance_m, 0.0), HERE, distance_m, _Jam(), STEP_S)
-            assert np.hypot(*wanted) == pytest.approx(speed_m_s)
-            turns_rad.append(math.atan2(wanted[1], wanted[0]))
-        assert min(turns_rad) == pytest.approx(-NUDGE_RAD, abs=0.005) and max(turns_rad) <= NUDGE_RAD
-        assert max(turns_rad) > 0.9 * NUDGE_RAD
-    assert controller._want((0.0, 0.0), HERE, 0.0, _Jam(), STEP_S).tolist() == [0.0, 0.0]
+        controller = make((0.0, distance_m), (5.0, 0.0))
+        asked.clear()
+        for _ in range(39):  # less than its patience
+            controller.step([HERE, Pose(4.0, 0.0, 0.0)])
+        wanted = np.array(asked)[:, 0]
+        assert np.hypot(*wanted.T) == pytest.approx(speed_m_s)
+        turns_rad = np.arctan2(-wanted[:, 0], wanted[:, 1])
+        assert -NUDGE_RAD <= turns_rad.min() < -0.7 * NUDGE_RAD and 0.7 * NUDGE_RAD < turns_rad.max() <= NUDGE_RAD
+    make(tuple(HERE[:2])).step([HERE])
+    assert asked[-1].tolist() == [[0.0, 0.0]]
 
 
-def test_a_jam_is_left_to_the_side_for_two_seconds_and_then_judged_anew():
-    controller, jam = make((1.0, 0.0)), _Jam()
-    aside = []
-    for _ in range(130):
-        wanted = controller._want((1.0, 0.0), HERE, 1.0, jam, STEP_S)
-        turn_rad = math.atan2(wanted[1], wanted[0])
-        aside.append(abs(turn_rad) > NUDGE_RAD)
-        assert not aside[-1] or 0.5 <= abs(turn_rad) <= 2.5
-        assert np.hypot(*wanted) == pytest.approx(0.08)
-    begins = [index for index in range(1, 130) if aside[index] and not aside[index - 1]]
+def test_a_jam_is_left_to_the_side_for_two_seconds_and_judged_anew():
+    controller = make((1.0, 0.0), (0.0, 1.0))
+    turns_rad = np.array([controller._find_turns(np.array((1.0, 9.0 - 0.1 * step)), STEP_S) for step in range(130)])
+    assert np.abs(turns_rad[:, 1]).max() <= NUDGE_RAD, "it makes progress"
+    aside = np.abs(turns_rad[:, 0]) > NUDGE_RAD
+    assert 0.49 < np.abs(turns_rad[aside, 0]).min() <= np.abs(turns_rad[aside, 0]).max() < 2.51
+    begins = np.flatnonzero(aside[1:] & ~aside[:-1]) + 1
     assert [begins[0] * STEP_S, (begins[1] - begins[0]) * STEP_S] == pytest.approx(
         [PATIENCE_S, PATIENCE_S + ASIDE_S], abs=0.21
     )
-    assert sum(aside[: begins[1]]) * STEP_S == pytest.approx(ASIDE_S, abs=0.11)
+    assert len(set(turns_rad[aside, 0])) == 2, "one angle each time"
+    assert aside[: begins[1]].sum() * STEP_S == pytest.approx(ASIDE_S, abs=0.11)
     for nearer_m, is_jam in ((0.009, True), (PROGRESS_M, True), (0.011, False)):
-        jam = _Jam()
+        controller = make((1.0, 0.0))
         for index in range(60):
-            jam.look(1.0 if index < 30 else 1.0 - nearer_m, STEP_S)
-        assert jam.aside == is_jam
+            turn_rad = controller._find_turns(np.array([1.0 if index < 30 else 1.0 - nearer_m]), STEP_S)[0]
+        assert (abs(turn_rad) > NUDGE_RAD) == is_jam
 
 
 def test_a_robot_arrives_within_a_share_of_the_tolerance_and_leaves_beyond():

@@ -10,14 +10,18 @@ pytest.importorskip("rospy", reason="teleoperation is made for ROS programs")
 from sensor_msgs.msg import Joy
 
 from hero_client.apps import joystick_teleop, keyboard_teleop
-from hero_client.apps.joystick_teleop import DRAIN_S, SILENCE_S, JoystickMapping, JoystickTeleop
+from hero_client.apps.joystick_teleop import (
+    DRAIN_S,
+    SILENCE_S,
+    JoystickMapping,
+    JoystickTeleop,
+    RobotChoice,
+)
 from hero_client.apps.keyboard_teleop import PERIOD_S, KeyboardTeleop
-from hero_client.apps.robot_choice import ChoiceButtons, RobotChoice
 from hero_client.apps.teleop_output import HOLD_ENDED, PAUSE_S, TeleopOutput
-from hero_client.controllers.formation_drive import FormationDrive
 from hero_client.ros.stop_status import StopStatus
 from hero_msgs.msg import RobotArray
-from hero_node import Pose, ProgramError, Velocity
+from hero_node import ProgramError
 
 MAPPING = JoystickMapping(0.1, 2.0, 1, 0, 4, 1)
 
@@ -61,7 +65,7 @@ def note_shown(monkeypatch):
 
 
 def test_every_motion_and_one_stop_pass():
-    output = TeleopOutput()
+    output = TeleopOutput(pytest.fail)
     moves = [(0.0, 0.0), (0.1, 0.0), (0.1, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.1), (0.0, 0.0), (0.0, 0.0)]
     assert [output.passes(move) for move in moves] == [False, True, True, True, False, True, True, False]
 
@@ -312,7 +316,7 @@ def test_a_press_of_the_stop_button_stops_all_once_even_after_a_pause(shown):
 
 
 def test_buttons_choose_robots_and_those_that_are_left_stop(shown):
-    swarm = make_swarm(0, 1, 2)
+    swarm = make_swarm(4, 1, 9)
     teleop = JoystickTeleop(swarm, MAPPING)
     push(teleop, 5, 4)
     push(teleop, 4)
@@ -324,7 +328,7 @@ def test_buttons_choose_robots_and_those_that_are_left_stop(shown):
 def test_a_choice_goes_round_keeps_and_returns_to_all():
     swarm = make_swarm(0, 1, 2)
     next_one, keep, everyone = (0, 0, 0, 0, 0, 1), (0, 0, 1), (0, 0, 0, 1)
-    choice = RobotChoice(swarm.robots, ChoiceButtons())
+    choice = RobotChoice(swarm.robots, MAPPING)
     for buttons, chosen, left in (
         (keep, [0, 1, 2], []),  # nothing is chosen yet
         (next_one, [0], [1, 2]),
@@ -344,7 +348,7 @@ def test_a_choice_goes_round_keeps_and_returns_to_all():
         assert [robot.robot_id for robot in choice.robots] == chosen
         lit = [link.colors[-1][1] == (1.0, 1.0, 1.0) if link.colors else False for link in swarm.links]
         assert lit == [len(chosen) < 3 and number in chosen for number in range(3)]
-    assert ChoiceButtons() == (5, 2, 3, 0), "as the documents say"
+    assert MAPPING[6:] == (5, 2, 3), "as the documents say"
 
 
 def test_a_program_with_a_keyboard_ends_and_reads_as_it_should(shown, monkeypatch):
@@ -374,29 +378,3 @@ def test_a_program_with_a_keyboard_ends_and_reads_as_it_should(shown, monkeypatc
     assert run([["\x04", "w"], ["w"]]) == [] and shown[-1] == "checked"
     assert run([[], ["w"], [], []], {1: 2.0 * PAUSE_S}) == [], "typed while it stood still"
     assert (0.0, 1.0) in run([[], ["w"], [], ["a"], []], {1: 2.0 * PAUSE_S}), "typed after it"
-
-
-def test_a_formation_is_one_body_until_a_press_or_another_choice(shown):
-    swarm = make_swarm(0, 1, 2)
-    swarm.links[1].pose = Pose(0.1, 0.0, 1.0)
-    teleop = JoystickTeleop(swarm, MAPPING, frame="world")
-    poses = [robot.pose_in("world") for robot in swarm]
-
-    def use(*pressed):
-        push(teleop, 4, *pressed)
-        teleop.step(swarm.now_s)
-        return [velocities(link) for link in swarm.links]
-
-    alone, stop = (0.1, 0.0), (0.0, 0.0)
-    body = [tuple(each) for each in FormationDrive(poses).step(poses, Velocity(*alone), 0.1)]
-    assert use() == [[alone]] * 3
-    assert use(0) == [[stop, each] for each in body] and alone not in body
-    assert [link.colors[-1][1] for link in swarm.links] == [(0.0, 1.0, 1.0)] * 3
-    use(0)
-    swarm.links[2].silent_s["odom"] = 2.0
-    assert use() == [[stop]] * 3, "a pose is not known"
-    swarm.links[2].silent_s["odom"] = 0.1
-    assert use(0) == [[stop, alone]] * 3 and swarm.links[0].colors[-1][1] == (0.0, 0.0, 0.0)
-    use()
-    assert use(0) == [[stop, each] for each in body], "a body of its own each time"
-    assert use(5) == [[stop, alone], [stop], [stop]] and use(0) == [[alone], [], []], "one robot is no formation"

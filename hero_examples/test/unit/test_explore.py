@@ -12,8 +12,8 @@ from hero_node import Pose
 from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
-from hero_examples import explore as explore_program
-from hero_examples.explore import NEAR_M, Explorer, explore_together
+from hero_examples.swarm import explore as explore_program
+from hero_examples.swarm.explore import NEAR_M, Explorer, explore_together
 
 GREEN, YELLOW = (0.0, 1.0, 0.0), (1.0, 1.0, 0.0)
 STARTS = """

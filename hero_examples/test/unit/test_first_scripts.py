@@ -8,7 +8,7 @@ import pytest
 import true_paths
 
 from hero_client.values import Obstacle
-from hero_examples import all_robots, avoid, drive_a_square, keep_distance, move, read_sensors
+from hero_examples.first import all_robots, avoid, drive_a_square, keep_distance, move, read_sensors
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
 from hero_test.nonempty import nonempty

@@ -10,7 +10,7 @@ from hero_client.values import BODY_RADIUS_M
 from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
-from hero_examples import follow
+from hero_examples.swarm import follow
 from hero_test.nonempty import nonempty
 
 ARENA = """

@@ -1,4 +1,4 @@
-"""Goals in virtual time: reached within their tolerance with and without obstacles, replaced, cancelled, given up."""
+"""Goals in virtual time: reached within their tolerance, with and without obstacles."""
 
 import math
 import random
@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 import true_paths
 
-from hero_client.apps.goals import MAX_QUEUED_GOALS, GoalQueue, GoalRequest, InvalidGoalError
-from hero_client.controllers import Goal
 from hero_client.values.errors import GoalError
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
@@ -70,83 +68,6 @@ def test_a_post_in_the_way_is_avoided_or_named_and_never_touched(tmp_path, avoid
         assert true_paths.stop_within(swarm)
 
 
-class NotedQueue(GoalQueue):
-    """Notes what a server would tell clients and the log."""
-
-    def __init__(self, robot, avoid):
-        super().__init__(robot, avoid)
-        self.accepted, self.progress, self.outcomes = [], [], []
-
-    def accept_goal(self, request):
-        self.accepted.append(request)
-
-    def show_progress(self, request, distance_m, elapsed_s):
-        self.progress.append(elapsed_s)
-
-    def end_goal(self, request, outcome):
-        self.outcomes.append(outcome)
-
-
-class Goals:
-    """The goals of one robot, and what happens while it drives."""
-
-    def __init__(self, arena="empty", avoid=False):
-        self.swarm = StepSwarm(1, arena=arena, perfect=True)
-        self.queue = NotedQueue(self.swarm[0], avoid)
-        self.events = []
-
-    def put(self, *goal, timeout_s=60.0, frame="", handle=None):
-        self.queue.put(GoalRequest(Goal(*goal), frame, TOLERANCE_M, timeout_s, handle))
-
-    def drive(self):
-        """Drive to all goals; events, a list of (time s, function), happen meanwhile."""
-
-        def wait(duration_s):
-            self.swarm.sleep(duration_s)
-            while self.events and self.events[0][0] <= self.swarm.now_s:
-                self.events.pop(0)[1]()
-
-        while self.queue.drive_to_next(wait):
-            continue
-        assert true_paths.stop_within(self.swarm)
-
-
-@pytest.fixture()
-def goals():
-    return Goals()
-
-
-def test_a_goal_is_reported_on_the_way_and_at_its_end(goals):
-    goals.put(0.2, 0.0)
-    assert goals.queue.busy
-    goals.drive()
-    (outcome,) = goals.queue.outcomes
-    assert outcome.reached and outcome.reason == "" and outcome.distance_m < TOLERANCE_M
-    assert goals.queue.reached and not goals.queue.busy
-    assert np.diff(goals.queue.progress) == pytest.approx(0.5, abs=0.1) and len(goals.queue.progress) > 4
-
-
-@pytest.mark.parametrize("avoid", [True, False])
-def test_a_goal_behind_a_post_is_reached_only_by_going_around_it(tmp_path, avoid):
-    arena = tmp_path / "post.yaml"
-    arena.write_text(ROUND_THE_POST)
-    goals = Goals(str(arena), avoid)
-    goals.put(0.8, 0.0)
-    goals.drive()
-    assert goals.queue.reached == avoid
-
-
-def test_a_new_goal_replaces_the_old_one(goals):
-    goals.put(0.5, 0.0)
-    goals.events = [(1.0, lambda: goals.put(0.0, 0.1))]
-    goals.drive()
-    first, second = goals.queue.outcomes
-    assert not first.reached and first.gave_up and first.reason == "another goal came"
-    assert first.elapsed_s < 1.3
-    assert second.reached and goals.queue.reached
-    assert math.dist(goals.swarm[0].pose[:2], (0.0, 0.1)) < TRUE_TOLERANCE_M
-
-
 def test_a_goal_around_obstacles_fails_for_sensors_without_calibration():
     with StepSwarm(1, seed=1, arena="empty") as swarm:
         swarm.rows.set_infrared_calibration(0, np.full(8, math.nan))
@@ -156,80 +77,3 @@ def test_a_goal_around_obstacles_fails_for_sensors_without_calibration():
             swarm[0].go_to(0.3, 0.0, avoid=True)
         assert swarm.now_s - start_s < 3.0
         assert np.ptp(log.true_pose[:, 0, 0], axis=0).max() < 1e-6
-
-
-def stream(goals, count, put):
-    """Call put(n) for each of count goals, 10 times a second, and drive to the last one."""
-    goals.events = [(0.1 * number, lambda number=number: put(number)) for number in range(1, count)]
-    put(0)
-    goals.drive()
-
-
-def test_a_stream_of_goals_is_followed_without_a_stop(goals, monkeypatch):
-    sent, send = [], goals.swarm.rows.send_velocity
-    monkeypatch.setattr(
-        goals.swarm.rows, "send_velocity", lambda row, *velocity: (sent.append(velocity), send(row, *velocity))
-    )
-    stream(goals, 40, lambda number: goals.put(0.3 + 0.005 * number, 0.0))
-    assert len(goals.queue.accepted) == 40 and goals.queue.reached and not goals.queue.busy
-    assert [outcome.reason for outcome in goals.queue.outcomes] == ["another goal came"] * 39 + [""]
-    assert math.dist(goals.swarm[0].pose[:2], (0.495, 0.0)) < TOLERANCE_M
-    assert all(linear_m_s > 0.0 for linear_m_s, _ in nonempty(sent[:40]))
-    assert goals.swarm.now_s < 8.0
-
-
-def test_of_goals_that_wait_only_the_newest_is_driven_to(goals):
-    for y_m in (0.3, 0.2, 0.1):
-        goals.put(0.0, y_m)
-    goals.drive()
-    assert [request.goal.y_m for request in goals.queue.accepted] == [0.1]
-    assert [outcome.gave_up for outcome in goals.queue.outcomes] == [True, True, False]
-
-
-def test_the_time_limit_of_a_goal_begins_with_it_and_names_it(goals):
-    stream(goals, 30, lambda number: goals.put(50.0 + number, 0.0, timeout_s=2.0))
-    assert [outcome.gave_up for outcome in goals.queue.outcomes] == [True] * 29 + [False]
-    assert "reach (79, 0): not there after 2 s" in goals.queue.outcomes[-1].reason
-
-
-def test_goals_in_another_frame_start_over(goals):
-    stream(goals, 2, lambda number: goals.put(0.2, 0.0, frame=("", "robot")[number]))
-    assert [request.frame for request in goals.queue.accepted] == ["", "robot"]
-    assert goals.queue.reached and goals.swarm[0].pose.x_m > 0.2
-
-
-def test_a_cancelled_goal_ends_and_another_ones_cancellation_does_not(goals):
-    goals.put(0.5, 0.0, handle="mine")
-    goals.events = [(1.0, lambda: goals.queue.cancel("another")), (2.0, lambda: goals.queue.cancel("mine"))]
-    goals.drive()
-    (outcome,) = goals.queue.outcomes
-    assert outcome.gave_up and outcome.reason == "cancelled" and 2.0 <= outcome.elapsed_s < 2.3
-    goals.put(0.1, 0.0, handle="next")
-    goals.drive()
-    assert goals.queue.reached
-
-
-def test_the_end_of_the_program_gives_up_all_goals(goals):
-    goals.put(0.5, 0.0)
-    goals.events = [(1.0, goals.queue.give_up)]
-    goals.drive()
-    assert [outcome.reason for outcome in goals.queue.outcomes] == ["the program ends"]
-    goals.put(0.1, 0.0)
-    assert not goals.queue.drive_to_next(goals.swarm.sleep)
-
-
-def test_a_goal_out_of_reach_or_in_an_unknown_frame_fails_with_the_reason(goals):
-    goals.put(50.0, 0.0, timeout_s=1.0)
-    goals.drive()
-    goals.put(0.1, 0.0, frame="nowhere")
-    goals.drive()
-    late, lost = goals.queue.outcomes
-    assert not late.reached and not late.gave_up and "not there after 1 s" in late.reason
-    assert not lost.reached and "nowhere" in lost.reason and math.isnan(lost.distance_m)
-
-
-def test_goals_are_refused_when_too_many_wait(goals):
-    for _ in range(MAX_QUEUED_GOALS):
-        goals.put(0.1, 0.0)
-    with pytest.raises(InvalidGoalError, match="more than 100 goals"):
-        goals.put(0.1, 0.0)

@@ -6,7 +6,7 @@ import true_paths
 from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
-from hero_examples import led_show
+from hero_examples.swarm import led_show
 from hero_test.nonempty import nonempty
 
 ROBOTS = 5

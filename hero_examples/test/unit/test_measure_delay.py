@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 from rospy import Time
 
 from hero_client import ProgramError
-from hero_examples import measure_delay
+from hero_examples.driving import measure_delay
 from hero_node import wrap_angle
 
 

@@ -13,7 +13,7 @@ from hero_sim.stepped import StepSwarm
 from hero_sim.world import build_default, load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
-from hero_examples.random_walk import Walker
+from hero_examples.driving.random_walk import Walker
 from hero_test.nonempty import nonempty
 
 WORLDS = 8

@@ -15,15 +15,15 @@ from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
-from hero_examples.swarm_go_to import STEP_HZ, Formation
+from hero_examples.swarm.swarm_go_to import STEP_HZ, Formation
 
 CIRCLE = str(Path(__file__).resolve().parents[3] / "test" / "hero_test" / "arenas" / "circle_arena.yaml")
 LAW = AvoidanceLaw()
 
 
-def form(swarm, goals, seed, **options):
+def form(swarm, goals, **options):
     """Drive to the goals; return the formation and the path."""
-    formation = Formation(swarm, CommonFrame("world"), goals, LAW, seed, **options)
+    formation = Formation(swarm, CommonFrame("world"), goals, LAW, **options)
 
     def step(time_s):
         formation.step(time_s)
@@ -37,7 +37,7 @@ def form(swarm, goals, seed, **options):
 def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
     with StepSwarm(10, seed=seed, arena=CIRCLE) as swarm:
         goals = [(-robot.true_pose.x_m, -robot.true_pose.y_m) for robot in swarm]
-        formation, path = form(swarm, goals, seed)
+        formation, path = form(swarm, goals)
         drift_m = np.hypot(*(swarm.rows.world.poses[:, :2] - goals).T).max()
         assert {robot.light for robot in swarm} == {(0.0, 1.0, 0.0)}
     assert formation.done
@@ -48,12 +48,12 @@ def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count, hz", [(8, 6.8), (6, 3.0), (8, 3.0), (6, 1.6), (8, 1.6)])
-def test_robots_whose_program_is_late_are_slow_and_do_not_touch(count, hz, monkeypatch):
+def test_robots_whose_program_is_late_are_slow_and_do_not_touch(count, hz):
     warnings = []
-    monkeypatch.setattr("rospy.logwarn", warnings.append)
     with StepSwarm(count, seed=100, arena=CIRCLE) as swarm:
+        swarm._log = lambda level, text: warnings.append(text)
         goals = [(-robot.true_pose.x_m, -robot.true_pose.y_m) for robot in swarm]
-        formation = Formation(swarm, CommonFrame("world"), goals, LAW, 100)
+        formation = Formation(swarm, CommonFrame("world"), goals, LAW)
         path = true_paths.run(swarm, formation.step, 60.0, hz=hz)[0]
     assert true_paths.measure_gaps(path).min() > 0.005
     assert true_paths.measure_lengths(path).min() > 0.3
@@ -79,7 +79,7 @@ def test_robots_take_their_places_in_a_formation(shape):
         places = [robot.true_pose[:2] for robot in swarm]
         goals = place_formation(wanted, len(swarm), LAW.min_spacing_m)
         goals = [goals[index] for index in assign_goals(places, goals)]
-        formation, path = form(swarm, goals, 1)
+        formation, path = form(swarm, goals)
         assert formation.done
         off_m = np.hypot(*(swarm.rows.world.poses[:, :2] - goals).T)
     assert off_m.max() < 0.03
@@ -90,7 +90,7 @@ def test_robots_take_their_places_in_a_formation(shape):
 def test_robots_that_are_not_in_place_in_time_are_named():
     swarm = StepSwarm(2, arena="empty")
     with pytest.raises(ProgramError, match="after 2 s not in place: hero_0, hero_1"):
-        form(swarm, [(0.0, 50.0), (50.0, 0.0)], 0, timeout_s=2.0)
+        form(swarm, [(0.0, 50.0), (50.0, 0.0)], timeout_s=2.0)
 
 
 def freeze_first(swarm):

@@ -2,11 +2,9 @@
 
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 import true_paths
 
-from hero_client.controllers.formation_drive import AHEAD_M
 from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="teleoperation imports rospy")
@@ -200,7 +198,7 @@ def test_a_short_press_of_the_stop_button_stops_all_robots_once(swarm):
     assert swarm.drivers.requests == [True]
 
 
-NEXT, KEEP, ALL, FORMATION = 5, 2, 3, 0
+NEXT, KEEP, ALL = 5, 2, 3
 
 
 def press(swarm, teleop, button):
@@ -217,38 +215,3 @@ def test_buttons_choose_one_robot_some_or_all_and_lights_show_it():
         assert [robot.light[:3] == (1.0, 1.0, 1.0) for robot in swarm] == [False, True, True]
         assert press(swarm, teleop, ALL) == [0, 1, 2]
         assert not any(any(robot.light[:3]) for robot in swarm)
-
-
-def measure_body(swarm):
-    """Return the distances between the points ahead of the axles, which a formation keeps, m."""
-    x_m, y_m, yaw_rad = swarm.rows.world.poses.T
-    points = x_m + 1j * y_m + AHEAD_M * np.exp(1j * yaw_rad)
-    return np.abs(points[:, None] - points)
-
-
-@pytest.mark.slow
-def test_chosen_robots_drive_as_one_body_until_the_button_is_pressed_again():
-    with StepSwarm(4, perfect=True, arena="empty") as swarm:
-        swarm.drivers = Drivers()
-        teleop = JoystickTeleop(swarm, MAPPING)
-        before = measure_body(swarm)
-        use_stick(swarm, teleop, make_joy(0.6, pressed=[FORMATION]), 0.2)
-        assert [robot.light[:3] for robot in swarm] == [(0.0, 1.0, 1.0)] * 4
-        use_stick(swarm, teleop, make_joy(0.6), 3.0)
-        use_stick(swarm, teleop, make_joy(0.3, turn=0.3), 3.0)
-        assert np.abs(measure_body(swarm) - before).max() < 0.05, "they stand 1 m apart, with four headings"
-        assert all(robot.driven for robot in swarm)
-        use_stick(swarm, teleop, make_joy(0.0), 1.5)
-        assert true_paths.stop_within(swarm, 0.2)
-        use_stick(swarm, teleop, make_joy(0.6, pressed=[FORMATION]), 1.0)
-        assert {robot.velocity.linear_m_s > 0.05 for robot in swarm} == {True}, "each by itself, forward"
-        assert not any(any(robot.light[:3]) for robot in swarm)
-
-
-def test_a_formation_stops_when_a_pose_is_not_known():
-    with StepSwarm(2, perfect=True, arena="empty") as swarm:
-        swarm.drivers = Drivers()
-        teleop = JoystickTeleop(swarm, MAPPING, frame="nowhere")
-        use_stick(swarm, teleop, make_joy(0.6), 1.0)
-        use_stick(swarm, teleop, make_joy(0.6, pressed=[FORMATION]), 1.0)
-        assert true_paths.stop_within(swarm, 0.2)

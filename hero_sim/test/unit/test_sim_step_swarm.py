@@ -56,12 +56,12 @@ def test_each_world_of_a_batch_is_that_of_its_seed_alone():
     batch = StepSwarm(3, seed=7, worlds=3)
     log = batch.log(ranges=True)
     for world in batch.worlds:
-        world.start_go_to(0.15, 0.1, frame="robot")
+        [robot.start_go_to(0.15, 0.1, frame="robot") for robot in world]
     batch.sleep(6.0)
     for index in range(3):
         alone = StepSwarm(3, seed=7 + index)
         alone_log = alone.log(ranges=True)
-        alone.start_go_to(0.15, 0.1, frame="robot")
+        [robot.start_go_to(0.15, 0.1, frame="robot") for robot in alone]
         alone.sleep(6.0)
         for name in ("pose", "true_pose", "velocity", "command", "range_m"):
             np.testing.assert_array_equal(getattr(log, name)[:, [index]], getattr(alone_log, name))
@@ -95,7 +95,7 @@ def test_over_wifi_data_are_older_and_motions_still_reach_their_goals():
     for row in range(10):
         alone = StepSwarm(1, seed=row, wifi="hotspot")
         alone_log = alone.log()
-        alone.start_go_to(0.15, 0.1, yaw_rad=1.0, frame="robot")
+        [robot.start_go_to(0.15, 0.1, yaw_rad=1.0, frame="robot") for robot in alone]
         alone.sleep(2.0)
         assert alone_log.pose.tolist() == log.pose[: len(alone_log), [row]].tolist()
 

@@ -1,11 +1,11 @@
 """Drives robots with a joystick (sensor_msgs/Joy): only while the enable button is held and /joy is alive.
 
-Other buttons choose which ones, drive them as a formation, and stop all robots of all drivers.
+Other buttons choose which ones, and stop all robots of all drivers.
 """
 
 import math
 from collections import deque
-from typing import Deque, Dict, NamedTuple, Optional, Sequence
+from typing import Any, Deque, List, NamedTuple, Optional, Sequence, Set
 
 import rospy
 from sensor_msgs.msg import Joy
@@ -13,12 +13,8 @@ from sensor_msgs.msg import Joy
 from hero_node import STOP, ProgramError, Velocity
 from hero_node.ros import Program
 
-from ..controllers.formation_drive import FormationDrive
-from ..controllers.lateness import Lateness
-from ..robots.common_frame import CommonFrame
 from ..robots.swarm_base import REPORT_PERIOD_S
 from ..swarm import Swarm
-from .robot_choice import ChoiceButtons, RobotChoice
 from .teleop_output import PauseDetector, TeleopOutput
 
 STEP_HZ = 10.0
@@ -36,6 +32,9 @@ FIRST_WARNING_S = 2.0
 """joy_node may start later."""
 
 
+CHOSEN_COLOR = "white"
+
+
 class JoystickMapping(NamedTuple):
     """Indices of axes and buttons, and the velocities at full stick."""
 
@@ -45,6 +44,12 @@ class JoystickMapping(NamedTuple):
     angular_axis: int
     enable_button: int
     stop_button: int
+    next_button: int = 5
+    """Chooses the next robot; after the last one the first. Buttons that a joystick lacks are never pressed."""
+    keep_button: int = 2
+    """Keeps the chosen robot, beside those that are chosen next."""
+    all_button: int = 3
+    """Chooses all robots again."""
 
     def is_enabled(self, buttons: Sequence[int]) -> bool:
         """Return whether the enable button is held."""
@@ -70,24 +75,57 @@ class JoystickMapping(NamedTuple):
         return Velocity(linear * self.linear_m_s, angular * self.angular_rad_s)
 
 
+class RobotChoice:
+    """The robots of a swarm that a joystick drives: at first all. Their lights show a choice."""
+
+    def __init__(self, robots: Sequence[Any], buttons: JoystickMapping) -> None:
+        self._robots = list(robots)
+        self._buttons = buttons
+        self._held: Set[int] = set()
+        self._current = -1  # of no robot: all are chosen
+        self._kept: Set[int] = set()
+
+    @property
+    def robots(self) -> List[Any]:
+        """Those that are chosen, in the order of the swarm."""
+        if self._current < 0:
+            return self._robots
+        return [robot for index, robot in enumerate(self._robots) if index == self._current or index in self._kept]
+
+    def read(self, buttons: Sequence[int]) -> List[Any]:
+        """Take the buttons of a message; return the robots that are no longer chosen."""
+        choosing = self._buttons.next_button, self._buttons.keep_button, self._buttons.all_button
+        held = {index for index in choosing if index < len(buttons) and buttons[index]}
+        pressed, self._held = held - self._held, held
+        before = self.robots
+        if self._buttons.all_button in pressed:
+            self._current = -1
+            self._kept.clear()
+        elif self._buttons.keep_button in pressed and self._current >= 0:
+            self._kept.add(self._current)
+        elif self._buttons.next_button in pressed:
+            self._current = (self._current + 1) % len(self._robots)
+        else:
+            return []
+        chosen = self.robots
+        for robot in self._robots:
+            robot.led(CHOSEN_COLOR if robot in chosen and self._current >= 0 else "off")
+        return [robot for robot in before if robot not in chosen]
+
+
 class JoystickTeleop:
     """Sends the joystick's commands to all robots of a swarm, or those that its buttons choose."""
 
-    def __init__(
-        self, swarm: Swarm, mapping: JoystickMapping, choice: Optional[ChoiceButtons] = None, frame: str = "map"
-    ) -> None:
-        """Start stopped; frame: in which the poses of a formation are known."""
-        self._formation: Optional[FormationDrive] = None
-        self._lateness = Lateness()
-        self._frame = CommonFrame(frame)
-        self._choice = RobotChoice(list(swarm), ChoiceButtons() if choice is None else choice)
+    def __init__(self, swarm: Swarm, mapping: JoystickMapping) -> None:
+        """Start stopped."""
+        self._choice = RobotChoice(list(swarm), mapping)
         self._presses: Deque[Sequence[int]] = deque(maxlen=PRESSES_MAX)
         self._swarm = swarm
         self._mapping = mapping
         self._newest: Optional[Joy] = None
         self._arrival_s = -math.inf
         self._is_stop_pressed = False
-        self._output = TeleopOutput()
+        self._output = TeleopOutput(rospy.logwarn)
         self._pauses = PauseDetector(swarm.now_s)
         self._fresh_s = -math.inf  # from when on messages are no longer those of before a pause
         self._next_warning_s = swarm.now_s + FIRST_WARNING_S
@@ -140,43 +178,14 @@ class JoystickTeleop:
         while self._presses:
             buttons = self._presses.popleft()
             self._output.note_hold(self._mapping.is_enabled(buttons))
-            was_formation = self._choice.is_formation
             for robot in self._choice.read(buttons):
                 robot.drive(*STOP)
-            if self._choice.is_formation != was_formation:
-                self._formation = None
-                for robot in self._choice.robots:
-                    robot.drive(*STOP)
-                    robot._link.subscribe("odom")  # by each alone none is read
         command = self._output.limit(command, self._swarm)
-        warning = self._output.take_warning()
-        if warning:
-            rospy.logwarn(warning)
-        missing = self._drive(command) if self._output.passes(command) else None
+        if self._output.passes(command):
+            for robot in self._choice.robots:
+                robot.drive(*command)
         self._report_stop()
-        self._swarm.report_missing(missing)
-
-    def _drive(self, command: Velocity) -> Optional[Dict[str, Optional[str]]]:
-        """Send a command to the chosen robots, or to the body that they form; return why it stands, if it does."""
-        missing: Optional[Dict[str, Optional[str]]] = None
-        robots = self._choice.robots
-        commands = [command] * len(robots)
-        if self._choice.is_formation and command != STOP:
-            poses = [self._frame.pose_of(robot) for robot in robots]
-            known = [pose for pose in poses if pose is not None]
-            if len(known) == len(robots):
-                self._formation = self._formation or FormationDrive(known)
-                commands = self._formation.step(known, command, 1.0 / STEP_HZ)
-                self._lateness.step(self._swarm.now_s)
-                commands = [self._lateness.slow(each, robot.age_s("odom")) for robot, each in zip(robots, commands)]
-                warning = self._lateness.take_warning()
-                if warning:
-                    rospy.logwarn(warning)
-            else:
-                commands, missing = [STOP] * len(robots), self._frame.missing
-        for robot, each in zip(robots, commands):
-            robot.drive(*each)
-        return missing
+        self._swarm.report_missing()
 
     def _report_stop(self) -> None:
         """Log once what came of a stop of all robots."""

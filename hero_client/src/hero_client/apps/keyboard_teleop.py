@@ -122,7 +122,7 @@ class KeyboardTeleop:
         self._swarm = swarm
         self._chosen: List[Robot] = swarm.robots[:1]
         self._drive = KeyDrive(linear_m_s, angular_rad_s)
-        self._output = TeleopOutput()
+        self._output = TeleopOutput(lambda text: show_text(f"{text}\n"))
         self._next_send_s = 0.0
         self._sent = STOP
         self._has_reported_stopped = False
@@ -187,9 +187,6 @@ class KeyboardTeleop:
         command = self._drive.command(now_s)
         self._output.note_hold(command != STOP)
         command = self._output.limit(command, self._swarm)
-        warning = self._output.take_warning()
-        if warning:
-            show_text(f"{warning}\n")
         if command == self._sent and now_s < self._next_send_s:
             return
         self._next_send_s = now_s + PERIOD_S

@@ -3,7 +3,7 @@
 Every motion, one stop after it, and no motion of before a pause, a stop or a release of all robots.
 """
 
-from typing import Iterable, Set
+from typing import Callable, Iterable, Set
 
 from hero_node import STOP, Velocity
 
@@ -19,12 +19,13 @@ HOLD_ENDED = "robots were stopped or released, which ends what you hold: let go,
 class TeleopOutput:
     """Lets motions pass, and one stop after a motion: then other programs may drive the robots. Pure."""
 
-    def __init__(self) -> None:
+    def __init__(self, warn: Callable[[str], None]) -> None:
+        """warn: tells the operator."""
+        self._warn = warn
         self._is_moving = False
         self._is_held = False
         self._stopped: Set[str] = set()
         self._is_hold_over = False
-        self._warning = ""
 
     def note_hold(self, is_held: bool) -> None:
         """The operator holds what drives robots, or has let go of it."""
@@ -39,13 +40,9 @@ class TeleopOutput:
         stopped = {robot.name for robot in robots if robot.is_stopped}
         if stopped != self._stopped:
             self._stopped, self._is_hold_over = stopped, self._is_held
-            self._warning = HOLD_ENDED if self._is_held else ""
+            if self._is_held:
+                self._warn(HOLD_ENDED)
         return STOP if self._is_hold_over else command
-
-    def take_warning(self) -> str:
-        """Return that the operator must let go, for users, once for each stop and release; else nothing."""
-        warning, self._warning = self._warning, ""
-        return warning
 
     def demand_stop(self) -> None:
         """Pass the next stop on, also without a motion before it."""

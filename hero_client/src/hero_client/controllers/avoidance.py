@@ -1,7 +1,7 @@
 """Obstacle avoidance by the proximity sensors: pure functions from ranges to a command.
 
-Ranges in m from the robot's center, the front first, counter-clockwise; inf: nothing in range, 0: too close to measure,
-nan: not known, which counts as an obstacle.
+Ranges of eight beams in m from the robot's center, the front first, counter-clockwise, or none; inf: nothing in range,
+0: too close to measure, nan: not known, which counts as an obstacle.
 """
 
 import math
@@ -19,19 +19,9 @@ def shorten_for_body(ranges: Sequence[float], body_radius_m: float) -> List[floa
 
 
 def split_sectors(ranges: Sequence[float]) -> Tuple[float, float, float]:
-    """Return the nearest range in the left, front and right sector, nan counted as 0.
-
-    With eight beams each sector is one beam: 45 degrees to the left, the front, 45 degrees to the right.
-    """
-    count = len(ranges)
-    sectors = [math.inf, math.inf, math.inf]
-    for index, range_m in enumerate(ranges):
-        bearing_rad = wrap_angle(index * 2.0 * math.pi / count)
-        if abs(bearing_rad) > 1.2:  # 67.5 degrees with a margin for rounding: beams to the side do not matter
-            continue
-        sector = 1 if abs(bearing_rad) < 0.39 else (0 if bearing_rad > 0.0 else 2)
-        sectors[sector] = min(sectors[sector], 0.0 if math.isnan(range_m) else range_m)
-    return sectors[0], sectors[1], sectors[2]
+    """Return the ranges of the left, front and right sector, nan counted as 0: beams at 45, 0 and -45 degrees."""
+    left_m, front_m, right_m = (0.0 if math.isnan(ranges[index]) else ranges[index] for index in (1, 0, -1))
+    return left_m, front_m, right_m
 
 
 def find_in_path(ranges: Sequence[float], backward: bool = False) -> Tuple[float, Optional[Obstacle]]:

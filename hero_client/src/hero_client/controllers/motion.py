@@ -1,9 +1,7 @@
 """The frame of a motion with an end: it is reached, or fails with a reason. Pure.
 
-Two things are detected by what a stock robot knows. Its proximity sensors show an obstacle in the way; without them
-nothing would, because wheels that slip at a wall count on, and odometry with them. Its odometry shows wheels that do
-not turn. Poses from elsewhere, such as those in map, are compared with odometry. now_s is any clock that never steps
-back.
+Proximity sensors show an obstacle in the way: wheels that slip at a wall count on, and odometry with them. Odometry
+shows wheels that do not turn, and wrong poses from elsewhere. now_s is any clock that never steps back.
 """
 
 import enum
@@ -77,7 +75,7 @@ class MotionController:
         is_unseen: whether it drives where not every sensor tells, and none sees an obstacle.
     """
 
-    def __init__(self, now_s: float, timeout_s: float) -> None:
+    def __init__(self, now_s: float, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
         """Begin at now_s; after timeout_s the motion fails."""
         self.state = State.ACTIVE
         self.reason = ""

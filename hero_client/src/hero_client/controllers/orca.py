@@ -6,8 +6,7 @@ Source: J. van den Berg, S. Guy, M. Lin, D. Manocha, Reciprocal n-body collision
 
 ORCA is made for discs that move any way at once; the disc is put around the point in front of the axle (half_planes),
 which covers the body whatever way it turns (J. Snape et al., Smooth and collision-free navigation for multiple robots
-under differential-drive constraints, IROS 2010). ORCA was chosen over potential fields and priorities because it is
-symmetric (same rule for all, no order among robots), local, and does not swing.
+under differential-drive constraints, IROS 2010).
 
 Arrays: robots N, with rows of places, velocities (N, 2) and headings (N,).
 """

@@ -5,7 +5,7 @@ from typing import Optional, Sequence
 
 from hero_node import Pose, Velocity, clamp, invert_pose, transform_pose, wrap_angle
 
-from .motion import DEFAULT_TIMEOUT_S, MotionController
+from .motion import MotionController
 
 TOLERANCE_M = 0.005
 TOLERANCE_RAD = 0.03
@@ -24,9 +24,9 @@ MIN_ANGULAR_RAD_S = 0.2
 class ForwardController(MotionController):
     """Drives by a distance on the heading that the robot has at the first pose, backwards if it is negative."""
 
-    def __init__(self, length_m: float, now_s: float, linear_m_s: float, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
+    def __init__(self, length_m: float, now_s: float, linear_m_s: float) -> None:
         """linear_m_s: the speed, also positive when driving backwards."""
-        super().__init__(now_s, timeout_s)
+        super().__init__(now_s)
         self._length_m = length_m
         self._linear_m_s = linear_m_s
         self._start: Optional[Pose] = None
@@ -49,11 +49,9 @@ class ForwardController(MotionController):
 class TurnController(MotionController):
     """Turns by an angle, which may be more than a full turn."""
 
-    def __init__(
-        self, angle_rad: float, now_s: float, angular_rad_s: float, timeout_s: float = DEFAULT_TIMEOUT_S
-    ) -> None:
+    def __init__(self, angle_rad: float, now_s: float, angular_rad_s: float) -> None:
         """angular_rad_s: the speed, also positive when turning to the right."""
-        super().__init__(now_s, timeout_s)
+        super().__init__(now_s)
         self._remaining_rad = angle_rad
         self._angular_rad_s = angular_rad_s
         self._last_yaw_rad: Optional[float] = None

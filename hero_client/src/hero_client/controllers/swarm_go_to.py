@@ -1,6 +1,5 @@
 """Drives every robot of a swarm to its goal without collisions, by ORCA. Pure."""
 
-import math
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -28,11 +27,11 @@ PATIENCE_S = 4.0
 ASIDE_S = 2.0
 """For this long, then it tries again."""
 
-SOFTNESS = 0.1
-"""Softness of half planes: with none, crowds were driven into each other; margin_m is wider than what is given way."""
-
 PROGRESS_M = 0.01
 """Nearer by more than this counts as nearer."""
+
+SOFTNESS = 0.1
+"""Softness of half planes: with none, crowds were driven into each other; margin_m is wider than what is given way."""
 
 
 class SwarmGoToController:
@@ -50,19 +49,20 @@ class SwarmGoToController:
         goals: Sequence[Tuple[float, float]],
         law: AvoidanceLaw,
         step_s: float,
-        seed: int,
         tolerance_m: float = 0.01,
     ) -> None:
-        """step_s: planned time between two calls of step(); seed: of the small random nudges."""
+        """step_s: planned time between two calls of step()."""
         self.goals = [(float(x), float(y)) for x, y in goals]
         self.law = law
         self.step_s = step_s
         self.arrived = [False] * len(self.goals)
         self._tolerance_m = tolerance_m
         self._dock_law = GoToLaw(tolerance_m=AIM_SHARE * tolerance_m, max_linear_m_s=law.max_linear_m_s)
-        self._random = np.random.RandomState(seed)
         self._last_places: Optional[np.ndarray] = None
-        self._jams = [_Jam() for _ in self.goals]
+        self._random = np.random.RandomState(0)
+        self._min_distances_m = np.full(len(self.goals), np.inf)
+        self._waited_s = np.zeros(len(self.goals))  # without progress
+        self._aside_rad = np.zeros(len(self.goals))
         self.lateness = Lateness(step_s)
         self._now_s = 0.0
 
@@ -86,13 +86,11 @@ class SwarmGoToController:
         if len(known) < len(poses):
             self._last_places = None  # what they drive until the next step is no speed
             return [STOP] * len(poses)
-        commands = self._steer(known, ranges, elapsed_s)
+        commands = self._steer(known, ranges or [()] * len(known), elapsed_s)
         ages_s = [0.0] * len(commands) if pose_ages_s is None else pose_ages_s  # which may be an array
         return [self.lateness.slow(*item) for item in zip(commands, ages_s)]
 
-    def _steer(
-        self, poses: Sequence[Pose], ranges: Optional[Sequence[Sequence[float]]], elapsed_s: float
-    ) -> List[Velocity]:
+    def _steer(self, poses: Sequence[Pose], ranges: Sequence[Sequence[float]], elapsed_s: float) -> List[Velocity]:
         yaws_rad = np.array([pose.yaw_rad for pose in poses])
         headings = np.column_stack((np.cos(yaws_rad), np.sin(yaws_rad)))
         places = np.array([pose[:2] for pose in poses]) + self.law.lookahead_m * headings
@@ -100,13 +98,20 @@ class SwarmGoToController:
         # Measured, not commanded: the motors take half a second to follow.
         velocities = (places - last_places) / elapsed_s
         self._last_places = places
-        distances_m = [math.dist(goal, pose[:2]) for goal, pose in zip(self.goals, poses)]
+        to_goals_m = np.array(self.goals) - np.array([pose[:2] for pose in poses])
+        distances_m = np.hypot(*to_goals_m.T)
         self.arrived = [
-            distance_m < (self._tolerance_m if done else self._dock_law.tolerance_m)
+            bool(distance_m < (self._tolerance_m if done else self._dock_law.tolerance_m))
             for done, distance_m in zip(self.arrived, distances_m)
         ]
-        straight = np.array([self._want(*item, elapsed_s) for item in zip(self.goals, poses, distances_m, self._jams)])
-        wanted, *sensed = avoid_sensed(yaws_rad, ranges or [()] * len(poses), straight, self.law)
+        speeds_m_s = np.minimum(self.law.max_linear_m_s, SPEED_GAIN * distances_m)
+        straight = to_goals_m * (speeds_m_s / np.maximum(distances_m, 1e-9))[:, None]
+        turns_rad = self._find_turns(distances_m, elapsed_s)
+        cos, sin = np.cos(turns_rad), np.sin(turns_rad)
+        straight = np.column_stack(
+            (cos * straight[:, 0] - sin * straight[:, 1], cos * straight[:, 1] + sin * straight[:, 0])
+        )
+        wanted, *sensed = avoid_sensed(yaws_rad, ranges, straight, self.law)
         others = avoid_others(places, velocities, self.law, elapsed_s)
         normals, bounds = (np.concatenate(parts, axis=1) for parts in zip(others, sensed))
         allowed = nearest_allowed(wanted, normals, bounds, self.law.max_linear_m_s, SOFTNESS)
@@ -122,41 +127,15 @@ class SwarmGoToController:
                 commands[index] = go_to_point(pose, *self.goals[index], self._dock_law)
         return commands
 
-    def _want(
-        self, goal: Tuple[float, float], pose: Pose, distance_m: float, jam: "_Jam", elapsed_s: float
-    ) -> np.ndarray:
-        """Return the velocity (2,) straight to the goal, with a small nudge; out of a jam, at an angle to that."""
-        to_goal_m = np.array([goal[0] - pose.x_m, goal[1] - pose.y_m])
-        speed_m_s = min(self.law.max_linear_m_s, SPEED_GAIN * distance_m)
-        straight = to_goal_m * (speed_m_s / max(distance_m, 1e-9))
-        side = np.array([-straight[1], straight[0]])
-        if jam.look(distance_m, elapsed_s):
-            jam.angle_rad = self._random.uniform(0.5, 2.5) * self._random.choice((-1.0, 1.0))
-        angle_rad = jam.angle_rad if jam.aside else NUDGE_RAD * self._random.uniform(-1.0, 1.0)
-        wanted: np.ndarray = straight * math.cos(angle_rad) + side * math.sin(angle_rad)
-        return wanted
-
-
-class _Jam:
-    """Checks whether one robot makes progress towards its goal."""
-
-    angle_rad: float
-    """To the goal, at which it goes aside."""
-
-    def __init__(self) -> None:
-        self._min_distance_m = math.inf
-        self._waited_s = 0.0
-
-    @property
-    def aside(self) -> bool:
-        """Return whether the robot is to go aside now."""
-        return self._waited_s > PATIENCE_S
-
-    def look(self, distance_m: float, step_s: float) -> bool:
-        """Take the distance to the goal; return whether to begin going aside now."""
-        was_aside = self.aside
-        self._waited_s += step_s
-        if self._waited_s > PATIENCE_S + ASIDE_S or (not was_aside and distance_m < self._min_distance_m - PROGRESS_M):
-            self._min_distance_m = distance_m
-            self._waited_s = 0.0
-        return self.aside and not was_aside
+    def _find_turns(self, distances_m: np.ndarray, elapsed_s: float) -> np.ndarray:
+        """Return the angles (N,) at which robots drive to the way to their goals: a nudge, or aside out of a jam."""
+        was_aside = self._waited_s > PATIENCE_S
+        self._waited_s += elapsed_s
+        has_progress = ~was_aside & (distances_m < self._min_distances_m - PROGRESS_M)
+        anew = has_progress | (self._waited_s > PATIENCE_S + ASIDE_S)
+        self._min_distances_m[anew], self._waited_s[anew] = distances_m[anew], 0.0
+        is_aside = self._waited_s > PATIENCE_S
+        count = len(distances_m)
+        asides_rad = self._random.uniform(0.5, 2.5, count) * self._random.choice((-1.0, 1.0), count)
+        self._aside_rad = np.where(is_aside & ~was_aside, asides_rad, self._aside_rad)
+        return np.where(is_aside, self._aside_rad, NUDGE_RAD * self._random.uniform(-1.0, 1.0, count))

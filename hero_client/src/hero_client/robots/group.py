@@ -4,7 +4,7 @@ import math
 from contextlib import suppress
 from numbers import Real
 from operator import index
-from typing import Optional, Protocol, Sequence, SupportsIndex, TypeVar
+from typing import Iterator, Optional, Protocol, Sequence, SupportsIndex, TypeVar
 
 from hero_node import Clock, list_names
 
@@ -36,7 +36,7 @@ def check_robot_id(robot_id: SupportsIndex) -> int:
 
 
 class Member(Protocol):
-    """Interface of a robot, as this module uses it."""
+    """Interface of a robot, as this module uses it: see BaseRobot."""
 
     name: str
     driven: bool
@@ -49,9 +49,7 @@ class Member(Protocol):
         """Raises: StoppedError if all robots are stopped."""
 
     def _end_motion(self) -> None: ...
-
     def _end_light(self) -> None: ...
-
     def _send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None: ...
 
 
@@ -101,7 +99,7 @@ def carry_out(steps: Steps, robots: Sequence[Member]) -> Steps:
     yield from stop_after(steps, robots)
 
 
-class Group(Clock):
+class Group:
     """Robots that are waited for, driven and stopped together; as a context manager it stops them at the end."""
 
     _clock: Clock
@@ -115,6 +113,10 @@ class Group(Clock):
     def sleep(self, duration_s: float) -> bool:
         """Wait for duration_s of the robots' time; return whether the program is to continue."""
         return self._clock.sleep(duration_s)
+
+    def rate(self, hz: float) -> Iterator[float]:
+        """Repeat the body of a `for` loop hz times per second of the robots' time: see Clock.rate()."""
+        return self._clock.rate(hz)
 
     def _run(self, steps: Steps, sleep: Optional[Sleep] = None) -> None:
         run_steps(steps, sleep or self._clock.sleep, self._clock.sleep)

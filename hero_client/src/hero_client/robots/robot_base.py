@@ -69,8 +69,6 @@ class BaseRobot(RobotReadings):
         self._link.subscribe("odom")
         self._link.wait_for_next("odom", NEXT_ODOM_S, count=2)  # one may have been on its way before the answer
 
-    # ------------------------------------------------------------------ motions
-
     def drive(self, linear_m_s: float, angular_rad_s: float, duration_s: Optional[float] = None) -> None:
         """Drive with these velocities, limited to 0.20 m/s and 8 rad/s.
 
@@ -200,10 +198,7 @@ class BaseRobot(RobotReadings):
         front, y to the left), or another frame: see pose_in(). In "map" the place is one of the arena, which odometry
         that drifts does not move.
         avoid: drive around what the proximity sensors see; otherwise the robot stops before an obstacle that is in the
-        way, and fails if it stays there for 2 s.
-        The default field of simulated robots is 1.5 m by 1.5 m with walls (larger for more than nine robots): a single
-        robot starts in its middle and reaches 0.7 m to each side.
-
+        way, and fails if it stays there for 2 s. The default field of one simulated robot ends 0.7 m from its start.
         on_step: called after each command.
 
         Raises: GoalError with the reason if the goal is not reached: an obstacle in the way and where it is, wheels
@@ -309,8 +304,6 @@ class BaseRobot(RobotReadings):
         if motion is not None:
             motion.cancel_and_wait()
 
-    # ------------------------------------------------------------------ light
-
     def led(self, color: Color) -> None:
         """Show a color: a name such as "red" (see colors.COLORS), or (red, green, blue), each 0..1.
 
@@ -328,15 +321,9 @@ class BaseRobot(RobotReadings):
     def _end_light(self) -> None:
         self._light.close()
 
-    # ------------------------------------------------------------------ end
-
     def close(self) -> None:
         """Stop the robot, if it was driven from here, and leave its topics; may be called twice."""
         self._leave()
-        self.leave_topics()
-
-    def leave_topics(self) -> None:
-        """Receive nothing more, without stopping the robot; may be called twice."""
         self._link.close()
 
     def __repr__(self) -> str:

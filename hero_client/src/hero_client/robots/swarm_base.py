@@ -7,24 +7,26 @@ from typing import Any, Dict, Generic, Iterator, List, Mapping, Optional, Sequen
 
 import numpy as np
 
-from hero_node import STOP, Clock, HeroError, Pose
+from hero_node import STOP, Clock, HeroError, Pose, ProgramError
 from hero_node.parameters import check_finite
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M
 from ..controllers.motion import DEFAULT_TIMEOUT_S, SILENT_STEPS
 from ..controllers.orca import AvoidanceLaw
-from ..controllers.pose_check import FrozenCheck
+from ..controllers.pose_check import FROZEN
 from ..controllers.swarm_go_to import SwarmGoToController
 from ..values.background_motion import BackgroundMotion, Steps
 from ..values.colors import Color
-from ..values.errors import GoalError, StaleDataError
-from ..values.readings import is_blind
+from ..values.errors import GoalError
 from ..values.robot_link import MAP
+from .common_frame import CommonFrame
 from .group import REPEAT_PERIOD_S, Group, stop_after, wait_for_all
 from .robot_base import BaseRobot
 
 REPORT_PERIOD_S = 5.0
 """Time between two lines on what is waited for."""
+
+POLL_HZ = 10.0
 
 FIRST_REPORT_S = 3.0
 """Most robots answer within a second or two even when all starts at once: no line about those."""
@@ -113,7 +115,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             return
         if y_m is None:
             raise TypeError("go_to takes x_m and y_m, or the goal of each robot: {0: (0.2, 0.1), 1: (-0.2, 0.1)}")
-        self._wait_for(self.start_go_to(x_m, y_m, yaw_rad, **options))
+        self._wait_for([robot.start_go_to(x_m, y_m, yaw_rad, **options) for robot in self.robots])
 
     def forward(self, distance_m: float, linear_m_s: float = 0.1) -> None:
         """Drive all robots straight on at once; return when all have ended: see Robot.forward().
@@ -166,47 +168,56 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             if apart_m < law.min_spacing_m and {one.robot_id, other.robot_id} & set(goals):
                 text = "the places of %s and %s are %.3f m apart: robots need %.3f m"
                 raise GoalError(text % (one.name, other.name, apart_m, law.min_spacing_m))
-        controller = SwarmGoToController(places, law, REPEAT_PERIOD_S, seed=0, tolerance_m=tolerance_m)
+        controller = SwarmGoToController(places, law, REPEAT_PERIOD_S, tolerance_m)
         end_s = self.now_s + timeout_s
-        checks = [FrozenCheck() for _ in self.robots]
-        silent_steps = dict.fromkeys((robot.name for robot in self.robots), 0)
+        common = CommonFrame(frame)
+        silent_steps: Dict[str, int] = {}
         while not all(controller.arrived):
-            poses: List[Optional[Pose]] = []
-            missing: Dict[str, Optional[str]] = {}
-            for robot, check in zip(self.robots, checks):
-                try:
-                    pose = robot.pose_in(frame, timeout_s=0.0)
-                except StaleDataError as error:
-                    poses.append(None)
-                    missing[robot.name] = str(error)
-                    silent_steps[robot.name] += 1
-                    if silent_steps[robot.name] >= SILENT_STEPS:
-                        raise GoalError(f"no goal is reached: {robot.name}: no pose for 2 s: {error}") from None
-                    continue
-                silent_steps[robot.name] = 0
-                poses.append(pose)
-                odometry = robot.fresh_pose()
-                problem = check.add(pose, odometry, self.now_s) if odometry else ""
-                if problem:
-                    raise GoalError(f"no goal is reached: {robot.name}: {problem}")
-            self.report_missing(missing)
-            ranges = [robot.fresh_proximity() for robot in self.robots]
-            ages_s = [robot.age_s("odom") for robot in self.robots]
-            commands = controller.step(poses, ranges, self.now_s, ages_s)
-            warning = controller.lateness.take_warning()
-            if warning:
-                self._log("warn", warning)
-            for robot, command, seen in zip(self.robots, commands, ranges):
+            for robot in self.robots:
                 robot.check_not_stopped()
-                robot._send_velocity(*command)
-                if command != STOP and is_blind(seen):
-                    robot._warn_unseen()
+            lost = self.step_to_goals(controller, common)
+            silent_steps = {robot.name: silent_steps.get(robot.name, 0) + 1 for robot in lost}
+            for name, steps in silent_steps.items():
+                reason = common.missing[name]
+                if steps >= SILENT_STEPS or reason == FROZEN:
+                    why = reason if reason == FROZEN else f"no pose for 2 s: {reason}"
+                    raise GoalError(f"no goal is reached: {name}: {why}")
             if self.now_s > end_s or not (yield REPEAT_PERIOD_S):
                 late = [robot.name for robot, arrived in zip(self.robots, controller.arrived) if not arrived]
                 why = "cancelled" if self.now_s <= end_s else f"not there after {timeout_s:g} s"
-                raise GoalError(
-                    "; ".join([f"no goal is reached by {', '.join(late)}: {why}", *filter(None, missing.values())])
-                )
+                missing = filter(None, common.missing.values())
+                raise GoalError("; ".join([f"no goal is reached by {', '.join(late)}: {why}", *missing]))
+
+    def step_to_goals(self, controller: SwarmGoToController, common: CommonFrame) -> List[AnyRobot]:
+        """Send every robot the next command of a controller, by its pose in a frame; call it ten times per second.
+
+        Return the robots whose poses are not known; while there are some, all are stopped.
+        """
+        poses = [common.pose_of(robot) for robot in self.robots]
+        ranges = [robot.fresh_proximity() for robot in self.robots]
+        ages_s = [robot.age_s("odom") for robot in self.robots]
+        commands = controller.step(poses, ranges, self.now_s, ages_s)
+        warning = controller.lateness.take_warning()
+        if warning:
+            self._log("warn", warning)
+        for robot, command in zip(self.robots, commands):
+            robot.drive(*command)
+            if command != STOP:
+                robot.warn_if_blind()
+        self.report_missing(common.missing)
+        return [robot for robot, pose in zip(self.robots, poses) if pose is None]
+
+    def wait_for_poses(self, common: CommonFrame, clock: Optional[Clock] = None) -> List[Pose]:
+        """Return the poses of all robots in a frame as soon as all are known, and log which are waited for.
+
+        clock: a Program, whose end ends the wait. Raises: ProgramError then.
+        """
+        for _ in (clock or self._clock).rate(POLL_HZ):
+            poses = [pose for pose in map(common.pose_of, self.robots) if pose is not None]
+            self.report_missing(common.missing)
+            if len(poses) == len(self.robots):
+                return poses
+        raise ProgramError("ended before all robots were there")
 
     @staticmethod
     def _wait_for(motions: Sequence[BackgroundMotion]) -> None:
@@ -215,12 +226,6 @@ class BaseSwarm(Group, Generic[AnyRobot]):
             raise GoalError("; ".join(map(str, errors)))
         for error in errors:
             raise error
-
-    def start_go_to(
-        self, x_m: float, y_m: float, yaw_rad: Optional[float] = None, **options: Any
-    ) -> List[BackgroundMotion]:
-        """Start go_to() of every robot, and return the motions in the order of the robots: see Robot.start_go_to()."""
-        return [robot.start_go_to(x_m, y_m, yaw_rad, **options) for robot in self.robots]
 
     def led(self, color: Color) -> None:
         """Show a color on all robots: see Robot.led()."""
@@ -258,7 +263,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         """Stop all robots that were driven from here, and leave their topics; may be called twice."""
         self._leave()
         for robot in self.robots:
-            robot.leave_topics()
+            robot._link.close()
 
     def __getitem__(self, robot_id: int) -> AnyRobot:
         if isinstance(robot_id, (slice, str, tuple, list)):

@@ -48,9 +48,6 @@ MAX_RATE = 1e9
 """Messages or bytes per second; a larger number is invalid."""
 
 
-# ---------------------------------------------------------------------------------------------- reports
-
-
 def find_drivers(system_state: Any, topics: Iterable[str]) -> Set[str]:
     """Return those of the topics that are reports of drivers.
 
@@ -102,9 +99,6 @@ def merge(reports: Sequence[RobotArray]) -> RobotArray:
     merged.gone = sorted(gone.values(), key=lambda robot: robot.id)
     merged.robots = sorted(by_name.values(), key=lambda robot: (robot.namespace, robot.address))
     return merged
-
-
-# ---------------------------------------------------------------------------------------------- connections
 
 
 class _DriverLink:

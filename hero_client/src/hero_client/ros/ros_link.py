@@ -25,7 +25,7 @@ from ..values.robot_link import RobotLink
 from ..values.sensing import Neighbor
 from .drivers import share_drivers
 from .extra_topics import find_class, load_fleet_file, read_field
-from .frames import share_frames
+from .frames import find_origin
 from .localized_poses import share_poses
 from .robot_topics import CommandTopic, NewestMessages
 
@@ -162,8 +162,7 @@ class RosLink(NewestMessages, RobotLink):
         return share_poses().find(self._robot_id, frame, timeout_s)
 
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
-        """The first call subscribes to /tf."""
-        return share_frames().find_origin(self._name + "/odom", frame, timeout_s)
+        return find_origin(self._name + "/odom", frame, timeout_s)
 
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         twist = Twist()

@@ -36,14 +36,7 @@ from .robot_constants import (
     RobotModel,
 )
 from .robot_link import MAP, RobotLink
-from .robot_states import (
-    STATES,
-    STOP_STATES,
-    describe_counts,
-    describe_gone,
-    describe_stop_origin,
-    name_state,
-)
+from .robot_states import STATES, STOP_STATES, describe_counts, describe_gone, describe_stop_origin, name_state
 from .sensing import Binary, Neighbor, Neighborhood, Neighbors, list_neighbors, sense_binary, sense_neighbors
 from .stamped_history import StampedHistory, interpolate_pose
 from .wheel_paths import follow_wheels

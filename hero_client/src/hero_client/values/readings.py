@@ -15,6 +15,9 @@ recording of real robots the longest one lasted 0.15 to 1.3 s."""
 MAX_POSITION_M = 1000.0
 """No robot drives this far; a position or range beyond is invalid."""
 
+BEAMS = 8
+"""Proximity sensors of a robot."""
+
 MAX_RANGES = 64
 """A robot has eight sensors; a scan with more ranges than this is invalid."""
 
@@ -56,12 +59,11 @@ def read_ranges(scan: Any) -> Sequence[float]:
 
 
 def front_first(scan: Any) -> List[float]:
-    """Return the ranges of a sensor_msgs/LaserScan starting at the front, with -inf (too close) as 0.0."""
-    count = len(scan.ranges)
-    if count == 0 or scan.angle_increment <= 0.0:
+    """Return the eight ranges of a sensor_msgs/LaserScan from the front on, with -inf (too close) as 0.0, or none."""
+    if len(scan.ranges) != BEAMS or scan.angle_increment <= 0.0:
         return []
     front = int(round(-scan.angle_min / scan.angle_increment))
-    ranges = [scan.ranges[(front + index) % count] for index in range(count)]
+    ranges = [scan.ranges[(front + index) % BEAMS] for index in range(BEAMS)]
     return [0.0 if range_m == -math.inf else range_m for range_m in ranges]
 
 

@@ -29,8 +29,6 @@ class RobotLink(Protocol):
     def missing(self) -> Optional[str]:
         """Return why the robot cannot be driven now, as text for users; None if it can."""
 
-    # -- data ---------------------------------------------------------------------------------------------
-
     def subscribe(self, topic: str) -> None:
         """Receive a topic from now on, if that was not so before."""
 
@@ -67,8 +65,6 @@ class RobotLink(Protocol):
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
         """Return the pose of hero_N/odom in another frame. Raises: FrameError if it is not known."""
 
-    # -- commands -----------------------------------------------------------------------------------------
-
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         """Send a velocity; a robot that is not there is warned about, unless it is a stop."""
 
@@ -78,16 +74,12 @@ class RobotLink(Protocol):
     def set_odometry(self, pose: Pose) -> None:
         """Set the odometry to this pose, in hero_N/odom. Raises: RobotError if it does not answer or refuses."""
 
-    # -- stop of all robots -------------------------------------------------------------------------------
-
     @property
     def is_stopped(self) -> bool:
         """Return whether the robot takes no motion because all robots are stopped, as far as is known now."""
 
     def describe_stop(self) -> str:
         """Return what has stopped all robots and how to release them, for users."""
-
-    # -- the program --------------------------------------------------------------------------------------
 
     def start(self, steps: Steps) -> BackgroundMotion:
         """Take steps in the background."""

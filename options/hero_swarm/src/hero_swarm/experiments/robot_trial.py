@@ -40,7 +40,7 @@ class StartDrive:
         self.done = False
         self._goals = [Pose(*place) for place in places.tolist()]
         law = AvoidanceLaw(body_m=body_radius_m)
-        self._controller = SwarmGoToController([goal[:2] for goal in self._goals], law, PERIOD_S, seed=0)
+        self._controller = SwarmGoToController([goal[:2] for goal in self._goals], law, PERIOD_S)
         self.lateness = self._controller.lateness
         self._steps_at_rest = 0
 

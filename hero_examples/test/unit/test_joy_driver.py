@@ -7,7 +7,7 @@ import struct
 import pytest
 
 from hero_client import ProgramError
-from hero_examples.joystick_device import JoystickDevice
+from hero_examples.driving.joy_driver import JoystickDevice
 
 BUTTON, AXIS, INITIAL = 1, 2, 0x80
 
@@ -86,7 +86,7 @@ def test_a_device_that_cannot_be_opened_names_the_remedy(monkeypatch, error, tol
         assert path == "/dev/input/js1"
         raise error
 
-    monkeypatch.setattr("hero_examples.joystick_device.os.open", refuse)
+    monkeypatch.setattr("hero_examples.driving.joy_driver.os.open", refuse)
     with pytest.raises(ProgramError, match=told):
         JoystickDevice("/dev/input/js1")
 

@@ -7,16 +7,7 @@ import rospy
 from geometry_msgs.msg import PoseArray
 
 from hero_client import CommonFrame, Program, open_swarm, read_parameters
-from hero_client.controllers import (
-    Goal,
-    GoToGoalController,
-    Lateness,
-    State,
-    WanderLaw,
-    WanderMemory,
-    shorten_for_body,
-    wander,
-)
+from hero_client.controllers import Goal, GoToGoalController, Lateness, State, WanderMemory, shorten_for_body, wander
 from hero_client.values import is_blind
 from hero_node import STOP
 from hero_node.parameters import flag, number, robot_ids, whole_number
@@ -61,7 +52,7 @@ class Explorer:
             if self.controller:
                 command = self.controller.step(pose, ranges, now_s, pose_age_s=age_s)
             else:
-                command, self.memory = wander(ranges, self.memory, self.random.random(), WanderLaw())
+                command, self.memory = wander(ranges, self.memory, self.random.random())
                 command = self.lateness.slow(command, age_s)
         self.robot.drive(*command)
         self.robot.led("green" if self.controller else "yellow")
@@ -108,7 +99,7 @@ def main():
         common, seed, newest = CommonFrame(parameters["frame"]), parameters["seed"], []
         rospy.Subscriber(parameters["frontiers_topic"], PoseArray, lambda message: newest.append(message), queue_size=1)
         with open_swarm(program, parameters["robots"]) as swarm:
-            common.wait_for_poses(program, swarm)
+            swarm.wait_for_poses(common, program)
             rospy.loginfo("%s explore", ", ".join(robot.name for robot in swarm))
             explorers = [Explorer(robot, common, None if seed < 0 else seed + robot.robot_id) for robot in swarm]
             busy_s = program.now_s

@@ -6,7 +6,7 @@ from hero_client import CommonFrame, Program, ProgramError, open_swarm, read_par
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers import AvoidanceLaw, SwarmGoToController
 from hero_client.values import MAX_LINEAR_M_S
-from hero_node.parameters import flag, number, robot_ids, whole_number
+from hero_node.parameters import flag, number, robot_ids
 
 STEP_HZ = 10.0
 
@@ -18,23 +18,15 @@ class Formation:
         done: whether all robots have been in place at once.
     """
 
-    def __init__(self, swarm, common, goals, law, seed=0, tolerance_m=0.01, timeout_s=120.0):
+    def __init__(self, swarm, common, goals, law, tolerance_m=0.01, timeout_s=120.0):
         self.swarm, self.common, self.timeout_s = swarm, common, timeout_s
-        self.controller = SwarmGoToController(goals, law, 1.0 / STEP_HZ, seed, tolerance_m)
+        self.controller = SwarmGoToController(goals, law, 1.0 / STEP_HZ, tolerance_m)
         self.done = False
 
     def step(self, elapsed_s):
         """Send every robot its next command; elapsed_s: since the start. Raises: ProgramError after timeout_s."""
-        poses = [self.common.pose_of(robot) for robot in self.swarm]
-        ranges = [robot.fresh_proximity() for robot in self.swarm]
-        ages_s = [robot.age_s("odom") for robot in self.swarm]
-        commands = self.controller.step(poses, ranges, self.swarm.now_s, ages_s)
-        warning = self.controller.lateness.take_warning()
-        if warning:
-            rospy.logwarn(warning)
-        for robot, command, arrived in zip(self.swarm, commands, self.controller.arrived):
-            robot.drive(*command)
-            robot.warn_if_blind()
+        self.swarm.step_to_goals(self.controller, self.common)
+        for robot, arrived in zip(self.swarm, self.controller.arrived):
             robot.led("green" if arrived else "yellow")
         late = [robot.name for robot, arrived in zip(self.swarm, self.controller.arrived) if not arrived]
         if not self.done and not late:
@@ -56,7 +48,6 @@ def main():
                 "timeout_s": number(120.0, 1.0, 3600.0, "s"),
                 "assign": flag(True),
                 "once": flag(False),
-                "seed": whole_number(0, 0, 2**31),
             }
         )
         ids, wanted = parameters["robots"], parameters["formation"]
@@ -64,16 +55,14 @@ def main():
         place_formation(wanted, len(ids or [0]), law.min_spacing_m)  # fails before robots are waited for
         common = CommonFrame(parameters["frame"])
         with open_swarm(program, ids) as swarm:
-            poses = common.wait_for_poses(program, swarm)
+            poses = swarm.wait_for_poses(common, program)
             law = law._replace(body_m=swarm.max_body_radius_m)
             goals = place_formation(wanted, len(swarm), law.min_spacing_m)
             if parameters["assign"]:
                 goals = [goals[index] for index in assign_goals([pose[:2] for pose in poses], goals)]
-            options = [parameters[name] for name in ("seed", "tolerance_m", "timeout_s")]
-            formation = Formation(swarm, common, goals, law, *options)
+            formation = Formation(swarm, common, goals, law, parameters["tolerance_m"], parameters["timeout_s"])
             for time_s in program.rate(STEP_HZ):
                 formation.step(time_s)
-                swarm.report_missing(common.missing)
                 if formation.done and parameters["once"]:
                     break
             return 1 if parameters["once"] and not formation.done else 0

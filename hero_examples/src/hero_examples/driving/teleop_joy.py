@@ -2,7 +2,6 @@
 
 from hero_client import Program, ProgramError, open_swarm, read_parameters
 from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
-from hero_client.apps.robot_choice import ChoiceButtons
 from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_node.parameters import number, robot_ids, whole_number
 
@@ -21,15 +20,11 @@ def main():
                 "next_button": whole_number(5, 0, 63),
                 "keep_button": whole_number(2, 0, 63),
                 "all_button": whole_number(3, 0, 63),
-                "formation_button": whole_number(0, 0, 63),
-                "frame": "map",
             }
         )
-        ids, frame = parameters.pop("robots"), parameters.pop("frame")
-        choice = ChoiceButtons(**{name: parameters.pop(name) for name in ChoiceButtons._fields})
-        mapping = JoystickMapping(**parameters)
-        for name, button in (("enable_button", mapping.enable_button), *choice._asdict().items()):
-            if mapping.stop_button == button:
-                raise ProgramError("~stop_button is %d, the same as ~%s" % (button, name))
+        ids = parameters.pop("robots")
+        for name in ("enable_button", "next_button", "keep_button", "all_button"):
+            if parameters["stop_button"] == parameters[name]:
+                raise ProgramError("~stop_button is %d, the same as ~%s" % (parameters[name], name))
         with open_swarm(program, ids, odom=False, proximity=False) as swarm:
-            JoystickTeleop(swarm, mapping, choice, frame).run(program)
+            JoystickTeleop(swarm, JoystickMapping(**parameters)).run(program)

@@ -1,15 +1,23 @@
-"""Reads a joystick by Linux's joystick interface (joystick-api.rst of the kernel's documentation).
+"""Publishes a joystick on /joy: by joy_node of the package joy where that is installed, else by Linux's own device.
 
-The kernel sends the state of each axis and button when the device is opened, then each change, as records of 8 bytes.
+The kernel sends the state of each axis and button when the device is opened, then each change, as records of 8 bytes
+(joystick-api.rst of its documentation).
 """
 
+import contextlib
 import errno
 import os
 import select
 import struct
+import sys
 from typing import List
 
-from hero_client import ProgramError
+import rospkg
+import rospy
+from sensor_msgs.msg import Joy
+
+from hero_client import Program, ProgramError, read_parameters
+from hero_node.parameters import number, string
 
 _RECORD = struct.Struct("=IhBB")  # time, ms; value; kind; number
 _BUTTON, _AXIS, _INITIAL = 0x01, 0x02, 0x80
@@ -58,11 +66,11 @@ class JoystickDevice:
         if not data:
             raise ProgramError(f"the joystick {self._path} has gone: plug it in and start again")
         # The kernel gives whole records only.
-        for _, value, kind, number in _RECORD.iter_unpack(data[: len(data) // _RECORD.size * _RECORD.size]):
+        for _, value, kind, index in _RECORD.iter_unpack(data[: len(data) // _RECORD.size * _RECORD.size]):
             if kind & ~_INITIAL == _AXIS:
-                self._set(self.axes, number, self._scale(-value / _FULL))
+                self._set(self.axes, index, self._scale(-value / _FULL))
             elif kind & ~_INITIAL == _BUTTON:
-                self._set(self.buttons, number, value)
+                self._set(self.buttons, index, value)
 
     def _scale(self, value: float) -> float:
         """Return a value with the deadzone taken out, so that it starts at 0 beyond it."""
@@ -70,12 +78,33 @@ class JoystickDevice:
         return beyond if value > 0.0 else -beyond
 
     @staticmethod
-    def _set(values: List, number: int, value: float) -> None:
-        values.extend([type(value)(0)] * (number + 1 - len(values)))
-        values[number] = value
+    def _set(values: List, index: int, value: float) -> None:
+        values.extend([type(value)(0)] * (index + 1 - len(values)))
+        values[index] = value
 
     def close(self) -> None:
         """Close the device; safe to call twice."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
+
+
+def main() -> None:
+    with contextlib.suppress(rospkg.ResourceNotFound):
+        rospkg.RosPack().get_path("joy")
+        os.execvp("rosrun", ["rosrun", "joy", "joy_node", *sys.argv[1:]])
+    with Program("joy_driver", anonymous=True) as program:
+        parameters = read_parameters(
+            {
+                "dev": string("/dev/input/js0"),
+                "deadzone": number(0.05, 0.0, 0.9),
+                "autorepeat_rate": number(20.0, 1.0, 100.0, "Hz"),
+            }
+        )
+        publisher = rospy.Publisher("joy", Joy, queue_size=1)
+        with contextlib.closing(JoystickDevice(parameters["dev"], parameters["deadzone"])) as device:
+            while program.running:
+                device.read(1.0 / parameters["autorepeat_rate"])
+                message = Joy(axes=device.axes, buttons=device.buttons)
+                message.header.stamp = rospy.Time.now()
+                publisher.publish(message)

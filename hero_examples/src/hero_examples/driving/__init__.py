@@ -1,0 +1,1 @@
+"""Robots that drive, each by itself or by its operator."""

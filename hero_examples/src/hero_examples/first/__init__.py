@@ -1,0 +1,1 @@
+"""First scripts, of at most 25 lines each."""

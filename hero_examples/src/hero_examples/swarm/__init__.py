@@ -1,0 +1,1 @@
+"""Swarms: robots that know of each other."""
