@@ -102,7 +102,7 @@ def test_reconnects_leak_nothing(start_driver, effort, record):
     witness = FakeRobot(1).connect(driver.address)
     service = ServiceCheck(driver, witness)
     swarm = Swarm(driver)
-    rounds = effort.choose(300, 10000) // SWARM
+    rounds = effort.choose(100, 10000) // SWARM
 
     def act():
         swarm.join()
@@ -119,7 +119,7 @@ def test_power_cuts_leak_nothing(start_driver, effort, record):
     witness = FakeRobot(1).connect(driver.address)
     service = ServiceCheck(driver, witness)
     swarm = Swarm(driver)
-    rounds = effort.choose(20, 1000)
+    rounds = effort.choose(8, 1000)
     before, after = run_rounds(driver, swarm, rounds, swarm.cut_power)
     wait_for(lambda: count_states(driver) == SWARM + 1, "all robots to be ready")
     service.verify(10)
@@ -131,7 +131,7 @@ def test_power_cuts_leak_nothing(start_driver, effort, record):
 def test_departed_robots_leak_nothing(start_driver, effort, record):
     # So many new robots in so short a time are more than one address may have otherwise.
     driver = start_driver(parameters={"grace_s": 0.0, "max_connections_per_address": 5000})
-    rounds = effort.choose(3, 100)
+    rounds = effort.choose(2, 100)
 
     def act():
         swarm = Swarm(driver)

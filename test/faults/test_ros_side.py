@@ -71,7 +71,7 @@ def test_dying_subscribers_affect_no_other(served, effort, record):
 
 def test_subscribers_that_come_and_go_leak_nothing(served, effort, record):
     driver, _, service = served
-    count, rounds = effort.choose((20, 5), (100, 10))
+    count, rounds = effort.choose((10, 3), (100, 10))
     service.verify()
 
     def come_and_go():
@@ -100,7 +100,7 @@ def test_subscribers_that_come_and_go_leak_nothing(served, effort, record):
 def test_a_publisher_at_1_khz_delays_no_other_and_its_stop_arrives(served, effort, record):
     _, robot, service = served
     publisher = make_publisher("/hero_1/velocity_controller/cmd_vel", Twist)
-    count = effort.choose(2000, 20000)
+    count = effort.choose(1000, 20000)
     command = Twist()
     rate = rospy.Rate(1000)
     for number in range(count):
