@@ -206,8 +206,7 @@ class FleetFeed:
         if gone:
             losses.append(Loss("robots", shorten(gone), "Switch them on, or dismiss this"))
         lost = [*self._lost_commands, *self._vain_goals][:LOST_SHOWN]
-        if lost:
-            losses.append(Loss("commands", "Commands may be in vain", shorten("; ".join(lost))))
+        losses += [Loss("commands", "A command may be in vain", shorten(text)) for text in lost]
         self.page_state.put("losses", [loss._asdict() for loss in losses])
 
     def _look_for_lost_commands(self) -> None:
