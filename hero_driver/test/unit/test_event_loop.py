@@ -268,12 +268,12 @@ def test_a_pause_of_more_than_a_second_is_told_to_all_who_read(still_loop, monke
     now_s, told = [1000.0], []
     monkeypatch.setattr(event_loop.time, "monotonic", lambda: now_s[0])
     monkeypatch.setattr(event_loop.time, "clock_gettime", lambda clock: now_s[0])
-    loop._readers.add(Stub(resume=lambda: told.append("reader"), close=lambda: None))
+    loop._readers |= {Stub(resume=lambda: told.append("reader"), close=lambda: None) for _ in range(2)}
     loop._look_for_pause()
     assert not handler.resumed and not loop.has_resumed_within(1e9), "the first look"
     now_s[0] += pause_s
     loop._look_for_pause()
-    assert (handler.resumed, told) == (([now_s[0]], ["reader"]) if is_pause else ([], []))
+    assert (handler.resumed, told) == (([now_s[0]], ["reader"] * 2) if is_pause else ([], []))
     now_s[0] += 0.5
     assert loop.has_resumed_within(0.6) == is_pause and not loop.has_resumed_within(0.5)
 

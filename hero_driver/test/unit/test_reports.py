@@ -102,6 +102,15 @@ def test_hundreds_of_duplicates_of_one_robot_do_not_fill_the_report(reporter):
     assert len(publish(reporter, make_record(refused=refused))) == 1 + DUPLICATES_SHOWN == 9
 
 
+def test_robots_that_leave_together_leave_the_diagnostics(reporter):
+    publish(reporter, *(make_record(identity=Identity("/hero_%d" % number, number)) for number in (2, 5, 7)))
+    reporter.diagnose()
+    assert list(reporter._updater.tasks) == ["driver", "hero_2", "hero_5", "hero_7"]
+    publish(reporter, make_record(identity=Identity("/hero_5", 5)))
+    reporter.diagnose()
+    assert list(reporter._updater.tasks) == ["driver", "hero_5"] and reporter._updater.updates == 2
+
+
 def test_what_a_robot_says_of_itself_keeps_no_other_out_of_the_report(reporter):
     odd = make_record(
         since_s=-1e9,

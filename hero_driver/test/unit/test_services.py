@@ -67,6 +67,25 @@ def test_a_caller_gets_the_answer_that_came_while_the_request_was_sent(robot):
     assert robot.service.call(b"request") == b"quick"
 
 
+def test_calls_that_wait_for_a_robot_that_left_fail_each_with_its_reason(robot):
+    for request in (b"first", b"second", b"third"):
+        robot.call(request)
+    robot.refusal = "the robot is not connected"
+    robot.service.fail("silent")
+    refused = "cannot be called: the robot is not connected"
+    assert robot.answers == {b"first": "was not answered: silent", b"second": refused, b"third": refused}
+
+
+def test_all_calls_behind_one_that_is_late_fail_at_once(robot):
+    robot.call(b"first")
+    robot.advance(TIMEOUT_S / 2.0)
+    robot.call(b"second")
+    robot.call(b"third")
+    robot.advance(TIMEOUT_S / 2.0)
+    reasons = [robot.answers.get(request, "") for request in (b"second", b"third")]
+    assert all(reason.startswith("has not answered the call before this one") for reason in reasons), reasons
+
+
 def test_a_second_call_is_not_sent_before_the_first_is_answered(robot):
     robot.call(b"first")
     robot.call(b"second")

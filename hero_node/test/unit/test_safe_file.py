@@ -122,6 +122,14 @@ def test_a_lock_that_is_never_released_ends_in_an_error(tmp_path, monkeypatch):
         pass
 
 
+def test_what_fails_under_a_lock_releases_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(safe_file, "LOCK_TIMEOUT_S", 0.0)
+    path = str(tmp_path / "a.yaml")
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt), lock_file(path):
+            raise KeyboardInterrupt
+
+
 def test_a_file_system_without_locks_is_no_obstacle(tmp_path, monkeypatch):
     def refuse(fd, operation):
         raise OSError(errno.EBADF, "Bad file descriptor")

@@ -1,0 +1,48 @@
+"""Several robots of one gateway: what befalls the first of them does not end what the others are due."""
+
+import pytest
+from test_gateway import HOST, OTHER_HOST, STOCK_DECLARATIONS
+from test_gateway_rules import Driver
+
+from hero_test.nonempty import nonempty
+
+
+@pytest.fixture(name="driver")
+def make_driver(monkeypatch):
+    return Driver(monkeypatch)
+
+
+def join_two(driver, **options):
+    """Return the connections of hero_2 and hero_7."""
+    return [driver.join(host, number=number, **options) for host, number in ((HOST, 2), (OTHER_HOST, 7))]
+
+
+def test_a_bug_with_one_robot_keeps_the_programs_of_the_others_watched(driver):
+    looks = []
+    first, second = [driver.gateway.peers[link].bridge for link in join_two(driver)]
+    first.commands.watch_commanders = lambda now_s: 1 / 0
+    second.commands.watch_commanders = looks.append
+    for now_s in (100.0, 100.05):
+        driver.gateway.poll(now_s)
+    assert looks == [100.0, 100.05] and driver.lines[-1][0] == "fatal" and "ZeroDivisionError" in driver.lines[-1][1]
+
+
+def test_after_a_pause_each_robot_gets_its_stop_anew_and_no_old_motion(driver):
+    links, resumed = join_two(driver, declarations=STOCK_DECLARATIONS), []
+    peers = [driver.gateway.peers[link] for link in links]
+    for peer in peers:
+        driver.gateway.stop_robot(peer)
+        peer.bridge.commands.queue.discard_motion = resumed.append
+    driver.now_s += 30.0
+    driver.gateway.resume(driver.now_s)
+    assert resumed == [driver.now_s] * 2 == [peer.stop._began_s for peer in peers]
+    for link in nonempty(links):
+        driver.gateway.poll_link(link, driver.now_s + 1.0)
+        assert not link.closed
+
+
+def test_every_duplicate_may_try_again_when_the_robot_left_for_good(driver):
+    first = driver.join()
+    others = [driver.join("10.42.0.%d" % number) for number in (18, 19)]
+    first.close("closed by the robot")
+    assert [other.reason for other in others] == ["the robot with the same id left; this one may try again"] * 2
