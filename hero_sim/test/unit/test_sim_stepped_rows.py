@@ -25,8 +25,7 @@ from hero_sim.robot.motor_control import MotorControl
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.robot.sensing import DISTANCE_MS, Sensing
 from hero_sim.robot.servo_pins import CORE_2, ServoPins
-from hero_sim.stepped.robot_rows import RobotRows
-from hero_sim.stepped.rules.proximity import correct_ranges
+from hero_sim.stepped.robot_rows import RobotRows, correct_ranges
 from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.world import STEP_MS
 

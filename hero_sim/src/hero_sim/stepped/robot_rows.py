@@ -11,8 +11,8 @@ from typing import Callable, Collection, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_driver.corrections import PLUS_WHEELS, WheelGeometry
-from hero_driver.robot_constants import SERVO_CENTER_US
+from hero_driver.corrections import CLAMP_TOLERANCE_M, PLUS_WHEELS, WheelGeometry
+from hero_driver.robot_constants import MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, SERVO_CENTER_US
 
 from ..link.wifi import Radio
 from ..robot.clock import NEVER_MS
@@ -23,6 +23,7 @@ from ..robot.motor_pid import POSITION_GAINS, VELOCITY_GAINS
 from ..robot.ranges import calibrate, convert_to_ranges
 from ..robot.sensing import CYCLE_MS, DISTANCE_MS, LASER_GATE_MS, LASER_READ_MS
 from ..robot_constants import (
+    BODY_RADIUS_M,
     LED_WATCHDOG_MS,
     MAX_ANGULAR_RAD_S,
     MAX_LINEAR_M_S,
@@ -34,7 +35,6 @@ from ..robot_constants import (
 from ..world.kinematics import split_to_wheels
 from ..world.world import STEP_MS, View, World
 from .rules.command_shaper import CommandShaper, Rows, Values
-from .rules.proximity import correct_ranges
 from .rules.radio_rows import RadioRows
 from .rules.readings import DISTANCE, SCAN, WHEELS, Readings
 from .rules.servo_pulses import ServoPulses
@@ -354,3 +354,17 @@ class RobotRows:
         pulses_us, which = np.zeros((2, len(self._rows))), np.zeros(len(self._rows), dtype=bool)
         pulses_us[:, rows], which[rows] = values, True
         self._servos.write(now_ms, pulses_us, which)
+
+
+def correct_ranges(ranges_m: np.ndarray) -> np.ndarray:
+    """Return ranges of /laser (R, 8) as programs see them, by the driver's make_proximity(), front first.
+
+    inf for nothing in range, 0 for too close; NaN for a sensor that is not calibrated stays.
+    """
+    corrected_m = np.roll(ranges_m, -4, axis=1)
+    with np.errstate(invalid="ignore"):  # comparisons with NaN
+        near = corrected_m <= BODY_RADIUS_M + MIN_RIM_RANGE_M + CLAMP_TOLERANCE_M
+        far = corrected_m >= BODY_RADIUS_M + MAX_RIM_RANGE_M - CLAMP_TOLERANCE_M
+    corrected_m[near] = 0.0
+    corrected_m[far] = np.inf
+    return corrected_m

@@ -354,7 +354,7 @@ def list_near(
     """
     x, y, radius = bodies[X], bodies[Y], bodies[RADIUS]
     forces = contacts[PRESSURE : GIVE + 1]
-    static, pairs, room, old, found = len(x) - 1, ends[0], len(first), 0, 0
+    static, room, found = len(x) - 1, len(first), 0
     for i in range(begin, end):
         for j in range(i + 1, end):
             away_x, away_y, reach_m = x[j] - x[i], y[j] - y[i], radius[i] + radius[j] + 2.0 * near_m
@@ -362,14 +362,8 @@ def list_near(
                 if found == room:
                     return False
                 spare[0, found], spare[1, found], spare[2, found] = i, j, -1
-                while old < pairs and (first[old] < i or (first[old] == i and second[old] < j)):
-                    old += 1
-                if old < pairs and first[old] == i and second[old] == j:
-                    spare_forces[:, found] = forces[:, old]
-                else:
-                    spare_forces[:, found] = 0.0
                 found += 1
-    new_pairs, old = found, pairs
+    new_pairs = found
     for i in range(begin, end):
         for o in range(obstacles.shape[1]):
             to_x, to_y = x[i] - obstacles[START_X, o], y[i] - obstacles[START_Y, o]
@@ -384,13 +378,16 @@ def list_near(
                 if found == room:
                     return False
                 spare[0, found], spare[1, found], spare[2, found] = static, i, o
-                while old < ends[1] and (second[old] < i or (second[old] == i and obstacle[old] < o)):
-                    old += 1
-                if old < ends[1] and second[old] == i and obstacle[old] == o:
-                    spare_forces[:, found] = forces[:, old]
-                else:
-                    spare_forces[:, found] = 0.0
                 found += 1
+    old = 0
+    for k in range(found):  # both lists are in the same order
+        key = (spare[0, k], spare[1, k], spare[2, k])
+        while old < ends[1] and (first[old], second[old], obstacle[old]) < key:
+            old += 1
+        if old < ends[1] and (first[old], second[old], obstacle[old]) == key:
+            spare_forces[:, k] = forces[:, old]
+        else:
+            spare_forces[:, k] = 0.0
     for k in range(found):
         i, j, o = spare[0, k], spare[1, k], spare[2, k]
         first[k], second[k], obstacle[k] = i, j, o

@@ -14,7 +14,6 @@ from ..errors import OptionError
 from ..key_values import parse_values
 from ..robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
 from .body_loops import CREEP_M_S
-from .noise import draw_normal
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 
 SERVO_CENTER_US = 1500.0
@@ -128,13 +127,18 @@ class RobotErrors(NamedTuple):
     mass_kg: np.ndarray
 
 
+def _draw_normal(rng: np.random.RandomState, count: int) -> np.ndarray:
+    """Return standard normal numbers, rounded: their last bits depend on the machine's logarithm."""
+    return rng.standard_normal(count).astype(np.float32).astype(float)
+
+
 def draw_errors(rngs: Iterable[np.random.RandomState], scale: float = 1.0) -> RobotErrors:
     """Return usual differences: one robot drawn from each of rngs; with scale 0 all are nominal.
 
     Sources: odometry off by 1.4 to 3.0 % of the path and alpha from 0.39 to 0.44 are published; that servos of
     one kind differ by some per cent and some microseconds is an assumption.
     """
-    drawn = np.array([draw_normal(rng, (6 + BEAMS + 4,)) for rng in rngs]) * scale
+    drawn = np.array([_draw_normal(rng, 6 + BEAMS + 4) for rng in rngs]) * scale
     on_robots, on_walls, on_floor, load = drawn[:, 6 + BEAMS :].T
     same = np.ones((len(drawn), 1))
     return RobotErrors(

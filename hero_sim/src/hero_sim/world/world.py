@@ -15,7 +15,6 @@ from .arena import Arena, Segments
 from .compiled import compile_loops
 from .contacts import Contacts
 from .kinematics import join_wheels
-from .noise import draw_keys, draw_steps
 from .pushing.pushing import Pushing
 from .pushing.shapes import PushedBody, list_outlines
 from .range_sensors import (
@@ -37,6 +36,9 @@ _STEP_S = STEP_MS / 1000.0
 
 _BLOCK_STEPS = 32
 """Steps that bodies follow their wheels at once; without compiled loops, random numbers are drawn for as many."""
+
+_CACHED = 8192
+"""Random numbers that are computed at once: they fit the processor's cache."""
 
 _SCAN_ROWS = 200
 """Robots whose sensors are computed at once: what they see fits the processor's cache."""
@@ -112,7 +114,9 @@ class World:
         self.time_ms = 0
         self.errors = errors
         self._views = 0
-        self._motion_keys, self._scan_keys = draw_keys(rngs), draw_keys(rngs)
+        self._motion_keys, self._scan_keys = (
+            np.array([rng.randint(0, 2**63 - 1, dtype=np.int64) for rng in rngs]).astype(np.uint64) for _ in range(2)
+        )
         objects = [arena.objects] * self.worlds if objects is None else objects
         self._separations_m, radii_m = errors.wheel_separation_m[:, 0], errors.radius_m[:, 0]
         obstacles = arena.segments_m.tolist(), arena.circles_m.tolist()
@@ -184,8 +188,7 @@ class World:
         self._block_step = self._body_step = 0
         self._speeds[np.abs(self._speeds) < _REST_M_S] = 0.0
         if self._loops is None:
-            first_step = self.time_ms // STEP_MS
-            noise = draw_steps(self._motion_keys, first_step, _BLOCK_STEPS, 4, self._robots)
+            noise = _draw_block(self._motion_keys, self.time_ms // STEP_MS, self._robots)
             self._ripples_m_s = noise[:, :2] * self._spreads[:2]
             # Distance of a wheel's body over the ground for each m/s.
             self._ground_s = (1.0 - np.abs(noise[:, 2:]) * self._spreads[2:4]) * self._spreads[4:6]
@@ -286,3 +289,16 @@ class World:
                 bodies_m = view.places_m.reshape(self.worlds, self._robots, 2)[rows // self._robots]
                 radii_m = self.errors.radius_m[: self._robots, 0]
                 yield rows, Sight(view.places_m[rows], view.headings[rows], bodies_m, radii_m, *obstacles)
+
+
+def _draw_block(keys: np.ndarray, first_step: int, robots: int) -> np.ndarray:
+    """Return the random numbers of a block of steps (K, 4, R), from the streams of worlds with so many robots each."""
+    drawn = np.empty((_BLOCK_STEPS, 4, len(keys), robots))
+    own = find_place(0, np.arange(4).reshape(-1, 1, 1), np.arange(robots))
+    at_once = max(1, _CACHED // drawn[0].size)
+    for begin in range(0, _BLOCK_STEPS, at_once):
+        steps = np.arange(first_step + begin, first_step + min(begin + at_once, _BLOCK_STEPS))
+        drawn[begin : begin + at_once] = draw_normal_at(
+            keys[:, None], own + find_place(steps, 0, 0).reshape(-1, 1, 1, 1)
+        )
+    return drawn.reshape(_BLOCK_STEPS, 4, -1)
