@@ -9,7 +9,7 @@ import pytest
 from driver_side import RECEIVED, SENT
 from stepped_worlds import build_world
 
-from hero_driver.commands import COMMAND_INTERVAL_S
+from hero_driver.commands import velocity_shaper
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS, VelocityShaper, check_twist
 from hero_driver.corrections import PLUS_WHEELS, WheelGeometry
 from hero_driver.corrections.message_layouts import make_proximity
@@ -26,6 +26,7 @@ from hero_sim.robot.ranges import calibrate, convert_to_ranges
 from hero_sim.robot.sensing import DISTANCE_MS, Sensing
 from hero_sim.robot.servo_pins import CORE_2, ServoPins
 from hero_sim.stepped.robot_rows import RobotRows, correct_ranges
+from hero_sim.stepped.rules.command_shaper import INTERVAL_MS
 from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.world import STEP_MS
 
@@ -49,6 +50,12 @@ def read_proximity(laser_payload):
     return np.roll(np.where(ranges_m == -np.inf, 0.0, ranges_m), -4)
 
 
+@pytest.fixture(autouse=True)
+def _driver_in_milliseconds(monkeypatch):
+    """Let the driver's shapers count whole milliseconds, as the simulator does."""
+    monkeypatch.setattr(velocity_shaper, "COMMAND_INTERVAL_S", INTERVAL_MS)
+
+
 class ScalarRobot:
     """One robot of the parts that the simulator behind sockets is made of, and its half of the driver."""
 
@@ -63,10 +70,7 @@ class ScalarRobot:
         self.motors = MotorControl(name, body, self.sensing.odometry, flash, ServoPins(CORE_2), rng, lambda text: None)
         self.table = CommandTable(name, self.sensing, self.motors, flash, lambda text: None, pytest.fail, model)
         self.model = model
-        self.shapers = {
-            topic_id: VelocityShaper(STOP_PAYLOADS[kind], round(COMMAND_INTERVAL_S * 1000))
-            for topic_id, kind in SHAPED_TYPES.items()
-        }
+        self.shapers = {topic_id: VelocityShaper(STOP_PAYLOADS[kind]) for topic_id, kind in SHAPED_TYPES.items()}
         self.odometry = TickOdometry(PLUS_WHEELS if model.is_plus else WheelGeometry())
         self.inbox = []
         self.ticks = (0.0, 0.0)
