@@ -64,7 +64,6 @@ class Control:
         """Return linear and angular speeds of all robots (R,) at poses (W, N, 3) that are ages_s old (W, N).
 
         time_s: by any clock that never steps back. Without ages and a filter, commands are those of the behavior.
-
         Raises: ValueError, or whatever the behavior raises.
         """
         self.has_decided = self._steps % self.steps_per_decision == 0

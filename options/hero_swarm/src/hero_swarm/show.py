@@ -39,9 +39,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     cell = experiment.cells[options.cell - 1]
     seed = experiment.seeds[0] if options.seed is None else options.seed
     if seed not in experiment.seeds:
-        raise ExperimentError(
-            "--seed %d: the experiment has seeds %d to %d" % (seed, experiment.seeds[0], experiment.seeds[-1])
-        )
+        first, last = experiment.seeds[0], experiment.seeds[-1]
+        raise ExperimentError("--seed %d: the experiment has seeds %d to %d" % (seed, first, last))
     trial = set_up(experiment, cell).build_trial([seed])
     if about["code"] != hash_code(experiment.list_code()):
         text = "note: the results are of other code (%s), so this run may differ from theirs"

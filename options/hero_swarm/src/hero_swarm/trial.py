@@ -61,7 +61,7 @@ def is_clear(places_m: np.ndarray, arena: Arena, overlap_m: float = _ROUNDED_M) 
     clear: np.ndarray = ((places_m >= low_m) & (places_m <= high_m)).all(axis=1)
     clear &= measure_clearance(places_m, arena) >= radius_m
     if arena.objects:
-        clear[clear] = [is_free(Pose(*place_m, 0.0), (), arena, radius_m) for place_m in places_m[clear].tolist()]
+        clear[clear] = [is_free(Pose(x_m, y_m, 0.0), (), arena, radius_m) for x_m, y_m in places_m[clear].tolist()]
     return clear
 
 

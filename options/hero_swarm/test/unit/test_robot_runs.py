@@ -68,7 +68,7 @@ class Stage(Clock):
             self.ahead_s += 1.0 / RATE_HZ  # twice as fast
 
     def drive(self):
-        return robot_runs._drive(self, self, self, self, self, self, self)
+        return robot_runs._drive(self, self, self, self, (self, self, self))
 
 
 @pytest.fixture(name="stage")

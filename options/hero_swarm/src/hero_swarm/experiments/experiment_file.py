@@ -240,7 +240,9 @@ def parse_experiment(
 def check_experiment(entry: Entry, folder: str, sources: Sources) -> Experiment:
     """Return what the entries of a file describe; arguments and errors as of parse_experiment(), EntryError too."""
     root = entry.mapping((*_KEYS, *(name for name in entry.mapping() if name in ERROR_KEYS)), _REQUIRED)
-    seeds = _parse_seeds(root["seeds"])
+    given = root["seeds"].mapping(("from", "count"), ("count",))
+    first = given["from"].whole(0, MAX_SEED) if "from" in given else 1
+    seeds = range(first, first + given["count"].whole(1, MAX_RUNS))
     cells = _parse_cells(root, entry.place, len(seeds))
     metrics = tuple(_parse_metric(entry) for entry in root["metrics"].entries())
     names = [metric.name for metric in metrics]
@@ -373,12 +375,6 @@ def _make_cell(fixed: List[_Value], chosen: Dict[str, _Value]) -> Cell:
         for name, new in value.fields.items():
             fields[name] = {**fields[name], **new} if isinstance(new, dict) else new
     return Cell(varied, **fields)
-
-
-def _parse_seeds(entry: Entry) -> range:
-    given = entry.mapping(("from", "count"), ("count",))
-    first = given["from"].whole(0, MAX_SEED) if "from" in given else 1
-    return range(first, first + given["count"].whole(1, MAX_RUNS))
 
 
 def _parse_bound(entry: Entry) -> Bound:

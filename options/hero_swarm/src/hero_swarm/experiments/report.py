@@ -3,9 +3,7 @@
 import argparse
 import io
 import os
-from typing import Mapping, Optional, Sequence
-
-from matplotlib.figure import Figure
+from typing import Optional, Sequence
 
 from hero_node.files import write_file
 
@@ -17,7 +15,7 @@ from .results_folder import REAL, SIMULATED, ResultsFolder, read_results
 
 
 def write_report(path: str) -> None:
-    """Write table, summary and page of the results in a folder, and print them. Raises: ExperimentError."""
+    """Write table, summary, figures and page of the results in a folder, and print them. Raises: ExperimentError."""
     text, experiment, about = read_results(path)
     folder = ResultsFolder(path, experiment, about["code"])
     runs = folder.read_runs()
@@ -31,21 +29,16 @@ def write_report(path: str) -> None:
         page = draw_page(report, figures, text, about)
         write_file(os.path.join(path, f"summary{suffix}.csv"), format_summaries(report).encode())
         write_file(os.path.join(path, f"report{suffix}.html"), page.encode())
-        _write_figures(os.path.join(path, "figures" + suffix), figures)
+        folder_of_figures = os.path.join(path, "figures" + suffix)
+        os.makedirs(folder_of_figures, exist_ok=True)
+        for name, figure in figures.items():  # the same bytes for the same runs
+            stem, content = os.path.join(folder_of_figures, name.replace(os.sep, "_")), io.BytesIO()
+            figure.savefig(content, format="pdf", metadata={"CreationDate": None})
+            write_file(stem + ".pdf", content.getvalue())
+            write_file(stem + ".svg", to_svg(figure).encode())
         print(describe(report))
         print(describe_method(report, about))
         print(os.path.join(path, f"report{suffix}.html"))
-
-
-def _write_figures(folder: str, figures: Mapping[str, Figure]) -> None:
-    """Write each figure as PDF and SVG, the same bytes for the same runs."""
-    os.makedirs(folder, exist_ok=True)
-    for name, figure in figures.items():
-        stem = os.path.join(folder, name.replace(os.sep, "_"))
-        content = io.BytesIO()
-        figure.savefig(content, format="pdf", metadata={"CreationDate": None})
-        write_file(stem + ".pdf", content.getvalue())
-        write_file(stem + ".svg", to_svg(figure).encode())
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:

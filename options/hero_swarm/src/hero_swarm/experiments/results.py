@@ -17,11 +17,9 @@ class Results:
     """The runs of an experiment of one kind, C cells with S seeds; nan where a run is missing or has ended.
 
     Attributes:
-        cells: the values that vary, by name, of each cell.
-        labels: of the cells, for legends.
-        seeds: (S,).
+        cells, labels: the values that vary, by name, of each cell, and a text of them for legends.
         metrics: columns of runs.csv by their names (C, S).
-        times_s: of series (T,).
+        seeds, times_s: of all runs (S,), of series (T,).
         series: metrics over time by their names (C, S, T); none of robots.
         pose_times_s: of poses (P,); empty if the experiment records none.
     """

@@ -31,7 +31,7 @@ from hero_node import one_line
 from hero_node.files import hold_file, read_file, write_file
 
 from .errors import ExperimentError
-from .experiment_file import Cell, Experiment, read_experiment
+from .experiment_file import Experiment, read_experiment
 
 SIMULATED = "simulated"
 """Kind of a run that was computed."""
@@ -83,7 +83,12 @@ class ResultsFolder:
         self.path = path
         self._experiment = experiment
         self._code = code
-        self._cells = [_digest_cell(experiment, cell) for cell in experiment.cells]
+        self._cells: List[str] = []
+        for cell in experiment.cells:
+            digest = hashlib.sha256(experiment.describe_cell(cell).encode())
+            for file in experiment.list_files(cell).values():
+                digest.update(experiment.sources.read(file))
+            self._cells.append(digest.hexdigest())
         self._indices = {digest: index for index, digest in enumerate(self._cells)}
         self._batches, self._series = os.path.join(path, "batches"), os.path.join(path, "series")
 
@@ -310,13 +315,6 @@ def read_results(path: str) -> Tuple[str, Experiment, Dict[str, str]]:
         raise ExperimentError(f"{path}: no {EXPERIMENT} in it, so not a folder of run")
     about = read_about(path)
     return (*read_experiment(file, os.path.join(path, about.get(FOLDER, ""))), about)
-
-
-def _digest_cell(experiment: Experiment, cell: Cell) -> str:
-    digest = hashlib.sha256(experiment.describe_cell(cell).encode())
-    for path in experiment.list_files(cell).values():
-        digest.update(experiment.sources.read(path))
-    return digest.hexdigest()
 
 
 def format_table(experiment: Experiment, runs: Sequence[Run]) -> str:

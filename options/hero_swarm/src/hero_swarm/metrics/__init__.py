@@ -24,16 +24,14 @@ radii (N,), and of the arena; the last three may be left out where they do not c
 METRICS: Dict[str, Metric] = {
     "algebraic_connectivity": lambda poses, *_: algebraic_connectivity(poses[..., :2], 0.5),
     "cluster_fraction": lambda poses, *_: cluster_fraction(poses[..., :2]),
-    "collisions": lambda poses, velocities, objects=None, radii_m=BODY_RADIUS_M, *_: collisions(
-        poses[..., :2], radii_m
-    ),
+    "collisions": lambda poses, _, objects=None, radii_m=BODY_RADIUS_M, *rest: collisions(poses[..., :2], radii_m),
     "consensus_error": lambda poses, *_: consensus_error(poses[..., :2]),
     "dispersion": lambda poses, *_: dispersion(poses[..., :2]),
     "dispersion_ratio": lambda poses, *_: dispersion_ratio(poses[..., :2]),
     "fatness": lambda poses, *_: fatness(poses[..., :2]),
     "nearest_neighbor": lambda poses, *_: nearest_neighbor(poses[..., :2]),
-    "object_cluster_fraction": lambda poses, velocities, objects, *_: object_cluster_fraction(objects[..., :2]),
-    "object_distance": lambda poses, velocities, objects, *_: object_distance(objects[..., :2]),
+    "object_cluster_fraction": lambda poses, _, objects, *rest: object_cluster_fraction(objects[..., :2]),
+    "object_distance": lambda poses, _, objects, *rest: object_distance(objects[..., :2]),
     "order": lambda poses, velocities, *_: order(poses[..., 2], velocities[..., :2]),
     "rotation": lambda poses, velocities, *_: rotation(poses[..., :2], velocities[..., :2]),
     "wall_following": lambda poses, velocities, objects=None, radii_m=None, arena=None: (

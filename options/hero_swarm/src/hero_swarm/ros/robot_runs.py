@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from typing import Iterator, Sequence
+from typing import Iterator, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -76,7 +76,7 @@ def run_on_robots(
             commands = WheelCommands(swarm, setup.behavior.drive, options.calibration)
             name = "cell_%d_seed_%d" % (cell_index + 1, seed)
             with _record(program, folder.path, name, ids, experiment.time_s):
-                finished = _drive(program, swarm, trial, commands, source, objects, others)
+                finished = _drive(program, swarm, trial, commands, (source, objects, others))
             if not finished:
                 break
             folder.write_batch([Run(cell_index, seed, trial.list_values(), REAL, trial.remark)])
@@ -182,16 +182,12 @@ def _record(program: Program, path: str, name: str, ids: Sequence[int], time_s: 
         end_process(recorder, RECORD_END_S)
 
 
-def _drive(
-    program: Program,
-    swarm: Swarm,
-    trial: RobotTrial,
-    commands: WheelCommands,
-    source: PoseSource,
-    objects: ObjectSource,
-    others: OtherRobots,
-) -> bool:
+_Sources = Tuple[PoseSource, ObjectSource, OtherRobots]
+
+
+def _drive(program: Program, swarm: Swarm, trial: RobotTrial, commands: WheelCommands, sources: _Sources) -> bool:
     """Run one trial; return whether it has ended by itself, by a stop or a loss."""
+    source, objects, others = sources
     start_s = read_duration_clock_s()
     all_may_move = np.ones(len(swarm), dtype=bool)
     try:

@@ -68,9 +68,9 @@ def set_up(experiment: Experiment, cell: Cell) -> CellSetup:
     with _at(experiment, "rate_hz"):
         behavior = kind(**{name: value for name, value in cell.parameters.items() if name in known})
     with _at(experiment, "arena"):
-        name = cell.settings.get("arena")
-        file = (files["arena"], sources.read) if "arena" in files else (name,)
-        arena: Arena = OPEN if name is None else sources.load(f"arena {name}", lambda: load_arena(*file))
+        chosen = cell.settings.get("arena")
+        file = (files["arena"], sources.read) if "arena" in files else (chosen,)
+        arena: Arena = OPEN if chosen is None else sources.load(f"arena {chosen}", lambda: load_arena(*file))
         pushes = any(isinstance(sensor, Objects) for sensor in behavior.sensors().values())
         if pushes and not arena.objects:
             raise ExperimentError(f"{cell.behavior} pushes objects: arena must have them, as box does")

@@ -66,18 +66,15 @@ def check_suite(suite: str) -> None:
 
 def describe_machine() -> Dict[str, str]:
     """Return what a reader of the results may want to know of the machine and the versions; no result depends on it."""
+    # With "-dirty" if the sources differ from it.
+    command = ["git", "-C", str(Path(__file__).resolve().parent), "describe", "--always", "--dirty", "--abbrev=12"]
+    try:
+        commit = subprocess.check_output(command, stderr=subprocess.DEVNULL, timeout=10.0).decode().strip()
+    except (OSError, subprocess.SubprocessError):
+        commit = "unknown"  # outside a checkout
     return {
-        "commit": _find_commit(),
+        "commit": commit,
         "machine": "%s, %d cores" % (platform.platform(), os.cpu_count() or 0),
         "numpy": np.__version__,
         "python": sys.version.split()[0],
     }
-
-
-def _find_commit() -> str:
-    """Return the commit of the sources, with "-dirty" if they differ from it; "unknown" outside a checkout."""
-    command = ["git", "-C", str(Path(__file__).resolve().parent), "describe", "--always", "--dirty", "--abbrev=12"]
-    try:
-        return subprocess.check_output(command, stderr=subprocess.DEVNULL, timeout=10.0).decode().strip()
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"

@@ -35,7 +35,6 @@ _WAITING = 2
 """Batches that wait for each worker: none idles while results are written, and few are lost by a kill."""
 
 Task = Tuple[Any, ...]
-"""Arguments of one call."""
 
 
 def open_pool(jobs: int) -> ProcessPoolExecutor:

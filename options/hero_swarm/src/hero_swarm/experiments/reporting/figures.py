@@ -22,7 +22,6 @@ _POINT_SPREAD = 0.12
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
-
 _DASHES = (1.0, 1.5, 3.0, 5.0)
 
 
