@@ -15,7 +15,6 @@ class CommandSender:
     """The way out of the driver."""
 
     def __init__(self, call_later: CallLater, owner: Owner) -> None:
-        """Take the loop's call_later(delay_s, call)."""
         self._call_later = call_later
         self._owner = owner
 

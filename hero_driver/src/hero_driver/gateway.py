@@ -64,6 +64,7 @@ class Gateway(LinkHandler):
         self.stop_robot = self._stops.begin
         self._robot_log = RobotLog(log, self._stops.begin, self.warn_late)
         self._transforms = TransformPublisher(loop.call_later)
+        self.open = self._transforms.open
         self._context = BridgeContext(
             self, loop, log, self._transforms, registrar, config, config, 2 * config.max_topics
         )
@@ -73,10 +74,6 @@ class Gateway(LinkHandler):
         self.stopped = False
         self.refused_connections = 0
         self.last_refusal = ""
-
-    def open(self) -> None:
-        """Begin to publish transforms."""
-        self._transforms.open()
 
     # What the transport calls.
 

@@ -21,7 +21,6 @@ class BurstGate:
     """The bursts to one robot over one connection."""
 
     def __init__(self, wheels: WheelMotion) -> None:
-        """Take the robot's wheels."""
         self._wheels = wheels
         self._is_outstanding = False
         self._acknowledged_readings: Optional[int] = None  # number of readings when the last burst was

@@ -92,7 +92,6 @@ class CommandSources:
     """The programs that command one robot: on each motion topic the one of the newest command."""
 
     def __init__(self, wheels: WheelMotion) -> None:
-        """Take the robot's wheels."""
         self._wheels = wheels
         self._by_topic: Dict[str, CommandSource] = {}
         self._zero: Optional[_Zero] = None  # until its effect shows

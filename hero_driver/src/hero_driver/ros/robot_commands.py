@@ -68,7 +68,6 @@ class RobotCommands:
     """
 
     def __init__(self, namespace: str, owner: Owner, loop: EventLoop, log: LogRelay, settings: CommandSettings) -> None:
-        """Take the commands for the robot in namespace."""
         self.queue = CommandQueue(settings.command_max_age_s)
         self.refused = 0
         self.fault = ""

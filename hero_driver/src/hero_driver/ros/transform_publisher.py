@@ -24,7 +24,6 @@ class TransformPublisher:
     """The publisher of /tf: add(geometry_msgs/TransformStamped as bytes), then schedule() unless is_scheduled."""
 
     def __init__(self, call_later: CallLater) -> None:
-        """call_later(delay_s, call) runs call on the same thread."""
         self._call_later = call_later
         self._publisher = RawPublisher(QUEUE_LENGTH, call_later)
         self._transforms: List[bytes] = []

@@ -80,7 +80,6 @@ class StopDelivery:
     """The stops of all robots of one driver."""
 
     def __init__(self, call_later: CallLater, owner: Owner) -> None:
-        """Take the loop's call_later(delay_s, call)."""
         self._call_later = call_later
         self._owner = owner
         self._peers: List[Peer] = []
