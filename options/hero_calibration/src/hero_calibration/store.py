@@ -4,7 +4,7 @@ import math
 import os
 from contextlib import suppress
 from statistics import median
-from typing import Dict, List, NamedTuple, Optional, Sequence
+from typing import Dict, List, Optional, Sequence, Tuple
 
 from hero_node import say
 from hero_node.files import (
@@ -73,18 +73,11 @@ def save(path: str, calibration: KeptCalibration) -> None:
         raise CalibrationError(f"{path} cannot be written: {error.strerror}") from error
 
 
-class Quality(NamedTuple):
-    """Errors that are left: of velocity, as a share; of ranges, m. None where they are not known."""
-
-    velocity: Optional[float]
-    range_m: Optional[float]
-
-
-def rate(kept: KeptCalibration) -> Quality:
-    """Return how good a calibration is."""
+def rate(kept: KeptCalibration) -> Tuple[Optional[float], Optional[float]]:
+    """Return the errors that are left: of velocity, as a share, and the largest of ranges, m; None: not known."""
     velocity = kept.values.get("velocity_errors", [math.nan, math.nan])[1]
     ranges = [abs(error_m) for error_m in kept.values.get("range_errors_after_m", []) if not math.isnan(error_m)]
-    return Quality(None if math.isnan(velocity) else velocity, max(ranges, default=None))
+    return None if math.isnan(velocity) else velocity, max(ranges, default=None)
 
 
 def find_missing(found: Dict[str, KeptCalibration], robot_ids: Sequence[int], parts: Sequence[str]) -> List[int]:
@@ -99,12 +92,12 @@ def describe_status(calibrations: Calibrations) -> List[str]:
     """Return a table of all robots with a file, and a line for each file that cannot be used."""
     found = sorted(calibrations.found.values(), key=lambda kept: kept.robot_id)
     qualities = [rate(kept) for kept in found]
-    limits = [_find_limit([quality[index] for quality in qualities]) for index in range(len(Quality._fields))]
+    limits = [_find_limit([quality[index] for quality in qualities]) for index in (0, 1)]
     lines = ["%-10s %-20s %-34s %-9s %s" % ("ROBOT", "DATE", "PARTS", "VELOCITY", "RANGE")]
     for kept, quality in zip(found, qualities):
         parts = ", ".join(part for part, key in KEYS.items() if key in kept.values) or "none"
-        velocity = "-" if quality.velocity is None else f"{100 * quality.velocity:.1f} %"
-        range_text = "-" if quality.range_m is None else f"{1000 * quality.range_m:.0f} mm"
+        velocity = "-" if quality[0] is None else f"{100 * quality[0]:.1f} %"
+        range_text = "-" if quality[1] is None else f"{1000 * quality[1]:.0f} mm"
         is_worse = any(value is not None and value > limit for value, limit in zip(quality, limits))
         line = "%-10s %-20s %-34s %-9s %-6s" % ("hero_%d" % kept.robot_id, kept.date, parts, velocity, range_text)
         lines.append((line + (" worse than the rest" if is_worse else "")).rstrip())

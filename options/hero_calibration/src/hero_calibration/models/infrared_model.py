@@ -93,9 +93,8 @@ def estimate_misalignment_rad(facing: Facing) -> float:
     neighbors = ((facing.sensor + 1) % BEAMS, (facing.sensor - 1) % BEAMS)
     left, right = (max(facing.counts[index], FAINT_COUNTS) for index in neighbors)
     if max(left, right) <= NO_WALL_COUNTS:
-        raise CalibrationError(
-            f"the sensors beside {name_beam(facing.sensor)} see no wall: is it wider than 30 cm, and white?"
-        )
+        text = f"the sensors beside {name_beam(facing.sensor)} see no wall: is it wider than 30 cm, and white?"
+        raise CalibrationError(text)
     wall_m = WALL_M + BODY_RADIUS_M - facing.moved_m
     step_rad = math.radians(1.0)
     at, beside = (math.log(expected_brightness(BEAM_STEP_RAD - offset_rad, wall_m)) for offset_rad in (0.0, step_rad))
@@ -103,10 +102,8 @@ def estimate_misalignment_rad(facing: Facing) -> float:
     # Turned to the left, the right neighbor comes closer to the wall's normal.
     misalignment_rad = math.log(right / left) / slope
     if abs(misalignment_rad) > MAX_MISALIGNMENT_RAD:
-        raise CalibrationError(
-            "misaligned by %.0f degrees when sensor %s faces the wall: place it straight, or clean its wheels"
-            % (abs(math.degrees(misalignment_rad)), name_beam(facing.sensor))
-        )
+        text = "misaligned by %.0f degrees when sensor %s faces the wall: place it straight, or clean its wheels"
+        raise CalibrationError(text % (abs(math.degrees(misalignment_rad)), name_beam(facing.sensor)))
     return misalignment_rad
 
 
@@ -119,10 +116,8 @@ def compute_calibration(facings: Sequence[Facing]) -> List[float]:
     for facing in facings:
         counts = facing.counts[facing.sensor]
         if not WALL_COUNTS[0] <= counts <= WALL_COUNTS[1]:
-            raise CalibrationError(
-                "sensor %s reads %.0f counts; %.0f are typical of a white wall 10 cm away: place it again"
-                % (name_beam(facing.sensor), counts, NOMINAL_COUNTS_M2 / WALL_M**2)
-            )
+            text = "sensor %s reads %.0f counts; %.0f are typical of a white wall 10 cm away: place it again"
+            raise CalibrationError(text % (name_beam(facing.sensor), counts, NOMINAL_COUNTS_M2 / WALL_M**2))
         # Relative to a straight view of the wall at 10 cm.
         brightness = expected_brightness(estimate_misalignment_rad(facing), WALL_M + BODY_RADIUS_M - facing.moved_m)
         alphas[facing.sensor] = counts / brightness

@@ -109,9 +109,8 @@ def measure_speed(readings: Readings, ticks: np.ndarray, start: int, end_s: floa
     seen = (times_s[:-APART] >= -0.1) & (times_s[APART:] <= driven_s)
     kept = np.flatnonzero(seen & readings.find_even(APART))
     if len(kept) < MIN_SPEEDS or times_s[kept[-1] + APART] < LATE_S + 0.2:
-        raise CalibrationError(
-            f"only {len(kept)} speeds could be measured in {STEP_S:.1f} s: is the network busy? try again"
-        )
+        text = f"only {len(kept)} speeds could be measured in {STEP_S:.1f} s: is the network busy? try again"
+        raise CalibrationError(text)
     distances_m = (ticks[kept + APART] - ticks[kept]) * TICK_M
     between_s = times_s[kept + APART] - times_s[kept]
     return times_s[kept] + between_s / 2.0, distances_m / between_s

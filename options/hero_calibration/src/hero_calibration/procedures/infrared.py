@@ -108,10 +108,8 @@ def _turn(session: Session, title: str, targets_rad: Dict[int, float]) -> None:
     def check(probe: Probe) -> None:
         probe.check_alive(session.now_s)
         if abs(remaining_rad(probe)) > TURN_TOLERANCE_RAD:
-            raise CalibrationError(
-                "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"
-                % abs(math.degrees(remaining_rad(probe)))
-            )
+            text = "could not turn on the spot: %.0f degrees are missing; calibrate its motors, or free its wheels"
+            raise CalibrationError(text % abs(math.degrees(remaining_rad(probe))))
 
     for tolerance_rad in (0.0, *[TURN_TOLERANCE_RAD / 2.0] * (TURN_TRIES - 1)):
         turning = [probe for probe in session.active if abs(remaining_rad(probe)) > tolerance_rad]

@@ -52,12 +52,10 @@ Stop = Tuple[float, Dict[int, Optional[Pose]]]
 
 
 class Leg(NamedTuple):
-    """Motion of a robot from one stop to the next."""
+    """Motion of a robot between two stops, as measured in its frame at the first, and its wheels' ticks, (K, 2)."""
 
     ticks: np.ndarray
-    """Ticks of the left and the right wheel, (K, 2)."""
     moved: Pose
-    """Measured: from the first stop to the second, in the robot's frame at the first."""
     sd: Sd = CAMERA_SD
 
 

@@ -50,8 +50,6 @@ class Probe(ABC):
         self._places: Deque[Tuple[float, Pose]] = deque(maxlen=KEPT_SCANS)
         self._heard_s: Dict[str, float] = dict.fromkeys(("encoder", "laser", "odom"), -math.inf)
 
-    # -- received data -------------------------------------------------------------------------------------
-
     def receive_encoder(self, heard_s: float, stamp_s: float, seq: int, left_ticks: float, right_ticks: float) -> None:
         """Keep an encoder reading; heard_s: when it arrived, stamp_s: when it was made, by the robot's clock."""
         with self._lock:
@@ -87,8 +85,6 @@ class Probe(ABC):
         x_m, y_m, yaw_rad = np.array(places).T
         mean_rad = math.atan2(np.sin(yaw_rad).sum(), np.cos(yaw_rad).sum())
         return Pose(float(x_m.mean()), float(y_m.mean()), mean_rad)
-
-    # -- readings ------------------------------------------------------------------------------------------
 
     def find_silence(self, now_s: float) -> Optional[str]:
         """Return what is missing of the robot, as text; None if all its topics are alive."""
@@ -129,8 +125,6 @@ class Probe(ABC):
             raise CalibrationError(f"no infrared readings came on /{self.name}/laser")
         signals, ranges_m = np.array(scans).transpose(1, 0, 2)
         return average(signals), average(ranges_m)
-
-    # -- commands ------------------------------------------------------------------------------------------
 
     @abstractmethod
     def drive(self, angular_rad_s: float, linear_m_s: float = 0.0) -> None:

@@ -141,9 +141,8 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Ro
         if ready and (drivers.is_settled if robot_ids is None else set(ready).issuperset(robot_ids)):
             break
     if report is None:
-        raise CalibrationError(
-            "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
-        )
+        text = "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
+        raise CalibrationError(text)
     wanted = sorted(ready if robot_ids is None else robot_ids)
     for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
         if drivers.is_stopped(driver):

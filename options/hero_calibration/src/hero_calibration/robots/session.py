@@ -36,8 +36,6 @@ class Session(Clock):
         with ThreadPoolExecutor(CALLS_AT_ONCE) as pool:
             list(pool.map(work, probes))
 
-    # -- time ----------------------------------------------------------------------------------------------
-
     def pause(self, duration_s: float) -> None:
         """Wait. Raises: EndedError if the program is to end."""
         self.wait_for(lambda: False, duration_s)
@@ -51,8 +49,6 @@ class Session(Clock):
                 return
             if not self.sleep(min(left_s, POLL_S)):
                 raise EndedError
-
-    # -- robots --------------------------------------------------------------------------------------------
 
     @property
     def active(self) -> List[Probe]:

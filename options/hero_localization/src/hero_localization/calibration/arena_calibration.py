@@ -11,7 +11,7 @@ from hero_node import Pose, measure_distance
 from ..camera.camera_model import Camera, Intrinsics, solve_camera
 from ..errors import CalibrationError
 from ..prints.tag_images import REFERENCE_SIZE_M
-from ..tracking.tag_pose import TagCorners, TagPose, fit_squares, list_corners
+from ..tracking.tag_pose import TagCorners, fit_squares, list_corners
 
 MIN_TAGS = 4
 MIN_EXTENT_M = 0.3
@@ -100,20 +100,18 @@ def calibrate_arena(
     seen = image.tags
     missing = sorted(set(references) - {tag.tag_id for tag in seen})
     if len(seen) < MIN_TAGS:
-        raise CalibrationError(
-            "the camera sees %d of %d reference tags, not %s: it takes %d; are they in the image, whole, and lit?"
-            % (len(seen), len(references), ", ".join(map(str, missing)) or "more", MIN_TAGS)
-        )
+        text = "the camera sees %d of %d reference tags, not %s: it takes %d; are they in the image, whole, and lit?"
+        raise CalibrationError(text % (len(seen), len(references), ", ".join(map(str, missing)) or "more", MIN_TAGS))
     _check_extent(seen, references)
     fit = image.fit()
-    if fit is None or fit.rms_m > SUSPICIOUS_RMS_M:
+    if fit is None or fit[1] > SUSPICIOUS_RMS_M:
         _refuse_mistakes(image)
     if fit is None:
         raise CalibrationError(
             "no camera above the floor sees the reference tags like this: check the ids and places in the camera file"
         )
-    camera, left_out = fit.camera, []  # type: Camera, List[int]
-    suspects, off_m, camera_without = _find_wrong_tag(image, fit)
+    (camera, rms_m), left_out = fit, []  # type: Tuple[Camera, float], List[int]
+    suspects, off_m, camera_without = _find_wrong_tag(image, rms_m)
     if camera_without is not None:
         camera, left_out = camera_without, suspects
     residuals_m = measure_residuals(camera, seen, references)
@@ -128,13 +126,6 @@ def calibrate_arena(
     return ArenaCalibration(camera, residuals_m, left_out, problems)
 
 
-class _Fit(NamedTuple):
-    """The camera that sees the reference tags of an image best, and the root mean square of their residuals."""
-
-    camera: Camera
-    rms_m: float
-
-
 class _Image(NamedTuple):
     """The reference tags in an image, and what is known of them and of the lens."""
 
@@ -143,8 +134,8 @@ class _Image(NamedTuple):
     references: Mapping[int, Pose]
     size_m: float
 
-    def fit(self) -> Optional[_Fit]:
-        """Return the camera above the floor that sees the tags like this best; None if there is none."""
+    def fit(self) -> Optional[Tuple[Camera, float]]:
+        """Return the camera above the floor that sees the tags best like this, and the residuals' rms, m; else None."""
         known = [self.references[tag.tag_id] for tag in self.tags]
         # The yaws are not known: centers first.
         points_m = np.array([(*pose[:2], 0.0) for pose in known])
@@ -160,7 +151,7 @@ class _Image(NamedTuple):
         assert camera is not None
         if not HEIGHTS_M[0] <= camera.position_m[2] <= HEIGHTS_M[1]:
             return None
-        return _Fit(camera, _compute_rms(measure_residuals(camera, self.tags, self.references), ()))
+        return camera, _compute_rms(measure_residuals(camera, self.tags, self.references), ())
 
 
 def _refuse_mistakes(image: _Image) -> None:
@@ -174,28 +165,28 @@ def _refuse_mistakes(image: _Image) -> None:
     causes = []
     for cause, places in tried:
         fit = image._replace(references=places).fit()
-        if fit is not None and fit.rms_m < WORST_RESIDUAL_M:
+        if fit is not None and fit[1] < WORST_RESIDUAL_M:
             causes.append(cause)
     if causes:
         raise CalibrationError(f"the places of the reference tags have {', or '.join(causes)}: correct them")
 
 
-def _find_wrong_tag(image: _Image, fit_of_all: _Fit) -> Tuple[List[int], float, Optional[Camera]]:
+def _find_wrong_tag(image: _Image, rms_m: float) -> Tuple[List[int], float, Optional[Camera]]:
     """Return the tags of which one contradicts all others, how far (m) the likeliest is off, the camera without it.
 
     No tags: none is wrong, or there is none to spare. No camera: chance may explain it, or another tag.
     """
-    count, fits, sums_m2 = len(image.tags), {}, {}  # type: int, Dict[int, _Fit], Dict[int, float]
+    count, cameras, sums_m2 = len(image.tags), {}, {}  # type: int, Dict[int, Camera], Dict[int, float]
     for tag in image.tags if count > MIN_TAGS else ():
         fit = image._replace(tags=[other for other in image.tags if other is not tag]).fit()
         if fit is not None:
-            fits[tag.tag_id], sums_m2[tag.tag_id] = fit, (count - 1) * fit.rms_m**2
-    if not fits:
+            cameras[tag.tag_id], sums_m2[tag.tag_id] = fit[0], (count - 1) * fit[1] ** 2
+    if not cameras:
         return [], 0.0, None
     suspects = sorted(sums_m2, key=sums_m2.__getitem__)
-    camera, rest_m2 = fits[suspects[0]].camera, sums_m2[suspects[0]]
+    camera, rest_m2 = cameras[suspects[0]], sums_m2[suspects[0]]
     off_m = measure_residuals(camera, image.tags, image.references)[suspects[0]]
-    gain = (count * fit_of_all.rms_m**2 - rest_m2) / 2.0 / max(rest_m2 / (2.0 * count - 8.0), MIN_RESIDUAL_M**2)
+    gain = (count * rms_m**2 - rest_m2) / 2.0 / max(rest_m2 / (2.0 * count - 8.0), MIN_RESIDUAL_M**2)
     if not (off_m > WRONG_PLACE_M and gain > WRONG_GAIN):
         return [], 0.0, None
     suspects = [tag_id for tag_id in suspects if sums_m2[tag_id] <= rest_m2 + AMBIGUOUS_M2]
@@ -203,10 +194,7 @@ def _find_wrong_tag(image: _Image, fit_of_all: _Fit) -> Tuple[List[int], float, 
 
 
 def _check_sizes(camera: Camera, tags: Sequence[TagCorners], size_m: float) -> List[str]:
-    """Compare the tags' measured size with the printed one; return what is wrong.
-
-    Raises: CalibrationError if places are far out of scale.
-    """
+    """Compare the tags' measured size with the printed one; return what is wrong. Raises: CalibrationError."""
     share = float(np.median([fit.size_m / size_m for fit in fit_squares(camera, tags, 0.0)]))
     text = "reference tags measure %.1f %% of their size: measure the places again, is the tape right? and the side of"
     text = text % (100.0 * share) + " a black square (reference_size_m)"
@@ -228,10 +216,8 @@ def _judge(residuals_m: Mapping[int, float], left_out: Sequence[int], missing: S
         problems.append(f"not seen: reference tags {', '.join(map(str, missing))}")
     rms_m = _compute_rms(residuals_m, left_out)
     if rms_m > GOOD_RESIDUAL_M:
-        problems.append(
-            "residual %.1f mm rms is above %.0f mm: check all places, the tags' size, and the lens calibration"
-            % (1e3 * rms_m, 1e3 * GOOD_RESIDUAL_M)
-        )
+        text = "residual %.1f mm rms is above %.0f mm: check all places, the tags' size, and the lens calibration"
+        problems.append(text % (1e3 * rms_m, 1e3 * GOOD_RESIDUAL_M))
     return problems
 
 
@@ -250,12 +236,7 @@ def _check_extent(seen: Sequence[TagCorners], references: Mapping[int, Pose]) ->
         raise CalibrationError("all reference tags lie in a row: spread them over the field, best into its corners")
 
 
-def fit_references(camera: Camera, tags: Sequence[TagCorners], references: Mapping[int, Pose]) -> List[TagPose]:
-    """Return where the camera sees the reference tags; other tags are ignored."""
-    return fit_squares(camera, [tag for tag in tags if tag.tag_id in references], 0.0)
-
-
 def measure_residuals(camera: Camera, seen: Sequence[TagCorners], references: Mapping[int, Pose]) -> Dict[int, float]:
     """Return how far (m) from its place each reference tag is seen, by id."""
-    fits = fit_references(camera, seen, references)
+    fits = fit_squares(camera, [tag for tag in seen if tag.tag_id in references], 0.0)
     return {fit.tag_id: measure_distance(fit.pose, references[fit.tag_id]) for fit in fits}

@@ -105,9 +105,8 @@ def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) ->
     Raises: CalibrationError for fewer than eight images, or images that no lens explains.
     """
     if len(views) < MIN_VIEWS:
-        raise CalibrationError(
-            "the board was found in %d images; it takes %d, from all sides and tilted" % (len(views), MIN_VIEWS)
-        )
+        text = "the board was found in %d images; it takes %d, from all sides and tilted" % (len(views), MIN_VIEWS)
+        raise CalibrationError(text)
     used = views
     fit = _choose_fit(used, width_px, height_px)
     left_out = np.flatnonzero(fit.errors_px > OUTLIER * np.median(fit.errors_px)).tolist()
@@ -119,16 +118,13 @@ def calibrate_lens(views: Sequence[BoardView], width_px: int, height_px: int) ->
     focal_error = _measure_focal_error(used, fit)
     problems = []
     if fit.rms_px > GOOD_RMS_PX:
-        problems.append(
-            f"error {fit.rms_px:.2f} px rms is above {GOOD_RMS_PX:.1f} px: is the board flat, are the images sharp?"
-        )
+        text = f"error {fit.rms_px:.2f} px rms is above {GOOD_RMS_PX:.1f} px: is the board flat, are the images sharp?"
+        problems.append(text)
     if (fit.tilts_rad > TILTED_RAD).sum() < MIN_TILTED:
         problems.append("the board is hardly tilted: take images with it tilted by 30 to 45 degrees")
     elif focal_error > GOOD_FOCAL_ERROR:
-        problems.append(
-            "the focal length is known to %.2f %% only: take more images with the board tilted by 30 to 45 degrees"
-            % (100.0 * focal_error)
-        )
+        text = "the focal length is known to %.2f %% only: take more images with the board tilted by 30 to 45 degrees"
+        problems.append(text % (100.0 * focal_error))
     empty = _list_empty_regions(used, width_px, height_px)
     if empty:
         problems.append(f"take images with the board there: {', '.join(empty)}")

@@ -70,15 +70,11 @@ def calibrate_robot(seen: Sequence[Tuple[float, Pose]], odometry: Sequence[Tuple
     inside = (stamps_s >= low) & (stamps_s <= high)
     stamps_s, tags = stamps_s[inside], tags[inside]
     if len(stamps_s) < MIN_POSES:
-        raise CalibrationError(
-            "the robot's tag was seen %d times, which is too few (%d): light, id, and size of the tag?"
-            % (len(stamps_s), MIN_POSES)
-        )
+        text = "the robot's tag was seen %d times, which is too few (%d): light, id, and size of the tag?"
+        raise CalibrationError(text % (len(stamps_s), MIN_POSES))
     if np.ptp(counted[:, 2]) < MIN_TURN_RAD:
-        raise CalibrationError(
-            "the robot turned by %.0f degrees only; it takes %.0f"
-            % (math.degrees(np.ptp(counted[:, 2])), math.degrees(MIN_TURN_RAD))
-        )
+        text = "the robot turned by %.0f degrees only; it takes %.0f"
+        raise CalibrationError(text % (math.degrees(np.ptp(counted[:, 2])), math.degrees(MIN_TURN_RAD)))
     delay_s, delay_error_s = _find_delay(stamps_s, tags[:, 2], odometry_s, counted[:, 2])
     at = np.column_stack([np.interp(stamps_s - delay_s, odometry_s, counted[:, column]) for column in range(3)])
     mount, rms_m = _fit_mount(tags, at)
@@ -147,10 +143,8 @@ def _fit_mount(tags: np.ndarray, at: np.ndarray) -> Tuple[Pose, float]:
     yaws = (tags[:-1, 2] + tags[1:, 2]) / 2.0
     driven = np.concatenate(((0.0,), np.cumsum(steps * np.exp(1j * (yaws - headings)))))
     if np.ptp(np.abs(driven)) < MIN_DRIVE_M:
-        raise CalibrationError(
-            "the robot drove %.0f mm only; to see which way is forward it takes %.0f"
-            % (1e3 * np.ptp(np.abs(driven)), 1e3 * MIN_DRIVE_M)
-        )
+        text = "the robot drove %.0f mm only; to see which way is forward it takes %.0f"
+        raise CalibrationError(text % (1e3 * np.ptp(np.abs(driven)), 1e3 * MIN_DRIVE_M))
     places = tags[:, 0] + 1j * tags[:, 1]
     design = np.column_stack((np.ones(len(places)), driven, np.exp(1j * tags[:, 2])))
     _, turn, offset = fit = np.linalg.lstsq(design, places, rcond=None)[0]

@@ -1,7 +1,6 @@
 """Images of one camera, gray, with the time at which they were taken: from topics, a V4L2 device or a video file."""
 
 import itertools
-import math
 import os
 import stat
 import threading
@@ -48,14 +47,14 @@ READ_BYTES = 2**20
 
 
 class Frame(NamedTuple):
-    """One image."""
+    """One image (H, W), 8 bit, and the ROS time at which it was taken.
+
+    number: among the source's images: gaps are those that did not get here.
+    """
 
     stamp_s: float
-    """ROS time at which it was taken."""
     gray: np.ndarray
-    """(H, W), 8 bit."""
     number: int
-    """Number among the source's images: gaps are those that did not get here."""
 
 
 class FrameSource:
@@ -181,8 +180,9 @@ class DeviceSource(FrameSource):
             asked_s = time.monotonic()
             is_read, image = self._capture.read()
             if is_read and image.size and image.shape == (shape or image.shape):
-                taken_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-                self._keep((rospy.get_time() - self._find_age(taken_s), image, number))
+                age_s = time.monotonic() - self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+                age_s = age_s if 0.0 <= age_s < PLAUSIBLE_AGE_S else 0.0  # the device may not tell
+                self._keep((rospy.get_time() - age_s, image, number))
                 backoff_s, failures, self.problem = MIN_BACKOFF_S, 0, ""
                 if shape is None and self._path.startswith(_DEVICES):
                     self.warning = "; ".join(apply_controls(self._controls, self._path))
@@ -203,12 +203,6 @@ class DeviceSource(FrameSource):
     def _decode(self, received: Tuple[float, np.ndarray, int]) -> Frame:
         stamp_s, image, number = received
         return Frame(stamp_s, _make_gray(image), number)
-
-    @staticmethod
-    def _find_age(taken_s: float) -> float:
-        """Return how long ago an image was taken; 0 if the device does not tell."""
-        age_s = time.monotonic() - taken_s
-        return age_s if math.isfinite(age_s) and 0.0 <= age_s < PLAUSIBLE_AGE_S else 0.0
 
     def close(self) -> None:
         self._ending.set()

@@ -107,10 +107,7 @@ class OdometryHistory:
         return Pose(way_m * math.cos(turn_rad / 2.0), way_m * math.sin(turn_rad / 2.0), turn_rad)
 
     def find(self, stamp_s: float) -> Optional[Odometry]:
-        """Return the odometry at stamp_s, interpolated between two readings; after the newest, that one.
-
-        None for a time before the history begins.
-        """
+        """Return the odometry at stamp_s, interpolated; after the newest reading that one, None before the history."""
         return self._readings.newest if stamp_s >= self._readings.newest_s else self._readings.find(stamp_s)
 
 

@@ -72,10 +72,7 @@ class PoseFilter:
         return 0 if self._main is None else self._main.support
 
     def add_odometry(self, stamp_s: float, pose: Pose) -> List[Tuple[StampedPose, Optional[Pose], Outcome]]:
-        """Follow a reading of /hero_N/odom.
-
-        Return measured poses that waited for it, each with the pose estimated before it, and what became of it.
-        """
+        """Follow odometry; return measured poses that waited for it, each with the estimate before, and its outcome."""
         newest_s = self.odometry.newest_s
         self.odometry.add(stamp_s, pose)
         for hypothesis in (self._main, self._rival):

@@ -202,10 +202,7 @@ class SwarmLocalizer:
         return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
 
     def distrust(self, stamp_s: float, robot_ids: Iterable[int], now_s: float) -> None:
-        """Take robots as lost, without a line, until a pose is used again: the camera that sees them moved.
-
-        Unless another camera has seen them.
-        """
+        """Take robots as lost, without a line, until a pose is used again: the camera that alone sees them moved."""
         if stamp_s > now_s + AHEAD_S:
             return
         for robot_id in robot_ids:

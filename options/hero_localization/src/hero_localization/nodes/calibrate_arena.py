@@ -4,11 +4,12 @@ import argparse
 
 from hero_node import say
 
-from ..calibration.arena_calibration import average_tags, calibrate_arena, fit_references
+from ..calibration.arena_calibration import average_tags, calibrate_arena
 from ..calibration.print_fit import refine_corners
 from ..errors import CalibrationError
 from ..tracking.detectors import find_print_mistake
 from ..tracking.settings import describe_camera
+from ..tracking.tag_pose import fit_squares
 from .calibration_images import Images, finish
 
 ARENA_FRAMES = 30
@@ -16,16 +17,16 @@ ARENA_FRAMES = 30
 
 def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
     """Calibrate the camera pose. Return the exit code. Raises: CalibrationError."""
-    settings, layout, seen = images.settings, images.settings.layout, []
+    settings, layout, found = images.settings, images.settings.layout, []
     for _ in range(ARENA_FRAMES):
         frame = images.take()
-        seen.append(images.find_tags(1.0, frame))
+        found.append(images.find_tags(1.0, frame))
     lens = settings.lens or images.source.lens
     if lens is None:
         reason = f" ({images.source.lens_problem})" if images.source.lens_problem else ""
         raise CalibrationError(f"{options.file} holds no lens{reason}: calibrate_camera lens comes first")
     lens.check_size(*frame.gray.shape)
-    tags = refine_corners(frame.gray, average_tags(seen), settings.family)
+    tags = refine_corners(frame.gray, average_tags(found), settings.family)
     try:
         result = calibrate_arena(lens, tags, layout.references, layout.reference_size_m)
     except CalibrationError as error:
@@ -35,5 +36,6 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
         say("tag %d: %.1f mm%s" % (tag_id, 1e3 * residual_m, " (left out)" if tag_id in result.left_out else ""))
     height_m = result.camera.position_m[2]
     say(f"residual {1000.0 * result.rms_m:.1f} mm rms; the camera is {height_m:.2f} m above the floor")
-    poses = {fit.tag_id: fit.pose for fit in fit_references(result.camera, tags, layout.references)}
+    seen = [tag for tag in tags if tag.tag_id in layout.references]
+    poses = {fit.tag_id: fit.pose for fit in fit_squares(result.camera, seen, 0.0)}
     return finish(options.file, describe_camera(result.camera, poses, result.sd_m), result.problems)

@@ -113,17 +113,13 @@ class LocalizationNode:
         self._outputs.publish(robots)
         if not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
-            self._outputs.publish_diagnostics(robots, self._list_unknown_robots(now_s), clocks)
-
-    def _list_unknown_robots(self, now_s: float) -> List[int]:
-        """Return the robots whose tags are seen, but which no driver knows."""
-        if self._chosen is not None:
-            return []
-        return [
-            robot_id
-            for robot_id, seen_s in sorted(self._unknown_s.copy().items())
-            if abs(now_s - seen_s) < UNKNOWN_S and robot_id not in self._inputs
-        ]
+            # Robots whose tags are seen, but which no driver knows.
+            unknown = [
+                robot_id
+                for robot_id, seen_s in sorted(self._unknown_s.copy().items())
+                if self._chosen is None and abs(now_s - seen_s) < UNKNOWN_S and robot_id not in self._inputs
+            ]
+            self._outputs.publish_diagnostics(robots, unknown, clocks)
 
 
 SD_TEXT = "standard deviation, in x and y each, of poses that come without covariance; `track` tells its own"

@@ -64,7 +64,11 @@ class PictureOutput:
         self._shown_s = now_s
         if self._view is None or self._view.camera is not tracker.camera:
             self._view = FloorView(tracker.camera, self._height_m)
-            self._publish_outline(self._view)
+            left_m, low_m, right_m, high_m = self._view.box_m
+            corners = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
+            outline = Polygon([Point32(x_m, y_m, 0.0) for x_m, y_m in corners])
+            header = Header(stamp=rospy.get_rostime(), frame_id=self._frame_id)
+            self._outline.publish(PolygonStamped(header, outline))
         sightings = tracker.sightings
         unusable = set(sightings.unknown + sightings.doubled + list(sightings.misshapen)) if sightings else set()
         picture = self._view.draw(frame.gray, tracker.found, unusable)
@@ -75,12 +79,6 @@ class PictureOutput:
         if self._jpeg in publishers:
             _, coded = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
             self._jpeg.publish(CompressedImage(header, "bgr8; jpeg compressed bgr8", coded.tobytes()))
-
-    def _publish_outline(self, view: FloorView) -> None:
-        left_m, low_m, right_m, high_m = view.box_m
-        corners = ((left_m, low_m), (right_m, low_m), (right_m, high_m), (left_m, high_m))
-        header = Header(stamp=rospy.get_rostime(), frame_id=self._frame_id)
-        self._outline.publish(PolygonStamped(header, Polygon([Point32(x_m, y_m, 0.0) for x_m, y_m in corners])))
 
 
 class TrackNode:
@@ -154,8 +152,6 @@ class TrackNode:
         tracker.measure_shade(frame.gray)
         self._publish(tracker, tracker.take(tags, frame.stamp_s, frame.number, expected), frame.stamp_s)
         self._pictures.show(tracker, frame, rospy.get_time())
-
-    # -- outputs ----------------------------------------------------------------------------------------------
 
     def _publish(self, tracker: Tracker, sightings: Sightings, stamp_s: float) -> None:
         stamp = rospy.Time.from_sec(tracker.taken_s(stamp_s))

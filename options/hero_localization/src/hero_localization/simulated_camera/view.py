@@ -72,10 +72,7 @@ class CameraOptions(NamedTuple):
 
 
 def list_frames(options: CameraOptions, start_s: float = 0.0, seed: int = 0) -> Iterator[Tuple[float, float]]:
-    """Yield the middle of the exposure and the arrival of images from start_s on, without end.
-
-    Dropped ones are left out. None overtakes another.
-    """
+    """Yield the middle of the exposure and the arrival of images from start_s on, but for those that are dropped."""
     random = np.random.RandomState(seed)
     index, arrival_s = 0, -np.inf
     while True:

@@ -78,9 +78,8 @@ class DetectorProcess:
                 return self._connection.recv()
         except (EOFError, OSError):
             self.close()
-            raise DetectorError(
-                f"the detector's process ended with status {self._process.returncode}: start again"
-            ) from None
+            text = f"the detector's process ended with status {self._process.returncode}: start again"
+            raise DetectorError(text) from None
         self.close()
         raise DetectorError(f"the detector's process did not answer for {ANSWER_S:.0f} s: start again")
 

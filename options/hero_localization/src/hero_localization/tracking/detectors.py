@@ -81,9 +81,8 @@ class AprilTagDetector:
         try:
             from apriltag import apriltag
         except ImportError:
-            raise DetectorError(
-                "the detector apriltag is not installed: apt install python3-apriltag, or take the detector aruco"
-            ) from None
+            text = "the detector apriltag is not installed: apt install python3-apriltag, or take the detector aruco"
+            raise DetectorError(text) from None
         # Corrected bits bring false tags in, of which 16h5 has many already.
         self._detector = apriltag("tag" + family, threads=1, maxhamming=0 if family == "16h5" else 1, decimate=decimate)
         self._least_margin = _MIN_MARGIN[family]

@@ -135,8 +135,6 @@ class Tracker:
         pixels = self.camera.project(np.array(list(places.values())))
         return {tag_id: (float(u), float(v)) for tag_id, (u, v) in zip(places, pixels) if np.isfinite((u, v)).all()}
 
-    # -- what is wrong --------------------------------------------------------------------------------------
-
     def _note_expected(self, seen: Set[int], expected: Mapping[int, Tuple[float, float]]) -> None:
         size_px = (self.camera.lens.width_px, self.camera.lens.height_px)
         for tag_id, place in expected.items():
@@ -234,10 +232,7 @@ class Tracker:
 
 
 def find_moved_references(seen: Mapping[int, Pose], at_calibration: Mapping[int, Pose]) -> Set[int]:
-    """Return the reference tags that are not seen where the calibration saw them.
-
-    All of them: the camera moved. One: that tag moved.
-    """
+    """Return the reference tags that are not seen where the calibration saw them; all of them: the camera moved."""
     known = seen.keys() & at_calibration.keys()
     return {tag_id for tag_id in known if not measure_distance(at_calibration[tag_id], seen[tag_id]) <= MOVED_M}
 
