@@ -219,8 +219,7 @@ class RobotRows:
             now_ms = min(
                 self._cycle_ms, self._distance_due_ms, self._control_ms, self._read_ms, servos.check_ms, radios.due_ms
             )
-            while world.time_ms + STEP_MS < min(now_ms, until_ms + 1):
-                world.step()
+            world.step((min(now_ms, until_ms + 1) - world.time_ms - 1) // STEP_MS)
             if now_ms > until_ms:
                 break
             self.now_ms = now_ms

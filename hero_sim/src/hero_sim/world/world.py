@@ -172,7 +172,7 @@ class World:
 
     def step(self, count: int = 1) -> None:
         """Move everything on by STEP_MS, or by count times that."""
-        while count:
+        while count > 0:
             if self._block_step == _BLOCK_STEPS:
                 self._begin_block()
             first, end = self._block_step, min(self._block_step + count, _BLOCK_STEPS)
