@@ -15,7 +15,7 @@ from hero_test.nonempty import nonempty
 
 pytest.importorskip("rospy", reason="the scripts' robots are on ROS")
 
-WORLDS = 20
+WORLDS = 12
 
 
 def step_all(swarm, step):

@@ -16,7 +16,7 @@ pytest.importorskip("rospy", reason="the program imports rospy")
 from hero_examples.driving.random_walk import Walker
 from hero_test.nonempty import nonempty
 
-WORLDS = 8
+WORLDS = 4
 ROBOTS = 10
 WALK_S = 60.0
 
@@ -58,12 +58,6 @@ def test_walkers_keep_a_bump_shield_as_far_away_as_a_stock_body():
     for path in nonempty(paths):
         assert true_paths.measure_gaps(path).min() - 2.0 * wider_m > 0.015
         assert true_paths.measure_wall_gaps(path, build_default(4)).min() - wider_m > 0.04
-
-
-@pytest.mark.slow
-def test_the_same_seeds_give_the_same_walk():
-    paths = [walk(StepSwarm(4, seed=3), 10.0)[0][0] for _ in range(2)]
-    assert paths[0].tobytes() == paths[1].tobytes()
 
 
 def test_a_walker_without_usable_ranges_stops_and_says_why():

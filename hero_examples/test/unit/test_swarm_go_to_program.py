@@ -33,9 +33,8 @@ def form(swarm, goals, **options):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 102))
-def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
-    with StepSwarm(10, seed=seed, arena=CIRCLE) as swarm:
+def test_ten_robots_swap_places_across_a_circle_without_touching():
+    with StepSwarm(10, seed=100, arena=CIRCLE) as swarm:
         goals = [(-robot.true_pose.x_m, -robot.true_pose.y_m) for robot in swarm]
         formation, path = form(swarm, goals)
         drift_m = np.hypot(*(swarm.rows.world.poses[:, :2] - goals).T).max()
@@ -47,7 +46,7 @@ def test_ten_robots_swap_places_across_a_circle_without_touching(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count, hz", [(8, 6.8), (6, 3.0), (8, 3.0), (6, 1.6), (8, 1.6)])
+@pytest.mark.parametrize("count, hz", [(8, 6.8), (8, 3.0), (8, 1.6)])
 def test_robots_whose_program_is_late_are_slow_and_do_not_touch(count, hz):
     warnings = []
     with StepSwarm(count, seed=100, arena=CIRCLE) as swarm:
