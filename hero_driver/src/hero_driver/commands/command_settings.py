@@ -13,12 +13,22 @@ class CommandSettings:
     allow_self_tuning: bool = declare(
         flag(
             False,
-            "allow pid_calibration: robots spin for a minute, without driver or Wi-Fi for ever; no gains kept",
+            "allow pid_calibration, with which a robot spins for up to a minute, or for ever without driver or Wi-Fi,"
+            " and keeps no gains",
         )
     )
-    orphan_stop_s: float = declare(number(0.25, 0.0, 10.0, "s", "delay of the stop when the driving program ends"))
+    orphan_stop_s: float = declare(
+        number(0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends")
+    )
     silent_stop_s: float = declare(
-        number(0.5, 0.0, 10.0, "s", "silence (four periods at least) after six commands that stops a robot; 0: never")
+        number(
+            0.5,
+            0.0,
+            10.0,
+            "s",
+            "silence, of at least four periods, after which the robot of a program that sent six commands is stopped;"
+            " 0: never",
+        )
     )
     service_timeout_s: float = declare(number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call"))
     command_max_age_s: float = declare(

@@ -43,7 +43,9 @@ class AdmissionLimits:
     max_connections_per_address: int = declare(whole_number(400, 1, 5000, "", "connections per address"))
     max_unidentified: int = declare(whole_number(200, 1, 5000, "", "connections that have not identified themselves"))
     max_packets_per_s: int = declare(whole_number(5000, 10, 1000000, "1/s", "packets per robot; stock robots send 211"))
-    max_bytes_per_s: int = declare(whole_number(2000000, 1000, 100000000, "bytes/s", "per robot; stock: 44051"))
+    max_bytes_per_s: int = declare(
+        whole_number(2000000, 1000, 100000000, "bytes/s", "bytes per robot; stock robots send 44051")
+    )
 
 
 class Admission:
