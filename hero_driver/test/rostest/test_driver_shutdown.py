@@ -52,9 +52,6 @@ class TestDriverShutdown(OwnDriverCase):
         self.assert_stopped(robots)
         self.assertEqual(driver.find_lines("Traceback"), [])
 
-    def test_ctrl_c_stops_every_robot(self):
-        self.end_by(signal.SIGINT)
-
     def test_a_closed_terminal_stops_every_robot(self):
         self.end_by(signal.SIGHUP)
 
