@@ -4,7 +4,7 @@ Publishes only; called by the simulator's thread after a physics step, so nothin
 Frame of everything: `world`, the arena's own.
 """
 
-from typing import List, Optional, Tuple
+from typing import Iterable, List, Optional, Tuple
 
 import rospy
 from nav_msgs.msg import Odometry
@@ -14,14 +14,19 @@ from visualization_msgs.msg import MarkerArray
 
 from hero_node import Pose
 
-from .scene import FRAME, START_S, draw_arena, draw_objects, draw_robots
-from .scene_markers import make_markers
+from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robots
 from .simulator import Simulator
-from .stepped.ros_messages import encode_odometry, encode_transforms
+from .stepped.ros_messages import encode_markers, encode_odometry, encode_transforms
 
 POSE_PERIOD_MS = 50
 MARKER_PERIOD_MS = 100
 """Simulated time between two publications."""
+
+
+def make_markers(shapes: Iterable[Shape], time_ns: int = 0) -> MarkerArray:
+    """Return shapes as the message, for RViz and the monitor's map; time_ns: of its stamp."""
+    markers: MarkerArray = MarkerArray().deserialize(encode_markers(time_ns, FRAME, shapes))
+    return markers
 
 
 class GroundTruth:

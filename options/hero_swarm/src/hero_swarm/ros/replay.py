@@ -4,8 +4,8 @@ import rospy
 from visualization_msgs.msg import MarkerArray
 
 from hero_client import Program
+from hero_sim.ground_truth import make_markers
 from hero_sim.scene import draw_arena, draw_objects, draw_robots
-from hero_sim.scene_markers import make_markers
 
 from ..trial import Trial
 
