@@ -180,7 +180,7 @@ def test_a_program_that_a_page_ends_gets_sigint_and_its_robots_are_stopped(start
 
 def test_a_program_that_ignores_sigint_is_ended_by_force(started, monkeypatch):
     read = wait_for_output(monkeypatch)
-    monkeypatch.setattr(programs_module, "USUAL_PATIENCE_S", 0.1)
+    monkeypatch.setattr(programs_module, "PATIENCE_S", 0.1)
     started.start(DEAF)
     assert read() == b"deaf\n"
     started.programs.end_those_of(["hero_0"])

@@ -29,11 +29,8 @@ from .offers import OFFERS, ProgramDescription, read_behaviors
 
 PROGRAMS_MAX = 20
 
-PATIENCE_S = {"record": 20.0}
-"""For the end after SIGINT: the recorder may wait 10 s for its files."""
-
-USUAL_PATIENCE_S = 3.0
-"""Stopping robots takes about 0.2 s."""
+RECORDER_PATIENCE_S, PATIENCE_S = 20.0, 3.0
+"""For the end after SIGINT: the recorder may wait 10 s for its files, stopping robots takes about 0.2 s."""
 
 SIZE_PERIOD_S = 1.0
 """Time between two looks at the size of a recording."""
@@ -101,7 +98,7 @@ class ChildProcess:
                 self.failure = read_last_line(output) or "ended with status %d" % code
 
     def _spawn(self, command: Sequence[str], output: IO[bytes]) -> "subprocess.Popen[bytes]":
-        patience_s = PATIENCE_S.get(self.program, USUAL_PATIENCE_S)
+        patience_s = PATIENCE_S if self.folder is None else RECORDER_PATIENCE_S
         guarded = [sys.executable, "-m", guard.__name__, str(patience_s), *command]
         process = subprocess.Popen(
             guarded, stdin=self._guard_end, stdout=output, stderr=subprocess.STDOUT, start_new_session=True
@@ -227,7 +224,7 @@ class Programs:
             child.end()
         return bool(with_robots)
 
-    def close(self, timeout_s: float = USUAL_PATIENCE_S) -> None:
+    def close(self, timeout_s: float = PATIENCE_S) -> None:
         """End all, and wait until robots are stopped; a recording closes its files by itself."""
         deadline_s = time.monotonic() + timeout_s
         children = list(self._running.values())
