@@ -47,9 +47,7 @@ def read_goal(message: Any, use_heading: bool) -> Tuple[Goal, str]:
     """Return the goal in a geometry_msgs/PoseStamped and its frame; an empty frame means the robot's own odometry.
 
     A quaternion of zeros, as sent by tools that do not care, means no heading. What passes here leads to no command
-    that is not finite, and to no frame name that tf2 or a log line cannot take.
-
-    Raises: InvalidGoalError.
+    that is not finite, and to no frame name that tf2 or a log line cannot take. Raises: InvalidGoalError.
     """
     frame = message.header.frame_id
     if not frame.isprintable() or len(frame) > MAX_FRAME_LENGTH:
@@ -91,9 +89,7 @@ class GoalRequest(NamedTuple):
 
 
 class GoToGoalServer:
-    """Drives one robot to its goals; the newest counts, wherever it comes from.
-
-    Goals and cancellations may come from any thread.
+    """Drives one robot to its goals, which may come from any thread; the newest counts, wherever it comes from.
 
     Attributes:
         robot: the robot.

@@ -96,9 +96,7 @@ def open_terminal() -> IO[bytes]:
     """Return the terminal for reading and setting, unbuffered.
 
     Standard input, if it is one. A node under roslaunch is in its own session, where /dev/tty does not open,
-    but it has roslaunch's standard streams.
-
-    Raises: NoTerminalError with what to do.
+    but it has roslaunch's standard streams. Raises: NoTerminalError with what to do.
     """
     for stream in (sys.__stdin__, sys.__stdout__, sys.__stderr__):
         if stream is not None and not stream.closed and os.isatty(stream.fileno()):

@@ -89,7 +89,6 @@ def wander(
     Three-sector rule: free sectors, walk on with a random drift; something near, slow down and bend away from the
     nearer side; something too near, stop, then turn on the spot until all three sectors are free, and never change
     the side meanwhile (else a corner would trap the robot). No ranges at all: stop.
-
     ranges: see the module. chance: a random number 0..1 that the caller draws for this step.
     """
     if not ranges:

@@ -35,9 +35,7 @@ SOFTNESS = 0.1
 
 
 class SwarmGoToController:
-    """Drives every robot to its goal; a robot that has arrived is stopped, and others drive around it.
-
-    Poses and goals of all robots are in one frame.
+    """Drives every robot to its goal, in one frame; one that has arrived is stopped, and others drive around it.
 
     Attributes:
         arrived: which robots are in place.

@@ -65,7 +65,6 @@ class RobotReadings(Group):
         """The robot's pose by its odometry, in the frame hero_N/odom: 0, 0, 0 where it was switched on.
 
         In the first 2 s of a Robot it waits for the first odometry, as other data properties wait for theirs.
-
         Raises: StaleDataError if odometry is older than 1 s.
         """
         self._check_fresh("odom")

@@ -145,9 +145,8 @@ class BaseSwarm(Group, Generic[AnyRobot]):
         stay, and the others drive around them. Law: controllers.swarm_go_to.
 
         Raises: GoalError for goals too near to each other, with the robots that are not there after timeout_s, and with
-        one that has no pose for 2 s, or whose pose stays the same although it drives.
-        KeyError for a robot of no swarm. FrameError, StoppedError and RobotNotReadyError as Robot.go_to(). All robots
-        are stopped then.
+        one that has no pose for 2 s, or whose pose stays the same although it drives. KeyError for a robot of no swarm.
+        FrameError, StoppedError and RobotNotReadyError as Robot.go_to(). All robots are stopped then.
         """
         for robot_id, goal in goals.items():
             if np.shape(goal) != (2,):

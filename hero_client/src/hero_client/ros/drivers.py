@@ -53,7 +53,6 @@ def find_drivers(system_state: Any, topics: Iterable[str]) -> Set[str]:
 
     A driver is a node that publishes NAME/robots and offers the service NAME/stop, where NAME is its own. A robot can
     declare such topics and services, but they are those of its driver's node.
-
     system_state: the ROS master's answer to getSystemState.
     """
     publishers, _, services = (dict(part) for part in system_state)

@@ -53,7 +53,6 @@ class StopRequest:
 
         The request is over once all have taken it: a driver that starts later is not asked. A release is asked for
         no longer than TIME_LIMIT_S, because a driver that hung must not let its robots go by surprise.
-
         all_found: whether these drivers are all that the ROS master knows.
         """
         if now_s - self.made_s < CROSSING_S:
