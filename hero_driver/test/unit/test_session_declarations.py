@@ -263,10 +263,3 @@ def test_a_name_and_a_type_may_have_128_characters():
     name, message_type = "/hero_0/" + "x" * 120, "geometry_msgs/" + "T" * 114
     (event,) = receive(session, build_declaration(1, 120, name, message_type, TWIST_MD5))
     assert isinstance(event, Topic) and len(name) == len(message_type) == 128
-
-
-@pytest.mark.parametrize(("length", "shown"), [(60, "x" * 60), (61, "x" * 57 + "...")])
-def test_long_texts_of_robots_are_shown_by_their_first_57_characters(length, shown):
-    session = open_session()
-    (event,) = receive(session, declare_twist(99, "x" * length))
-    assert event == Problem("topic '%s' refused: its id 99 is below 100" % shown)

@@ -5,7 +5,7 @@ from typing import Iterator
 
 
 class Clock(ABC):
-    """A time in seconds, and waits. A Program is a clock; Robot and Swarm have its methods: a loop needs no other time."""
+    """A time in seconds, and waits. A Program is a clock; Robot and Swarm have its methods, so loops need no other."""
 
     @property
     @abstractmethod

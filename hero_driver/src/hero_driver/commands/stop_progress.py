@@ -35,7 +35,6 @@ TIRED_AFTER_S = 5.0
 TIRED_INTERVAL_S = 1.0
 """Wheels that keep turning, as of a robot that is pushed, get fewer stops, but without end."""
 
-
 READING_S = 0.034
 """Time between two readings, by the robot's time."""
 

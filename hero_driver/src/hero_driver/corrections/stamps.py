@@ -16,10 +16,8 @@ MAX_AGE_NS = 5 * NS_PER_S
 STEP_NS = 1000
 """Distance of a stamp from the one before it while the robot's clock has gone back: 1 us keeps them distinct."""
 
-
 STEP_SLACK_NS = 1000 * STEP_NS
 """Limit of many such steps in a row."""
-
 
 Topic = Union[str, bytes]
 """Key of a sequence of rising stamps: a topic by its name, a transform by its frames."""

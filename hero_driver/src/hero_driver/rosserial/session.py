@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Union
 
+from hero_node import shorten
 from hero_node.parameters import declare, number, whole_number
 
 from . import packets, payloads
@@ -260,7 +261,7 @@ class Session:
         info = payloads.decode_topic_info(payload)
         fault = self._find_error(info)
         if fault is not None:
-            return Problem(f"topic {_shorten(info.name)} refused: {fault}")
+            return Problem(f"topic {shorten(info.name)} refused: {fault}")
         topic = Topic(info, kind)
         if self.topics.get(info.topic_id) == topic:
             return None
@@ -291,16 +292,11 @@ class Session:
         if not _NAME.match(info.name) or "//" in info.name or info.name.endswith("/"):
             return "its name is not a ROS name"
         if len(info.message_type) > NAME_LENGTH_MAX or not _MESSAGE_TYPE.match(info.message_type):
-            return f"its type {_shorten(info.message_type)} is not of the form package/Type"
+            return f"its type {shorten(info.message_type)} is not of the form package/Type"
         if not _MD5SUM.match(info.md5sum):
-            return f"its md5 {_shorten(info.md5sum)} is not 32 hexadecimal digits"
+            return f"its md5 {shorten(info.md5sum)} is not 32 hexadecimal digits"
         if info.topic_id < packets.FIRST_TOPIC_ID:
             return "its id %d is below %d" % (info.topic_id, packets.FIRST_TOPIC_ID)
         if info.buffer_length < 1:
             return "its buffer_size is %d" % info.buffer_length
         return None
-
-
-def _shorten(text: str) -> str:
-    """Return untrusted text quoted, escaped and short enough for one line of a log."""
-    return ascii(text if len(text) <= 60 else text[:57] + "...")

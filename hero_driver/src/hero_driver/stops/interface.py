@@ -26,7 +26,6 @@ ANSWER_WAIT_S = 0.5
 KEEP_WAIT_S = 1.0
 """Likewise the disk: writing took 0.3 to 45 ms; one that hangs (a network's, a failing card) is told of."""
 
-
 Stops = List[Tuple[str, Optional[StopState]]]
 """Name and stop of each connection that can move a robot, and None for each robot that is away."""
 

@@ -48,7 +48,6 @@ CALLS_MAX = 10000
 ACCEPT_PAUSE_S = 0.5
 """Rest of the listener when the process has no file descriptors left; connected robots are not affected."""
 
-
 FILES_RESERVED = 64
 """Files that robots leave to ROS, at most a quarter: rospy takes no subscriber ever again once it had none left."""
 

@@ -18,7 +18,6 @@ MASTER_TIMEOUT_S = 3.0
 SUCCESS = 1
 """First part of an answer of the master (ROS Master API)."""
 
-
 CALL_ERRORS = (OSError, OverflowError, ValueError, http.client.HTTPException, xmlrpc.client.Error, ExpatError)
 """Raised by calls to anything but a master or node; two of them by an address that a node registered as its own."""
 
