@@ -12,6 +12,9 @@ import numpy as np
 
 from .robot_constants import BODY_RADIUS_M
 
+_CACHED_PAIRS = 16384
+"""Pairs of robots that are computed at once: they fit the processor's cache."""
+
 
 class Binary(NamedTuple):
     """A sensor in the front rim that tells whether a beam or cone straight ahead touches another body."""
@@ -107,6 +110,16 @@ def sense_binary(poses: np.ndarray, sensor: Binary, random: Optional[Any] = None
 
     random: needed for a sensor with errors; random.random() returns one number from 0 to 1 for each robot (W * N,).
     """
+    at_once = max(1, _CACHED_PAIRS // poses.shape[1] ** 2)
+    worlds = [poses[first : first + at_once] for first in range(0, max(len(poses), 1), at_once)]
+    sees = np.concatenate([_find_touched(some, sensor) for some in worlds])
+    if sensor.error > 0.0 and random is not None:
+        sees ^= random.random() < sensor.error
+    return sees & np.isfinite(poses).all(axis=2).ravel()
+
+
+def _find_touched(poses: np.ndarray, sensor: Binary) -> np.ndarray:
+    """Return whether each robot's sensor touches another body (W * N,)."""
     ahead_m, left_m = look_at(poses, poses, BODY_RADIUS_M)
     with np.errstate(invalid="ignore"):
         square_m2 = ahead_m * ahead_m + left_m * left_m
@@ -125,10 +138,8 @@ def sense_binary(poses: np.ndarray, sensor: Binary, random: Optional[Any] = None
         touched |= square_m2 <= BODY_RADIUS_M * BODY_RADIUS_M
     robots = poses.shape[1]
     touched[:, np.arange(robots), np.arange(robots)] = False
-    sees = touched.any(axis=2).ravel()
-    if sensor.error > 0.0 and random is not None:
-        sees ^= random.random() < sensor.error
-    return sees & np.isfinite(poses).all(axis=2).ravel()
+    seen: np.ndarray = touched.any(axis=2).ravel()
+    return seen
 
 
 def sense_neighbors(poses: np.ndarray, sensor: Neighbors, random: Optional[Any] = None) -> Neighborhood:
