@@ -16,7 +16,7 @@ WHOLE, CHOICE, REAL = "whole", "choice", "real"
 RUNS, RACE_RUNS = 5, 200
 """Runs of a candidate before it is compared, as more at once are computed faster, and of a race, at least."""
 
-SIGNIFICANCE, MUTATION = 0.05, 0.05
+SIGNIFICANCE, MUTATION, SPREAD = 0.05, 0.05, 0.3
 
 
 class Genes(NamedTuple):
@@ -55,15 +55,15 @@ def race(evaluate: Evaluate, genes: Genes, budget: int, random: Any) -> np.ndarr
     survivors = 2 + int(math.log2(size))
     races, used, seed, elites = max(1, min(survivors, budget // RACE_RUNS)), 0, 0, np.empty((0, size))
     for number in range(races):
-        share = (budget - used) // (races - number)
-        count = max(share // (2 * RUNS) - len(elites), 1)
+        share = (budget - used) // (races - number) if number else budget // min(races, 2)
+        count = max(3 * share // (4 * RUNS) - len(elites), 1)
         children = genes.place(random.random_sample((count, size)))
         if number:  # of two elites drawn, the better one
             parents = elites[random.randint(len(elites), size=(2, count)).min(axis=0)]
-            children = genes.vary(parents, 0.5 * (1.0 - number / races), random)
-        candidates = np.vstack((elites, children))
+            children = genes.vary(parents, SPREAD * (1.0 - number / races), random)
+        candidates, enough = np.vstack((elites, children)), survivors if number < races - 1 else 1
         scores, left = np.empty((len(candidates), 0)), share
-        while left == share or (len(candidates) > survivors and left >= RUNS * len(candidates)):
+        while left == share or (len(candidates) > enough and left >= RUNS * len(candidates)):
             scores = np.hstack((scores, evaluate(candidates, range(seed, seed + RUNS))))
             seed, left = seed + RUNS, left - RUNS * len(candidates)
             stays = ~find_worse(scores)

@@ -287,10 +287,10 @@ def test_a_score_that_is_nan_or_tells_nothing_is_refused(path):
         program.main(["m.yaml", "--budget", "200"])
     (path.parent / "score.py").write_text(SCORE.replace("mean(axis=1)", "mean(axis=1) * 0.0"))
     with pytest.raises(
-        ExperimentError, match="score: is 0 in all 100 runs of 20 controllers: it tells none apart; change score"
+        ExperimentError, match="score: is 0 in all 150 runs of 30 controllers: it tells none apart; change score"
     ):
         program.main(["m.yaml", "--budget", "200", "--fresh"])
-    assert len(Path("m_chocolate/design_1.csv").read_text().splitlines()) == 102, "what was computed is kept"
+    assert len(Path("m_chocolate/design_1.csv").read_text().splitlines()) == 152, "what was computed is kept"
 
 
 @pytest.mark.parametrize("method, least", [("chocolate", 200), ("maple", 200), ("evostick", 100), ("cma", 250)])
