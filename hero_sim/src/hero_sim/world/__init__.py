@@ -4,6 +4,6 @@ from .arena import BARE_GRAY, Area, Arena, Segments, build_default, is_free, mea
 from .arena_file import SHIPPED, load_arena
 from .kinematics import join_wheels, split_to_wheels
 from .pushing.shapes import PushedBody, list_outlines
-from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS, NOISE_COUNTS, Sight, find_offset, measure_brightness
+from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS, NOISE_COUNTS, Sight
 from .robot_errors import KINDS, MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors, draw_errors, read_known
 from .world import STEP_MS, World

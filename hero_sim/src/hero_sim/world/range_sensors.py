@@ -135,11 +135,14 @@ def measure_signals(sight: Sight, alpha_counts_m2: np.ndarray, beta_counts: np.n
 
     alpha_counts_m2 (K, 8) of each sensor, beta_counts (K, 1) of each robot.
     """
-    bright = measure_brightness(sight)
-    return np.minimum(alpha_counts_m2 * bright + find_offset(bright, beta_counts), SATURATION_COUNTS)
+    bright = _measure_brightness(sight)
+    distance_m = 1.0 / np.sqrt(np.maximum(bright, 1e-12))
+    share = np.minimum(np.maximum((distance_m - FIT_END_M) / (TABLE_END_M - FIT_END_M), 0.0), 1.0)
+    beyond = np.minimum(bright * (TABLE_END_M * TABLE_END_M), 1.0) * TABLE_END_EXCESS_COUNTS
+    return np.minimum(alpha_counts_m2 * bright + (beta_counts + share * (beyond - beta_counts)), SATURATION_COUNTS)
 
 
-def measure_brightness(sight: Sight) -> np.ndarray:
+def _measure_brightness(sight: Sight) -> np.ndarray:
     """Return cosine / distance^2 (1/m^2) of what the eight sensors of each robot see, shape (K, 8)."""
     cosine, sine = sight.headings[:, :1], sight.headings[:, 1:]
     rays = Rays(cosine * _RAYS_X - sine * _RAYS_Y, sine * _RAYS_X + cosine * _RAYS_Y)
@@ -164,11 +167,3 @@ def _meet_all(rays: Rays, sight: Sight) -> None:
     if len(sight.circles_m):
         circles_m = sight.circles_m
         rays.meet_circles(circles_m[:, 0] - x_m, circles_m[:, 1] - y_m, circles_m[:, 2])
-
-
-def find_offset(bright: np.ndarray, beta_counts: np.ndarray) -> np.ndarray:
-    """Return the signal's part besides alpha * bright (counts); bright is that of measure_brightness()."""
-    distance_m = 1.0 / np.sqrt(np.maximum(bright, 1e-12))
-    share = np.minimum(np.maximum((distance_m - FIT_END_M) / (TABLE_END_M - FIT_END_M), 0.0), 1.0)
-    beyond = np.minimum(bright * (TABLE_END_M * TABLE_END_M), 1.0) * TABLE_END_EXCESS_COUNTS
-    return beta_counts + share * (beyond - beta_counts)

@@ -13,14 +13,10 @@ from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import Odometry
 
 from hero_client.values import is_plausible, read_pose
-from hero_node import Pose
+from hero_node import HEADER, LENGTH, POSE_FORM, Pose
 
 from ..filter.pose_hypothesis import StampedPose
 from .outputs import IN_PLANE
-
-_HEADER = struct.Struct("<3I")
-_LENGTH = struct.Struct("<I")
-_POSE = struct.Struct("<7d")
 
 MAX_FIELD_M = 100.0
 QUATERNION_TOLERANCE = 0.01
@@ -59,11 +55,10 @@ def _read_odometry(data: bytes) -> Tuple[float, Optional[Pose]]:
 
     Raises: struct.error.
     """
-    _, seconds, nanoseconds = _HEADER.unpack_from(data)
-    offset = _HEADER.size
-    for _ in range(2):  # frame_id, child_frame_id
-        offset += _LENGTH.size + _LENGTH.unpack_from(data, offset)[0]
-    x_m, y_m, _, x, y, z, w = _POSE.unpack_from(data, offset)
+    _, seconds, nanoseconds, frame_length = HEADER.unpack_from(data)
+    offset = HEADER.size + frame_length
+    offset += LENGTH.size + LENGTH.unpack_from(data, offset)[0]  # child_frame_id
+    x_m, y_m, _, x, y, z, w = POSE_FORM.unpack_from(data, offset)
     if not is_rotation(x, y, z, w):
         return seconds + 1e-9 * nanoseconds, None
     yaw_rad = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
