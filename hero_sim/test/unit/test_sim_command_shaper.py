@@ -5,6 +5,7 @@ import struct
 import numpy as np
 import pytest
 
+from hero_driver.commands import velocity_shaper
 from hero_driver.commands.velocity_shaper import VelocityShaper
 from hero_sim.stepped.rules.command_shaper import INTERVAL_MS, MAX_AGE_MS, CommandShaper
 
@@ -15,7 +16,7 @@ class ScalarShapers:
     """One VelocityShaper for each robot, asked every millisecond as the driver's queue asks it."""
 
     def __init__(self, count):
-        self.shapers = [VelocityShaper(STOP, INTERVAL_MS) for _ in range(count)]
+        self.shapers = [VelocityShaper(STOP) for _ in range(count)]
         self.offered_ms = [0] * count
         self.sent = []
 
@@ -37,7 +38,8 @@ class ScalarShapers:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_each_robot_gets_what_the_drivers_shaper_sends(seed):
+def test_each_robot_gets_what_the_drivers_shaper_sends(seed, monkeypatch):
+    monkeypatch.setattr(velocity_shaper, "COMMAND_INTERVAL_S", INTERVAL_MS)  # it counts whole ms, as the simulator does
     rng, count = np.random.RandomState(seed), 3
     rows, scalar = CommandShaper(count, 0.0), ScalarShapers(count)
     sent = 0

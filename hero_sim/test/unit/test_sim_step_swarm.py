@@ -389,7 +389,7 @@ def test_robots_that_do_not_get_to_their_goals_are_named_and_stopped():
     with StepSwarm(2, seed=1, arena="empty") as swarm:
         with pytest.raises(GoalError, match="no goal is reached by hero_1: not there after 2 s"):
             swarm.go_to_each({1: (5.0, 0.0)}, timeout_s=2.0)
-        swarm.sleep(0.5)
+        swarm.sleep(1.0)
         assert swarm[1].velocity == (0.0, 0.0)
         with pytest.raises(KeyError, match="hero_7 is not in this swarm"):
             swarm.go_to_each({7: (0.0, 0.0)})
