@@ -31,6 +31,9 @@ OBJECT_RADIUS_M = 0.05
 RECORD_START_S = 20.0
 """The recorder has opened its first file by then."""
 RECORD_END_S = 15.0
+RAW_TOPICS = "/hero_[0-9]+/(odom_raw|laser|laser_enable)"
+"""Recorded beside what every recording holds."""
+
 START_LIMIT_S = 120.0
 """For driving to the start; then robots are placed by hand."""
 
@@ -167,8 +170,8 @@ def _record(program: Program, path: str, name: str, ids: Sequence[int], time_s: 
     bags = os.path.join(path, "bags")
     pattern = os.path.join(glob.escape(bags), name + "_*")
     before = set(glob.glob(pattern))
-    command = ["rosrun", "hero_recording", "record", "--raw", "--folder", bags, "--name", name]
-    command += ["--robots", " ".join(map(str, ids))]
+    command = ["rosrun", "hero_recording", "record", "--folder", bags, "--name", name]
+    command += ["--robots", " ".join(map(str, ids)), "--topics", RAW_TOPICS]
     # Should this program be killed, the recorder ends by itself.
     command += ["--seconds", f"{time_s + RECORD_START_S:g}"]
     recorder = subprocess.Popen(command, stdin=subprocess.DEVNULL)
