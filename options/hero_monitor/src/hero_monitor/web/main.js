@@ -177,7 +177,7 @@ function receive(updates) {
   if ("hold_over" in updates) panel.endHold(updates.hold_over);
   if ("log" in updates) log.append(updates.log);
   if (SHOWN_BY_ALL.some((name) => name in updates)) showAll();
-  else if ("poses" in updates) panel.show(state, listPresent().filter((robot) => state.chosen.has(robot.name)));
+  else if ("poses" in updates || "ground_truth" in updates) panel.show(state, listPresent().filter((robot) => state.chosen.has(robot.name)));
   if ("user" in updates && !state.chosen.size) choose(state.user.robots); // a driver's own
   if (RECEIVED.some((name) => name in updates)) map.update(updates); // most carry the clock alone
 }
