@@ -214,7 +214,7 @@ class DriverNode:
         try:
             reporter.publish(status)
         except rospy.ROSException:
-            if not rospy.is_shutdown():
+            if not rospy.core.is_shutdown_requested():
                 raise
             return  # another program ends the node (rosnode kill): rospy closes topics before it calls end()
         if is_periodic:
