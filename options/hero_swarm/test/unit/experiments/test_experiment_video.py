@@ -93,7 +93,7 @@ def test_a_frame_shows_robots_with_their_noses_and_the_time():
             column, row = (
                 np.array((x_m, 3.0 - y_m)) * 200.0 + np.array((1, -1)) * 200.0 * distance_m * BODY_RADIUS_M * ahead
             )
-            assert tuple(frame[round(row), round(column)]) == color, distance_m
+            assert tuple(frame[int(round(row)), int(round(column))]) == color, distance_m
         column, row = np.array((x_m, 3.0 - y_m)) * 200.0 + np.array((1, -1)) * 200.0 * 0.6 * BODY_RADIUS_M * side
-        assert tuple(frame[round(row), round(column)]) == (0x00, 0x72, 0xB2)
+        assert tuple(frame[int(round(row)), int(round(column))]) == (0x00, 0x72, 0xB2)
     assert (frame[10:30, 10:60] == 0).any(), "the time"
