@@ -161,8 +161,8 @@ def test_a_controller_that_was_edited_stays_until_fresh(path, light):
     assert file.read_text() == designed
 
 
+@pytest.mark.option("cmaes")
 def test_a_behavior_of_a_file_is_found_from_the_folder_of_designs(path, light):
-    pytest.importorskip("cmaes")
     own = "class Own(Dispersion):\n    pass\n"
     Path("own.py").write_text("from hero_swarm.behaviors.spacing import Dispersion\n\n\n" + own)
     path.write_text(MISSION.replace("arena: arena.yaml\n", "") + "behavior: own.py:Own\n")
@@ -242,12 +242,12 @@ def test_files_do_what_candidates_did(path):
         np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
 
 
+@pytest.mark.option("cmaes")
 def test_cma_designs_the_numbers_of_a_behavior(path, light, monkeypatch):
     path.write_text(
         MISSION.replace("score: {mean_of_last_s: {score.py:right: 1}}", "score: dispersion")
         + "behavior: dispersion\nranges: {spacing_m: [0.1, 1], near.range_m: [0.2, 2]}\n"
     )
-    pytest.importorskip("cmaes")
     program.main(["m.yaml", "--method", "cma", "--budget", "400"])
     behavior = find_behavior("m_cma/design_1_1.controller")()
     assert behavior.arena == "m_cma/../arena.yaml"

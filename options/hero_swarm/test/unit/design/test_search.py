@@ -60,8 +60,8 @@ def test_evolution_comes_near_the_best():
     assert np.abs(found[0] - BEST).max() < 0.15 and evaluate.runs <= 4000
 
 
+@pytest.mark.option("cmaes")
 def test_cma_finds_the_minimum_of_a_quadratic():
-    pytest.importorskip("cmaes")
     evaluate = Counted(lambda genome: -(((genome - BEST) / 2.0) ** 2).sum())
     found = adapt(evaluate, QUADRATIC, 2500, np.random.RandomState(1))
     assert np.abs(found[0] - BEST).max() < 0.01 and evaluate.runs <= 2500
