@@ -11,6 +11,7 @@ from hero_client.apps.formations import FormationError, assign_goals, place_form
 from hero_test.bad_yaml import make_bad_yaml
 
 
+@pytest.mark.slow
 def test_goals_are_assigned_with_the_least_sum_of_squares():
     rng = random.Random(3)
     for _ in range(50):

@@ -44,6 +44,7 @@ def test_each_robot_takes_the_nearest_place_that_no_other_has(swarm):
     assert {robot.light for robot in swarm} == {GREEN}
 
 
+@pytest.mark.slow
 def test_robots_get_to_where_the_map_ends_and_walk_at_random_there(swarm):
     _, path = explore(swarm, [LEFT, RIGHT], 9.0)
     for robot, place in zip(range(2), (LEFT, RIGHT)):

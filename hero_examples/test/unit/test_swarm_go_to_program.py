@@ -59,6 +59,7 @@ def test_robots_whose_program_is_late_are_slow_and_do_not_touch(count, hz):
     assert hz > 5.0 or "commands are late by" in warnings[0]
 
 
+@pytest.mark.slow
 def test_a_robot_that_drives_by_its_pose_alone_is_named():
     with StepSwarm(2, arena="empty") as swarm:
         log, calibrated = [], swarm[1].fresh_proximity
@@ -99,6 +100,7 @@ def freeze_first(swarm):
     swarm[1].localize_by(lambda: swarm[1].true_pose)
 
 
+@pytest.mark.slow
 def test_a_robot_whose_pose_is_frozen_ends_go_to_each_with_the_reason():
     with StepSwarm(2, seed=1, arena="empty") as swarm:
         freeze_first(swarm)

@@ -148,6 +148,7 @@ def test_a_robot_that_leaves_pulls_nothing():
     assert bench.bodies[0].pose == (0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_walls_stop_what_is_pushed_and_the_robot_behind_it():
     wall = [(-1.0, 0.3, 1.0, 0.3)]
     for shape, half_m in ((BOX, 0.1), (Disc(0.08), 0.08)):

@@ -103,6 +103,7 @@ def test_a_start_that_touches_something_is_refused_by_its_place(tmp_path, second
         load_arena(path)
 
 
+@pytest.mark.slow
 def test_too_many_robots_are_refused(tmp_path):
     arena = load_arena(write(tmp_path, "bounds_m: [0, 0, 0.3, 0.3]\n"))
     with pytest.raises(OptionError, match="no free place"):
@@ -206,6 +207,7 @@ def test_a_pipe_as_arena_is_refused_at_once(tmp_path):
         load_arena(str(tmp_path / "arena.yaml"))
 
 
+@pytest.mark.slow
 def test_more_starts_than_robots_can_be_are_refused(tmp_path):
     rows = ", ".join("[%d, %d, 0]" % (number % 100, number // 100) for number in range(1001))
     with pytest.raises(OptionError, match="starts_m_deg has 1001 starts, more than 1000"):

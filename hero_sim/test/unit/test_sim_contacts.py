@@ -62,6 +62,7 @@ def test_a_robot_that_no_longer_pushes_lets_go_at_once():
         assert world.poses[:, 0] == pytest.approx(before[:, 0] + [-0.002 * number, 0.0], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_robot_pressed_from_behind_still_slides_off_sideways():
     poses = [(-0.2, 0.0, 0.0), (-0.1, 0.0, 0.0), (0.0, 0.005, 0.0), (0.5, 0.0, 0.0)]
     world = build_world(poses, build_rectangle(1.2, 1.2, 1), known=["friction=0"])
@@ -84,6 +85,7 @@ def test_robots_pushed_far_at_once_are_still_kept_out_of_walls(to_wall_m):
         step(world)
 
 
+@pytest.mark.slow
 def test_robots_that_come_from_afar_do_not_drive_through_each_other():
     world = build_world([(-0.9, 0.0, 0.0), (0.9, 0.0, math.pi), (0.0, 0.9, -math.pi / 2), (0.0, -0.9, math.pi / 2)])
     set_speeds(world, [0.28] * 4)

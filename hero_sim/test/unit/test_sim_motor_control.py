@@ -161,6 +161,7 @@ def test_a_position_command_drives_as_far_as_its_speed_in_one_second():
     assert np.mean(distances_m[-50:]) == pytest.approx(0.1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_gains_of_the_position_controller_matter():
     distances_m = []
     for gains in ((5.0, 9.0, 0.1), (1.0, 0.0, 0.0)):

@@ -166,6 +166,7 @@ def test_a_goal_not_reached_in_time_is_an_error_with_what_is_left():
         robot.start_go_to(50.0, 0.0, timeout_s=0.5).result()
 
 
+@pytest.mark.slow
 def test_a_started_motion_ends_by_cancel_by_stop_and_by_another(monkeypatch):
     swarm = StepSwarm(1)
     robot = swarm[0]
@@ -221,6 +222,7 @@ def test_motions_wait_for_simulated_time_only_as_long_as_they_are_told():
     assert motion.done() and motion.exception() is None
 
 
+@pytest.mark.slow
 def test_a_swarm_moves_as_one_and_tells_who_did_not():
     swarm = StepSwarm(6, arena=CORNER_ARENA)
     before = [robot.true_pose for robot in swarm]
@@ -250,6 +252,7 @@ def test_a_timed_drive_takes_its_time_and_ends_with_one_stop(monkeypatch):
         assert is_at_rest(swarm)
 
 
+@pytest.mark.slow
 def test_while_all_robots_are_stopped_motions_are_errors_that_tell_so(capsys):
     swarm = StepSwarm(2)
     robot = swarm[0]

@@ -212,6 +212,7 @@ def test_an_unknown_common_frame_is_reported(capsys):
     assert capsys.readouterr().err == "hero_0 answers\n"
 
 
+@pytest.mark.slow
 def test_lights_show_the_color_that_was_asked_for_and_blink():
     swarm = StepSwarm(3)
     swarm[0].led("green")

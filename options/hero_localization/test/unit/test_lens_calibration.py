@@ -197,6 +197,7 @@ def test_the_focal_length_is_no_worse_than_reported():
     assert np.sqrt(np.mean(np.square(off))) < 1.5 * np.sqrt(np.mean(np.square(reported)))
 
 
+@pytest.mark.slow
 def test_a_mirrored_board_is_recognized():
     random = np.random.RandomState(5)
     picture = render(OPTIONS, *list_holds(1, 0.3)[0], random)

@@ -114,6 +114,7 @@ def test_distortion_bends_lines_at_the_rim_as_opencvs_model_does():
     assert np.abs(pixels - np.dstack((u, v))).max() < 0.01
 
 
+@pytest.mark.slow
 def test_floor_tags_lie_on_the_floor_and_robots_hide_them():
     floor_tag = PrintedTag(7, 0.1, 0.0, 0.5, 0.2, 0.3)
     away, above = (
@@ -147,6 +148,7 @@ def test_moving_robot_smears_along_its_motion_only():
     assert smeared_down > 0.85 * still_down
 
 
+@pytest.mark.slow
 def test_blurred_motion_is_centered_on_the_pose_given():
     poses, options = [(0.1, 0.1, 0.7)], SMALL._replace(exposure_s=0.08)
     weights = []
@@ -171,6 +173,7 @@ def test_noise_has_the_deviation_given_and_differs_between_frames():
     assert (first - second).std() == pytest.approx(4.0 * math.sqrt(2.0), rel=0.05)
 
 
+@pytest.mark.slow
 def test_hand_covers_what_lies_below_it():
     pose = np.array([(0.1, 0.1, 0.0)])
     center = (0.1, 0.1, 0.076)
@@ -178,6 +181,7 @@ def test_hand_covers_what_lies_below_it():
     assert (render(pose, hand_m=(-0.6, 0.1)) != render(pose)).any()
 
 
+@pytest.mark.slow
 def test_same_seed_gives_the_same_bytes_and_another_seed_others():
     options = SMALL._replace(noise=3.0)
     first, again, other = (render([(0.3, 0.2, 1.0)], options=options, seed=seed) for seed in (1, 1, 2))
@@ -272,6 +276,7 @@ def test_everything_has_its_own_shade_and_solids_their_height():
     assert wall.sum() == pytest.approx(463.0 * 1.2 * (1.0 / 2.15 - 1.0 / 2.2), abs=2.5)
 
 
+@pytest.mark.slow
 def test_a_robots_top_is_a_disc_round_its_center_wherever_its_tag_sits():
     for tag, pose in (
         (TAG._replace(x_m=0.008, y_m=-0.006, yaw_rad=0.5), (0.3, -0.2, 1.0)),
@@ -302,6 +307,7 @@ def test_light_falls_off_mostly_to_the_right_and_on_robots_too():
     assert tops[1] / tops[0] == pytest.approx(share[1] / share[0], abs=0.04)
 
 
+@pytest.mark.slow
 def test_blur_widens_edges_of_walls_and_prints():
     steepest = []
     for blur_px in (0.0, 1.0, 2.0):

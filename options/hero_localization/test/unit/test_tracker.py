@@ -153,6 +153,7 @@ def test_images_may_be_as_dark_and_bright_as_the_limits(shade, count):
     assert len(tracker.list_problems()) == count
 
 
+@pytest.mark.slow
 def test_what_is_missed_moved_or_missing_counts_from_its_limit_on():
     for missed, count in ((12, 0), (13, 1)):
         tracker = make_tracker()
@@ -183,6 +184,7 @@ def test_a_tag_expected_near_the_border_need_not_be_seen():
         assert len(tracker.list_problems()) == count, place
 
 
+@pytest.mark.slow
 def test_a_tag_that_left_the_image_is_expected_anew_when_it_is_back():
     tracker = make_tracker()
     for frame in range(120):

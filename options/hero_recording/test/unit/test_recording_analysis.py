@@ -126,6 +126,7 @@ def test_a_path_is_moved_and_turned_with_the_origin_of_its_time():
     assert moved.yaw_rad == pytest.approx([math.pi / 2.0, math.pi / 2.0, 3.0 - math.pi])
 
 
+@pytest.mark.slow
 def test_localized_robots_are_drawn_in_map_and_others_are_named(tmp_path):
     path = tmp_path / "localized.bag"
     write_bag(path, robot_ids=(0, 3, 5), seconds=3.0)
@@ -150,6 +151,7 @@ def test_robots_can_be_selected(two_robots):
     assert sorted(observe(two_robots, {3}).robots) == [3]
 
 
+@pytest.mark.slow
 def test_the_table_holds_rate_gaps_delays_and_error(two_robots):
     cells = plot.describe_robot(observe(two_robots).robots[3])
     assert cells["ODOM"] == "%.1f Hz" % (1.0 / PERIOD_S)
@@ -159,6 +161,7 @@ def test_the_table_holds_rate_gaps_delays_and_error(two_robots):
     assert float(cells["COMMAND TO MOTION"].split()[0]) == pytest.approx(1e3 * MOTION_DELAY_S, abs=1.5e3 * PERIOD_S)
 
 
+@pytest.mark.slow
 def test_without_an_origin_odometry_is_aligned_with_ground_truth(two_robots):
     robot = observe(two_robots).robots[3]
     robot.origins.clear()
@@ -296,6 +299,7 @@ def test_figures_for_which_a_topic_is_missing_are_named_with_it(tmp_path, capsys
         run_plot(capsys, tmp_path / "part.bag", "--figures", "errors")
 
 
+@pytest.mark.slow
 def test_all_obstacles_have_one_color_and_ground_truth_its_name(two_robots):
     axes = Figures(observe(two_robots), START_S, START_S + 12.0, "two.bag").draw_paths().axes[0]
     (walls,) = axes.collections
@@ -305,6 +309,7 @@ def test_all_obstacles_have_one_color_and_ground_truth_its_name(two_robots):
     assert {"ground truth", "walls, obstacles"} <= set(labels)
 
 
+@pytest.mark.slow
 def test_wrong_input_of_plot_is_refused_by_name(two_robots, tmp_path, capsys):
     rosbag.Bag(str(tmp_path / "other.bag"), "w").close()
     with rosbag.Bag(str(tmp_path / "other.bag"), "w") as bag:

@@ -95,6 +95,7 @@ def test_a_bag_that_was_cut_off_is_refused_and_can_be_repaired(tmp_path):
 needs_lz4 = pytest.mark.skipif(find_spec("roslz4") is None, reason="roslz4 is not installed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compression", ["none", pytest.param("lz4", marks=needs_lz4)])
 def test_every_whole_chunk_of_a_bag_that_was_cut_off_is_read_again(tmp_path, compression):
     path = tmp_path / "cut.bag"
@@ -110,6 +111,7 @@ def test_every_whole_chunk_of_a_bag_that_was_cut_off_is_read_again(tmp_path, com
             assert bag.get_message_count() == readable
 
 
+@pytest.mark.slow
 def test_a_bag_with_damage_in_its_middle_is_refused_by_name(tmp_path):
     path = tmp_path / "damaged.bag"
     write_bag(path, seconds=20.0)

@@ -107,6 +107,7 @@ def test_wrong_options_of_export_are_refused_by_name(bag, capsys):
         assert arguments[0] in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_npz_tables_hold_the_values_of_csv(bag, tmp_path, capsys):
     run_export(capsys, bag, "--out", tmp_path / "csv")
     run_export(capsys, bag, "--out", tmp_path / "npz", "--format", "npz")

@@ -119,6 +119,7 @@ def test_a_page_grows_with_its_robots():
         assert draw_page(name, robots).get_size_inches() == pytest.approx((9.0, height_in)), (name, count)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2), ("connections", 21)])
 def test_texts_of_a_page_lie_on_it_and_apart(name, count):
     figure = draw_page(name, make_driven(count))
@@ -172,6 +173,7 @@ def test_every_figure_says_what_its_axes_are():
         assert draw_page(name, make_driven(1), duration_s=0.0).axes[0].get_xlim() == (0.0, 1e-3), "one message alone"
 
 
+@pytest.mark.slow
 def test_a_path_begins_white_and_ends_with_the_robot_and_its_front():
     figure = draw_page("paths", make_driven(2))
     (axes,) = figure.axes

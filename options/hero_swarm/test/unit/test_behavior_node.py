@@ -146,6 +146,7 @@ def test_a_controller_senses_the_floor_of_the_arena_that_it_names(stage, tmp_pat
     assert stage.node.control.memory[0].tolist() == [1] * 6 and not stage.warnings
 
 
+@pytest.mark.slow
 def test_a_robot_whose_pose_is_old_stops_alone_and_is_named(stage):
     stage.start("wheel_genome")
     stage.run(4.0)
@@ -164,6 +165,7 @@ def test_a_robot_whose_pose_is_old_stops_alone_and_is_named(stage):
     assert np.abs(stage.swarm.rows.world.speeds_m_s[2]).max() > 0.02, "it goes on with a fresh pose"
 
 
+@pytest.mark.slow
 def test_a_program_that_is_late_drives_slowly_says_so_and_recovers(stage):
     stage.start("wheel_genome")
     stage.run(4.0)
@@ -179,6 +181,7 @@ def test_a_program_that_is_late_drives_slowly_says_so_and_recovers(stage):
     assert np.abs(stage.swarm.rows.world.speeds_m_s).mean() > 0.8 * usual_m_s
 
 
+@pytest.mark.slow
 def test_the_time_of_a_behavior_goes_on_when_the_clock_is_set(stage, monkeypatch):
     stage.clock_ahead_s = 7200.0
     stage.start("wheel_genome")
@@ -258,6 +261,7 @@ def test_a_color_is_sent_when_it_changes_and_not_again(stage):
     assert shown == [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)] * 3
 
 
+@pytest.mark.slow
 def test_speeds_that_are_no_numbers_stop_their_robot_alone(stage, tmp_path):
     (tmp_path / "odd.py").write_text(
         "import numpy as np\n"

@@ -25,6 +25,7 @@ def run(seed, steps, side_m=1.5):
     return np.array(observed), np.array(rewards)
 
 
+@pytest.mark.slow
 def test_steps_after_the_same_seed_are_equal_and_others_differ():
     first, again, other = run(3, 100), run(3, 100), run(4, 20)
     assert first[0].tobytes() == again[0].tobytes() and first[1].tobytes() == again[1].tobytes()

@@ -56,6 +56,7 @@ def test_sensors_of_behaviors_are_observed_by_the_same_names(arena):
     assert lamp[0] == pytest.approx(1.0 / (1.0 + x_m**2 + (1.0 - y_m) ** 2), rel=1e-5) and len(lamp) == 2
 
 
+@pytest.mark.slow
 def test_a_saved_policy_drives_as_it_did_in_its_environment(arena, tmp_path):
     path = str(tmp_path / "p.npz")
     env = SwarmVectorEnv(1, 3, arena, neighbors=2, range_m=0.7, sensors={"floor": Floor()})

@@ -169,6 +169,7 @@ def test_robots_are_scattered_inside_and_apart():
         scatter(60, 0.5, 0.5, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["obstacles", "maze", "box", "discs"])
 def test_robots_are_never_scattered_into_what_an_arena_holds(name):
     arena = load_arena(name)

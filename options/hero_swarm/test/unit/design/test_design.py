@@ -150,6 +150,7 @@ def test_a_killed_design_goes_on_to_the_same_bytes(path, light, capsys):
     capsys.readouterr()
 
 
+@pytest.mark.slow
 def test_a_controller_that_was_edited_stays_until_fresh(path, light):
     options, file = ["m.yaml", "--budget", "200"], Path("m_chocolate/design_1_1.controller")
     program.main(options)
@@ -171,6 +172,7 @@ def test_a_behavior_of_a_file_is_found_from_the_folder_of_designs(path, light):
     assert behavior.__name__ == "Own" and behavior.arena == "empty" and behavior.spacing_m != 0.5
 
 
+@pytest.mark.slow
 def test_parts_share_out_the_designs(path, light, capsys):
     options = ["m.yaml", "--budget", "200", "--designs", "3", "--part"]
     program.main([*options, "2/2"])
@@ -196,6 +198,7 @@ def test_a_damaged_history_is_named_and_what_is_above_is_kept(path, light):
     assert history.read_text() == whole and InProcess.left < 100
 
 
+@pytest.mark.slow
 def test_other_options_and_missions_are_not_mixed(path, light):
     program.main(["m.yaml", "--budget", "200"])
     with pytest.raises(ExperimentError, match="is of another mission, code or options .*: use --fresh"):
@@ -206,6 +209,7 @@ def test_other_options_and_missions_are_not_mixed(path, light):
     program.main(["m.yaml", "--budget", "200", "--fresh"])
 
 
+@pytest.mark.slow
 def test_candidates_of_a_batch_score_as_they_do_alone(path):
     mission = read_mission("m.yaml")
     common = mission, evaluation.hash_suite()
@@ -219,6 +223,7 @@ def test_candidates_of_a_batch_score_as_they_do_alone(path):
         assert together == alone and len(set(together)) > 1
 
 
+@pytest.mark.slow
 def test_files_do_what_candidates_did(path):
     mission = read_mission("m.yaml")
     path.write_text(MISSION + "behavior: dispersion\n")

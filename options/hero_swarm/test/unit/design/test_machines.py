@@ -96,6 +96,7 @@ def share_of_moves(folder, poses, **condition):
     return take_steps(machine, folder, [pose for pose in poses for _ in range(400)])[2].reshape(-1, 400).mean(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("color, row", [("black floor", 0), ("gray floor", 1), ("white floor", 2)])
 def test_floors_and_probabilities_lead_on(folder, color, row):
     places = [(1, 0, 0), (0, 0, 0), (-1, 0, 0)]

@@ -55,6 +55,7 @@ def test_robots_carry_items_from_sources_to_the_nest():
     assert run_and_measure(trial, "items", 30)[0] >= 1.0, "the light led it home within 30 s"
 
 
+@pytest.mark.slow
 def test_the_age_of_the_grid_grows_where_no_robot_was():
     explore = find_behavior(str(EXAMPLES / "exploration.py"))
     trial = Trial(explore(linear_m_s=0.0), load_arena("empty"), robots=4, seeds=[1, 2])

@@ -128,6 +128,7 @@ def test_options_of_run_have_their_limits(capsys):
         assert end.value.code == 2 and words.split()[0] in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_two_programs_that_record_one_batch_leave_it_whole(tmp_path, monkeypatch):
     stem, measured = str(tmp_path / "a"), metrics.METRICS["dispersion"]
 

@@ -419,6 +419,7 @@ def replay(*arguments):
     show.main(list(map(str, arguments)))
 
 
+@pytest.mark.slow
 def test_a_run_is_replayed_as_a_video_that_ends_as_the_run_did(finished, tmp_path, capsys):
     replay(finished, "--seed", 13, "--cell", 4, "--video", tmp_path / "run.gif")
     assert "robots 5, errors default, seed 13" in capsys.readouterr().out

@@ -90,6 +90,7 @@ def test_names_that_no_behavior_has_are_refused_with_their_line(path, old, new, 
         load(path, FILE.replace(old, new))
 
 
+@pytest.mark.slow
 def test_errors_of_all_robots_and_wifi_reach_the_robots(path):
     text = FILE.replace(
         "near.range_m: [0.05, 5]", "errors.slip: [0, 0.3]\n  errors: [perfect, 2.0]\n  wifi: [ideal, bad]"

@@ -120,6 +120,7 @@ def test_without_a_nominal_score_there_is_no_verdict(metrics, nominal, words):
     assert "no score" in text and text.endswith(f"no verdict: the nominal score is {words}, or never reached")
 
 
+@pytest.mark.slow
 def test_run_names_that_other_assumptions_were_not_tried(path):
     options = ["--jobs", "1"]
     text = FILE.replace("count: 50", "count: 2")

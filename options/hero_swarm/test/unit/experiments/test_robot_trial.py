@@ -61,12 +61,14 @@ def test_collisions_are_counted_by_the_radii_of_the_robots(radii_m, touching):
     assert trial.list_values() == (touching,)
 
 
+@pytest.mark.slow
 def test_a_trial_ends_when_its_condition_holds():
     trial, end_s, _ = drive(FILE + "until: {consensus_error: 0.25}\n")
     error_m, reached_s = trial.list_values()
     assert end_s == reached_s < 11.0 and error_m <= 0.25
 
 
+@pytest.mark.slow
 def test_a_lost_pose_ends_the_trial_with_a_remark():
     trial, end_s, _ = drive(lost_s=2.5)
     assert trial.remark == "no pose of hero_1 at 2.5 s" and end_s == pytest.approx(2.5)
@@ -160,6 +162,7 @@ def test_a_trial_is_filtered_between_decisions_and_counts_limits(tmp_path):
     assert trial.safety.calls == trial.safety.limited_calls == 241, "the last one, at 12 s, for the metrics alone"
 
 
+@pytest.mark.slow
 def test_metrics_of_a_trial_keep_what_they_count(tmp_path):
     file = tmp_path / "count.py"
     file.write_text(
