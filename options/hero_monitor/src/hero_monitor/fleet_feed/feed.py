@@ -53,7 +53,7 @@ LOOK_PERIOD_S = 3.0
 """Time between two looks at the ROS master's list of topics: that of 100 robots takes it some 20 ms."""
 
 LOST_SHOWN = 3
-"""Commands in vain that are named at once."""
+"""Lost commands, and goals outside the walls, that are named at once."""
 
 LOG_LINES_PER_READ = 40
 """Decoding a line takes about 0.05 ms; a swarm that tunes its motors logs thousands a second."""
@@ -119,7 +119,7 @@ class FleetFeed:
         self._looked_s = 0.0
         self._lost_commands: List[str] = []
         self._walls: List[float] = []  # left, right, low and high of the arena's, mm; empty without one
-        self._vain_goals: List[str] = []
+        self._goals_outside: List[str] = []
         self.stopper = ""
         """User who stopped the robots on a page."""
         self._rows: Sequence[Robot] = ()
@@ -205,8 +205,8 @@ class FleetFeed:
         gone = describe_gone(self._report, time.time()) if any(self._answering.values()) else ""
         if gone:
             losses.append(Loss("robots", shorten(gone), "Switch them on, or dismiss this"))
-        lost = [*self._lost_commands, *self._vain_goals][:LOST_SHOWN]
-        losses += [Loss("commands", "A command may be in vain", shorten(text)) for text in lost]
+        lost = [*self._lost_commands, *self._goals_outside][:LOST_SHOWN]
+        losses += [Loss("commands", "A command may have no effect", shorten(text)) for text in lost]
         self.page_state.put("losses", [loss._asdict() for loss in losses])
 
     def _look_for_lost_commands(self) -> None:
@@ -358,7 +358,7 @@ class FleetFeed:
 
     def _put_robots(self) -> None:
         poses, ranges, lights, goals = {}, {}, {}, {}
-        self._vain_goals = []
+        self._goals_outside = []
         for feed in list(self._feeds.values()):
             track = feed.listener.track
             if track.pose is not None:
@@ -370,7 +370,7 @@ class FleetFeed:
             if goal is not None:
                 goals[feed.name] = encode_pose(goal)
                 if self._is_within_walls(poses.get(feed.name)) and not self._is_within_walls(goals[feed.name]):
-                    self._vain_goals.append(f"the goal of {feed.name} lies outside the walls")
+                    self._goals_outside.append(f"the goal of {feed.name} lies outside the walls")
         for name, value in (("poses", poses), ("ranges", ranges), ("lights", lights), ("goals", goals)):
             self.page_state.put(name, value)
 

@@ -105,7 +105,7 @@ def check_master(own: Sequence[Address]) -> Finding:
 def check_commands() -> Finding:
     """Check whether a program sends commands that no robot hears."""
     lost = find_lost_commands(ask_master("getSystemState"), ask_master("getTopicTypes"))
-    return warn("commands are lost", *lost[:LINES_MAX]) if lost else ok("no program commands a robot in vain")
+    return warn("commands are lost", *lost[:LINES_MAX]) if lost else ok("no commands are lost")
 
 
 class OwnNode:
