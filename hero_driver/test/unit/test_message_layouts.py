@@ -25,7 +25,7 @@ from robot_messages import (
 from sensor_msgs.msg import Range
 
 from hero_driver.corrections import message_layouts
-from hero_node import LENGTH, encode_pose, encode_text
+from hero_node import LENGTH, encode_list, encode_pose, encode_text
 from hero_test.nonempty import nonempty
 
 POSE_DIAGONAL = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -168,8 +168,8 @@ def test_a_transform_that_was_read_is_packed_as_the_same_bytes():
         for stamp_ns, frames, tail in message_layouts.read_transforms(message)
     ]
     assert packed == [transform, transform]
-    assert message_layouts.pack_transform_message(packed) == message
-    assert message_layouts.pack_transform_message([]) == bytes(4)
+    assert encode_list(packed) == message
+    assert encode_list([]) == bytes(4)
 
 
 def test_a_tail_is_the_pose():

@@ -19,8 +19,7 @@ from robot_messages import (
     read_stamp_ns,
 )
 
-from hero_driver.corrections.message_layouts import PLUS_ENCODER_MD5
-from hero_node import Pose
+from hero_node import PLUS_ENCODER_MD5, Pose
 
 PERIOD_NS = 34 * MS
 TICK_M = math.pi * 0.0492 / 288.0

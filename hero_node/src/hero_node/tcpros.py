@@ -1,39 +1,12 @@
-"""ROS messages as bytes: fields of many types, and messages in a TCPROS stream, each behind its length. Pure."""
+"""Messages in a TCPROS stream, each behind its length. Pure."""
 
-import math
-import struct
 from typing import Iterator, Tuple, Union
 
-LENGTH = struct.Struct("<I")
-"""In front of texts, lists and messages."""
-
-HEADER = struct.Struct("<4I")
-"""std_msgs/Header before its text: seq, secs, nsecs, length of frame_id."""
-
-POSE_FORM = struct.Struct("<7d")
-TWIST_FORM = struct.Struct("<6d")
+from .ros_messages import LENGTH
 
 
 class TooLongError(ValueError):
     """A length that no message has: the other end does not speak TCPROS."""
-
-
-def encode_text(text: str) -> bytes:
-    """Return a string field."""
-    data = text.encode()
-    return LENGTH.pack(len(data)) + data
-
-
-def encode_header(seq: int, frame_id: str, stamp: Tuple[int, int] = (0, 0)) -> bytes:
-    """Return a std_msgs/Header; stamp: s, ns."""
-    data = frame_id.encode()
-    return HEADER.pack(seq & 0xFFFFFFFF, *stamp, len(data)) + data
-
-
-def encode_pose(x_m: float, y_m: float, yaw_rad: float, z_m: float = 0.0) -> bytes:
-    """Return a geometry_msgs/Pose or Transform that is turned about z only."""
-    half_rad = yaw_rad / 2.0
-    return POSE_FORM.pack(x_m, y_m, z_m, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
 
 
 def find_messages(data: Union[bytes, bytearray], length_max: int) -> Iterator[Tuple[int, int]]:

@@ -12,11 +12,10 @@ from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from hero_node import Pose
+from hero_node import Pose, encode_header, encode_odometry, encode_pose, encode_transforms, encode_twist
 
-from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robots
+from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robots, encode_markers
 from .simulator import Simulator
-from .stepped.ros_messages import encode_markers, encode_odometry, encode_transforms
 
 POSE_PERIOD_MS = 50
 MARKER_PERIOD_MS = 100
@@ -25,7 +24,7 @@ MARKER_PERIOD_MS = 100
 
 def make_markers(shapes: Iterable[Shape], time_ns: int = 0) -> MarkerArray:
     """Return shapes as the message, for RViz and the monitor's map; time_ns: of its stamp."""
-    markers: MarkerArray = MarkerArray().deserialize(encode_markers(time_ns, FRAME, shapes))
+    markers: MarkerArray = MarkerArray().deserialize(encode_markers(time_ns, shapes))
     return markers
 
 
@@ -75,8 +74,8 @@ class GroundTruth:
         speeds = self._swarm.world.measure_body_speeds().tolist()
         for index in watched:
             robot = self._swarm.robots[index]
-            frames = FRAME, robot.name + "/base_link"
-            content = encode_odometry(stamp.to_nsec(), frames, robot.body.true_pose, *speeds[index])
+            header, pose = encode_header(0, FRAME, (stamp.secs, stamp.nsecs)), encode_pose(*robot.body.true_pose)
+            content = encode_odometry(header, robot.name + "/base_link", pose, encode_twist(*speeds[index]))
             self._poses[index].publish(Odometry().deserialize(content))
 
     def _publish_objects(self, stamp: rospy.Time) -> None:
@@ -100,4 +99,4 @@ class GroundTruth:
         origins = [(FRAME, robot.name + "/odom", robot.body.odom_origin) for robot in self._swarm.robots]
         if origins != self._odom_origins:
             self._odom_origins = origins
-            publisher.publish(TFMessage().deserialize(encode_transforms(stamp.to_nsec(), origins)))
+            publisher.publish(TFMessage().deserialize(encode_transforms((stamp.secs, stamp.nsecs), origins)))

@@ -1,9 +1,10 @@
 """Shapes of the simulated world as viewers draw them: arena, objects and robots, in the frame `world`. Pure."""
 
 import math
-from typing import List, NamedTuple, Sequence, Tuple
+import struct
+from typing import Iterable, List, NamedTuple, Sequence, Tuple
 
-from hero_node import Pose
+from hero_node import Pose, encode_header, encode_list, encode_pose, encode_text
 
 from .robot_constants import BODY_RADIUS_M
 from .world.arena import Area, Arena
@@ -111,3 +112,21 @@ def _draw_circle(namespace: str, number: int, circle_m: Sequence[float], color: 
     x_m, y_m, radius_m = circle_m
     size_m = (2.0 * radius_m, 2.0 * radius_m, WALL_HEIGHT_M)
     return Shape(namespace, number, CYLINDER, color, Pose(x_m, y_m, 0.0), WALL_HEIGHT_M / 2.0, size_m)
+
+
+_MARKER_KIND = struct.Struct("<3i")
+"""visualization_msgs/Marker between its namespace and its pose: id, type, action."""
+
+_MARKER_SIZE = struct.Struct("<3d4f2i?2I")
+"""Behind its pose: scale, color, lifetime, frame_locked, and the numbers of its points and their colors."""
+
+
+def encode_markers(time_ns: int, shapes: Iterable[Shape]) -> bytes:
+    """Return the visualization_msgs/MarkerArray that adds or moves shapes; time_ns: of its stamp."""
+    header, encoded = encode_header(0, FRAME, divmod(time_ns, 10**9)), []
+    for shape in shapes:
+        kind = _MARKER_KIND.pack(shape.number, shape.kind, 0)
+        size = _MARKER_SIZE.pack(*shape.size_m, *shape.color, 0, 0, False, 0, 0)
+        head = header + encode_text(shape.namespace) + kind + encode_pose(*shape.pose, shape.z_m)
+        encoded.append(head + size + encode_text(shape.text) + encode_text("") + b"\0")
+    return encode_list(encoded)

@@ -1,10 +1,21 @@
-"""The messages that the driver reads or writes, by fixed offsets, in the order of their definitions. Pure."""
+"""The messages that the driver reads and patches, by fixed offsets. Pure."""
 
 import math
 import struct
 from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
-from hero_node import HEADER, LENGTH, POSE_FORM, TWIST_FORM, encode_header
+from hero_node import (
+    COVARIANCE_FORM,
+    ENCODER_FORM,
+    HEADER,
+    LENGTH,
+    PLUS_ENCODER_MD5,
+    POSE_FORM,
+    SCAN_FORM,
+    TWIST_FORM,
+    encode_header,
+    encode_turn_scan,
+)
 
 from ..robot_constants import (
     BODY_RADIUS_M,
@@ -14,34 +25,15 @@ from ..robot_constants import (
     MAX_WHEEL_SPEED_M_S,
     MIN_DISTANCE_M,
     MIN_RIM_RANGE_M,
-    PROXIMITY_BEAMS,
     STOCK_BEAMS,
 )
 from .stamps import NS_PER_S
 
 _SEQ_AND_STAMP = struct.Struct("<III")
 _ENCODER_TICKS = struct.Struct("<2d")
-_COVARIANCE = struct.Struct("<36d")
-
-MD5SUMS = {
-    "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
-    "hero_msgs/Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
-    "tf2_msgs/TFMessage": "94810edda583a504dfda3829e70d7eec",
-    "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
-    "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
-    "geometry_msgs/Twist": "9f195f881246fdfa2798d1d3eebca84a",
-    "hero_msgs/Motor": "44d4249d207ce6a89de3d72080e4d0b5",
-    "std_msgs/Float32": "73fcbf46b49191e672908e50842a83d4",
-    "sensor_msgs/Range": "c005c34273dc426c67a020a87bc24148",
-}
-"""The layouts that are read or written here; another md5 is another layout, which CONVERSIONS may translate."""
-
-PLUS_ENCODER_MD5 = "ec5c02e99365233af779a0f9f54cb0df"
-"""HeRo+'s hero_msgs/Encoder, which has one field more."""
 
 TRANSFORM_TAIL_LENGTH = POSE_FORM.size  # translation and rotation
-ODOMETRY_TAIL_LENGTH = POSE_FORM.size + _COVARIANCE.size + TWIST_FORM.size + _COVARIANCE.size
-ENCODER_TAIL_LENGTH = 11 * 8
+ODOMETRY_TAIL_LENGTH = POSE_FORM.size + COVARIANCE_FORM.size + TWIST_FORM.size + COVARIANCE_FORM.size
 
 CLAMP_TOLERANCE_M = 1e-4
 
@@ -69,7 +61,7 @@ def restamp(payload: bytes, seq: int, stamp_ns: int) -> bytes:
 
 def read_encoder(payload: bytes) -> Optional[Tuple[int, float, float]]:
     """Return (stamp_ns, left_ticks, right_ticks) of a hero_msgs/Encoder, or None if payload is not one."""
-    end = len(payload) - ENCODER_TAIL_LENGTH
+    end = len(payload) - ENCODER_FORM.size
     if end < HEADER.size:
         return None
     _, secs, nsecs, length = HEADER.unpack_from(payload)
@@ -94,7 +86,7 @@ CONVERSIONS: Dict[Tuple[str, str], Callable[[bytes], bytes]] = {
 
 _ODOMETRY_FRAMES = slice(_SEQ_AND_STAMP.size, -ODOMETRY_TAIL_LENGTH)
 _ODOMETRY_POSE = slice(-ODOMETRY_TAIL_LENGTH, POSE_FORM.size - ODOMETRY_TAIL_LENGTH)
-_ODOMETRY_TWIST = slice(-TWIST_FORM.size - _COVARIANCE.size, -_COVARIANCE.size)
+_ODOMETRY_TWIST = slice(-TWIST_FORM.size - COVARIANCE_FORM.size, -COVARIANCE_FORM.size)
 
 
 def read_odometry_velocity(payload: bytes) -> Optional[Tuple[float, float]]:
@@ -112,8 +104,8 @@ class OdometryWriter:
 
     def __init__(self, pose_covariance: Sequence[float], twist_covariance: Sequence[float]) -> None:
         """Take the diagonals of both covariances (x, y, z, roll, pitch, yaw), in m^2 and rad^2, per s^2."""
-        self._pose_covariance = _COVARIANCE.pack(*_make_diagonal(pose_covariance))
-        self._twist_covariance = _COVARIANCE.pack(*_make_diagonal(twist_covariance))
+        self._pose_covariance = COVARIANCE_FORM.pack(*_make_diagonal(pose_covariance))
+        self._twist_covariance = COVARIANCE_FORM.pack(*_make_diagonal(twist_covariance))
         self._frames: Optional[bytes] = None
 
     def rewrite(
@@ -236,13 +228,7 @@ def pack_transform_head(stamp_ns: int, frames: bytes) -> bytes:
     return _SEQ_AND_STAMP.pack(0, secs, nsecs) + frames
 
 
-def pack_transform_message(transforms: Sequence[bytes]) -> bytes:
-    """Return the tf2_msgs/TFMessage of transforms, each the bytes of one geometry_msgs/TransformStamped."""
-    return LENGTH.pack(len(transforms)) + b"".join(transforms)
-
-
-_STOCK_SCAN_TAIL = struct.Struct("<7fI16fI16f")
-_PROXIMITY_TAIL = struct.Struct("<7fI8fI8f")
+_STOCK_SCAN_TAIL = struct.Struct(SCAN_FORM % (STOCK_BEAMS, STOCK_BEAMS))
 
 
 def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) -> Optional[bytes]:
@@ -265,21 +251,8 @@ def make_proximity(payload: bytes, seq: int, stamp_ns: int, scan_time_s: float) 
         elif range_m <= range_min_m + CLAMP_TOLERANCE_M:
             range_m = -math.inf
         ranges_m.append(range_m)
-    increment_rad = 2.0 * math.pi / PROXIMITY_BEAMS
-    tail = _PROXIMITY_TAIL.pack(
-        -math.pi,
-        -math.pi + (PROXIMITY_BEAMS - 1) * increment_rad,
-        increment_rad,
-        0.0,
-        scan_time_s,
-        range_min_m,
-        range_max_m,
-        PROXIMITY_BEAMS,
-        *ranges_m,
-        PROXIMITY_BEAMS,
-        *fields[25:41:2],
-    )
-    return restamp(payload[:end], seq, stamp_ns) + tail
+    head = restamp(payload[:end], seq, stamp_ns)
+    return encode_turn_scan(head, scan_time_s, (range_min_m, range_max_m), ranges_m, fields[25:41:2])
 
 
 _DISTANCE = struct.Struct("<f")

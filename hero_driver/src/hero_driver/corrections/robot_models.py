@@ -6,10 +6,10 @@ one field more, a distance sensor on the hat, and a bump shield. Its firmware lo
 
 from typing import List
 
+from hero_node import PLUS_ENCODER_MD5
 from hero_node.files import HERO_PLUS, STOCK
 
 from .correction_settings import CorrectionSettings
-from .message_layouts import PLUS_ENCODER_MD5
 from .tick_odometry import WheelGeometry
 
 DISTANCE = "/distance"

@@ -9,7 +9,8 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 
-from ..corrections.message_layouts import MD5SUMS
+from hero_node import MD5SUMS
+
 from . import message_types
 from .message_types import MessageTypeError
 from .raw_publisher import RawPublisher

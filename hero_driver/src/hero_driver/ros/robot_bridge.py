@@ -9,6 +9,8 @@ registrar. Endpoints stay up when the connection goes and are there again when t
 import functools
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Set, Tuple
 
+from hero_node import MD5SUMS
+
 from ..commands.command_settings import CommandSettings
 from ..commands.service_requests import is_success, read_set_odom_pose
 from ..commands.velocity_shaper import STOP_PAYLOADS
@@ -123,7 +125,7 @@ class RobotBridge:
             self._names.add(name)
         ros_type = message_types.apply_aliases(info.message_type)
         convert = message_layouts.CONVERSIONS.get((ros_type, info.md5sum))
-        layout = Layout(ros_type, (message_layouts.MD5SUMS[ros_type] if convert else info.md5sum,))
+        layout = Layout(ros_type, (MD5SUMS[ros_type] if convert else info.md5sum,))
         if kind is TopicKind.PUBLISHER:
             if ros_type == ENCODER_TYPE:
                 self.corrections.note_encoder(info.md5sum)
@@ -192,7 +194,7 @@ class RobotBridge:
             if ros_type == ENCODER_TYPE:
                 text += "; odom is the robot's own estimate until then, which loses distance"
             known = [md5 for message_type, md5 in message_layouts.CONVERSIONS if message_type == ros_type]
-            md5sums = " or ".join([message_layouts.MD5SUMS[ros_type], *known])
+            md5sums = " or ".join([MD5SUMS[ros_type], *known])
             self._endpoints.report_error(name, text % (name, topic.info.message_type, layout.md5sums[0], md5sums))
             return []
         if name == TRANSFORMS and ros_type != TRANSFORM_TYPE:
@@ -271,4 +273,4 @@ def _convert_first(
 
 def _has_known_layout(layout: Layout) -> bool:
     """Return whether a layout of a type that is read or written here is the one that is known."""
-    return layout.md5sums[0] == message_layouts.MD5SUMS.get(layout.message_type, layout.md5sums[0])
+    return layout.md5sums[0] == MD5SUMS.get(layout.message_type, layout.md5sums[0])

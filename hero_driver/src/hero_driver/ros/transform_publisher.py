@@ -7,7 +7,8 @@ from typing import Callable, List
 
 from tf2_msgs.msg import TFMessage
 
-from ..corrections import message_layouts
+from hero_node import encode_list
+
 from ..transport.event_loop import CallLater
 from .message_types import make_raw_class
 from .raw_publisher import RawPublisher
@@ -45,5 +46,5 @@ class TransformPublisher:
         if self._publisher.is_wanted:
             for start in range(0, len(self._transforms), TRANSFORMS_MAX):
                 part = self._transforms[start : start + TRANSFORMS_MAX]
-                self._publisher.publish(message_layouts.pack_transform_message(part))
+                self._publisher.publish(encode_list(part))
         self._transforms.clear()

@@ -16,9 +16,10 @@ one write, below the robot's TCP window of 2144 bytes, and no second one before 
 import time
 from typing import Callable, Iterable, List, Optional
 
+from hero_node import MD5SUMS
+
 from ..commands.stop_progress import StopProgress, StopState
 from ..commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
-from ..corrections.message_layouts import MD5SUMS
 from ..peer import Peer
 from ..ros.message_types import apply_aliases
 from ..ros.robot_commands import LIGHT_SUFFIX, NO_LIGHT, Owner

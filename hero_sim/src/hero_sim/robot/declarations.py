@@ -8,6 +8,7 @@ import itertools
 from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 
 from hero_driver.rosserial import packets, payloads
+from hero_node import MD5SUMS
 
 BUFFER_LENGTH = 4096
 """INPUT_SIZE and OUTPUT_SIZE of the firmware's NodeHandle."""
@@ -45,23 +46,23 @@ class Topic(NamedTuple):
 
 
 STOCK_TOPICS = (
-    Topic(PUB, "/%s/laser", "sensor_msgs/LaserScan", "90c7ef2dc6895d81024acba2ac42f369"),
+    Topic(PUB, "/%s/laser", "sensor_msgs/LaserScan", MD5SUMS["sensor_msgs/LaserScan"]),
     Topic(SUB, "/%s/led", "std_msgs/ColorRGBA", "a29a96539573343b1310c73607334b00"),
     # The one name that the firmware sends without a leading slash (RangeSensor.ino:79).
     Topic(SUB, "%s/laser_enable", "std_msgs/Bool", "8b94c1b53db61fb6aed406028ad6332a"),
     Topic(SERVICE, "/%s/ir_calibration", "hero_common/SetIRCalibration", "27748d949ad62e65750ad22074426005"),
-    Topic(PUB, "/%s/imu", "sensor_msgs/Imu", "6a62c6daae103f4ff57a132d6f95cec2"),
-    Topic(PUB, "/%s/encoder", "hero_common/Encoder", "b5586cdbae9b740afc6a1f403a2d7dde"),
-    Topic(PUB, "/tf", "tf/tfMessage", "94810edda583a504dfda3829e70d7eec"),
-    Topic(PUB, "/%s/odom", "nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"),
+    Topic(PUB, "/%s/imu", "sensor_msgs/Imu", MD5SUMS["sensor_msgs/Imu"]),
+    Topic(PUB, "/%s/encoder", "hero_common/Encoder", MD5SUMS["hero_msgs/Encoder"]),
+    Topic(PUB, "/tf", "tf/tfMessage", MD5SUMS["tf2_msgs/TFMessage"]),
+    Topic(PUB, "/%s/odom", "nav_msgs/Odometry", MD5SUMS["nav_msgs/Odometry"]),
     Topic(SERVICE, "/%s/set_odom", "hero_common/SetOdom", "938fa65709584ad8e77d238529be13b8"),
-    Topic(SUB, "/%s/cmd_motor", "hero_common/Motor", "44d4249d207ce6a89de3d72080e4d0b5"),
-    Topic(SERVICE, "/%s/motors_parameters", "hero_common/SetMotor", "44d4249d207ce6a89de3d72080e4d0b5"),
+    Topic(SUB, "/%s/cmd_motor", "hero_common/Motor", MD5SUMS["hero_msgs/Motor"]),
+    Topic(SERVICE, "/%s/motors_parameters", "hero_common/SetMotor", MD5SUMS["hero_msgs/Motor"]),  # the same fields
     *(
         topic
         for controller in ("/%s/position_controller/", "/%s/velocity_controller/")
         for topic in (
-            Topic(SUB, controller + "cmd_vel", "geometry_msgs/Twist", "9f195f881246fdfa2798d1d3eebca84a"),
+            Topic(SUB, controller + "cmd_vel", "geometry_msgs/Twist", MD5SUMS["geometry_msgs/Twist"]),
             Topic(SERVICE, controller + "pid_parameters", "hero_common/SetPID", "f0d0bdba02bc62a48d52638e38dc8a4b"),
             Topic(SERVICE, controller + "pid_calibration", "std_srvs/Trigger", "d41d8cd98f00b204e9800998ecf8427e"),
         )

@@ -11,7 +11,19 @@ import struct
 from typing import List, Sequence, Tuple
 
 from hero_driver.rosserial import packets
-from hero_node import LENGTH, POSE_FORM, TWIST_FORM, Pose, encode_header, encode_text
+from hero_node import (
+    COVARIANCE_FORM,
+    ENCODER_FORM,
+    POSE_FORM,
+    TWIST_FORM,
+    Pose,
+    encode_header,
+    encode_list,
+    encode_odometry,
+    encode_scan,
+    encode_text,
+    encode_transform,
+)
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 from .models import HERO, RobotModel
@@ -21,9 +33,7 @@ SEQ_NEVER_COUNTED = 0xFFFFFFFF
 
 _STAMP = struct.Struct("<II")
 _QUATERNION = struct.Struct("<4d")
-_ENCODER = struct.Struct("<11d")
 _PLUS_ENCODER = struct.Struct("<12d")
-_COVARIANCE_LENGTH = 36 * 8
 _SUMMED_OFFSET = 5  # sync, length and its checksum are not part of a packet's last checksum
 
 # Places of the robot's parts in base_link (m), as the firmware sends them in its transforms.
@@ -72,10 +82,10 @@ class CycleMessages:
 
     def __init__(self, name: str, model: RobotModel = HERO) -> None:
         """Build the templates of the robot called name (hero_N)."""
-        self._encoder_form = _PLUS_ENCODER if model.is_plus else _ENCODER
+        self._encoder_form = _PLUS_ENCODER if model.is_plus else ENCODER_FORM
         odom_id, base_id = name + "/odom", name + "/base_link"
-        odom = encode_header(SEQ_NEVER_COUNTED, odom_id) + encode_text(base_id)
-        odom += bytes(POSE_FORM.size + _COVARIANCE_LENGTH + TWIST_FORM.size + _COVARIANCE_LENGTH)
+        header = encode_header(SEQ_NEVER_COUNTED, odom_id)
+        odom = encode_odometry(header, base_id, bytes(POSE_FORM.size), bytes(TWIST_FORM.size))
         encoder = encode_header(SEQ_NEVER_COUNTED, name + "/encoder") + bytes(self._encoder_form.size)
         transforms = [
             _build_transform(odom_id, base_id, (0.0, 0.0, 0.0)),
@@ -96,8 +106,8 @@ class CycleMessages:
             self._sums.append((start + _SUMMED_OFFSET, ends[-1]))
         # Behind the sequence number; in a tfMessage the number of transforms comes first.
         self._stamps = [starts[0] + 4] + [start + 8 for start in starts[1:6]] + [starts[6] + 4]
-        self._twist = ends[0] - _COVARIANCE_LENGTH - TWIST_FORM.size
-        self._poses = (self._twist - _COVARIANCE_LENGTH - POSE_FORM.size, ends[1] - POSE_FORM.size)
+        self._twist = ends[0] - COVARIANCE_FORM.size - TWIST_FORM.size
+        self._poses = (self._twist - COVARIANCE_FORM.size - POSE_FORM.size, ends[1] - POSE_FORM.size)
         self._left_wheel = ends[2] - _QUATERNION.size
         self._right_wheel = ends[3] - _QUATERNION.size
         self._encoder = ends[6] - self._encoder_form.size
@@ -137,7 +147,7 @@ class CycleMessages:
 def _build_transform(parent: str, child: str, place_m: Sequence[float]) -> bytes:
     """Return a tfMessage with one transform, without rotation."""
     values = round_to_float32((*place_m, 0.0, 0.0, 0.0, 1.0))
-    return LENGTH.pack(1) + encode_header(0, parent) + encode_text(child) + POSE_FORM.pack(*values)
+    return encode_list([encode_transform(encode_header(0, parent), child, POSE_FORM.pack(*values))])
 
 
 def _wheel_half_angle(ticks: float) -> float:
@@ -152,9 +162,9 @@ def encode_laser(
 
     Odd values are averages of their neighbors (quirk of the firmware, RangeSensor.ino:167).
     """
-    limits = (-math.pi, math.pi, LASER_ANGLE_INCREMENT_RAD, 0.0, 0.0, LASER_RANGE_MIN_M, LASER_RANGE_MAX_M)
-    values = struct.pack("<7fI16fI16f", *limits, 16, *_interpolate(ranges_m), 16, *_interpolate(counts))
-    return encode_header(seq, name + "/laser_link", stamp) + values
+    settings = (-math.pi, math.pi, LASER_ANGLE_INCREMENT_RAD, 0.0, 0.0, LASER_RANGE_MIN_M, LASER_RANGE_MAX_M)
+    header = encode_header(seq, name + "/laser_link", stamp)
+    return encode_scan(header, settings, _interpolate(ranges_m), _interpolate(counts))
 
 
 def _interpolate(values: Sequence[float]) -> List[float]:

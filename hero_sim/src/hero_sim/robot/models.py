@@ -7,6 +7,8 @@ is as in the stock robot; HeRo+'s own law for its motors, too, is that of the st
 
 from typing import Dict, List, NamedTuple, Tuple
 
+from hero_node import MD5SUMS, PLUS_ENCODER_MD5
+
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M, TICK_M, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from ..world.robot_errors import RobotErrors
@@ -40,8 +42,8 @@ class RobotModel(NamedTuple):
 
 _NEWER_NAMES = ("ir_calibration", "laser_enable", "motors_parameters")
 _PLUS_TOPICS = {
-    "imu": Topic(PUB, "/%s/distance", "std_msgs/Float32", "73fcbf46b49191e672908e50842a83d4"),
-    "encoder": Topic(PUB, "/%s/encoder", "hero_common/Encoder", "ec5c02e99365233af779a0f9f54cb0df"),
+    "imu": Topic(PUB, "/%s/distance", "std_msgs/Float32", MD5SUMS["std_msgs/Float32"]),
+    "encoder": Topic(PUB, "/%s/encoder", "hero_common/Encoder", PLUS_ENCODER_MD5),
 }
 
 HERO = RobotModel("Firmware: v3.8 | Hardware: v2.5 | Config: v2.3")

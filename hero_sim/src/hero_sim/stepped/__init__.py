@@ -1,6 +1,5 @@
 """Robots stepped in process: firmware rules and driver corrections as arrays over robots, without bytes or sockets."""
 
 from .robot_rows import RobotRows
-from .ros_messages import MessageType
 from .swarm import StepSwarm
 from .topics import LATCHED, StepTopics

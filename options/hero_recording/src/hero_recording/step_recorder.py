@@ -10,7 +10,7 @@ from contextlib import ExitStack
 from typing import Any, Dict, Sequence
 
 from hero_node import import_optional
-from hero_sim.stepped import LATCHED, MessageType, RobotRows, StepTopics
+from hero_sim.stepped import LATCHED, RobotRows, StepTopics
 
 from .errors import RecordingError, explain_write_errors
 
@@ -25,6 +25,11 @@ class StepRecorder(ExitStack):
         """
         super().__init__()
         rosbag1: Any = import_optional("rosbags.rosbag1", "rosbags")
+        typesys: Any = import_optional("rosbags.typesys", "rosbags")
+        self._types: Any = typesys.get_typestore(typesys.Stores.ROS1_NOETIC)
+        # The one type that it lacks.
+        transforms = typesys.get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage")
+        self._types.register(transforms)
         self._path = path
         self._connections: Dict[str, Any] = {}
         try:
@@ -36,14 +41,13 @@ class StepRecorder(ExitStack):
         self.callback(self._complete)
         self.callback(StepTopics(rows, robot_ids, self._write).close)
 
-    def _write(self, topic: str, kind: MessageType, content: bytes, time_ns: int) -> None:
+    def _write(self, topic: str, kind: str, content: bytes, time_ns: int) -> None:
         with explain_write_errors(self._path):
             if topic not in self._connections:
                 self._connections[topic] = self._writer.add_connection(
                     topic,
-                    kind.name.replace("/", "/msg/"),
-                    msgdef=kind.definition,
-                    md5sum=kind.md5,
+                    kind.replace("/", "/msg/"),
+                    typestore=self._types,
                     callerid="/hero_sim",
                     latching=int(topic in LATCHED),
                 )

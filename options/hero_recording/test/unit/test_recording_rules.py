@@ -399,6 +399,28 @@ class WriterError(Exception):
     pass
 
 
+class Types:
+    """What rosbags knows of types."""
+
+    Stores = SimpleNamespace(ROS1_NOETIC="ROS 1")
+
+    def __init__(self, names):
+        self.names = names
+
+    def register(self, definitions):
+        self.names += definitions
+
+    @staticmethod
+    def get_typestore(store):
+        assert store == "ROS 1"
+        return Types([])
+
+    @staticmethod
+    def get_types_from_msg(text, name):
+        assert text == "geometry_msgs/TransformStamped[] transforms"
+        return {name: text}
+
+
 class FakeWriter:
     """What rosbags has, without a file."""
 
@@ -424,8 +446,8 @@ class FakeWriter:
 
 
 def test_stepped_robots_are_recorded_from_beginning_to_end(monkeypatch):
-    library = SimpleNamespace(Writer=FakeWriter, WriterError=WriterError)
-    monkeypatch.setattr(step_recorder, "import_optional", lambda module, requirement: library)
+    modules = {"rosbags.rosbag1": SimpleNamespace(Writer=FakeWriter, WriterError=WriterError), "rosbags.typesys": Types}
+    monkeypatch.setattr(step_recorder, "import_optional", lambda module, requirement: modules[module])
     with StepSwarm(2, arena="maze") as swarm:
         with StepRecorder(swarm.rows, range(2), "run.bag") as recorder:
             writer = FakeWriter.made
@@ -439,6 +461,6 @@ def test_stepped_robots_are_recorded_from_beginning_to_end(monkeypatch):
             StepRecorder(swarm.rows, range(2), "taken.bag")
     assert {topic for topic, _, _ in writer.written} == set(writer.connections) >= {"/hero_1/odom", "/hero_sim/arena"}
     kind, options = writer.connections["/hero_1/odom"]
-    assert kind == "nav_msgs/msg/Odometry" and options["md5sum"] == "cd5e73d190d741a2f92e81eda573aca7"
+    assert kind == "nav_msgs/msg/Odometry" and options["typestore"].names == ["tf2_msgs/msg/TFMessage"]
     latched = {topic for topic, (_, options) in writer.connections.items() if options["latching"]}
     assert latched == set(writer.connections) & set(LATCHED) != set()

@@ -2,6 +2,7 @@
 
 import pytest
 import rosbag
+from roslib.message import get_message_class
 from synthetic_bag import write_bag
 
 from hero_recording.bags import plain_reader, ros_reader
@@ -43,5 +44,8 @@ def test_stepped_robots_record_what_ros_reads(tmp_path):
     with rosbag.Bag(str(path)) as bag:
         odometry = [message for _, message, _ in bag.read_messages(["/hero_1/odom"])]
         assert bag.get_message_count(["/tf_static"]) == bag.get_message_count(["/hero_sim/arena"]) == 1
+        types = {connection.datatype: connection.md5sum for connection in bag._get_connections()}
+    assert {"nav_msgs/Odometry", "tf2_msgs/TFMessage", "visualization_msgs/MarkerArray"} < set(types)
+    assert types == {name: get_message_class(name)._md5sum for name in types}
     assert odometry[-1].header.stamp.to_sec() == pytest.approx(1600000002.0, abs=0.04)
     assert odometry[-1].pose.pose.position.x > 0.1

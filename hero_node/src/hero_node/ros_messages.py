@@ -1,0 +1,112 @@
+"""ROS messages as bytes: md5 sums, layouts in the order of their definitions, and encoders. Pure."""
+
+import math
+import struct
+from typing import Iterable, Sequence, Tuple
+
+from .geometry import Pose
+
+MD5SUMS = {
+    "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
+    "hero_msgs/Encoder": "b5586cdbae9b740afc6a1f403a2d7dde",
+    "tf2_msgs/TFMessage": "94810edda583a504dfda3829e70d7eec",
+    "sensor_msgs/LaserScan": "90c7ef2dc6895d81024acba2ac42f369",
+    "sensor_msgs/Imu": "6a62c6daae103f4ff57a132d6f95cec2",
+    "geometry_msgs/Twist": "9f195f881246fdfa2798d1d3eebca84a",
+    "hero_msgs/Motor": "44d4249d207ce6a89de3d72080e4d0b5",
+    "std_msgs/Float32": "73fcbf46b49191e672908e50842a83d4",
+    "sensor_msgs/Range": "c005c34273dc426c67a020a87bc24148",
+}
+"""By type: the layouts that are read or written as bytes. Another md5 is another layout."""
+
+PLUS_ENCODER_MD5 = "ec5c02e99365233af779a0f9f54cb0df"
+"""HeRo+'s hero_msgs/Encoder, which has |left_ticks - right_ticks| before timestep, too."""
+
+LENGTH = struct.Struct("<I")
+"""In front of texts, lists and, in a TCPROS stream, messages."""
+
+HEADER = struct.Struct("<4I")
+"""std_msgs/Header before its text: seq, secs, nsecs, length of frame_id."""
+
+POSE_FORM = struct.Struct("<7d")
+"""geometry_msgs/Pose or Transform: x, y, z and a quaternion x, y, z, w."""
+
+TWIST_FORM = struct.Struct("<6d")
+"""geometry_msgs/Twist: linear x, y, z and angular x, y, z."""
+
+COVARIANCE_FORM = struct.Struct("<36d")
+NO_COVARIANCE = bytes(COVARIANCE_FORM.size)
+
+ENCODER_FORM = struct.Struct("<11d")
+"""hero_msgs/Encoder behind its header; left and right ticks come first."""
+
+SCAN_FORM = "<7fI%dfI%df"
+"""sensor_msgs/LaserScan behind its header: angles, times and limits; ranges and intensities, each behind its number."""
+
+
+def encode_text(text: str) -> bytes:
+    """Return a string field."""
+    data = text.encode()
+    return LENGTH.pack(len(data)) + data
+
+
+def encode_header(seq: int, frame_id: str, stamp: Tuple[int, int] = (0, 0)) -> bytes:
+    """Return a std_msgs/Header; stamp: s, ns."""
+    data = frame_id.encode()
+    return HEADER.pack(seq & 0xFFFFFFFF, *stamp, len(data)) + data
+
+
+def encode_pose(x_m: float, y_m: float, yaw_rad: float, z_m: float = 0.0) -> bytes:
+    """Return a geometry_msgs/Pose or Transform that is turned about z only."""
+    half_rad = yaw_rad / 2.0
+    return POSE_FORM.pack(x_m, y_m, z_m, 0.0, 0.0, math.sin(half_rad), math.cos(half_rad))
+
+
+def encode_twist(linear_m_s: float, angular_rad_s: float) -> bytes:
+    """Return a geometry_msgs/Twist in the plane."""
+    return TWIST_FORM.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
+
+
+def encode_odometry(header: bytes, child_frame_id: str, pose: bytes, twist: bytes) -> bytes:
+    """Return a nav_msgs/Odometry without covariances, from the bytes of its parts."""
+    return b"".join((header, encode_text(child_frame_id), pose, NO_COVARIANCE, twist, NO_COVARIANCE))
+
+
+def encode_transform(header: bytes, child_frame_id: str, pose: bytes) -> bytes:
+    """Return a geometry_msgs/TransformStamped, from the bytes of its parts."""
+    return header + encode_text(child_frame_id) + pose
+
+
+def encode_transforms(stamp: Tuple[int, int], transforms: Iterable[Tuple[str, str, Pose]]) -> bytes:
+    """Return a tf2_msgs/TFMessage; each transform: parent, child, pose of the child in the parent. stamp: s, ns."""
+    headed = [(encode_header(0, parent, stamp), child, encode_pose(*pose)) for parent, child, pose in transforms]
+    return encode_list([encode_transform(*parts) for parts in headed])
+
+
+def encode_list(items: Sequence[bytes]) -> bytes:
+    """Return a list field of encoded items, and so a message that is one list: tf2_msgs/TFMessage, MarkerArray."""
+    return LENGTH.pack(len(items)) + b"".join(items)
+
+
+def encode_scan(
+    header: bytes, settings: Sequence[float], ranges_m: Sequence[float], intensities: Sequence[float] = ()
+) -> bytes:
+    """Return a sensor_msgs/LaserScan.
+
+    settings: angle_min, angle_max, angle_increment (rad), time_increment, scan_time (s), range_min, range_max (m).
+    """
+    beams, count = len(ranges_m), len(intensities)
+    return header + struct.pack(SCAN_FORM % (beams, count), *settings, beams, *ranges_m, count, *intensities)
+
+
+def encode_turn_scan(
+    header: bytes,
+    scan_time_s: float,
+    limits_m: Tuple[float, float],
+    ranges_m: Sequence[float],
+    intensities: Sequence[float] = (),
+) -> bytes:
+    """Return a sensor_msgs/LaserScan of a whole turn, rear first and counter-clockwise; limits_m: least, greatest."""
+    step_rad = 2.0 * math.pi / len(ranges_m)
+    settings = (-math.pi, math.pi - step_rad, step_rad, 0.0, scan_time_s, *limits_m)
+    return encode_scan(header, settings, ranges_m, intensities)
