@@ -117,6 +117,22 @@ def test_no_robot_is_placed_inside_an_obstacle(tmp_path):
     assert inside[0] < 0 < inside[1]
 
 
+def test_no_robot_is_placed_outside_of_a_closed_wall_around_all(tmp_path):
+    diamond, island = "[[1, 0], [0, 1], [-1, 0], [0, -1], [1, 0]]", "[[0, 0], [0.4, 0], [0.2, 0.2], [0, 0]]"
+    arena = load_arena(write(tmp_path, "bounds_m: [-2, -2, 2, 2]\nwalls_m:\n  - %s\n  - %s\n" % (diamond, island)))
+    clearance_m = arenas.measure_clearance(np.array([[0.2, 0.1], [-0.3, 0.0], [0.8, 0.8], [1.5, 0.0]]), arena)
+    assert (clearance_m[:2] > 0.0).all() and (clearance_m[2:] < 0.0).all()
+    poses = arenas.place_robots(arena, 20, np.random.RandomState(0))
+    assert np.abs(poses[:, :2]).sum(axis=1).max() < 1.0
+    with pytest.raises(OptionError, match=r"the start at \(0.8, 0.8\) .* or is outside"):
+        load_arena(write(tmp_path, "walls_m: [%s]\nstarts_m_deg: [[0.8, 0.8, 0]]\n" % diamond))
+
+
+def test_an_open_wall_has_no_outside(tmp_path):
+    arena = load_arena(write(tmp_path, "walls_m: [[[1, 0], [0, 1], [-1, 0], [0, -1]]]\nbounds_m: [-2, -2, 2, 2]\n"))
+    assert arenas.measure_clearance(np.array([[0.8, 0.8], [1.5, 0.0]]), arena).min() > 0.0
+
+
 def test_starts_are_headed_along_the_rim_counter_clockwise():
     starts = arenas.build_default(4).starts
     assert [pose[:2] for pose in starts] == [(-0.375, -0.375), (0.375, -0.375), (-0.375, 0.375), (0.375, 0.375)]
@@ -137,7 +153,7 @@ def test_a_place_is_free_with_room_for_both_bodies_and_beside_objects():
     arena = load_arena("discs")
     arena = arena._replace(segments_m=np.array([(0.0, -1.0, 0.0, 1.0)]), circles_m=np.array([(2.0, 0.0, 0.3)]))
     thing = arena.objects[0]
-    arena = arena._replace(polygons_m=(), objects=(thing.put(Pose(4.0, 0.0, 0.0)),))
+    arena = arena._replace(polygons_m=(), rims_m=(), objects=(thing.put(Pose(4.0, 0.0, 0.0)),))
     reach_m = thing.shape.reach_m
     for x_m, radius_m, is_free in (
         (0.051, 0.05, True), (0.049, 0.05, False), (-0.051, 0.05, True),

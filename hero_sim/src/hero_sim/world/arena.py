@@ -59,6 +59,7 @@ class Arena(NamedTuple):
         objects: what robots can push, where it is at the start; each world moves copies.
         areas: painted parts of the floor, later ones over earlier ones.
         lamps_m: places of lamps (L, 2), x y.
+        rims_m: the corners of each closed wall around all the others; what lies outside of it is not free.
     """
 
     name: str
@@ -70,6 +71,7 @@ class Arena(NamedTuple):
     objects: Tuple[PushedBody, ...] = ()
     areas: Tuple[Area, ...] = ()
     lamps_m: np.ndarray = np.empty((0, 2))
+    rims_m: Tuple[np.ndarray, ...] = ()
 
 
 def square_length(ways_m: np.ndarray) -> np.ndarray:
@@ -152,12 +154,15 @@ def list_obstacles(arena: Arena) -> Tuple[Segments, np.ndarray]:
 
 
 def measure_clearance(points_m: np.ndarray, arena: Arena) -> np.ndarray:
-    """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle, negative inside one."""
+    """Return the distance (m) of each point (P, 2) to the nearest wall or obstacle, negative inside an obstacle and
+    outside of the arena."""
     obstacles, radii_m = list_obstacles(arena)
     distance_m = np.sqrt(square_length(obstacles.for_each_place().point_away(points_m.T[..., None])))
     clearance_m = (distance_m - radii_m).min(axis=1, initial=np.inf)
-    for corners_m in arena.polygons_m:
-        clearance_m = np.where(_lies_inside(points_m, corners_m), -np.abs(clearance_m), clearance_m)
+    solid = [_lies_inside(points_m, corners_m) for corners_m in arena.polygons_m]
+    solid += [~_lies_inside(points_m, corners_m) for corners_m in arena.rims_m]
+    for is_solid in solid:
+        clearance_m = np.where(is_solid, -np.abs(clearance_m), clearance_m)
     return clearance_m
 
 

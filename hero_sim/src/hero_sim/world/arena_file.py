@@ -87,7 +87,8 @@ def _build_arena(root: Entry, file_name: str) -> Arena:
     areas = tuple(_read_area(entry) for entry in _list_items(content, "areas"))
     lamps_m = np.reshape([_read_row(entry, "x and y") for entry in _list_items(content, "lamps_m")], (-1, 2))
     circles = np.reshape(circles_m, (-1, 3))
-    arena = Arena(name, segments_m, circles, (), bounds_m, tuple(polygons_m), objects, areas, lamps_m)
+    rims_m = tuple(points_m for points_m in walls_m if _is_rim(points_m, segments_m))
+    arena = Arena(name, segments_m, circles, (), bounds_m, tuple(polygons_m), objects, areas, lamps_m, rims_m)
     entries = _list_items(content, "starts_m_deg")
     if len(entries) > _MAX_STARTS:  # each is compared with all before it
         raise ValueError("starts_m_deg has %d starts, more than %d" % (len(entries), _MAX_STARTS))
@@ -95,8 +96,8 @@ def _build_arena(root: Entry, file_name: str) -> Arena:
     for row, (x_m, y_m, _) in enumerate(rows.tolist()):
         if not is_free(Pose(x_m, y_m, 0.0), rows[:row], arena, BODY_RADIUS_M):
             raise EntryError(
-                "%s: the start at (%g, %g) touches a wall, an obstacle or another start; robots need %.3f m"
-                " around their center" % (entries[row].place, x_m, y_m, BODY_RADIUS_M)
+                "%s: the start at (%g, %g) touches a wall, an obstacle or another start, or is outside; robots need"
+                " %.3f m around their center" % (entries[row].place, x_m, y_m, BODY_RADIUS_M)
             )
     starts = tuple(Pose(x_m, y_m, math.radians(heading_deg)) for x_m, y_m, heading_deg in rows.tolist())
     return arena._replace(starts=starts)
@@ -145,8 +146,18 @@ def _read_bounds(content: Dict[str, Entry], segments_m: np.ndarray) -> np.ndarra
         return bounds_m
     if not len(segments_m):
         raise ValueError("an arena without walls needs bounds_m: [x min, y min, x max, y max]")
-    ends_m = segments_m.reshape(-1, 2)
-    return np.hstack((ends_m.min(axis=0), ends_m.max(axis=0)))
+    return _measure_extent(segments_m.reshape(-1, 2))
+
+
+def _measure_extent(points_m: np.ndarray) -> np.ndarray:
+    """Return x min, y min, x max, y max of points (P, 2)."""
+    return np.hstack((points_m.min(axis=0), points_m.max(axis=0)))
+
+
+def _is_rim(points_m: np.ndarray, segments_m: np.ndarray) -> bool:
+    """Return whether a wall is closed, and reaches as far to all sides as all walls and polygons together."""
+    is_closed = len(points_m) > 3 and bool((points_m[0] == points_m[-1]).all())
+    return is_closed and bool((_measure_extent(points_m) == _measure_extent(segments_m.reshape(-1, 2))).all())
 
 
 def _list_items(content: Dict[str, Entry], key: str) -> List[Entry]:
