@@ -1,7 +1,11 @@
-"""Commands that no robot hears, by the ROS master's lists: a misspelled topic, an absent robot, another type. Pure."""
+"""Commands that no robot hears, by the ROS master's lists: a misspelled topic, an absent robot, another type."""
 
 import re
-from typing import Any, Dict, Iterable, List, Sequence, Tuple
+from typing import Dict, List
+
+import rospy
+
+from hero_node.ros import ask_master
 
 COMMANDS = {
     "velocity_controller/cmd_vel": "geometry_msgs/Twist",
@@ -19,21 +23,19 @@ USUAL = {COMMANDS[topic]: topic for topic in ("velocity_controller/cmd_vel", "cm
 _ROBOT_TOPIC = re.compile(r"/(hero_[0-9]+)/(.+)")
 
 
-def find_lost_commands(
-    system_state: Sequence[Any], topic_types: Iterable[Tuple[str, str]], own_name: str = ""
-) -> List[str]:
+def find_lost_commands() -> List[str]:
     """Return a sentence for each topic whose publishers mean to command robots, but are heard by none.
 
-    system_state, topic_types: the master's answers to getSystemState and getTopicTypes. own_name: of the asking node,
-    which keeps topics open for robots that may return.
+    This node is not among them: it keeps topics open for robots that may return. Asks the ROS master, which may take
+    seconds. Raises: NodeError if it does not answer.
     """
-    published, subscribed, _ = (dict(part) for part in system_state)
-    types: Dict[str, str] = dict(topic_types)
+    published, subscribed, _ = (dict(part) for part in ask_master("getSystemState"))
+    types: Dict[str, str] = dict(ask_master("getTopicTypes"))
     heard = {topic for topic in subscribed if _ROBOT_TOPIC.fullmatch(topic)}
     drivers = {node for topic in heard if topic.endswith("/cmd_vel") for node in subscribed[topic]}
     lost = []
     for topic, publishers in sorted(published.items()):
-        nodes = sorted(set(publishers) - {own_name})
+        nodes = sorted(set(publishers) - {rospy.get_name()})
         match, kind = _ROBOT_TOPIC.fullmatch(topic), types.get(topic, "")
         robot, name = match.groups() if match else ("hero_N", "")
         says = f"{', '.join(nodes)} publishes {topic}"

@@ -34,7 +34,6 @@ from hero_client.values import (
 )
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
 from hero_node import NodeError, Pose, make_printable, pose_of
-from hero_node.ros import ask_master
 
 from ..background import Background
 from .camera_picture import CameraPicture
@@ -212,8 +211,7 @@ class FleetFeed:
     def _look_for_lost_commands(self) -> None:
         """Ask the ROS master, which may take seconds."""
         with contextlib.suppress(NodeError):
-            state, types = ask_master("getSystemState"), ask_master("getTopicTypes")
-            self._lost_commands = find_lost_commands(state, types, rospy.get_name())
+            self._lost_commands = find_lost_commands()
 
     def _make_row(self, row: Robot) -> Dict[str, Any]:
         name = make_printable(row.namespace.strip("/"))
