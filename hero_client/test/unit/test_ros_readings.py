@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 
@@ -175,7 +176,7 @@ def test_only_a_stop_is_sent_without_a_warning():
     assert sent == [("move", 0.1, 0.0), ("move", 0.0, -0.5), ("stop", 0.0, 0.0)]
 
 
-def test_odometry_is_set_or_the_refusal_told(monkeypatch):
+def test_odometry_is_set_or_why_it_is_not_is_told(monkeypatch):
     link, asked = RosLink.__new__(RosLink), []
     link._namespace = "/hero_3"
     answer = SimpleNamespace(success=True, message="")
@@ -185,6 +186,10 @@ def test_odometry_is_set_or_the_refusal_told(monkeypatch):
     assert asked == [("/hero_3/set_odom", ros_link.SERVICE_TIMEOUT_S), (1.0, 2.0, 3.0)]
     answer.success, answer.message = False, "busy"
     with pytest.raises(RobotError, match="/hero_3/set_odom: the robot answers: busy"):
+        link.set_odometry(Pose(1.0, 2.0, 3.0))
+    refuse = create_autospec(rospy.wait_for_service, side_effect=rospy.ROSException("timeout exceeded"))
+    monkeypatch.setattr(rospy, "wait_for_service", refuse)
+    with pytest.raises(RobotError, match="/hero_3/set_odom: timeout exceeded"):
         link.set_odometry(Pose(1.0, 2.0, 3.0))
 
 

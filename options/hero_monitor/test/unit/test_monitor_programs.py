@@ -215,6 +215,16 @@ def test_why_a_program_failed_is_shown_until_another_one_starts(started):
     assert started.programs.describe() == []
 
 
+def test_all_programs_are_told_to_end_before_one_is_waited_for(started, monkeypatch):
+    read = wait_for_output(monkeypatch)
+    children = [started.start(OBEDIENT, robots=["hero_%d" % number]) for number in range(2)]
+    assert [read(), read()] == [b"runs\n"] * 2
+    told = []
+    started.programs._on_end = lambda _: told.append([child.is_ending for child in children])
+    started.programs.close(DEADLINE_S)
+    assert told[0] == [True, True]
+
+
 def test_the_end_of_the_monitor_ends_the_program(monkeypatch):
     # As the kernel does with the pipe of a monitor that was killed.
     read = wait_for_output(monkeypatch)
