@@ -19,7 +19,7 @@ from ..metrics import FALLING
 from ..metrics.own import is_own, list_names
 from ..sources import Sources
 from .errors import ExperimentError
-from .worlds import NOMINAL, WORLDS
+from .worlds import NOMINAL, OF_PAPERS, WORLDS
 
 MAX_ROBOTS = 1000
 MAX_TIME_S = 86_400.0
@@ -285,8 +285,9 @@ def _parse_value(name: str, entry: Entry) -> _Value:
     if name == "behavior":
         return _parse_behavior(entry)
     if name == "world":
-        world = entry.choice(WORLDS)
-        return _Value(world, {"settings": WORLDS[world]})
+        known = {**WORLDS, **OF_PAPERS}
+        world = entry.choice(known)
+        return _Value(world, {"settings": known[world]})
     if name == "start":
         start = _parse_start(entry)
         given = {key: value.value for key, value in entry.mapping().items() if key != "kind"}

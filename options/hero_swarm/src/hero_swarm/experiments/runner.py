@@ -19,7 +19,7 @@ from hero_node.parameters import explicit_ids_option, within
 from .computing import engines
 from .computing.batch import Batch, compute_batch, load_checked
 from .computing.code_version import describe_machine, hash_code, hash_suite
-from .experiment_file import MAX_ROBOTS, Experiment, read_experiment
+from .experiment_file import MAX_ROBOTS, MAX_RUNS, Experiment, read_experiment
 from .results_folder import FOLDER, REAL, SIMULATED, ResultsFolder, Run, RunKey
 
 MAX_BATCH = 1000
@@ -69,6 +69,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     add("file", metavar="EXPERIMENT.yaml", help="experiment file")
     add("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
     add("--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (about 10 s of work)")
+    add("--seeds", type=within(1, MAX_RUNS, int), metavar="N", help="only the first N seeds of the file")
     add_engine_options(parser)
     add("--robots", type=explicit_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9")
     add("--frame", default="map", help="of robots' poses: of localize (map), or world in the simulator")
@@ -133,6 +134,7 @@ def open_folder(options: argparse.Namespace) -> Iterator[Tuple[Experiment, Resul
     Other programs cannot add runs of the same kind meanwhile, unless both compute parts. Raises: ExperimentError.
     """
     text, experiment = read_experiment(options.file)
+    experiment = experiment._replace(seeds=experiment.seeds[: options.seeds])
     load_checked(experiment)
     experiment.sources.complete()
     path, kind = options.out or os.path.splitext(options.file)[0], SIMULATED if options.robots is None else REAL

@@ -30,3 +30,8 @@ WORLDS: Dict[str, Dict[str, Any]] = {
     },
 }
 """Settings of an experiment by the name of the world."""
+
+OF_PAPERS: Dict[str, Dict[str, Any]] = {
+    "discs": {**_NOMINAL, "errors.lag_s": 0.001},
+}
+"""Robots as papers have them: discs whose wheels follow at once."""

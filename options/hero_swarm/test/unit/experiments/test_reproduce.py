@@ -1,0 +1,173 @@
+"""Published experiments: what is read, run, judged and shown, and what happens when a file is changed or damaged."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hero_node.files import EntryError
+from hero_swarm.experiments import reproduce, runner
+from hero_swarm.experiments.computing.batch import load_checked
+from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import read_experiment
+from hero_swarm.experiments.reporting.statistics import Interval
+from hero_swarm.experiments.reproduce import NO_FIGURE, NO_RUN, OUTSIDE, WITHIN, Figure, Verdict
+from hero_swarm.experiments.results import load
+from hero_test.nonempty import nonempty
+
+AHEAD = """\
+from hero_swarm.behavior import Behavior
+
+class Ahead(Behavior):
+    metric = "dispersion"
+
+    def step(self, sensed, memory, random):
+        return 0.1, 0.0, memory
+"""
+FILE = """\
+behavior: ahead.py
+vary: {robots: [2, 3]}
+start: {kind: circle, gap_m: 0.2}
+errors: perfect
+time_s: 2
+seeds: {from: 7, count: 3}
+metrics: [dispersion, cluster_fraction]
+record: {hz: 1}
+"""
+FIGURES = """\
+ahead:
+  sentence: Robots drive ahead
+  source: none
+  differs: they have wheels
+  minutes: 0.1
+  figures:
+    - {name: before, metric: dispersion, at_s: 0, cells: {robots: 2}, published: 0.274}
+    - {name: after, metric: dispersion, cells: {robots: 2}, published: [5, 6]}
+    - {name: cluster, metric: cluster_fraction, published: null}
+    - {name: none, metric: cluster_fraction, cells: {robots: 3}, published: [0, 1], claim: some cluster}
+"""
+
+
+@pytest.fixture(name="shipped")
+def ship(tmp_path, monkeypatch):
+    """Give the folder of published experiments, with one; the user's folder is the working one."""
+    folder = tmp_path / "published"
+    folder.mkdir()
+    for name, text in (("ahead.py", AHEAD), ("ahead.yaml", FILE), ("published.yaml", FIGURES)):
+        (folder / name).write_text(text)
+    monkeypatch.setattr(reproduce, "SHIPPED", folder)
+    monkeypatch.setattr(reproduce.read_publications, "__defaults__", (folder / "published.yaml",))
+    monkeypatch.chdir(str(tmp_path))
+    return folder
+
+
+def run(capsys, *options):
+    """Run the program, and return what it prints, and says of progress."""
+    reproduce.main(["ahead", "--jobs", "1", *options])
+    return capsys.readouterr()
+
+
+@pytest.mark.parametrize(
+    ("interval", "published", "word"),
+    [
+        (Interval(2.0, 1.0, 3.0), (3.0, 4.0), WITHIN),
+        (Interval(2.0, 1.0, 2.9), (3.0, 4.0), OUTSIDE),
+        (Interval(5.0, 4.1, math.inf), (3.0, 4.0), OUTSIDE),
+        (Interval(math.inf, 4.0, math.inf), (3.0, 4.0), WITHIN),
+        (Interval(2.0, 1.0, 3.0), (None, None), NO_FIGURE),
+        (None, (3.0, 4.0), NO_RUN),
+    ],
+)
+def test_a_figure_is_within_where_the_two_intervals_meet(interval, published, word):
+    figure = Figure("cluster", "cluster_fraction", None, {}, "", *published)
+    assert Verdict(figure, "all", 9, interval).word == word
+
+
+def test_each_figure_is_shown_with_ours_its_runs_and_the_verdict(shipped, capsys):
+    lines = [line.split() for line in run(capsys, "--quick").out.splitlines()]
+    assert lines[0] == ["ahead:", "Robots", "drive", "ahead"]
+    assert lines[1:3] == [
+        ["before:", "published", "0.274"],
+        ["robots", "2", "0.2737", "(0.2737", "to", "0.2737),", "2", "runs", WITHIN],
+    ]
+    assert lines[3] == ["after:", "published", "5", "to", "6"] and lines[4][-1] == OUTSIDE
+    assert [" ".join(line[-3:]) for line in lines[6:8]] == [NO_FIGURE] * 2, "a row for each of the two cells"
+    assert lines[8] == ["none:", "published", "some", "cluster", "(0", "to", "1)"]
+    assert lines[-2:] == [["may", "differ:", "they", "have", "wheels"], ["source:", "none"]]
+    assert not any(line[0] == "changed:" for line in lines)
+
+
+def test_an_interrupted_run_goes_on_with_the_seeds_of_its_file(shipped, capsys):
+    assert "2 runs in" in run(capsys, "--seeds", "1").err
+    assert "4 runs in" in run(capsys).err
+    again = run(capsys)
+    assert "runs in" not in again.err and " 3 runs " in again.out
+    assert load("reproduction/ahead").seeds.tolist() == [7, 8, 9]
+
+
+def test_what_was_changed_by_hand_is_shown_beside_the_verdict(shipped, capsys):
+    run(capsys, "--quick")
+    own = Path("reproduction")
+    (own / "ahead.yaml").write_text(FILE.replace("time_s: 2", "time_s: 1") + "errors.friction: 0.1\n")
+    (own / "ahead.py").write_text(AHEAD.replace("0.1, 0.0", "0.2, 0.0"))
+    with pytest.raises(ExperimentError, match="--fresh"):
+        run(capsys, "--quick")
+    lines = run(capsys, "--quick", "--fresh").out.splitlines()
+    assert [line.strip() for line in lines if "changed:" in line] == [
+        "changed: time_s 1 (published: 2)",
+        "changed: errors.friction 0.1 (published: none)",
+        "changed: ahead.py is another one",
+    ]
+    assert (shipped / "ahead.yaml").read_text() == FILE
+
+
+def test_a_name_or_a_file_that_is_wrong_is_told_with_a_remedy(shipped, capsys):
+    with pytest.raises(ExperimentError, match="'gauci' is no published experiment; there are ahead"):
+        reproduce.main(["gauci"])
+    Path("reproduction").mkdir()
+    Path("reproduction/ahead.yaml").write_text("behavior: [")
+    with pytest.raises(ExperimentError, match=r"ahead.yaml, line 1.*; delete reproduction/ahead.yaml to have"):
+        run(capsys)
+    Path("reproduction/ahead.yaml").unlink()
+    (shipped / "published.yaml").write_text(FIGURES.replace("[5, 6]", "[5]"))
+    with pytest.raises(
+        EntryError, match=r"published.yaml, line 8: .*published is 'a list', but must be a number, \[low"
+    ):
+        run(capsys)
+
+
+def test_the_page_has_a_row_for_each_verdict_and_a_picture(shipped, capsys, tmp_path):
+    run(capsys, "--quick")
+    (tmp_path / "docs" / "pictures").mkdir(parents=True)
+    reproduce.main(["--page", "docs/reproduction.md"])
+    page = (tmp_path / "docs" / "reproduction.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith(("| before", "| cluster"))]
+    assert [row.rsplit("| ", 1)[1] for row in rows] == ["within |"] + ["no published figure |"] * 2
+    assert "![Where the robots of one run of each cell ended](pictures/reproduction_ahead.png)" in page
+    assert (tmp_path / "docs" / "pictures" / "reproduction_ahead.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_without_a_name_the_experiments_are_listed_and_nothing_is_run(shipped, capsys):
+    reproduce.main([])
+    assert capsys.readouterr().out.split() == "ahead Robots drive ahead (0.1 min of CPU)".split()
+    assert not Path("reproduction").exists()
+
+
+def test_run_computes_the_first_seeds_only(shipped, capsys):
+    reproduce.copy_files(".")
+    runner.run_experiment(runner.parse_options(["ahead.yaml", "--seeds", "2", "--jobs", "1"]))
+    assert np.isfinite(load("ahead").metrics["dispersion"]).tolist() == [[True, True, False]] * 2
+
+
+@pytest.mark.parametrize("name", [one.name for one in reproduce.read_publications()])
+def test_every_figure_that_ships_finds_its_cells_and_its_metric(name):
+    publication = reproduce.find_publication(name)
+    _, experiment = read_experiment(str(publication.path))
+    columns, sampled = ({metric.name for metric in experiment.metrics}, {m.source for m in experiment.metrics})
+    sampled = {source.rpartition(":")[2] for source in sampled}
+    assert len(experiment.seeds) >= 30 and experiment.record_hz
+    for figure in nonempty(publication.figures):
+        assert figure.metric in (columns if figure.at_s is None else sampled), figure
+        assert any(figure.cells.items() <= cell.varied.items() for cell in experiment.cells), figure
+    load_checked(experiment._replace(cells=experiment.cells[:1]))
