@@ -17,8 +17,6 @@ MIN_RIM_RANGE_M = 0.01
 MAX_RIM_RANGE_M = 0.20
 """The firmware's range_max, from the body's rim; ranges beyond it stand for nothing in range."""
 
-"""Infrared sensors, pi/4 apart."""
-
 STOCK_BEAMS = 16
 """Ranges of a stock laser message; the odd ones are averages."""
 
