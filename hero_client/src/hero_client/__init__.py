@@ -3,42 +3,26 @@
 Public names are imported on first use (PEP 562), so that pure modules of this package work without ROS.
 """
 
-# ruff: noqa: PLC0414
+# ruff: noqa: F401
+# mypy: implicit-reexport
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Dict, List, Mapping
 
-if TYPE_CHECKING:  # for editors and mypy, to which a name with `as` is public
-    from hero_node import Clock as Clock
-    from hero_node import HeroError as HeroError
-    from hero_node import NodeError as NodeError
-    from hero_node import Pose as Pose
-    from hero_node import ProgramError as ProgramError
-    from hero_node import Velocity as Velocity
-    from hero_node import run as run
-    from hero_node.ros import Program as Program
-    from hero_node.ros import rate as rate
-    from hero_node.ros import read_parameters as read_parameters
-    from hero_node.ros import start_node as start_node
+if TYPE_CHECKING:  # for editors and mypy
+    from hero_node import Clock, HeroError, NodeError, Pose, ProgramError, Velocity, run
+    from hero_node.ros import Program, rate, read_parameters, start_node
 
-    from .apps.go_to_goal_server import GoToGoalServer as GoToGoalServer
-    from .robot import Robot as Robot
-    from .robots.common_frame import CommonFrame as CommonFrame
-    from .robots.robot_base import BaseRobot as BaseRobot
-    from .robots.swarm_base import BaseSwarm as BaseSwarm
-    from .ros.drivers import Drivers as Drivers
-    from .ros.stop_status import StopStatus as StopStatus
-    from .swarm import Swarm as Swarm
-    from .swarm import open_swarm as open_swarm
-    from .values.background_motion import BackgroundMotion as BackgroundMotion
-    from .values.colors import COLORS as COLORS
-    from .values.errors import FrameError as FrameError
-    from .values.errors import GoalError as GoalError
-    from .values.errors import RobotError as RobotError
-    from .values.errors import RobotNotReadyError as RobotNotReadyError
-    from .values.errors import StaleDataError as StaleDataError
-    from .values.errors import StoppedError as StoppedError
-    from .values.readings import Obstacle as Obstacle
+    from .apps.go_to_goal_server import GoToGoalServer
+    from .robot import Robot
+    from .robots import BaseRobot, BaseSwarm
+    from .robots.common_frame import CommonFrame
+    from .ros import Drivers, StopStatus
+    from .swarm import Swarm, open_swarm
+    from .values.background_motion import BackgroundMotion
+    from .values.colors import COLORS
+    from .values.errors import FrameError, GoalError, RobotError, RobotNotReadyError, StaleDataError, StoppedError
+    from .values.readings import Obstacle
 
 _NAMES = {
     "hero_client.apps.go_to_goal_server": "GoToGoalServer",

@@ -12,14 +12,13 @@ import signal
 import sys
 import threading
 import time
-import xmlrpc.client
 from typing import Any, Callable, List, Optional
 
 import rosgraph
 import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
-from hero_node import NodeError, ProgramError, print_error
+from hero_node import ProgramError, print_error
 from hero_node.ros import (
     MasterWatch,
     end_ros_node,
@@ -27,6 +26,7 @@ from hero_node.ros import (
     init_ros_node,
     limit_xmlrpc_connections,
     open_tcpros_server,
+    read_given,
     read_master_uri,
 )
 
@@ -60,9 +60,6 @@ REPORT_CHECK_S = 0.1
 
 MASTER_CHECK_S = 0.5
 """Time between two looks for the ROS master at the start."""
-
-MASTER_WATCH_S = 2.0
-"""Time between two looks whether the ROS master still knows this node."""
 
 LEAVE_WAIT_S = 3.0
 """Time limit for unregistering at the ROS master; 50 robots take 0.5 s."""
@@ -114,7 +111,11 @@ class DriverNode:
         self._stop_interface.open(since_s is not None or self._config.start_stopped == "always", since_s)
         self._thread.start()
         rospy.Service("~dismiss_gone", Trigger, self._serve_dismissal)
-        threading.Thread(target=self._watch_master, name="master watch", daemon=True).start()
+        MasterWatch().start(
+            self._is_closed,
+            lambda news: self._log.log("warn", news),
+            lambda loss: self._log.log("error", f"{loss}; programs that start now find no robots"),
+        )
         self._log.log("info", f"hero_driver: listening on {self._loop.listening}")
         for problem in self._config.calibration_problems.values():
             self._log.log("warn", f"a calibration is not used: {problem}, then restart the driver")
@@ -179,19 +180,6 @@ class DriverNode:
             self._crash = error
             self.end()
             raise
-
-    def _watch_master(self) -> None:
-        watch, was_lost = MasterWatch(), False
-        while not self._is_closed.wait(MASTER_WATCH_S):
-            try:
-                news = watch.look()
-                if news:
-                    self._log.log("warn", news)
-            except (NodeError, OSError, xmlrpc.client.Error) as error:
-                if not was_lost and not self._is_closed.is_set():
-                    text = "%s: existing connections keep working; programs that start now find no robots"
-                    self._log.log("error", text % error)
-            was_lost = watch.is_lost
 
     def _serve_dismissal(self, request: Any) -> TriggerResponse:
         del request
@@ -260,7 +248,7 @@ def _run(argv: Optional[List[str]], threads: ThreadWatch) -> int:
     log = LogRelay()
     try:
         _enter_ros(argv, log)
-        node = DriverNode(read_config(_read_private_parameters()), log, threads)
+        node = DriverNode(read_config(read_given()), log, threads)
         sys.setswitchinterval(SWITCH_INTERVAL_S)
         # The driver handles signals itself: robots are stopped before ROS goes down.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -311,16 +299,6 @@ def _wait_for_master(uri: str) -> None:
     )
     while not rosgraph.is_master_online():
         time.sleep(MASTER_CHECK_S)
-
-
-def _read_private_parameters() -> Any:
-    try:
-        parameters = rospy.get_param("~", {})
-    except (rosgraph.MasterException, OSError) as error:
-        raise ProgramError(f"the ROS master cannot be asked for parameters: {error}") from error
-    if not isinstance(parameters, dict):
-        return {}
-    return parameters
 
 
 def _explain_bind_error(config: DriverConfig, error: OSError) -> str:

@@ -111,3 +111,36 @@ def test_everything_is_registered_again_after_a_master_that_hung(master):
     master.answers = True  # registrations may have been cut off meanwhile
     assert watch.look() == "the ROS master answers again; 2 topics and 1 services are registered again"
     assert [watch.is_lost, watch.look()] == [False, ""]
+
+
+class LooksThenEnd:
+    """Stands for the event that ends the watch: each wait is followed by one look."""
+
+    def __init__(self, monkeypatch, outcomes):
+        self.outcomes, self.waited_s = list(outcomes), 0.0
+        monkeypatch.setattr(master_watch, "ask_master", self.ask)
+        monkeypatch.setattr(master_watch, "_register_again", lambda: (2, 1))
+
+    def wait(self, timeout_s):
+        self.waited_s += timeout_s
+        return not self.outcomes
+
+    def is_set(self):
+        return False
+
+    def ask(self, method, name):
+        outcome = self.outcomes.pop(0)
+        if outcome is not None:
+            raise outcome
+
+
+@pytest.mark.parametrize("failure", [NodeError("no answer"), OSError("refused"), master_watch.xmlrpc.client.Error()])
+def test_the_watch_tells_of_a_loss_once_and_of_the_return(monkeypatch, failure):
+    lost = NodeError("no ROS master")
+    end = LooksThenEnd(monkeypatch, [None, lost, lost, failure, None, None, lost])
+    news, losses = [], []
+    monkeypatch.setattr(master_watch.rospy, "resolve_name", lambda name: name)
+    MasterWatch()._run(end, news.append, losses.append)
+    assert news == ["the ROS master answers again; 2 topics and 1 services are registered again"]
+    assert losses == ["no ROS master: existing connections keep working"] * 2
+    assert end.waited_s == 8 * master_watch.WATCH_PERIOD_S

@@ -6,6 +6,7 @@ its computation, and gives the same each time.
 
 import argparse
 import builtins
+import os
 import runpy
 import sys
 import time
@@ -43,11 +44,12 @@ def run_script(options: argparse.Namespace) -> None:
         raise ProgramError(f"{options.script}: no such script")
     swarm = StepSwarm(options.count, options.seed, options.arena, options.wifi, options.perfect, model=options.model)
     replace_ros(swarm)
-    give_script_clock(swarm)
+    folder = str(Path(options.script).resolve().parent)
+    give_scripts_clock(swarm, folder)
     if options.seconds is not None:
         StepMotion(swarm._clock, end_at(options.seconds))
     sys.argv = [options.script, *options.arguments]
-    sys.path.insert(0, str(Path(options.script).resolve().parent))
+    sys.path.insert(0, folder)
     try:
         runpy.run_path(options.script, run_name="__main__")
     except HeroError as error:
@@ -110,15 +112,17 @@ def replace_ros(swarm: StepSwarm) -> None:
     hero_client.choose_backend(replacements)
 
 
-def give_script_clock(swarm: StepSwarm) -> None:
-    """Give the script, and no other module, these robots' time where it imports `time`."""
+def give_scripts_clock(swarm: StepSwarm, folder: str) -> None:
+    """Give the script and modules in its folder, and no others, these robots' time where they import `time`."""
     clock = ModuleType("time")
     vars(clock).update(vars(time), time=lambda: swarm.now_s, monotonic=lambda: swarm.now_s, sleep=swarm.sleep)
     import_module = builtins.__import__
 
     def import_for(name: str, variables: Optional[Mapping[str, Any]] = None, *arguments: Any) -> Any:
-        is_clock = name == "time" and variables is not None and variables.get("__name__") == "__main__"
-        return clock if is_clock else import_module(name, variables, *arguments)
+        if name == "time" and variables is not None:
+            if variables.get("__name__") == "__main__" or os.path.dirname(variables.get("__file__") or "") == folder:
+                return clock
+        return import_module(name, variables, *arguments)
 
     builtins.__import__ = import_for  # type: ignore[assignment]
 

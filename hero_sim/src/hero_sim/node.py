@@ -9,13 +9,12 @@ import signal
 import sys
 import threading
 import uuid
-import xmlrpc.client
 from contextlib import suppress
 from typing import Tuple
 
 import rospy
 
-from hero_node import NodeError, call
+from hero_node import call
 from hero_node.ros import MasterWatch, end_ros_node, find_running_node, init_ros_node, read_master_uri
 
 from . import main as command_line
@@ -35,9 +34,6 @@ MASTER_WAIT_S = 0.7
 
 DRIVER_WAIT_S = 1.0
 """Time between two looks whether this node is to end."""
-
-MASTER_WATCH_S = 2.0
-"""Time between two looks at the master."""
 
 LINGER_S = 2.5
 """roslaunch ends all of its nodes at once; the driver takes up to 2 s to stop its robots."""
@@ -85,16 +81,6 @@ def wait_for_driver(name: str) -> bool:
     return False
 
 
-def watch_master(has_ended: threading.Event) -> None:
-    """Register with a master that was started again, until the event is set."""
-    watch = MasterWatch()
-    while not has_ended.wait(MASTER_WATCH_S):
-        with suppress(NodeError, OSError, xmlrpc.client.Error):  # the driver reports a lost master
-            news = watch.look()
-            if news:
-                rospy.logwarn(news)
-
-
 def main() -> None:
     """Run the simulator until ROS or a signal ends it."""
     status = call(_run)
@@ -126,7 +112,7 @@ def _run() -> None:
         FaultService(simulator, injector)
         has_ended = threading.Event()
         rospy.on_shutdown(has_ended.set)
-        threading.Thread(target=watch_master, args=(has_ended,), daemon=True).start()
+        MasterWatch().start(has_ended, rospy.logwarn)  # the driver reports a lost master
         simulator.run(options.seconds)
         if simulator.stopping and not rospy.is_shutdown():
             simulator.linger(LINGER_S)

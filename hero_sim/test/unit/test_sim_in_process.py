@@ -40,7 +40,16 @@ def test_a_script_for_robots_runs_unchanged_on_stepped_ones(tmp_path):
     assert first.stdout == again.stdout
 
 
-def test_only_the_script_itself_has_simulated_time(tmp_path):
+def test_modules_beside_the_script_have_its_time_and_others_do_not(tmp_path):
+    (tmp_path / "beside.py").write_text("from time import monotonic, sleep\n")
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package" / "__init__.py").write_text("from time import monotonic\n")
+    text = "import beside, package, time\nbeside.sleep(100.0)\nprint(beside.monotonic(), time.time())\n"
+    ended = run(tmp_path, text + "print(package.monotonic is beside.monotonic)\n")
+    assert (ended.returncode, ended.stdout) == (0, "100.0 100.0\nFalse\n"), ended.stderr
+
+
+def test_libraries_keep_the_time_of_the_machine(tmp_path):
     text = "import time, threading\nfrom time import monotonic\nthreading.Event().wait(0.01)\n"
     ended = run(tmp_path, text + "import sched\nassert sched._time is not monotonic\nprint(monotonic(), time.time())\n")
     assert (ended.returncode, ended.stdout) == (0, "0.0 0.0\n"), ended.stderr

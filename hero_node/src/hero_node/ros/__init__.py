@@ -14,7 +14,7 @@ from .master import (
     read_master_uri,
 )
 from .master_watch import MasterWatch
-from .private_parameters import read_parameters
+from .private_parameters import read_given, read_parameters
 from .program import Program
 from .ros_clock import ROS_CLOCK, read_duration_clock_s
 from .ros_node import end_ros_node, init_ros_node

@@ -3,8 +3,9 @@
 Programs that start after that would not find this node; open connections are not affected.
 """
 
+import threading
 import xmlrpc.client
-from typing import Tuple
+from typing import Callable, Tuple
 
 import rospy
 from rospy.impl.registration import get_service_manager, get_topic_manager
@@ -16,11 +17,37 @@ SENTINEL = "~get_loggers"
 """A service that rospy registers when a node starts, and not again: what the node registers later does not tell."""
 
 
+WATCH_PERIOD_S = 2.0
+"""Time between two looks at the master."""
+
+
 class MasterWatch:
     """The ROS master as look() finds it; is_lost: it did not answer, or lacks registrations."""
 
     def __init__(self) -> None:
         self.is_lost = False
+
+    def start(
+        self, has_ended: threading.Event, tell: Callable[[str], None], tell_loss: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Look on a thread of its own every WATCH_PERIOD_S, until has_ended is set.
+
+        tell: takes what was registered; tell_loss: that the master was lost, once until it is back; both for users.
+        """
+        arguments = has_ended, tell, tell_loss
+        threading.Thread(target=self._run, args=arguments, name="master watch", daemon=True).start()
+
+    def _run(self, has_ended: threading.Event, tell: Callable[[str], None], tell_loss: Callable[[str], None]) -> None:
+        while not has_ended.wait(WATCH_PERIOD_S):
+            was_lost = self.is_lost
+            try:
+                news = self.look()
+            except (NodeError, OSError, xmlrpc.client.Error) as error:
+                if not was_lost and not has_ended.is_set():
+                    tell_loss(f"{error}: existing connections keep working")
+            else:
+                if news:
+                    tell(news)
 
     def look(self) -> str:
         """Ask the master, and register with one that was started again; return what was registered, for users.

@@ -28,12 +28,20 @@ def delete_own_parameters() -> None:
                 rospy.delete_param("~" + name)
 
 
-def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
-    """Return the node's private parameters, as check_parameters(). Raises: ProgramError."""
+def read_given() -> Dict[str, Any]:
+    """Return the node's private parameters as they were given. Raises: ProgramError if the master does not answer."""
     try:
         given = rospy.get_param("~", {})
     except KeyError:
-        given = {}
+        return {}
+    except (rosgraph.MasterException, OSError) as error:
+        raise ProgramError(f"the ROS master cannot be asked for parameters: {error}") from error
+    return given if isinstance(given, dict) else {}
+
+
+def read_parameters(declared: Mapping[str, Any]) -> Dict[str, Any]:
+    """Return the node's private parameters, as check_parameters(). Raises: ProgramError."""
+    given = read_given()
     try:
         return check_parameters(declared, given)
     except ProgramError as error:

@@ -10,6 +10,7 @@ from typing import Dict, List, NamedTuple, Tuple
 from hero_node import MD5SUMS, PLUS_ENCODER_MD5
 
 from ..errors import OptionError
+from ..key_values import parse_values
 from ..robot_constants import BODY_RADIUS_M, TICK_M, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from ..world.robot_errors import RobotErrors
 from .declarations import PUB, STOCK_TOPICS, Topic, assign_ids
@@ -72,16 +73,11 @@ def parse_models(texts: List[str], first_id: int, count: int) -> List[RobotModel
     """
     models = [HERO] * count
     for text in texts:
-        name, _, robot = text.partition(",robot=")
+        name, _, tail = text.partition(",")
         if name not in MODELS:
             raise OptionError(f"--model {text}: must be one of {', '.join(MODELS)}, or that with ,robot=ID")
-        rows = range(count)
-        if robot:
-            if not robot.isdecimal() or not 0 <= int(robot) - first_id < count:
-                last_id = first_id + count - 1
-                raise OptionError("--model %s: robot must be %d..%d, not %s" % (text, first_id, last_id, robot))
-            rows = range(int(robot) - first_id, int(robot) - first_id + 1)
-        for row in rows:
+        robot_id = parse_values(f"--model {text}", tail, {"robot": (first_id, first_id + count - 1)}).get("robot")
+        for row in range(count) if robot_id is None else [int(robot_id) - first_id]:
             models[row] = MODELS[name]
     return models
 

@@ -2,15 +2,13 @@
 
 import math
 import re
-import struct
 from typing import Any, Dict, Optional, Tuple
 
 from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
-from hero_node import clamp
+from hero_node import TWIST_FORM, clamp
 
 _VELOCITY_TOPIC = re.compile(r"/(hero_[0-9]+)(?:/velocity_controller)?/cmd_vel")
 _STOP_TOPIC = re.compile(r"/(?:[A-Za-z0-9_/]+/)?stop_request")
-_TWIST = struct.Struct("<6d")
 
 
 PRESS_GAP_MS = 1500
@@ -33,8 +31,8 @@ def read_command(topic: str, message_type: str, content: bytes) -> Optional[Dict
     """Return a message as a page's request: a velocity within the firmware's limits, or a stop; None for others."""
     message_type = message_type.replace("/msg/", "/")  # as some clients write it
     velocity_topic = _VELOCITY_TOPIC.fullmatch(topic)
-    if velocity_topic and message_type == "geometry_msgs/Twist" and len(content) == _TWIST.size:
-        linear_m_s, _, _, _, _, angular_rad_s = _TWIST.unpack(content)
+    if velocity_topic and message_type == "geometry_msgs/Twist" and len(content) == TWIST_FORM.size:
+        linear_m_s, _, _, _, _, angular_rad_s = TWIST_FORM.unpack(content)
         if not math.isfinite(linear_m_s + angular_rad_s):
             return None
         robots = {"robots": [velocity_topic[1]]}
