@@ -1,22 +1,66 @@
-"""Program export: writes recordings as tables, a folder per robot and a file per message type.
+"""Program export: writes recordings as tables (CSV), a folder per robot and a file per kind of message.
 
-What is written is in OUT.part until it is complete.
+What is written is in OUT.part until it is complete. No file stays open: a recording of 100 robots has a thousand tables.
 """
 
 import argparse
+import csv
 import os
 import shutil
-from typing import Optional, Sequence
+from typing import Dict, List, Optional, Sequence, Tuple
 
 from hero_node.files import read_fleet_file
 from hero_node.parameters import robot_ids_option
 
 from .bags.bag_set import BagSet
-from .bags.tables import TABLES, declare_tables, is_exported, read_rows
+from .bags.tables import TABLES, Row, declare_tables, is_exported, read_rows
 from .bags.topics import Message
 from .errors import RecordingError, explain_write_errors
 from .options import list_of
-from .table_files import CSV, TABLE_FORMATS, CsvFiles, convert_csv, load_writer
+
+BATCH_ROWS = 4096
+"""Buffered rows of a table: 8 numbers take some 0.8 MB."""
+
+TIME_COLUMN = "time_s"
+
+
+class CsvFiles:
+    """All tables of an export, in a folder per robot.
+
+    Attributes:
+        rows: how many rows were written, by robot and kind.
+    """
+
+    def __init__(self, folder: str) -> None:
+        """Write to folder, which is created."""
+        self.rows: Dict[Tuple[int, str], int] = {}
+        self._folder = folder
+        self._buffers: Dict[Tuple[int, str], List[Row]] = {}
+
+    def add(self, robot_id: int, kind: str, row: Row) -> None:
+        """Add a row. Raises: RecordingError if a file cannot be written."""
+        buffer = self._buffers.setdefault((robot_id, kind), [])
+        buffer.append(row)
+        if len(buffer) >= BATCH_ROWS:
+            self._write(robot_id, kind)
+
+    def flush(self) -> None:
+        """Write all buffered rows. Raises: RecordingError if a file cannot be written."""
+        for robot_id, kind in list(self._buffers):
+            self._write(robot_id, kind)
+
+    def _write(self, robot_id: int, kind: str) -> None:
+        key = (robot_id, kind)
+        rows = self._buffers.pop(key)
+        path = os.path.join(self._folder, "hero_%d" % robot_id, kind + ".csv")
+        with explain_write_errors(path):
+            os.makedirs(os.path.dirname(path), exist_ok=True)
+            with open(path, "a", encoding="utf-8", newline="") as file:
+                writer = csv.writer(file)
+                if key not in self.rows:
+                    writer.writerow((TIME_COLUMN, *TABLES[kind]))
+                writer.writerows(rows)
+        self.rows[key] = self.rows.get(key, 0) + len(rows)
 
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
@@ -27,13 +71,11 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
     every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
     parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)
-    parser.add_argument("--format", choices=TABLE_FORMATS, default=CSV, help="of the files (%(default)s)")
     return parser.parse_args(arguments)
 
 
 def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str:
     """Write tables into a new folder and return what was written. Raises: RecordingError, also if that is nothing."""
-    write = None if options.format == CSV else load_writer(options.format)
     files = CsvFiles(folder)
 
     def receive(message: Message) -> None:
@@ -48,9 +90,6 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
             "%s: nothing of these robots and tables in it; its topics: %s"
             % (", ".join(bags.paths), bags.describe_topics())
         )
-    if write:
-        for robot_id, kind in files.rows:
-            convert_csv(files.path(robot_id, kind), "." + options.format, write)
     robots = {robot_id for robot_id, _ in files.rows}
     return "%d robots, %d tables, %d rows" % (len(robots), len(files.rows), sum(files.rows.values()))
 

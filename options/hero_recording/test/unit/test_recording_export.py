@@ -2,17 +2,13 @@
 
 import csv
 import math
-import sys
 
-import numpy as np
 import pytest
 import rosbag
 from synthetic_bag import DELAY_S, START_S, make_localized, write_bag
 
-from hero_node import ProgramError
 from hero_recording import export
 from hero_recording.errors import RecordingError
-from hero_test.nonempty import nonempty
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +89,7 @@ def test_an_interrupted_export_leaves_nothing_behind(bag, tmp_path, capsys, monk
 
 
 def test_all_buffered_rows_are_written(bag, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("hero_recording.table_files.BATCH_ROWS", 10)
+    monkeypatch.setattr("hero_recording.export.BATCH_ROWS", 10)
     output = run_export(capsys, bag, "--out", tmp_path / "out", "--tables", "odometry")
     assert output.endswith("2 robots, 2 tables, 234 rows\n")
     assert len(read_csv(tmp_path / "out" / "hero_0" / "odometry.csv")) == 117
@@ -105,37 +101,3 @@ def test_wrong_options_of_export_are_refused_by_name(bag, capsys):
             export.parse_options([str(bag), *arguments])
         assert caught.value.code == 2
         assert arguments[0] in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_npz_tables_hold_the_values_of_csv(bag, tmp_path, capsys):
-    run_export(capsys, bag, "--out", tmp_path / "csv")
-    run_export(capsys, bag, "--out", tmp_path / "npz", "--format", "npz")
-    assert not list((tmp_path / "npz").rglob("*.csv"))
-    tables = sorted((tmp_path / "csv").rglob("*.csv"))
-    assert len(tables) == 12 == len(list((tmp_path / "npz").rglob("*.npz")))
-    for path in tables:
-        rows = read_csv(path)
-        with np.load(str(tmp_path / "npz" / path.parent.name / (path.stem + ".npz"))) as arrays:
-            assert list(arrays) == list(rows[0])
-            for name, column in nonempty(arrays.items()):
-                values = [row[name] for row in rows]
-                expected = values if name in ("state", "address", "last_error") else [float(value) for value in values]
-                np.testing.assert_array_equal(column, expected)
-
-
-@pytest.mark.option("pyarrow.parquet")
-def test_parquet_tables_hold_all_rows_and_columns(bag, tmp_path, capsys):
-    from pyarrow import parquet
-
-    run_export(capsys, bag, "--out", tmp_path / "out", "--format", "parquet")
-    table = parquet.read_table(str(tmp_path / "out" / "hero_3" / "odometry.parquet"))
-    assert table.num_rows == 117
-    assert table.column_names[:3] == ["time_s", "stamp_s", "x_m"]
-
-
-def test_a_missing_library_is_named_and_nothing_is_left(bag, tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(ProgramError, match="pip install 'pyarrow"):
-        run_export(capsys, bag, "--out", tmp_path / "out", "--format", "parquet")
-    assert not list(tmp_path.iterdir())

@@ -104,9 +104,6 @@ TABLES: Dict[str, Columns] = {
 }
 """By kind, which is also the name of the file."""
 
-TEXT_COLUMNS = {"state", "address", "last_error"}
-"""All other columns are numbers."""
-
 
 def declare_tables(topics: Iterable[ExtraTopic]) -> None:
     """Add a table for each topic that fleet.yaml declares, with its value as a column."""
@@ -114,8 +111,6 @@ def declare_tables(topics: Iterable[ExtraTopic]) -> None:
     for topic in topics:
         column = "_".join(filter(None, (topic.name, re.sub(r"\W+", "_", topic.unit))))
         TABLES[topic.name] = {column: attrgetter(topic.field)}
-        if topic.type == "std_msgs/String":
-            TEXT_COLUMNS.add(column)
 
 
 def is_exported(topic: str, message_type: str) -> bool:
