@@ -43,7 +43,7 @@ def list_names(node):
 
 
 def test_a_default_bind_is_warned_about_with_the_remedy(start_driver, record):
-    driver = start_driver()
+    driver = start_driver(parameters={"host": "0"})  # another name of the default
     line = driver.wait_line("can pose as a robot")
     assert "~host" in line and "~allow" in line
     quiet = start_driver(parameters={"host": "127.0.0.1"})

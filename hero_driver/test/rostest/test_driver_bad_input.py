@@ -1,11 +1,8 @@
 #!/usr/bin/env python3
 """What bad input gets: one clear line and an exit code from the node, a counter and nothing else from a robot."""
 
-import random
 import select
 import socket
-import struct
-import tempfile
 import time
 from pathlib import Path
 
@@ -14,8 +11,7 @@ import rospy
 import rostest
 from std_srvs.srv import SetBool
 
-from hero_driver.rosserial import packets
-from hero_msgs.msg import Encoder, Robot
+from hero_msgs.msg import Encoder
 from hero_node.ros.handshakes import HANDSHAKE_TIMEOUT_S
 from hero_test import stock_messages
 from hero_test.driver_case import (
@@ -24,7 +20,7 @@ from hero_test.driver_case import (
     Recorder,
     list_driver_topics,
 )
-from hero_test.fake_robot import PUB, STOCK_DECLARATIONS, Declaration, FakeRobot
+from hero_test.fake_robot import FakeRobot
 from hero_test.waiting import wait_for
 
 USAGE_ERROR = 2
@@ -53,13 +49,6 @@ class TestDriverBadInput(OwnDriverCase):
                 "another ~port",
             )
 
-    def test_an_address_that_is_not_ours_is_named(self):
-        self.assert_start_fails({"host": "192.0.2.1"}, "192.0.2.1", "not an address of this machine")
-
-    def test_a_host_name_that_does_not_exist_is_named(self):
-        for host in ("no-such-host.invalid", "10.42.0..1"):
-            self.assert_start_fails({"host": host}, "'%s' cannot be found" % host, "ip address")
-
     def test_an_address_that_yaml_reads_as_no_text_is_refused_in_one_line(self):
         driver = DriverProcess(arguments=["_host:=::"])
         self.addCleanup(driver.fleet.close)
@@ -67,34 +56,20 @@ class TestDriverBadInput(OwnDriverCase):
         self.assertEqual(len(driver.lines), 1, driver.lines)
         self.assertIn("quote it twice, as in _host:='\"::\"'", driver.lines[0])
 
-    def test_another_name_of_all_addresses_is_warned_about_too(self):
-        self.start(host="0").wait_line("any host in the networks of this PC can pose as a robot")
-
     def test_an_environment_in_which_ros_cannot_start_is_named_in_one_line(self):
-        with tempfile.NamedTemporaryFile() as file:
-            cases = [
-                (DriverProcess(environment={name: value}), value, part)
-                for name, value, part in (
-                    ("ROS_MASTER_URI", "localhost:11311", "http://localhost:11311"),
-                    ("ROS_MASTER_URI", "ftp://localhost:11311", "http://localhost:11311"),
-                    ("ROS_MASTER_URI", "http://10.42.0..1:11311", "http://localhost:11311"),
-                    ("ROS_MASTER_URI", "http://localhost:99999", "http://localhost:11311"),
-                    ("ROS_LOG_DIR", file.name, "ROS_LOG_DIR"),
-                    ("ROS_LOG_DIR", "/dev/null", "ROS_LOG_DIR"),
-                )
-            ]
-            for driver, value, part in cases:
-                self.addCleanup(driver.fleet.close)
-                self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
-                self.assertEqual(len(driver.lines), 1, driver.lines)
-                for text in ("hero_driver cannot start: ", value, part):
-                    self.assertIn(text, driver.lines[0])
+        for name, value, part in (
+            ("ROS_MASTER_URI", "http://localhost:99999", "http://localhost:11311"),
+            ("ROS_LOG_DIR", __file__, "ROS_LOG_DIR"),
+        ):
+            driver = DriverProcess(environment={name: value})
+            self.addCleanup(driver.fleet.close)
+            self.assertEqual(driver.wait_end(), USAGE_ERROR, driver.lines)
+            self.assertEqual(len(driver.lines), 1, driver.lines)
+            for text in ("hero_driver cannot start: ", value, part):
+                self.assertIn(text, driver.lines[0])
 
     def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
         self.assert_start_fails({"prot": 11411}, "unknown parameter ~prot", "did you mean ~port?")
-
-    def test_a_wrong_value_is_named_with_what_is_allowed(self):
-        self.assert_start_fails({"port": 70000}, "~port is 70000, but must be ", "0 to 65535")
 
     # Bytes.
 
@@ -111,56 +86,6 @@ class TestDriverBadInput(OwnDriverCase):
         self.assertEqual(encoders.wait_count(1)[0].left_ticks, ticks)
         self.assertTrue(robot.is_connected)
 
-    def make_encoder_frame(self, robot, ticks=1.0):
-        payload = stock_messages.make_encoder(robot.name, rospy.Time.now(), ticks, ticks)
-        return packets.encode_packet(128, payload)
-
-    def test_garbage_between_packets_is_counted_and_the_next_is_read(self):
-        driver, bad, good = self.dial_pair(30)
-        encoders = Recorder("/hero_30/encoder", Encoder)
-        chance = random.Random(7)
-        for count in range(1, 21):
-            garbage = bytes(chance.randrange(256) for _ in range(chance.randrange(1, 200)))
-            bad.send_bytes(garbage.replace(b"\xff\xfe", b"\xff\xff") + b"\xff\xfe\x05\x00\xfa")
-            bad.send_bytes(bytes(20))
-            bad.send_bytes(self.make_encoder_frame(bad, float(count)))
-        self.assertEqual([m.left_ticks for m in encoders.wait_count(20)], [float(n) for n in range(1, 21)])
-        self.assertGreaterEqual(
-            driver.fleet.wait("/hero_30", Robot.READY, "counted", lambda e: e.bad_packets >= 20).bad_packets, 20
-        )
-        self.assert_alive(good)
-
-    def test_a_robot_that_vanishes_within_a_packet_may_return(self):
-        driver, bad, good = self.dial_pair(34)
-        bad.send_bytes(self.make_encoder_frame(bad)[:40])
-        bad.close()
-        driver.fleet.wait("/hero_34", Robot.AWAY)
-        self.assert_alive(good)
-        self.assert_alive(self.dial(driver, 34))
-
-    def test_half_a_declaration_and_declarations_of_nonsense_are_reported(self):
-        driver, bad, good = self.dial_pair(35)
-        burst = bad.encode_declarations()
-        first = packets.PacketReader().receive_bytes(burst)[0].payload
-        bad.send_packet(PUB, first[: len(first) // 2])
-        bad.send_packet(PUB, first + b"more")
-        bad.send_packet(PUB, struct.pack("<HI", 140, 0xFFFFFFFF) + b"name")
-        line = driver.wait_line("hero_35: TopicInfo: ")
-        self.assertNotIn("Traceback", line)
-        self.assert_alive(bad)
-        self.assert_alive(good)
-
-    def test_ids_below_100_and_buffers_without_room_are_refused(self):
-        odd = [
-            Declaration(PUB, 40, "/{}/low", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1"),
-            Declaration(1, 115, "/{}/tight", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", 0),
-            Declaration(1, 116, "/{}/negative", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1", -5),
-        ]
-        driver = self.share()
-        self.dial(driver, 3, declarations=[*STOCK_DECLARATIONS, *odd])
-        for name in ("low", "tight", "negative"):
-            driver.wait_line("topic '?/hero_3/%s'? refused" % name)
-
     def test_a_program_that_does_not_speak_rosserial_is_disconnected(self):
         driver, _, good = self.dial_pair(36)
         other_program = FakeRobot(9, declarations=[])
@@ -172,15 +97,6 @@ class TestDriverBadInput(OwnDriverCase):
         wait_for(lambda: other_program.ended, "the end of the connection")
         driver.wait_line("127.0.0.1:.*does not speak rosserial")
         self.assert_alive(good)
-
-    def test_a_hundred_connections_that_end_at_once_leave_nothing_behind(self):
-        driver, _, good = self.dial_pair(37)
-        for _ in range(100):
-            socket.create_connection(driver.address, 60.0).close()
-        self.assert_alive(good)
-        late = self.dial(driver, 4)
-        self.assert_alive(late)
-        self.assertLess(len(driver.find_lines("unidentified connection")), 10)
 
     # Programs that connect.
 

@@ -15,11 +15,9 @@ from rosgraph_msgs.msg import Log as RosLog
 from std_msgs.msg import Bool, ColorRGBA
 from std_srvs.srv import SetBool
 
-from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
 from hero_msgs.msg import Motor, Robot
 from hero_msgs.srv import SetOdom
 from hero_test.driver_case import NODE, DriverCase, Recorder, make_command, make_publisher, wait_payloads
-from hero_test.fake_robot import STOCK_DECLARATIONS
 from hero_test.processes import Program
 from hero_test.waiting import wait_for
 
@@ -55,34 +53,6 @@ class TestDriverCommands(DriverCase):
                 self.wait_stopped(robot)
                 del robot.velocities[:]
 
-    def test_a_motion_right_after_a_stop_does_not_swallow_the_stop(self):
-        robot = self.join(5)
-        publisher = make_publisher("/hero_5/" + VELOCITY, Twist)
-        publisher.publish(make_command(0.1))
-        publisher.publish(make_command(0.0))
-        publisher.publish(make_command(0.2))
-        wait_for(lambda: any(v.linear_m_s == 0.2 for v in list(robot.velocities)), "the second motion")
-        speeds = [velocity.linear_m_s for velocity in robot.velocities]
-        self.assertIn(0.0, speeds)
-        self.assertLess(speeds.index(0.0), speeds.index(0.2))
-
-    def test_a_stop_is_repeated_once_and_then_there_is_silence(self):
-        robot = self.join(6)
-        publisher = make_publisher("/hero_6/" + VELOCITY, Twist)
-        publisher.publish(make_command(0.0))
-        self.wait_stopped(robot)
-        publisher.publish(make_command(0.05))
-        wait_for(lambda: not robot.velocities[-1].is_zero, "the motion")
-        self.assertEqual([velocity.linear_m_s for velocity in robot.velocities], [0.0, 0.0, 0.05])
-
-    def test_the_newest_of_many_commands_wins(self):
-        robot = self.join(7)
-        publisher = make_publisher("/hero_7/" + VELOCITY, Twist)
-        for step in range(1, 51):
-            publisher.publish(make_command(step / 1000.0))
-        wait_for(lambda: robot.velocities and robot.velocities[-1].linear_m_s == 0.05, "the newest command")
-        self.assertLess(len(robot.velocities), 50)
-
     def test_velocity_and_position_control_are_shaped_each_on_its_own(self):
         robot = self.join(9)
         publishers = [make_publisher("/hero_9/" + name, Twist) for name in (VELOCITY, POSITION)]
@@ -106,15 +76,6 @@ class TestDriverCommands(DriverCase):
             [struct.unpack("<4f", payload)[0] for payload in wait_payloads(robot, "led", 20)], list(range(20))
         )
         self.assertEqual(wait_payloads(robot, "laser_enable", 20), [b"\x01", b"\x00"] * 10)
-
-    def test_of_servo_pulses_the_newest_wins_and_the_stop_arrives(self):
-        robot = self.join(22)
-        motor = make_publisher("/hero_22/cmd_motor", Motor)
-        for pulse_us in range(1400, 1450):
-            motor.publish(Motor(pulse_us, 1500))
-        motor.publish(Motor(1500, 1500))
-        wait_for(lambda: robot.payloads_on("cmd_motor")[-2:] == [STOPPED_MOTORS] * 2, "the stop, twice")
-        self.assertLess(len(robot.payloads_on("cmd_motor")), 10)
 
     def test_of_cmd_vel_and_the_velocity_controllers_the_newest_wins(self):
         robot = self.join(20)
@@ -154,16 +115,6 @@ class TestDriverCommands(DriverCase):
         for part in (name, rospy.get_name(), "end one of them"):
             self.assertIn(part, line.msg)
 
-    def test_programs_that_command_a_robot_one_after_another_are_fine(self):
-        robot = self.join(32)
-        publisher = make_publisher("/hero_32/" + VELOCITY, Twist)
-        publisher.publish(make_command(0.1))
-        wait_payloads(robot, VELOCITY)
-        self.start_commander(robot, 0.05)
-        robot.log("after the second program")
-        self.wait_log("after the second program")
-        self.assertEqual(self.find_logs("hero_32 is commanded by"), [])
-
     def test_non_finite_velocities_are_refused_and_reported_once(self):
         robot = self.join(11)
         publisher = make_publisher("/hero_11/" + VELOCITY, Twist)
@@ -178,12 +129,6 @@ class TestDriverCommands(DriverCase):
         self.fleet.wait("/hero_11", Robot.READY, "with refusals", lambda e: e.dropped_messages == 7)
         self.wait_log("hero_11: .*not finite")
         self.assertEqual(len(self.find_logs("hero_11: .*not finite")), 1)
-
-    def test_velocities_over_the_limits_pass_unless_clamp_is_set(self):
-        robot = self.join(12)
-        make_publisher("/hero_12/" + VELOCITY, Twist).publish(make_command(5.0, -50.0))
-        wait_for(lambda: robot.velocities, "the command")
-        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].angular_rad_s), (5.0, -50.0))
 
     def test_the_stop_service_stops_every_robot_until_released(self):
         stopped = Recorder(NODE + "/stopped", Bool)
@@ -228,31 +173,6 @@ class TestDriverCommands(DriverCase):
         publisher.publish(make_command(0.1))
         wait_for(lambda: any(not v.is_zero for v in list(robot.velocities)), "the motion")
 
-    def test_the_stop_applies_to_a_robot_that_returns(self):
-        robot = self.join(16)
-        publisher = make_publisher("/hero_16/" + VELOCITY, Twist)
-        publisher.publish(make_command(0.1))
-        wait_for(lambda: robot.velocities, "the motion")
-        robot.close()  # it drives on until its watchdog ends that
-        self.fleet.wait("/hero_16", Robot.AWAY)
-        self.call_stop(True)
-        returned = self.join(16)
-        self.wait_stopped(returned)
-
-    def test_the_stop_stops_a_robot_driven_by_motor_commands(self):
-        robot = self.join(17)
-        make_publisher("/hero_17/cmd_motor", Motor).publish(Motor(1400, 1600))
-        wait_payloads(robot, "cmd_motor")
-        self.call_stop(True)
-        self.wait_stopped(robot)
-        self.assertEqual(len(robot.payloads_on("cmd_motor")), 1)
-
-    def test_a_robot_without_velocity_control_is_stopped_by_servo_pulses(self):
-        motors_only = [entry for entry in STOCK_DECLARATIONS if entry.message_type != "geometry_msgs/Twist"]
-        robot = self.join(18, declarations=motors_only)
-        self.call_stop(True)
-        self.assertEqual(wait_payloads(robot, "cmd_motor")[0], STOPPED_MOTORS)
-
     def test_a_robot_that_does_not_read_gets_the_newest_command_and_no_backlog(self):
         stalled = self.join(19, receive_buffer_length=4096)
         other = self.join(24)
@@ -281,25 +201,6 @@ class TestDriverCommands(DriverCase):
         wait_for(lambda: stalled.velocities and stalled.velocities[-1].linear_m_s == 0.15, "the newest command")
         # One may have been on its way, and no other follows before that one is acknowledged.
         self.assertLessEqual(len(stalled.velocities), 2)
-
-    def test_a_robot_that_returns_gets_no_command_of_before(self):
-        robot = self.join(21)
-        drive = make_publisher("/hero_21/" + VELOCITY, Twist)
-        light = make_publisher("/hero_21/led", ColorRGBA)
-        robot.is_stalled = True
-        drive.publish(make_command(0.1))
-        drive.publish(make_command(0.2))
-        robot.reset()
-        self.fleet.wait("/hero_21", Robot.AWAY)
-        before = self.fleet.find("/hero_21").dropped_messages
-        drive.publish(make_command(0.3))
-        light.publish(ColorRGBA(1.0, 0.0, 0.0, 0.0))
-        self.fleet.wait("/hero_21", Robot.AWAY, "refusals", lambda e: e.dropped_messages >= before + 2)
-        returned = self.join(21)
-        drive.publish(make_command(0.05))
-        wait_for(lambda: returned.velocities, "the new command")
-        self.assertEqual([velocity.linear_m_s for velocity in returned.velocities], [0.05])
-        self.assertEqual(returned.payloads_on("led"), [])
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ from hero_test.driver_case import (
     wait_payloads,
 )
 from hero_test.fake_robot import FakeRobot, boot_line, heartbeat_line
-from hero_test.nonempty import nonempty
 from hero_test.waiting import wait_for
 
 OTHER_HOST = "127.0.0.2"
@@ -131,13 +130,6 @@ class TestDriverFleet(DriverCase):
         self.assertIn("hero_4", dismissed.message)
         wait_for(lambda: not self.fleet.newest.gone, "an empty list")
 
-    def test_a_connection_that_is_reset_is_a_departure_like_any_other(self):
-        robot = self.join(5)
-        robot.reset()
-        self.assertNotEqual(self.fleet.wait("/hero_5", Robot.AWAY).last_error, "")
-        self.join(5)
-        self.fleet.wait("/hero_5", Robot.READY, "again", lambda e: e.reconnects == 1)
-
     def test_a_power_cycle_without_fin_takes_over_at_once(self):
         old = self.join(6)
         encoders = Recorder("/hero_6/encoder", Encoder)
@@ -158,33 +150,6 @@ class TestDriverFleet(DriverCase):
         wait_payloads(new, "led")
         self.assertEqual(old.payloads_on("led"), [])
         self.assertEqual(self.fleet.find("/hero_6", Robot.AWAY), None)
-
-    def test_a_robot_that_keeps_losing_its_connection_always_takes_over(self):
-        robots = []
-        for count in range(5):
-            if robots:
-                robots[-1].is_silent = True
-            robots.append(self.join(14, ready=False))
-            newest = robots[-1]
-            self.fleet.wait("/hero_14", Robot.READY, "anew", lambda e, r=newest: e.address == r.address)
-            self.assertEqual(self.fleet.find("/hero_14", Robot.READY).reconnects, count)
-        self.assertIsNone(self.fleet.find("/hero_14", Robot.REFUSED))
-        wait_for(lambda: all(robot.ended for robot in nonempty(robots[:-1])), "the old connections to be closed")
-
-    def test_duplicates_behind_one_address_stop_evicting_each_other(self):
-        robots = [self.join(15, ready=False), self.join(15, ready=False)]
-
-        def look():
-            for robot in robots:
-                if not robot.is_connected:
-                    robot.close()
-                    robot.connect(self.address)
-                robot.log("I am alive")
-            return self.fleet.find("/hero_15", Robot.REFUSED) and self.fleet.find("/hero_15", Robot.READY)
-
-        wait_for(look, "one to stay and one to be refused")
-        self.assertLess(self.fleet.find("/hero_15", Robot.READY).reconnects, 20)
-        self.assertIn("two robots", self.fleet.find("/hero_15", Robot.REFUSED).last_error)
 
     def test_of_two_robots_with_one_id_the_second_is_refused(self):
         first = self.join(7)
@@ -228,17 +193,6 @@ class TestDriverFleet(DriverCase):
         self.wait_log("hero_7 has left")
         self.assertIsNone(self.fleet.find("/hero_7", Robot.REFUSED))
 
-    def test_a_refused_robot_that_keeps_dialling_does_not_fill_the_log(self):
-        first = self.join(8)
-        for _ in range(15):
-            second = self.join(8, ready=False, source_host=OTHER_HOST)
-            self.fleet.wait("/hero_8", Robot.REFUSED, "", lambda e, s=second: e.address == s.address)
-            second.close()
-        wait_for(lambda: self.fleet.find("/hero_8", Robot.REFUSED) is None, "the refusals to be over")
-        self.assertEqual(self.fleet.find("/hero_8", Robot.READY).address, first.address)
-        self.assertLessEqual(len(self.find_logs("hero_8.*is refused")), 2)
-        self.assertTrue(first.is_connected)
-
     def test_a_silent_robot_is_away_and_its_connection_is_closed(self):
         robot = self.join(9)
         robot.is_silent = True
@@ -246,20 +200,6 @@ class TestDriverFleet(DriverCase):
         self.assertIn("silent", away.last_error)
         wait_for(lambda: robot.ended, "the connection to be closed")
         self.wait_log("hero_9 left .*silent")
-
-    def test_a_dead_robots_id_is_free_before_its_connection_is_given_up(self):
-        dead = self.join(10)
-        dead.is_silent = True
-        other = self.join(10, ready=False, source_host=OTHER_HOST)
-
-        def look():
-            if not other.is_connected:
-                other.close()
-                other.connect(self.address)
-            entry = self.fleet.find("/hero_10", Robot.READY)
-            return entry is not None and entry.address == other.address
-
-        wait_for(look, "the living robot to have the id")
 
     def test_a_connection_that_declares_nothing_is_asked_again_then_closed(self):
         robot = FakeRobot(11, declarations=[])
@@ -269,34 +209,6 @@ class TestDriverFleet(DriverCase):
         self.assertGreaterEqual(robot.requests, 2)
         self.wait_log("did not identify itself as a robot within 10.0 s")
         self.assertIsNone(self.fleet.find("/hero_11"))
-
-    def test_an_unidentified_robot_that_says_nothing_is_closed_as_silent(self):
-        robot = FakeRobot(12, declarations=[])
-        self.addCleanup(robot.close)
-        robot.is_silent = True
-        robot.declares = False
-        robot.connect(self.address)
-        wait_for(lambda: robot.ended, "the connection to be closed")
-        self.assertGreaterEqual(robot.requests, 2)
-
-    def test_a_robot_that_comes_and_goes_fast_ends_up_ready(self):
-        for _ in range(8):
-            robot = self.join(13, ready=False)
-            wait_for(lambda r=robot: r.requests or r.ended, "a request")
-            robot.close()
-        last = self.join(13, ready=False)
-
-        def look():
-            if not last.is_connected:
-                last.close()
-                last.connect(self.address)
-            entry = self.fleet.find("/hero_13", Robot.READY)
-            return entry is not None and entry.address == last.address
-
-        wait_for(look, "the last connection to be ready")
-        encoders = Recorder("/hero_13/encoder", Encoder)
-        self.send_encoder(last, 4.0)
-        encoders.wait_count(1)
 
     def test_twenty_robots_at_once_all_join_and_are_listed_in_order(self):
         robots = [self.join(number, ready=False) for number in range(120, 100, -1)]

@@ -8,16 +8,15 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, LaserScan, Range
+from sensor_msgs.msg import LaserScan, Range
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import Encoder, Robot
 from hero_msgs.srv import SetOdom
 from hero_test import stock_messages
 from hero_test.driver_case import DriverCase, DriverProcess, Recorder
-from hero_test.fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer, heartbeat_line
-from hero_test.nonempty import nonempty
-from hero_test.stock_messages import TICK_M, WHEEL_SEPARATION_M, send_burst
+from hero_test.fake_robot import STOCK_DECLARATIONS, FakeRobot, boot_line, encode_answer
+from hero_test.stock_messages import TICK_M, send_burst
 from hero_test.waiting import wait_for
 
 STEP_S = 0.034
@@ -61,30 +60,6 @@ class TestDriverMessages(DriverCase):
             robot.send("laser", payload)
         self.assertEqual([message._buff for message in scans.wait_count(3)], payloads)
 
-    def test_proximity_holds_the_eight_real_beams_by_rep_117(self):
-        robot = self.join(2)
-        scans = Recorder("/hero_2/proximity", LaserScan)
-        stamp = rospy.Time.now()
-        beams_m = [0.10, 0.2568, 0.0468, math.nan, 0.15, 0.2367, 0.06, 0.2368]
-        robot.send("laser", stock_messages.make_laser("hero_2", stamp, beams_m))
-        scan = scans.wait_count(1)[0]
-        self.assertEqual((scan.header.stamp, scan.header.frame_id), (stamp, "hero_2/laser_link"))
-        self.assertAlmostEqual(scan.angle_min, -math.pi, 5)
-        self.assertAlmostEqual(scan.angle_increment, math.pi / 4, 6)
-        self.assertAlmostEqual(scan.angle_max, scan.angle_min + 7 * scan.angle_increment, 5)
-        self.assertGreater(scan.scan_time, 0.0)
-        self.assertEqual(len(scan.ranges), 8)
-        expected_m = [0.10, math.inf, -math.inf, math.nan, 0.15, None, 0.06, math.inf]
-        for index, (range_m, expected) in enumerate(zip(scan.ranges, expected_m)):
-            if expected is not None and math.isnan(expected):
-                self.assertTrue(math.isnan(range_m), index)
-            elif expected is not None:
-                self.assertAlmostEqual(range_m, expected, 6, index)
-        for range_m in scan.ranges:
-            if math.isfinite(range_m):
-                self.assertTrue(scan.range_min <= range_m <= scan.range_max)
-        self.assertEqual(list(scan.intensities), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0])
-
     def test_a_scan_of_another_shape_passes_without_proximity(self):
         robot = self.join(3)
         scans = Recorder("/hero_3/laser", rospy.AnyMsg)
@@ -100,14 +75,6 @@ class TestDriverMessages(DriverCase):
 
     # Odometry.
 
-    def test_odom_raw_passes_byte_for_byte(self):
-        robot = self.join(4)
-        raw = Recorder("/hero_4/odom_raw", rospy.AnyMsg)
-        payloads = [stock_messages.make_odom("hero_4", rospy.Time(2, index), 0.5) for index in range(3)]
-        for payload in payloads:
-            robot.send("odom", payload)
-        self.assertEqual([message._buff for message in raw.wait_count(3)], payloads)
-
     def test_odom_follows_the_ticks_and_not_the_robots_own_estimate(self):
         robot = self.join(5)
         messages = self.drive(robot, [(5.0 * step, 5.0 * step) for step in range(31)])
@@ -116,43 +83,6 @@ class TestDriverMessages(DriverCase):
         self.assertEqual(messages[-1].twist.twist.linear.y, 0.0)
         header = messages[-1].header
         self.assertEqual((header.frame_id, messages[-1].child_frame_id), ("hero_5/odom", "hero_5/base_link"))
-
-    def test_odom_follows_exact_arcs(self):
-        robot = self.join(6)
-        messages = self.drive(robot, [(0.0, 0.0), (100.0, 300.0), (300.0, 300.0)])
-        turn_rad = 200 * TICK_M / WHEEL_SEPARATION_M
-        radius_m = 200 * TICK_M / turn_rad
-        self.assert_pose(messages[1], radius_m * math.sin(turn_rad), radius_m * (1 - math.cos(turn_rad)), turn_rad)
-        # Left and right have the same total, so it heads where it began; the path was an S.
-        self.assertAlmostEqual(read_pose(messages[2])[2], 0.0, 9)
-
-    def test_odom_carries_covariances(self):
-        robot = self.join(7)
-        message = self.drive(robot, [(0.0, 0.0)])[0]
-        for covariance in (message.pose.covariance, message.twist.covariance):
-            self.assertTrue(all(covariance[index * 7] > 0.0 for index in range(6)))
-            self.assertEqual(sum(value != 0.0 for value in covariance), 6)
-
-    def test_the_odom_transform_agrees_with_odom(self):
-        robot = self.join(8)
-        transforms = Recorder("/tf", TFMessage)
-        messages = self.drive(robot, [(7.0 * step, 9.0 * step) for step in range(10)])
-
-        def list_own():
-            return [
-                transform
-                for message in list(transforms.messages)
-                for transform in message.transforms
-                if transform.child_frame_id == "hero_8/base_link"
-            ]
-
-        wait_for(lambda: len(list_own()) == 10, "ten transforms")
-        for transform, message in nonempty(zip(list_own(), messages)):
-            self.assertEqual(transform.header.frame_id, "hero_8/odom")
-            self.assertEqual(transform.header.stamp, message.header.stamp)
-            self.assertEqual(transform.transform.rotation, message.pose.pose.orientation)
-            self.assertEqual(transform.transform.translation.x, message.pose.pose.position.x)
-            self.assertEqual(transform.transform.translation.y, message.pose.pose.position.y)
 
     def test_set_odom_sets_the_pose_without_a_jump(self):
         robot = self.join(9)
@@ -165,15 +95,6 @@ class TestDriverMessages(DriverCase):
         self.assert_pose(messages[-1], 1.0, -2.0 + 90 * TICK_M, math.pi / 2)
         self.call_set_odom(robot, 0.0, 0.0, 0.0)
         self.assert_pose(self.drive(robot, [(0.0, 0.0)], odoms=odoms)[0], 0.0, 0.0, 0.0)
-
-    def test_a_refused_set_odom_changes_nothing(self):
-        robot = self.join(10)
-        odoms = Recorder("/hero_10/odom", Odometry)
-        self.drive(robot, [(0.0, 0.0), (20.0, 20.0)], odoms=odoms)
-        robot.answers["set_odom"] = lambda _: b"\x00\x00\x00\x00\x00"
-        rospy.wait_for_service("/hero_10/set_odom", 60.0)
-        self.assertFalse(rospy.ServiceProxy("/hero_10/set_odom", SetOdom)(5.0, 5.0, 0.0).success)
-        self.assert_pose(self.drive(robot, [(20.0, 20.0)], odoms=odoms)[0], 20 * TICK_M, 0.0, 0.0)
 
     def test_a_reboot_leaves_the_pose_where_it_was(self):
         robot = self.join(11)
@@ -192,72 +113,16 @@ class TestDriverMessages(DriverCase):
         self.assert_pose(messages[0], 100 * TICK_M, 0.0, 0.0)
         self.assert_pose(messages[1], 110 * TICK_M, 0.0, 0.0)
 
-    def test_a_reboot_whose_boot_line_was_lost_leaves_the_pose_where_it_was(self):
-        robot = self.join(26)
-        odoms = Recorder("/hero_26/odom", Odometry)
-        self.drive(robot, [(20.0 * step, 20.0 * step) for step in range(11)], odoms=odoms)
-        robot.close()
-        self.fleet.wait("/hero_26", Robot.AWAY)
-        rebooted = self.join(26)
-        # Before its first time answer a robot that has just started stamps with its uptime.
-        messages = self.drive(rebooted, [(0.0, 0.0), (1.0, 1.0)], start=rospy.Time(2, 10000000), odoms=odoms)
-        self.assert_pose(messages[0], 200 * TICK_M, 0.0, 0.0)
-        messages = self.drive(rebooted, [(2.0, 2.0)], odoms=odoms)
-        self.assert_pose(messages[0], 202 * TICK_M, 0.0, 0.0)
-
     def test_a_set_odom_that_is_answered_too_late_still_counts(self):
         robot = self.join(27)
         odoms = Recorder("/hero_27/odom", Odometry)
         self.drive(robot, [(0.0, 0.0), (50.0, 50.0)], odoms=odoms)
         robot.answers["set_odom"] = lambda _: None
         rospy.wait_for_service("/hero_27/set_odom", 60.0)
-        with self.assertRaisesRegex(rospy.ServiceException, "was not answered within"):
+        with self.assertRaisesRegex(rospy.ServiceException, r"was not answered within 8\.0 s.*~service_timeout_s"):
             rospy.ServiceProxy("/hero_27/set_odom", SetOdom)(3.0, 4.0, 0.0)
         robot.answer("set_odom", encode_answer(True, "late"))
         self.assert_pose(self.drive(robot, [(10.0, 10.0)], odoms=odoms)[0], 3.0 + 10 * TICK_M, 4.0, 0.0)
-
-    def test_a_reconnect_without_a_reboot_keeps_the_ticks(self):
-        robot = self.join(12)
-        odoms = Recorder("/hero_12/odom", Odometry)
-        self.drive(robot, [(0.0, 0.0), (50.0, 50.0)], odoms=odoms)
-        robot.close()
-        self.fleet.wait("/hero_12", Robot.AWAY)
-        returned = self.join(12)
-        messages = self.drive(returned, [(60.0, 60.0)], odoms=odoms)
-        self.assert_pose(messages[0], 60 * TICK_M, 0.0, 0.0)
-
-    def test_a_heartbeat_that_tells_of_a_reboot_is_reported(self):
-        robot = self.join(13)
-        robot.log(heartbeat_line("hero_13", 500.0))
-        robot.log(heartbeat_line("hero_13", 1.5))
-        self.wait_log("hero_13 rebooted 1.5 s ago")
-        self.fleet.wait("/hero_13", Robot.READY, "young", lambda e: 1.0 < e.uptime.to_sec() < 100.0)
-
-    def test_ticks_that_no_wheel_can_have_run_do_not_move_the_robot(self):
-        robot = self.join(14)
-        readings = [(0.0, 0.0), (10.0, 10.0), (1e9, -1e9), (math.nan, 5.0), (20.0, 20.0), (30.0, 30.0)]
-        for message in nonempty(self.drive(robot, readings)):
-            x_m, y_m, yaw_rad = read_pose(message)
-            self.assertLessEqual(abs(x_m), 31 * TICK_M)
-            self.assertEqual((y_m, yaw_rad), (0.0, 0.0))
-            self.assertTrue(math.isfinite(message.twist.twist.linear.x))
-
-    def test_a_robot_without_an_encoder_gets_its_own_odometry_published(self):
-        robot = self.join(15, declarations=[e for e in STOCK_DECLARATIONS if "encoder" not in e.name])
-        odoms = Recorder("/hero_15/odom", Odometry)
-        robot.send("odom", stock_messages.make_odom("hero_15", rospy.Time.now(), 0.7, 0.1, 0.2))
-        message = odoms.wait_count(1)[0]
-        self.assert_pose(message, 0.7, 0.1, 0.2)
-        self.assertGreater(message.pose.covariance[0], 0.0)
-
-    def test_odometry_is_not_held_back_when_encoder_readings_stay_away(self):
-        robot = self.join(16)
-        odoms = Recorder("/hero_16/odom", Odometry)
-        self.drive(robot, [(0.0, 0.0), (10.0, 10.0)], odoms=odoms)
-        for _ in range(5):
-            robot.send("odom", stock_messages.make_odom("hero_16", rospy.Time.now()))
-        odoms.wait_count(2 + 4)
-        self.assert_pose(odoms.messages[-1], 10 * TICK_M, 0.0, 0.0)
 
     # HeRo+.
 
@@ -299,39 +164,6 @@ class TestDriverMessages(DriverCase):
                 arrived = recorder.wait_count(before + 1)[before].header.stamp
                 self.assertLessEqual(earliest, arrived)
                 self.assertLessEqual(arrived, rospy.Time.now())
-
-    def test_a_good_stamp_is_the_robots_own(self):
-        robot = self.join(18)
-        odoms = Recorder("/hero_18/odom", Odometry)
-        stamp = rospy.Time.now() - rospy.Duration(0.8)
-        self.assertEqual(self.drive(robot, [(0.0, 0.0)], start=stamp, odoms=odoms)[0].header.stamp, stamp)
-
-    def test_stamps_never_go_backwards_on_a_topic(self):
-        robot = self.join(19)
-        start = rospy.Time.now() - rospy.Duration(2.0)
-        odoms = Recorder("/hero_19/odom", Odometry)
-        encoders = Recorder("/hero_19/encoder", Encoder)
-        imus = Recorder("/hero_19/imu", Imu)
-        transforms = Recorder("/tf", TFMessage)
-        for offset_s in (0.0, 1.0, 0.3, 0.4, 1.0, 1.1):
-            stamp = start + rospy.Duration(offset_s)
-            send_burst(robot, 0.0, 0.0, stamp)
-            robot.send("imu", stock_messages.make_imu("hero_19", stamp))
-        for recorder in (odoms, encoders, imus):
-            stamps = [message.header.stamp for message in recorder.wait_count(6)]
-            self.assertEqual(stamps, sorted(set(stamps)))
-
-        def list_stamps():
-            by_child = {}
-            for message in list(transforms.messages):
-                for transform in message.transforms:
-                    if transform.child_frame_id.startswith("hero_19/"):
-                        by_child.setdefault(transform.child_frame_id, []).append(transform.header.stamp)
-            return by_child
-
-        wait_for(lambda: sum(map(len, list_stamps().values())) == 30, lambda: "30 of %s" % list_stamps())
-        for child, stamps in nonempty(list_stamps().items()):
-            self.assertEqual(stamps, sorted(set(stamps)), child)
 
     # Transforms.
 
@@ -395,18 +227,6 @@ class TestDriverMessages(DriverCase):
             ),
             "a report in diagnostics",
         )
-
-    def test_messages_that_are_cut_short_are_counted_and_nothing_else_suffers(self):
-        robot = self.join(25)
-        odoms = Recorder("/hero_25/odom", Odometry)
-        # Messages that nobody wants are not looked at, so all are wanted here.
-        for topic in ("/hero_25/imu", "/hero_25/encoder", "/hero_25/laser", "/hero_25/proximity", "/tf"):
-            Recorder(topic, rospy.AnyMsg)
-        for name in ("odom", "encoder", "imu", "/tf", "laser"):
-            for payload in (b"", b"\x01", bytes(15), b"\xff" * 40):
-                robot.send(name, payload)
-        self.fleet.wait("/hero_25", Robot.READY, "counted", lambda e: e.dropped_messages >= 16)
-        self.drive(robot, [(0.0, 0.0)], odoms=odoms)
 
     # Parameters.
 

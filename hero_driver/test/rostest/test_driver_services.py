@@ -15,7 +15,6 @@ from hero_msgs.srv import SetIRCalibration, SetMotor, SetOdom, SetPID
 from hero_test import stock_messages
 from hero_test.driver_case import DriverCase, make_publisher, wait_payloads
 from hero_test.fake_robot import encode_answer
-from hero_test.nonempty import nonempty
 from hero_test.waiting import wait_for
 
 GAINS = (100.0, 2.0, 0.5, 101.0, 2.5, 0.25)
@@ -78,65 +77,6 @@ class TestDriverServices(DriverCase):
         answer = make_service(robot, "velocity_controller/pid_calibration", Trigger)()
         self.assertEqual((answer.success, answer.message), (False, "PID Autotuning!"))
 
-    def test_only_one_call_of_a_service_is_under_way_at_a_time(self):
-        robot = self.join(3)
-        robot.answers["motors_parameters"] = lambda _: None
-        service = make_service(robot, "motors_parameters", SetMotor)
-        first = Call(service, 1501, 1500)
-        wait_payloads(robot, "motors_parameters")
-        second = Call(make_service(robot, "motors_parameters", SetMotor), 1502, 1500)
-        # Meanwhile other services of the robot answer.
-        self.assertTrue(make_service(robot, "set_odom", SetOdom)(0.0, 0.0, 0.0).success)
-        self.assertEqual(len(robot.payloads_on("motors_parameters")), 1)
-        robot.answer("motors_parameters", encode_answer(True, "first"))
-        self.assertEqual(first.wait().answer.message, "first")
-        self.assertEqual(wait_payloads(robot, "motors_parameters", 2)[1], struct.pack("<2h", 1502, 1500))
-        robot.answer("motors_parameters", encode_answer(True, "second"))
-        self.assertEqual(second.wait().answer.message, "second")
-
-    def test_many_callers_of_one_service_all_get_their_own_answer(self):
-        robot = self.join(4)
-        robot.answers["motors_parameters"] = lambda request: encode_answer(True, request.hex())
-        services = [make_service(robot, "motors_parameters", SetMotor) for _ in range(10)]
-        calls = [Call(service, 1500 + index, 1500) for index, service in enumerate(services)]
-        for index, call in enumerate(calls):
-            self.assertEqual(call.wait().error, "")
-            self.assertEqual(call.answer.message, struct.pack("<2h", 1500 + index, 1500).hex())
-
-    def test_a_call_that_is_not_answered_ends_with_a_clear_error(self):
-        robot = self.join(5)
-        robot.answers["set_odom"] = lambda _: None
-        call = Call(make_service(robot, "set_odom", SetOdom), 0.0, 0.0, 0.0).wait()
-        self.assertIn("/hero_5/set_odom was not answered within 8.0 s", call.error)
-        self.assertIn("~service_timeout_s", call.error)
-
-    def test_a_late_answer_is_never_taken_for_that_of_the_next_call(self):
-        robot = self.join(6)
-        robot.answers["motors_parameters"] = lambda _: None
-        service = make_service(robot, "motors_parameters", SetMotor)
-        self.assertIn("not answered within", Call(service, 1501, 1500).wait().error)
-        next_call = Call(service, 1502, 1500).wait()
-        self.assertIn("has not answered the call before", next_call.error)
-        self.assertEqual(len(robot.payloads_on("motors_parameters")), 1)
-        robot.answer("motors_parameters", encode_answer(True, "late"))
-        robot.answers["motors_parameters"] = lambda _: encode_answer(True, "in time")
-
-        def look():
-            call = Call(make_service(robot, "motors_parameters", SetMotor), 1503, 1500).wait()
-            return call.answer
-
-        self.assertEqual(wait_for(look, "an answer").message, "in time")
-
-    def test_after_a_lost_answer_a_robot_that_returns_can_be_called_again(self):
-        robot = self.join(7)
-        robot.answers["set_odom"] = lambda _: None
-        service = make_service(robot, "set_odom", SetOdom)
-        Call(service, 1.0, 0.0, 0.0).wait()
-        robot.close()
-        self.join(7)
-        answer = wait_for(lambda: Call(service, 2.0, 0.0, 0.0).wait().answer, "an answer")
-        self.assertEqual(answer.message, "set_odom")
-
     def test_a_call_fails_at_once_when_the_robot_leaves(self):
         robot = self.join(8)
         robot.answers["motors_parameters"] = lambda _: None
@@ -145,42 +85,12 @@ class TestDriverServices(DriverCase):
         robot.close()
         self.assertIn("/hero_8/motors_parameters was not answered: closed by the robot", call.wait().error)
 
-    def test_a_call_fails_at_once_when_the_robots_new_connection_takes_over(self):
-        old = self.join(9)
-        old.answers["motors_parameters"] = lambda _: None
-        call = Call(make_service(old, "motors_parameters", SetMotor), 1500, 1500)
-        wait_payloads(old, "motors_parameters")
-        old.is_silent = True
-        new = self.join(9, ready=False)
-        error = call.wait().error
-        self.assertIn("/hero_9/motors_parameters was not answered", error)
-        self.assertNotIn("within", error)
-        self.fleet.wait("/hero_9", Robot.READY, "anew", lambda e: e.address == new.address)
-        answer = wait_for(
-            lambda: Call(make_service(new, "motors_parameters", SetMotor), 1600, 1500).wait().answer,
-            "an answer",
-        )
-        self.assertEqual(answer.message, "motors_parameters")
-
     def test_a_call_while_the_robot_is_away_fails_at_once(self):
         robot = self.join(10)
         service = make_service(robot, "set_odom", SetOdom)
         robot.close()
         self.fleet.wait("/hero_10", Robot.AWAY)
         self.assertIn("the robot is not connected", Call(service, 0.0, 0.0, 0.0).wait().error)
-
-    def test_three_robots_are_calibrated_at_once(self):
-        robots = [self.join(number) for number in (11, 12, 13)]
-        calls = []
-        for robot in robots:
-            robot.answers["ir_calibration"] = lambda _: None
-            calls.append(Call(make_service(robot, "ir_calibration", SetIRCalibration), *[0.4] * 8))
-        for robot in robots:
-            wait_payloads(robot, "ir_calibration")
-        self.assertFalse(any(call.is_over for call in calls))
-        for robot, call in nonempty(zip(reversed(robots), reversed(calls))):
-            robot.answer("ir_calibration", encode_answer(True, robot.name))
-            self.assertEqual(call.wait().answer.message, robot.name)
 
     def test_a_request_that_would_harm_the_robot_is_refused_with_the_reason(self):
         robot = self.join(14)
@@ -203,14 +113,6 @@ class TestDriverServices(DriverCase):
             service(0.0, 0.0, 0.0)
         del robot.answers["set_odom"]
         self.assertTrue(make_service(robot, "set_odom", SetOdom)(0.0, 0.0, 0.0).success)
-
-    def test_an_unrequested_answer_is_ignored(self):
-        robot = self.join(16)
-        service = make_service(robot, "set_odom", SetOdom)
-        robot.answer("set_odom", encode_answer(True, "unasked"))
-        robot.log("said after the answer")
-        self.wait_log("hero_16: said after the answer")
-        self.assertEqual(service(0.0, 0.0, 0.0).message, "set_odom")
 
     def test_a_slow_service_does_not_delay_commands_or_other_robots(self):
         slow, other = self.join(17), self.join(18)

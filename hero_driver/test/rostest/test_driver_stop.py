@@ -5,7 +5,6 @@ import math
 import os
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import rospy
@@ -162,16 +161,6 @@ class TestDriverStop(OwnDriverCase):
         driver.wait_line("hero_54 tunes itself, without a request from this driver: stopped")
         wait_for(lambda: not robot.motors.is_tuning, "the tuning to end")
 
-    def test_the_end_of_the_driver_ends_the_tuning_of_a_robot(self):
-        driver = self.start(allow_self_tuning=True)
-        robots = [self.dial_stock(driver, number) for number in (73, 74)]
-        self.start_tuning(driver, robots[0], VELOCITY)
-        self.drive(robots[1])
-        driver.process.send_signal(signal.SIGINT)
-        self.assertEqual(driver.wait_end(), 0, driver.lines)
-        self.assertFalse(any(robot.motors.is_turning for robot in robots))
-        self.assertEqual(driver.find_lines("not known to be at rest"), [])
-
     def test_the_end_of_the_driver_names_a_robot_whose_wheels_turn(self):
         driver = self.start()
         robots = [self.dial_stock(driver, number) for number in (75, 76)]
@@ -216,15 +205,6 @@ class TestDriverStop(OwnDriverCase):
         robot.motors.take_velocity("/hero_57/position_controller/cmd_vel", False)
         robot.connect(driver.address)
         self.wait_at_rest(driver, robot)
-
-    def test_released_robots_are_not_stopped_any_more(self):
-        driver = self.share()
-        robot = self.dial_stock(driver, 58)
-        self.call_stop(driver, True)
-        self.wait_at_rest(driver, robot)
-        self.assertEqual(self.call_stop(driver, False), "robots may move")
-        driver.fleet.wait("/hero_58", Robot.READY, "free", lambda entry: entry.stop_state == Robot.NOT_STOPPED)
-        self.drive(robot)
 
     def test_a_refused_robot_is_stopped_and_counted(self):
         driver = self.share()
@@ -309,24 +289,6 @@ class TestDriverStop(OwnDriverCase):
 
     # Programs that go, or go wrong.
 
-    def test_a_robot_stops_when_its_commander_has_gone(self):
-        driver = self.start()
-        robot = self.dial_stock(driver, 61)
-        # Another program is connected, and has nothing to say.
-        make_publisher("/hero_61/velocity_controller/cmd_vel", Twist)
-        code = (
-            "import rospy; from geometry_msgs.msg import Twist; rospy.init_node('commander');"
-            "t = Twist(); t.linear.x = 0.1;"
-            "p = rospy.Publisher('/hero_61/cmd_vel', Twist, queue_size=1)\n"
-            "while not rospy.is_shutdown(): p.publish(t); rospy.sleep(0.05)"
-        )
-        commander = subprocess.Popen([sys.executable, "-c", code])
-        self.addCleanup(commander.wait)
-        wait_for(lambda: robot.motors.is_turning, "the wheels to turn")
-        commander.kill()
-        wait_for(lambda: not robot.motors.is_turning, "the wheels to rest")
-        self.assertFalse(driver.fleet.newest.stopped)
-
     def test_a_robot_stops_when_its_commander_hangs(self):
         driver = self.share()
         robot = self.dial_stock(driver, 82)
@@ -372,19 +334,6 @@ class TestDriverStop(OwnDriverCase):
         # Both are handled in order: a stop would be there before what comes now.
         wait_for(lambda: not receives_topic(driver.node, "/hero_41/velocity_controller/cmd_vel"), "its end")
         make_publisher("/hero_41/led", ColorRGBA).publish(ColorRGBA())
-        wait_for(lambda: robot.payloads_on("led"), "the next command")
-        self.assertTrue(robot.motors.is_turning)
-
-    def test_the_end_of_an_older_program_on_cmd_vel_stops_no_robot(self):
-        driver = self.share(orphan_stop_s=0.0)
-        robot = self.dial_stock(driver, 43)
-        older = make_publisher("/hero_43/cmd_vel", Twist)
-        older.publish(make_command(0.05))
-        wait_for(lambda: robot.velocities, "the first command")
-        self.drive(robot)
-        older.unregister()
-        wait_for(lambda: not receives_topic(driver.node, "/hero_43/cmd_vel"), "its end")
-        make_publisher("/hero_43/led", ColorRGBA).publish(ColorRGBA())
         wait_for(lambda: robot.payloads_on("led"), "the next command")
         self.assertTrue(robot.motors.is_turning)
 

@@ -26,7 +26,7 @@ from hero_test.driver_case import (
     wait_packets,
     wait_payloads,
 )
-from hero_test.fake_robot import STOCK_DECLARATIONS, SUB, TIME_PACKET, FakeRobot, boot_line, heartbeat_line
+from hero_test.fake_robot import STOCK_DECLARATIONS, SUB, TIME_PACKET, heartbeat_line
 from hero_test.nonempty import nonempty
 from hero_test.waiting import wait_for
 
@@ -161,17 +161,6 @@ class TestDriverTopics(DriverCase):
         declared = {entry.topic_id for entry in older} | {packets.ID_PUBLISHER, packets.ID_TIME}
         self.assertEqual({packet.topic_id for packet in returned.received} - declared, set())
 
-    def test_a_command_that_does_not_fit_the_robots_buffer_is_not_sent(self):
-        small = [
-            entry._replace(buffer_length=8) if entry.name.endswith("/led") else entry for entry in STOCK_DECLARATIONS
-        ]
-        robot = self.join(7, declarations=small)
-        make_publisher("/hero_7/led", ColorRGBA).publish(ColorRGBA())
-        self.wait_log("hero_7: .*/hero_7/led.*16 bytes.*8 bytes")
-        make_publisher("/hero_7/laser_enable", Bool).publish(Bool(True))
-        wait_payloads(robot, "laser_enable")
-        self.assertEqual(robot.payloads_on("led"), [])
-
     def test_each_time_request_is_answered_with_ros_time(self):
         robot = self.join(8)
         before = len(robot.payloads_with_id(packets.ID_TIME))
@@ -183,37 +172,6 @@ class TestDriverTopics(DriverCase):
         for secs, nsecs in nonempty(times):
             self.assertLessEqual(earliest.to_nsec(), secs * 10**9 + nsecs)
             self.assertLessEqual(secs * 10**9 + nsecs, rospy.Time.now().to_nsec())
-
-    def test_a_robot_that_first_answers_without_topics_is_asked_again(self):
-        robot = self.join(9, ready=False, declarations=[])
-        wait_for(lambda: robot.requests == 1, "the first request")
-        # Now it advertises, but believes that it is configured and streams ids that it never declared.
-        robot.declarations = FakeRobot(9).declarations
-        robot.send("encoder", stock_messages.make_encoder("hero_9", rospy.Time(2), 0.0, 0.0))
-        self.fleet.wait_ready("/hero_9")
-        self.wait_topics("/hero_9")
-
-    def test_a_robot_that_streams_before_the_handshake_joins(self):
-        robot = FakeRobot(10)
-        self.addCleanup(robot.close)
-        robot.declares = False
-        robot.connect(self.address)
-        robot.send("encoder", stock_messages.make_encoder("hero_10", rospy.Time.now(), 1.0, 1.0))
-        robot.declares = True
-        self.fleet.wait_ready("/hero_10")
-        encoders = Recorder("/hero_10/encoder", Encoder)
-        robot.send("encoder", stock_messages.make_encoder("hero_10", rospy.Time.now(), 2.0, 2.0))
-        self.assertEqual(encoders.wait_count(1)[0].left_ticks, 2.0)
-
-    def test_a_robot_that_declares_the_same_again_changes_nothing(self):
-        robot = self.join(11)
-        encoders = Recorder("/hero_11/encoder", Encoder)
-        for count in range(1, 4):
-            robot.declare()
-            robot.send("encoder", stock_messages.make_encoder("hero_11", rospy.Time.now(), float(count), 0.0))
-        self.assertEqual([message.left_ticks for message in encoders.wait_count(3)], [1.0, 2.0, 3.0])
-        self.assertEqual(encoders.subscriber.get_num_connections(), 1)
-        self.assertEqual(self.fleet.find("/hero_11").reconnects, 0)
 
     def test_log_lines_reach_rosout_with_level_and_name_and_without_colors(self):
         robot = self.join(12)
@@ -233,17 +191,6 @@ class TestDriverTopics(DriverCase):
         self.wait_log("after the heartbeat")
         self.assertEqual([line.msg for line in self.find_logs("onected at time") if line.level > RosLog.DEBUG], [])
         self.fleet.wait("/hero_13", 1, "with uptime", lambda entry: 421 <= entry.uptime.to_sec() < 500)
-
-    def test_an_early_boot_line_gives_versions_and_reaches_the_log(self):
-        robot = FakeRobot(14)
-        self.addCleanup(robot.close)
-        robot.declares = False
-        robot.connect(self.address)
-        robot.log(boot_line("hero_14"))
-        robot.declares = True
-        entry = self.fleet.wait("/hero_14", 1, "with versions", lambda entry: entry.firmware)
-        self.assertEqual((entry.firmware, entry.hardware, entry.config), ("v3.8", "v2.5", "v2.3"))
-        self.wait_log("^hero_14: Firmware: v3.8")
 
 
 if __name__ == "__main__":

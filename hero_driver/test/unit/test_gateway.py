@@ -10,7 +10,7 @@ from hero_driver.gateway import Gateway
 from hero_driver.rosserial.packets import ID_LOG, encode_packet
 from hero_driver.rosserial.payloads import LOG_INFO, Log, encode_log
 from hero_driver.transport.link import Address
-from hero_test.fake_robot import PUB, STOCK_DECLARATIONS, FakeRobot
+from hero_test.fake_robot import PUB, STOCK_DECLARATIONS, FakeRobot, boot_line
 
 PUBLISHED = [entry for entry in STOCK_DECLARATIONS if entry.kind == PUB]
 HELLO = FakeRobot(0, PUBLISHED).encode_declarations()
@@ -38,22 +38,26 @@ class FakeLink:
 class Driver:
     """A gateway, and links that bring it what robots send."""
 
-    def __init__(self, monkeypatch):
+    def __init__(self, monkeypatch, **parameters):
         self.now_s = 100.0
         monkeypatch.setattr(gateway.time, "monotonic", lambda: self.now_s)
-        self.lines = []
+        self.lines, self.keys = [], set()  # keys: of throttled lines
         self.gateway = Gateway(
-            read_config({}),
+            read_config(parameters),
             SimpleNamespace(call_later=lambda delay_s, call: None, call_soon=lambda call: None),
             SimpleNamespace(
                 log=lambda level, text: self.lines.append(text),
-                log_throttled=lambda level, key, text, robot="", host="": self.lines.append(text),
+                log_throttled=self.log_throttled,
             ),
             SimpleNamespace(submit=lambda job, always=False: True),  # nothing is registered with a master
             "/hero_driver",
             lambda: int(self.now_s * 1e9),
             lambda: None,
         )
+
+    def log_throttled(self, level, key, text, robot="", host=""):
+        self.lines.append(text)
+        self.keys.add(key)
 
     def connect(self, host):
         """Open a link from host."""
@@ -98,6 +102,24 @@ def test_log_lines_of_a_robot_are_passed_on_with_its_name(driver):
     assert driver.lines[-1] == "hero_0: hello"
 
 
+def test_a_boot_line_that_comes_before_the_name_tells_the_versions(driver):
+    link = driver.connect(HOST)
+    driver.receive(link, encode_packet(ID_LOG, encode_log(Log(LOG_INFO, boot_line("hero_0")))))
+    driver.receive(link)
+    assert driver.gateway.fleet.robots["/hero_0"].firmware == "v3.8"
+    assert any(line.startswith("hero_0: Firmware: v3.8") for line in driver.lines)
+
+
+def test_parameters_limit_the_topics_and_the_packets_of_a_robot(monkeypatch):
+    driver = Driver(monkeypatch, max_topics=len(PUBLISHED) - 1, max_payload_length=200)
+    link = driver.join(HOST)
+    assert driver.lines[-1].endswith("refused: more than %d topics (max_topics)" % (len(PUBLISHED) - 1))
+    bad_packets = lambda: driver.gateway.peers[link].session.reader.bad_packets  # noqa: E731
+    for length, expected in ((200, 0), (201, 1)):
+        driver.receive(link, encode_packet(PUBLISHED[0].topic_id, bytes(length)))
+        assert bad_packets() == expected
+
+
 def test_a_robot_that_connects_again_is_found_by_its_new_link(driver):
     old = driver.join(HOST)
     driver.now_s += 10.0
@@ -114,6 +136,12 @@ def test_a_robot_that_was_just_heard_keeps_its_id_from_another_host(driver):
     assert driver.find_link() is first
     assert not second.closed
     assert "two robots call themselves /hero_0: 10.42.0.17:50000 was first" in driver.lines[-1]
+    keys = set(driver.keys)
+    second.close("closed by the robot")
+    driver.now_s += 1.0
+    driver.receive(first)
+    driver.join(OTHER_HOST)
+    assert driver.keys == keys, "a duplicate that keeps dialling is one line"
 
 
 def test_a_robot_that_fell_silent_loses_its_id_to_another_host(driver):

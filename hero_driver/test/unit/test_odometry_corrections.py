@@ -183,11 +183,12 @@ def test_counters_with_stamps_since_boot_are_of_a_new_boot():
     assert list_odometry(outputs)[0][2] == pytest.approx(10.0 * TICK_M)
 
 
-def test_the_pose_stays_where_it_was_when_the_robot_reboots():
+@pytest.mark.parametrize("is_noticed", [True, False], ids=["noticed", "seen by its counters alone"])
+def test_the_pose_stays_where_it_was_when_the_robot_reboots(is_noticed):
     robot = CorrectedRobot()
     robot.receive_burst(NOW_NS, (100.0, 100.0))
     robot.receive_burst(NOW_NS + PERIOD_NS, (200.0, 200.0))
-    robot.reconnect(rebooted=True)
+    robot.reconnect(rebooted=is_noticed)
     outputs = robot.receive_burst(NOW_NS + 3000 * MS, (0.0, 0.0))
     assert list_odometry(outputs)[0][2] == pytest.approx(100.0 * TICK_M)
     outputs = robot.receive_burst(NOW_NS + 3034 * MS, (10.0, 10.0))
