@@ -155,7 +155,7 @@ def test_speeds_are_limited_and_that_is_said_once():
     turning, its_link = make_robot()
     turning.drive(0.1, 9.0)
     assert len(its_link.warned) == 1
-    for wrong in ((math.nan, 0.0), (0.0, math.inf)):
+    for wrong in ((math.nan, 0.0), (0.0, math.inf), ("0.1", 0.0), (None, 0.0)):
         with pytest.raises(ValueError, match="speeds must be finite"):
             robot.drive(*wrong)
     assert len(link.sent) == 4
@@ -181,7 +181,7 @@ def test_driving_for_a_time_repeats_the_command_and_stops_on_time():
     link.sent.clear()
     robot.drive(0.1, 0.0, duration_s=0.0)
     assert [velocity for _, *velocity in link.sent] == [[0.0, 0.0]]
-    for wrong in (-0.1, math.nan):
+    for wrong in (-0.1, math.nan, "2"):
         with pytest.raises(ValueError, match="a duration must be 0 s or more"):
             robot.drive(0.1, 0.0, wrong)
 
@@ -229,7 +229,7 @@ def test_forward_and_turn_end_within_their_tolerance():
     assert link.pose.yaw_rad == pytest.approx(math.tau - 7.0, abs=0.03)
     assert min(velocity[2] for velocity in link.sent) == -3.0
     for move in (robot.forward, robot.turn):
-        for wrong in ((math.inf, 0.1), (math.nan, 0.1), (0.1, 0.0), (0.1, -0.1), (0.1, math.inf)):
+        for wrong in ((math.inf, 0.1), (math.nan, 0.1), ("0.1", 0.1), (0.1, 0.0), (0.1, -0.1), (0.1, math.inf)):
             with pytest.raises(ValueError, match="the speed positive"):
                 move(*wrong)
 

@@ -37,12 +37,6 @@ def is_idle(queue):
     return queue.due_in_s(True, 0.0) is None
 
 
-def test_an_empty_queue_is_idle_and_has_nothing_to_send():
-    queue = make_queue()
-    assert take(queue, 0.0) == []
-    assert is_idle(queue)
-
-
 def test_commands_that_are_no_velocities_go_out_in_order_and_all():
     queue = make_queue()
     for number in range(QUEUE_LENGTH):
@@ -70,14 +64,6 @@ def test_velocities_of_two_controllers_are_shaped_each_on_its_own():
     assert take(queue, 0.01) == []
     assert queue.due_in_s(True, 0.01) == pytest.approx(0.05)
     assert take(queue, 0.06) == [(VELOCITY, SLOW)]
-
-
-def test_a_full_queue_of_other_commands_does_not_hold_up_a_stop():
-    queue = make_queue()
-    for _ in range(QUEUE_LENGTH):
-        queue.offer(LED, bytes(16))
-    offer(queue, VELOCITY, ZERO_TWIST, 0.0)
-    assert take(queue, 0.0)[0] == (VELOCITY, ZERO_TWIST)
 
 
 def test_unacknowledged_bytes_delay_other_commands_but_not_a_stop():
@@ -172,20 +158,6 @@ def test_zeros_that_keep_coming_on_another_topic_do_not_hold_up_motion():
         offer(queue, VELOCITY if step % 2 else POSITION, FAST if step % 2 else ZERO_TWIST, 0.02 * step)
         sent += take(queue, 0.02 * step)
     assert sent.count((VELOCITY, FAST)) > 20
-
-
-def test_of_servo_pulses_only_the_newest_goes_out():
-    queue = make_queue()
-    for pulse_us in range(1400, 1410):
-        queue.offer_motion(MOTORS, struct.pack("<hh", pulse_us, 1500), STOPPED_MOTORS, 0.0)
-    assert take(queue, 0.0) == [(MOTORS, struct.pack("<hh", 1409, 1500))]
-    assert is_idle(queue)
-
-
-def test_servo_pulses_that_could_not_be_sent_in_time_are_dropped():
-    queue = make_queue()
-    queue.offer_motion(MOTORS, PULSES, STOPPED_MOTORS, 0.0)
-    assert take(queue, 2.1) == []
 
 
 def test_motion_is_held_for_a_robot_that_is_not_heard_and_stops_are_not():

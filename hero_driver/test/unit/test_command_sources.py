@@ -40,14 +40,6 @@ def test_single_commands_keep_the_meaning_that_the_firmware_gives_them(commands)
     assert robot.lines == []
 
 
-def test_a_program_that_commands_once_a_second_is_left_to_the_firmware():
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        robot.publish_at(1, 10.0)
-        clock.run(2.9)
-        assert robot.motors.is_turning
-
-
 @given(pauses_s=st.lists(st.floats(0.0, 0.45), min_size=5, max_size=40))
 def test_a_program_with_jitter_is_never_classified_as_hung(pauses_s):
     with Clock().is_the_drivers() as clock:
@@ -56,27 +48,6 @@ def test_a_program_with_jitter_is_never_classified_as_hung(pauses_s):
             robot.publish_velocity(0.1)
             clock.run(pause_s)
     assert robot.lines == []
-
-
-def test_short_bursts_with_pauses_keep_the_firmwares_meaning():
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        for _ in range(10):
-            robot.publish_at(50, 0.1)
-            clock.run(0.9)
-        assert robot.motors.is_turning
-    assert robot.lines == []
-
-
-@pytest.mark.parametrize("pause_s", [0.6, 1.0, 2.0, 3.9, 6.0])
-def test_a_program_that_hangs_twice_within_seconds_is_stopped_twice(pause_s):
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        for _ in range(2):
-            robot.publish_at(10, 0.7)
-            assert robot.motors.is_turning
-            clock.run(pause_s)
-            assert not robot.motors.is_turning
 
 
 def find_silence_s(period_s, end_s, pauses, is_read_first=True, until_s=6.0):
@@ -125,27 +96,6 @@ def test_pauses_of_the_driver_keep_no_robot_of_a_hung_program_moving(period_s, p
     stopped_s = find_silence_s(period_s, end_s, times_s, until_s=20.0)
     # One pause that does not count, and one in which the time is over.
     assert stopped_s <= end_s + max(STOP_S, 4.0 * period_s) + 2.0 * longest_s + 2.0 * POLL_INTERVAL_S + 0.2
-
-
-def test_of_two_programs_the_one_that_goes_on_keeps_the_robot_moving():
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        for _ in range(10):
-            for node in ("/first", "/second"):
-                robot.publish_velocity(0.1, node=node)
-            clock.run(0.1)
-        robot.publish_at(10, 3.0, node="/second")
-        assert robot.motors.is_turning
-    assert [line for line in robot.lines if "silent" in line] == []
-
-
-def test_a_commander_that_stopped_its_robot_may_be_silent():
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        robot.publish_at(10, 2.0)
-        robot.publish_velocity(0.0)
-        clock.run(10.0)
-    assert robot.lines == []
 
 
 # What a stop has to end.
@@ -221,15 +171,6 @@ def test_a_stop_leaves_what_another_program_drives_at_this_moment():
         robot.publish_at(5, 1.0, name=POSITION, node="/other")
         clock.run(3.0)
         assert not robot.motors.is_turning, "the other program fell silent"
-
-
-def test_a_stop_that_repeats_itself_on_a_resting_robot_stays_two_packets():
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        clock.run(1.0)
-        robot.publish_velocity(0.0)
-        clock.run(2.0)
-    assert len(robot.writes) == 2
 
 
 @pytest.mark.parametrize("controller", ["velocity_controller", "position_controller"])

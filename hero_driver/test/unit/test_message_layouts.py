@@ -130,13 +130,6 @@ def test_odometry_of_a_wrong_length_is_refused():
         assert writer.rewrite(payload, 0, NOW_NS, None) is not None
 
 
-def test_a_robot_may_change_its_frames():
-    writer = make_writer()
-    for robot in ("hero_0", "hero_12", "hero_0"):
-        written = writer.rewrite(build_odometry(NOW_NS, robot=robot), 0, NOW_NS, None)
-        assert read_odometry(written)[:2] == (robot + "/odom", robot + "/base_link")
-
-
 @given(payload=st.binary(max_size=800))
 def test_any_bytes_are_odometry_or_none(payload):
     written = make_writer().rewrite(payload, 0, NOW_NS, None)

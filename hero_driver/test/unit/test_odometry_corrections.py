@@ -81,27 +81,6 @@ def test_odometry_has_covariances_and_the_velocity_of_the_wheels():
     assert twist_covariance[::7] == (1e-4, 1e-9, 1e-9, 1e-9, 1e-9, 1e-2)
 
 
-def test_a_reading_stamped_a_millisecond_after_its_odometry_belongs_to_it():
-    # As in one of 436 bursts of a recorded robot.
-    robot = CorrectedRobot()
-    for number in range(5):
-        stamp_ns = NOW_NS + number * PERIOD_NS
-        outputs = robot.receive_burst(stamp_ns, (5.0 * number,) * 2, encoder_stamp_ns=stamp_ns + MS)
-        assert list_odometry(outputs)[0][2] == pytest.approx(5.0 * number * TICK_M)
-
-
-def test_a_transform_one_millisecond_after_odometry_is_of_its_burst():
-    robot = CorrectedRobot()
-    for number in range(5):
-        stamp_ns = NOW_NS + number * PERIOD_NS
-        transform = build_transform_message(build_transform(stamp_ns + MS, "hero_0/odom", "hero_0/base_link"))
-        robot.receive("/hero_0/odom", build_odometry(stamp_ns), stamp_ns)
-        robot.receive("/tf", transform, stamp_ns)
-        outputs = robot.receive("/hero_0/encoder", build_encoder(stamp_ns, 5.0 * number, 5.0 * number), stamp_ns)
-        assert list_odometry(outputs)[0][2] == pytest.approx(5.0 * number * TICK_M)
-        assert list_transforms(outputs)[0][3] == pytest.approx(5.0 * number * TICK_M)
-
-
 # Other orders, and readings that do not come.
 
 
@@ -321,15 +300,3 @@ def test_an_encoder_reading_that_cannot_be_true_is_named(ticks, text):
     robot.receive_burst(NOW_NS + 2 * PERIOD_NS, (ticks, 7.0))
     assert text in robot.corrections.take_problem()
     assert robot.corrections.take_problem() == ""
-
-
-def test_stamps_too_close_together_give_no_impossible_velocity():
-    robot = CorrectedRobot()
-    for number in range(3):
-        robot.receive_burst(NOW_NS + number * PERIOD_NS, (10.0 * number, 10.0 * number))
-    before = robot.corrections.odometry.ticks.linear_m_s
-    robot.corrections.odometry.ticks.expect_reset()
-    robot.corrections.odometry.ticks.integrate(0.0, 0.0, 1.0)
-    robot.corrections.odometry.ticks.integrate(300.0, 300.0, 1.0 + 1e-6)
-    assert 0.1 < before < 1.0
-    assert robot.corrections.odometry.ticks.linear_m_s == 0.0

@@ -1,7 +1,7 @@
 """What a robot may declare, what is refused, and that nothing leaves that was not declared."""
 
 import pytest
-from conversation import T0, list_messages, list_requests, open_declared_session, open_session, receive
+from conversation import T0, list_requests, open_declared_session, open_session, receive
 from hypothesis import given
 from hypothesis import strategies as st
 from vectors import (
@@ -9,7 +9,6 @@ from vectors import (
     HANDSHAKE,
     ODOM_MESSAGE,
     STOCK_TOPICS,
-    TO_ROBOT,
     TWIST_MD5,
     build_declaration,
     build_packet,
@@ -56,26 +55,10 @@ def test_the_id_of_the_declaring_packet_says_the_kind_and_the_direction(frame_id
     assert kind.is_from_robot is is_from_robot
 
 
-def test_ids_of_an_older_firmware_are_taken_as_they_are_declared():
-    session = open_session()
-    receive(session, declare_twist(106, "/hero_0/velocity_controller/cmd_vel"))
-    assert session.encode_message(106, bytes(48)) == build_packet(106, bytes(48))
-    with pytest.raises(RosserialError, match="not declared"):
-        session.encode_message(109, bytes(48))
-
-
 def test_the_same_declaration_again_is_no_event():
     session = open_declared_session()
     assert receive(session, HANDSHAKE) == []
     assert len(session.topics) == len(STOCK_TOPICS)
-
-
-def test_another_declaration_of_an_id_replaces_the_one_before():
-    session = open_declared_session()
-    (event,) = receive(session, declare_twist(130, "/hero_0/other", frame_id=0))
-    assert type(event) is Topic
-    ((topic, _),) = list_messages(receive(session, ODOM_MESSAGE))
-    assert topic.info.name == "/hero_0/other"
 
 
 def test_ids_redeclared_too_often_are_refused_and_keep_their_name():
@@ -186,26 +169,6 @@ def test_an_id_may_be_declared_again_at_the_limit_of_topics():
 
 
 # What may be sent.
-
-
-@pytest.mark.parametrize("topic_id", TO_ROBOT)
-def test_a_message_for_an_id_that_the_robot_receives_is_one_packet(topic_id):
-    session = open_declared_session()
-    assert session.encode_message(topic_id, b"\x01\x02") == build_packet(topic_id, b"\x01\x02")
-    assert session.take_packets() == []
-
-
-@pytest.mark.parametrize("topic_id", [*FROM_ROBOT, 0, 6, 7, 10, 11, 99, 112, 124, 137, 65535, -1])
-def test_a_message_for_any_other_id_is_never_encoded(topic_id):
-    with pytest.raises(RosserialError, match="not declared"):
-        open_declared_session().encode_message(topic_id, b"")
-
-
-def test_before_the_handshake_nothing_can_be_sent():
-    session = open_session()
-    for topic_id in range(256):
-        with pytest.raises(RosserialError, match="not declared"):
-            session.encode_message(topic_id, b"")
 
 
 def test_a_message_fills_the_robots_buffer_and_never_more():

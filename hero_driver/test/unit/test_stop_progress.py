@@ -4,17 +4,12 @@ import pytest
 
 from hero_driver.commands.stop_progress import (
     SILENT_AFTER_S,
-    STOPS_UNREAD,
-    TIRED_AFTER_S,
-    TIRED_INTERVAL_S,
-    UNREAD_AFTER_S,
     StopProgress,
     StopState,
 )
 from hero_driver.corrections.wheel_motion import REST_READINGS, WheelMotion
 
 READING_S = 0.034
-READ_CYCLE_S = 0.051
 STEP_S = 0.002
 
 
@@ -68,13 +63,6 @@ class Robot:
         return states
 
 
-def test_the_first_stop_goes_at_once_and_each_reading_cycle_gets_another():
-    robot = Robot(lambda now_s: 186.0)
-    robot.run(0.4)
-    assert robot.sent_s[0] == 0.0
-    assert all(later - earlier < READ_CYCLE_S for earlier, later in zip(robot.sent_s, robot.sent_s[1:]))
-
-
 def test_a_robot_at_rest_is_confirmed_and_gets_no_more():
     robot = Robot(lambda now_s: 0.0, warm_up=20)
     assert robot.run(1.0) == [StopState.STOPPING, StopState.AT_REST]
@@ -92,28 +80,6 @@ def test_a_robot_that_moves_is_told_until_its_wheels_rest():
     robot = Robot(lambda now_s: 186.0 if now_s < 0.3 else 0.0)
     assert robot.run(0.7) == [StopState.STOPPING, StopState.AT_REST]
     assert robot.sent_s[-1] >= 0.3
-
-
-def test_a_robot_that_goes_on_is_reported_and_told_less_often_for_ever():
-    robot = Robot(lambda now_s: 186.0)
-    assert robot.run(20.0) == [StopState.STOPPING, StopState.MOVING]
-    late = [sent_s for sent_s in robot.sent_s if sent_s > TIRED_AFTER_S + 1.0]
-    assert all(later - earlier >= 1.0 for earlier, later in zip(late, late[1:]))
-    assert late[-1] > 18.0
-
-
-def test_wheels_that_are_pushed_after_rest_are_seen_and_stopped_again():
-    robot = Robot(lambda now_s: 186.0 if 1.0 < now_s < 1.5 else 0.0)
-    assert robot.run(5.0) == [StopState.STOPPING, StopState.AT_REST, StopState.MOVING, StopState.AT_REST]
-    assert any(sent_s > 1.0 for sent_s in robot.sent_s)
-
-
-def test_a_robot_without_readings_is_told_for_two_cycles_and_unconfirmed():
-    robot = Robot(lambda now_s: 0.0, reads=False)
-    assert robot.run(UNREAD_AFTER_S - 0.1) == [StopState.STOPPING]
-    assert robot.run(20.0)[-1] is StopState.UNCONFIRMED
-    assert len(robot.sent_s) == STOPS_UNREAD
-    assert 2 * READ_CYCLE_S <= robot.sent_s[-1] < 0.2
 
 
 def test_a_robot_without_new_readings_is_unconfirmed_until_they_come():
@@ -185,32 +151,6 @@ def test_wheels_that_really_turn_are_reported_once_readings_are_in_time():
     assert robot.run(5.1) == [StopState.STOPPING, StopState.MOVING]
 
 
-def test_no_stops_pile_up_in_front_of_a_robot_that_acknowledges_nothing():
-    robot = Robot(lambda now_s: 186.0, reads=False, is_acknowledged=lambda now_s: now_s > 3.0, warm_up=20)
-    assert robot.run(3.0) == [StopState.STOPPING]
-    assert robot.sent_s == [0.0]
-    robot.run(3.5)
-    assert len(robot.sent_s) > 1
-
-
-def test_a_robot_that_tunes_itself_gets_bursts_from_the_first_stop_on():
-    robot = Robot(lambda now_s: 186.0)
-    robot.run(0.5, tunes=True)
-    assert all(robot.bursts)
-
-
-def list_burst_times(robot):
-    return [sent_s for sent_s, burst in zip(robot.sent_s, robot.bursts) if burst]
-
-
-def test_wheels_that_go_on_without_slowing_down_get_a_burst_after_0_8_s():
-    robot = Robot(lambda now_s: 186.0)
-    robot.run(3.0)
-    first_s, second_s = list_burst_times(robot)[:2]
-    assert 0.8 <= first_s < 1.3
-    assert second_s - first_s >= 0.8
-
-
 @pytest.mark.parametrize(
     "turns",
     [
@@ -226,39 +166,10 @@ def test_wheels_that_come_to_rest_by_themselves_get_no_burst(turns):
     assert not any(robot.bursts)
 
 
-def test_no_burst_before_the_robot_has_acknowledged_a_stop():
-    robot = Robot(lambda now_s: 186.0, is_acknowledged=lambda now_s: now_s > 2.0)
-    robot.run(2.7)
-    assert not any(robot.bursts)
-
-
-def test_asking_again_brings_the_next_stop_forward():
-    robot = Robot(lambda now_s: 186.0)
-    robot.run(8.2)
-    half_way_s = robot.sent_s[-1] + TIRED_INTERVAL_S / 2.0
-    robot.run(half_way_s)
-    sent = len(robot.sent_s)
-    robot.stop.renew(robot.now_s)
-    robot.run(half_way_s + 0.01)
-    assert len(robot.sent_s) == sent + 1
-
-
 @pytest.mark.parametrize("ticks_per_s", [12.0, 50.0, 400.0])
 def test_no_speed_above_a_tick_per_rest_window_passes_for_rest(ticks_per_s):
     robot = Robot(lambda now_s: ticks_per_s)
     assert StopState.AT_REST not in robot.run(3.0)
-
-
-def test_a_stop_that_is_requested_again_is_sent_as_often_as_the_first():
-    robot = Robot(lambda now_s: 186.0)
-    robot.run(TIRED_AFTER_S + 5.0)
-    robot.stop.renew(robot.now_s)
-    began_s = robot.now_s - 100.0
-    robot.run(began_s + 2.0)
-    renewed_s = [sent_s for sent_s in robot.sent_s if sent_s >= began_s]
-    assert renewed_s[0] < began_s + 2 * STEP_S
-    assert all(later - earlier < 1.0 for earlier, later in zip(renewed_s, renewed_s[1:]))
-    assert renewed_s[-1] > began_s + 1.0
 
 
 def make_progress(readings=100):

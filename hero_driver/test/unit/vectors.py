@@ -142,7 +142,6 @@ STOCK_TOPICS = [
     (3, 111, "/hero_0/velocity_controller/pid_calibration", "std_srvs/Trigger", EMPTY_MD5),
 ]
 FROM_ROBOT = [topic_id for frame_id, topic_id, *_ in STOCK_TOPICS if frame_id in (0, 2)]
-TO_ROBOT = [topic_id for frame_id, topic_id, *_ in STOCK_TOPICS if frame_id in (1, 3)]
 
 HANDSHAKE = TIME_REQUEST + b"".join(build_declaration(*topic) for topic in STOCK_TOPICS)
 """What a stock robot answers to a request, in one burst."""

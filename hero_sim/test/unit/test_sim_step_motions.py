@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hero_client import FrameError, GoalError, RobotNotReadyError, StoppedError
+from hero_client import FrameError, GoalError, StoppedError
 from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
 from hero_test.nonempty import nonempty
@@ -56,11 +56,6 @@ def note_commands(swarm, monkeypatch):
 
     monkeypatch.setattr(swarm.rows, "send_velocity", note)
     return sent
-
-
-def find_stops(sent):
-    """Return when (ms) stops were sent."""
-    return [at_ms for at_ms, _, *velocity in sent if velocity == [0.0, 0.0]]
 
 
 @pytest.mark.slow
@@ -158,39 +153,6 @@ def test_a_robot_whose_wheels_do_not_turn_fails_and_says_so():
         assert swarm.now_s - begun_s < 6.0
 
 
-def test_a_goal_not_reached_in_time_is_an_error_with_what_is_left():
-    robot = StepSwarm(1)[0]
-    with pytest.raises(GoalError, match=r"hero_0 did not reach \(50, 0\): not there after 1 s, 49.\d+ m are left"):
-        robot.go_to(50.0, 0.0, timeout_s=1.0)
-    with pytest.raises(GoalError, match="not there after 0.5 s"):
-        robot.start_go_to(50.0, 0.0, timeout_s=0.5).result()
-
-
-@pytest.mark.slow
-def test_a_started_motion_ends_by_cancel_by_stop_and_by_another(monkeypatch):
-    swarm = StepSwarm(1)
-    robot = swarm[0]
-    sent = note_commands(swarm, monkeypatch)
-    ends = (
-        lambda motion: motion.cancel(),
-        lambda motion: robot.stop(),
-        lambda motion: robot.drive(0.0, 0.0),
-        lambda motion: robot.forward(-0.01),
-    )
-    for end in ends:
-        motion = robot.start_go_to(5.0, 0.0, frame="robot")
-        swarm.sleep(1.03)
-        assert robot.velocity.linear_m_s > 0.03 and not motion.done()
-        del sent[:]
-        told_ms = swarm.rows.now_ms
-        end(motion)
-        with pytest.raises(GoalError, match=r"hero_0 did not reach \(5, 0\) in the frame robot: cancelled"):
-            motion.result()
-        assert sent[0] == (told_ms, 0, 0.0, 0.0)
-        assert not motion.cancel()
-        assert is_at_rest(swarm)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("wifi", ["ideal", "router"])
 def test_one_stop_brings_robots_to_rest_at_each_phase_of_their_loop(wifi, monkeypatch):
@@ -239,19 +201,6 @@ def test_a_swarm_moves_as_one_and_tells_who_did_not():
     assert is_at_rest(swarm)
 
 
-def test_a_timed_drive_takes_its_time_and_ends_with_one_stop(monkeypatch):
-    swarm = StepSwarm(1)
-    sent = note_commands(swarm, monkeypatch)
-    for duration_s in (0.3, 0.25, 1.0):
-        del sent[:]
-        begun_ms = swarm.rows.now_ms
-        swarm[0].drive(0.1, 0.0, duration_s)
-        stops_ms = [at_ms - begun_ms for at_ms in find_stops(sent)]
-        assert stops_ms == [duration_s * 1000.0]
-        assert len(sent) - 1 == math.ceil(duration_s * 10.0)
-        assert is_at_rest(swarm)
-
-
 @pytest.mark.slow
 def test_while_all_robots_are_stopped_motions_are_errors_that_tell_so(capsys):
     swarm = StepSwarm(2)
@@ -283,58 +232,6 @@ def test_while_all_robots_are_stopped_motions_are_errors_that_tell_so(capsys):
     robot.forward(0.05)
 
 
-def silence(swarm, row):
-    """Let the program receive nothing more of the robot at row."""
-    rows, last_ms = swarm.rows, swarm.rows.now_ms
-
-    def forget(_):
-        rows.odometry_ms[row] = rows.scan_ms[row] = last_ms
-
-    rows.on_cycle.append(forget)
-    rows.on_scan.append(forget)
-
-
-def test_motions_of_a_robot_that_fell_silent_end_and_no_new_one_begins():
-    swarm = StepSwarm(2)
-    robot = swarm[1]
-    motion = robot.start_go_to(0.5, 0.0, frame="robot")
-    swarm.sleep(1.0)
-    silence(swarm, robot.row)
-    with pytest.raises(GoalError, match="hero_1 did not .*: no pose for 2 s: the last message on /hero_1/odom came"):
-        motion.result()
-    assert swarm.now_s == pytest.approx(4.2, abs=0.3)
-    before = swarm.now_s
-    with pytest.raises(RobotNotReadyError, match="hero_1 is not ready after 2 s: no message on /hero_1/odom"):
-        robot.forward(0.1)
-    assert swarm.now_s - before == pytest.approx(2.0, abs=0.05)
-    swarm[0].forward(0.05)
-    assert is_at_rest(swarm)
-
-
-def test_speeds_beyond_the_robot_are_cut_before_they_are_sent(monkeypatch):
-    swarm = StepSwarm(1)
-    sent = note_commands(swarm, monkeypatch)
-    swarm[0].drive(9.0, -99.0)
-    swarm[0].drive(-0.3, 1.0)
-    assert [velocity for _, _, *velocity in sent] == [[0.2, -8.0], [-0.2, 1.0]]
-
-
-def test_speeds_and_distances_that_mean_nothing_are_refused():
-    robot = StepSwarm(1)[0]
-    for speed in (0.0, -1.0, math.nan, math.inf):
-        with pytest.raises(ValueError, match="the speed positive"):
-            robot.forward(0.1, speed)
-        with pytest.raises(ValueError, match="the speed positive"):
-            robot.turn(0.1, speed)
-    for wrong in (math.nan, "0.1", None):
-        with pytest.raises(ValueError, match="speeds must be finite"):
-            robot.drive(wrong, 0.0)
-        with pytest.raises(ValueError, match="the speed positive"):
-            robot.forward(wrong)
-        with pytest.raises(ValueError, match="0 s or more"):
-            robot.drive(0.1, 0.0, "2" if wrong is None else math.nan)
-
-
 def test_goals_and_poses_that_mean_nothing_are_refused_at_once():
     swarm = StepSwarm(2)
     for wrong in (math.nan, math.inf, "1", [1.0]):
@@ -362,50 +259,3 @@ def test_dropping_a_swarm_with_a_motion_on_its_way_is_no_error(recwarn):
     del swarm
     gc.collect()
     assert not recwarn.list
-
-
-def test_a_swarm_drives_forward_and_turns_all_at_once():
-    with StepSwarm(4, seed=2, arena="empty", perfect=True) as swarm:
-        before = [robot.true_pose for robot in swarm]
-        swarm.forward(0.1)
-        swarm.turn(1.0)
-        for robot, pose in nonempty(zip(swarm, before)):
-            forward_m, _, turn_rad = find_motion(pose, robot.true_pose)
-            assert (forward_m, turn_rad) == (pytest.approx(0.1, abs=0.01), pytest.approx(1.0, abs=0.1))
-        assert swarm.now_s < 12.0 and is_at_rest(swarm)  # one after the other they need 30 s
-
-
-def test_a_robot_of_a_swarm_that_cannot_drive_on_is_named():
-    with StepSwarm(6, arena=CORNER_ARENA) as swarm, pytest.raises(GoalError, match="hero_4 did not drive 0.3 m"):
-        swarm.forward(0.3)
-
-
-def test_speeds_that_are_limited_are_said_once(capsys):
-    with StepSwarm(1) as swarm:
-        for _ in range(3):
-            swarm[0].drive(0.5, 0.0)
-        assert capsys.readouterr().err.count("hero_0 cannot drive 0.5 m/s and 0 rad/s: it is limited to 0.2 m/s") == 1
-
-
-def test_an_angle_that_looks_like_degrees_is_asked_about(capsys):
-    with StepSwarm(1) as swarm:
-        swarm[0].turn_steps(90, 1.5).close()
-        assert "hero_0 turns by 90 rad, 14.3 full turns: for degrees, turn(math.radians(90))" in capsys.readouterr().err
-        swarm[0].turn_steps(2.0 * math.tau, 1.5).close()
-        assert not capsys.readouterr().err
-
-
-def test_headings_in_another_frame_stay_within_a_half_turn():
-    with StepSwarm(1, arena="empty") as swarm:
-        swarm.sleep(0.2)
-        swarm[0].set_pose(0.0, 0.0, 3.0)
-        swarm[0]._link._origin = swarm[0].true_pose._replace(yaw_rad=3.0)
-        assert abs(swarm[0].pose_in("world").yaw_rad) <= math.pi
-        assert swarm[0].pose_in("world").yaw_rad == pytest.approx(6.0 - math.tau, abs=0.02)
-
-
-def test_slices_and_names_of_a_swarm_are_refused_with_what_to_write():
-    with StepSwarm(2) as swarm:
-        for key in (slice(0, 2), "hero_0"):
-            with pytest.raises(TypeError, match=r"swarm\[3\] is hero_3, not swarm.*; for several robots"):
-                swarm[key]

@@ -212,87 +212,6 @@ def test_an_unknown_common_frame_is_reported(capsys):
     assert capsys.readouterr().err == "hero_0 answers\n"
 
 
-@pytest.mark.slow
-def test_lights_show_the_color_that_was_asked_for_and_blink():
-    swarm = StepSwarm(3)
-    swarm[0].led("green")
-    swarm[1].led((1.0, 0.0, 0.25))
-    assert [robot.light for robot in swarm] == [(0.0, 1.0, 0.0), (1.0, 0.0, 0.25), (0.0, 0.0, 0.0)]
-    swarm.blink("red", 0.4)
-    shown = []
-    for _ in range(8):
-        swarm.sleep(0.1)
-        shown.append(swarm[2].light[0])
-    assert shown == [1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0]
-    swarm.led("blue")
-    swarm.sleep(2.0)
-    assert {robot.light for robot in swarm} == {(0.0, 0.0, 1.0)}
-    swarm[0].led("green")
-    swarm.sleep(20.0)  # a robot alone would go dark after 15 s
-    assert [robot.light for robot in swarm] == [(0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 1.0)]
-    swarm.close()
-    swarm.sleep(20.0)
-    assert {robot.light for robot in swarm} == {(0.0, 0.0, 0.0)}
-    with pytest.raises(ValueError, match=r"pink.*there are: .*green"):
-        swarm[0].led("pink")
-    with pytest.raises(ValueError, match=r"at least 0.2 s"):
-        swarm[0].blink("red", period_s=0.1)
-
-
-def test_leaving_a_with_block_stops_the_robots_also_after_an_error():
-    swarm = StepSwarm(2)
-
-    def drive_and_fail():
-        with swarm:
-            swarm[0].drive(0.1, 0.0)
-            swarm.sleep(1.0)
-            raise RuntimeError("a mistake in the user's program")
-
-    with pytest.raises(RuntimeError, match="mistake"):
-        drive_and_fail()
-    swarm.sleep(0.5)
-    before = swarm[0].true_pose
-    swarm.sleep(1.0)  # the robot's own watchdog would not have ended this yet
-    assert math.dist(swarm[0].true_pose, before) < 1e-4
-
-
-def test_robots_that_were_only_watched_are_not_stopped_at_the_end():
-    swarm = StepSwarm(1)
-    with swarm:
-        swarm.rows.send_velocity(0, 0.1, 0.0)  # another program
-        swarm.sleep(0.8)
-    swarm.rows.send_velocity(0, 0.1, 0.0)
-    swarm.sleep(0.3)
-    assert swarm[0].velocity.linear_m_s > 0.05
-    assert not swarm[0].driven
-
-
-def test_data_that_no_longer_come_are_refused_after_a_while():
-    swarm = StepSwarm(1)
-    robot = swarm[0]
-
-    def forget(_):
-        swarm.rows.odometry_ms[:] = swarm.rows.scan_ms[:] = 34
-
-    swarm.sleep(0.05)
-    swarm.rows.on_cycle.append(forget)
-    swarm.rows.on_scan.append(forget)
-    swarm.sleep(0.95)
-    assert robot.fresh_pose() is not None and robot.nearest() is None and robot.missing() is None
-    swarm.sleep(0.2)
-    for read in (lambda: robot.pose, lambda: robot.velocity, lambda: robot.pose_in("world")):
-        with pytest.raises(StaleDataError, match="last message on /hero_0/odom came 1.2 s ago: has the robot gone"):
-            read()
-    assert robot.fresh_pose() is None
-    for read in (lambda: robot.proximity, robot.nearest):
-        with pytest.raises(StaleDataError, match=r"/hero_0/proximity came 1.2 s ago"):
-            read()
-    assert all(map(math.isnan, robot.fresh_proximity()))
-    assert robot.missing() == "no message on /hero_0/odom: is the robot on and in reach?"
-    with pytest.raises(StaleDataError, match="no message on /hero_0/proximity within 2.0 s"):
-        robot.wait_for_scan()
-
-
 OPTIONS = {name: "--" + name.replace("_", "-") for name in ("count", "first_id", "seed", "arena", "error", "model")}
 
 
@@ -385,32 +304,6 @@ def test_a_bump_shield_is_kept_from_walls_and_from_other_robots(tmp_path):
         assert swarm[0].true_pose.x_m < 1.0 - radius_m - 0.005
 
 
-@pytest.mark.slow
-def test_robots_that_do_not_get_to_their_goals_are_named_and_stopped():
-    with StepSwarm(2, seed=1, arena="empty") as swarm:
-        with pytest.raises(GoalError, match="no goal is reached by hero_1: not there after 2 s"):
-            swarm.go_to_each({1: (5.0, 0.0)}, timeout_s=2.0)
-        swarm.sleep(1.0)
-        assert swarm[1].velocity == (0.0, 0.0)
-        with pytest.raises(KeyError, match="hero_7 is not in this swarm"):
-            swarm.go_to_each({7: (0.0, 0.0)})
-        with pytest.raises(TypeError, match="the goal of hero_1 must be"):
-            swarm.go_to_each({1: 0.2})
-        begun_s = swarm.now_s
-        for goals in ({0: swarm[1].true_pose[:2]}, {0: (5.0, 0.1), 1: (5.0, 0.0)}):
-            with pytest.raises(GoalError, match=r"hero_0 and hero_1 are 0.\d+ m apart: robots need 0.178 m"):
-                swarm.go_to_each(goals)
-        assert swarm.now_s - begun_s < 1.0
-
-
-def test_a_swarm_is_indexed_by_the_ids_of_its_robots():
-    swarm = StepSwarm(2, first_id=3)
-    assert 3 in swarm and swarm[4] in swarm and 0 not in swarm and "hero_3" not in swarm
-    for wrong in ("hero_3", slice(2), [3, 4], (3, 4)):
-        with pytest.raises(TypeError, match=r"swarm\[3\] is hero_3, not swarm\["):
-            assert swarm[wrong]
-
-
 def test_arrays_hold_what_the_robots_read_one_by_one():
     with StepSwarm(3, seed=2, arena="obstacles") as swarm:
         swarm.drive(0.1, 0.5, duration_s=1.0)
@@ -430,26 +323,6 @@ def test_wheel_speeds_and_infrared_counts_fit_velocity_and_ranges(tmp_path):
     robot.sleep(1.0)
     left_m_s, right_m_s = robot.wheel_speeds
     assert left_m_s < 0.0 < right_m_s and right_m_s - left_m_s == pytest.approx(2.0 * 0.063, abs=0.04)  # whole ticks
-
-
-@pytest.mark.slow
-def test_a_dict_of_goals_drives_each_robot_to_its_own():
-    swarm = StepSwarm(2, seed=1)
-    goals = {robot.robot_id: (robot.true_pose.x_m, robot.true_pose.y_m + 0.1) for robot in swarm}
-    swarm.go_to(goals)
-    for robot in nonempty(swarm):
-        assert robot.true_pose[:2] == pytest.approx(goals[robot.robot_id], abs=0.03)
-    timeouts_s, read = [], swarm[0].pose_in
-
-    def pose_in(frame, timeout_s=2.0):
-        timeouts_s.append(timeout_s)
-        return read(frame, timeout_s)
-
-    swarm[0].pose_in = pose_in
-    swarm.go_to(goals)
-    assert timeouts_s[0] == 2.0  # at the start of a program, tf and localization take their time
-    with pytest.raises(TypeError, match=r"the goal of each robot: \{0: \(0.2, 0.1\)"):
-        swarm.go_to(0.2)
 
 
 def test_a_log_names_what_robots_did_by_time_world_and_robot():

@@ -172,11 +172,9 @@ class DoorsTest(unittest.TestCase):
         flood.start()
         self.addCleanup(flood.join)
         self.addCleanup(end.set)
-        page = self.open_page()
-        for _ in range(3):
-            page.send(do="stop")
-            self.wait_until_stopped(True)
-            self.release()
+        self.open_page().send(do="stop")
+        self.wait_until_stopped(True)
+        self.release()
 
     def test_messages_without_pause_keep_no_page_from_stopping_all_robots(self):
         page = self.open_page()

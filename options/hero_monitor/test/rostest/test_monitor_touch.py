@@ -194,7 +194,7 @@ class TouchTest(unittest.TestCase):
             self.assertGreater(height, 0, size)
 
     def test_three_quick_taps_on_stop_all_or_release_never_release(self):
-        for size in SIZES:
+        for size in (SIZES[0], SIZES[4], SIZES[-1]):  # the buttons keep their places at all sizes
             self.page.resize(*size)
             for state, ready in ("empty", "0 of 0 ready"), ("live", "3 of 3 ready"):
                 self.show(state)
