@@ -2,6 +2,7 @@
 
 import contextlib
 import socket
+import struct
 
 import pytest
 
@@ -127,6 +128,14 @@ def test_the_end_of_a_connection_is_told_once_and_nothing_is_sent_after_it(drive
     driver.link.drop_unsent(0)
     driver.link.close(0)
     assert driver.events.seen == ["made", "lost"] and driver.link.count_open() == 0
+
+
+def test_a_reset_while_bytes_wait_is_told_once(driver):
+    driver.fill()
+    driver.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    driver.socket.close()
+    driver.poll_until(lambda: driver.events.seen[-1] == "lost")
+    assert driver.events.seen == ["made", "blocked", "lost"]
 
 
 def test_an_abandoned_connection_gets_no_end(driver):

@@ -102,3 +102,23 @@ def test_robots_drive_to_their_starts_as_wide_as_the_widest(stage, monkeypatch):
     robot_runs._drive_to_starts(stage, stage, starts, stage, "seed 1")
     start_drive.assert_called_once_with(starts, 0.06)
     assert stage.stops == 1
+
+
+def test_a_robot_that_is_missing_counts_as_unseen_on_the_way_to_its_start(stage, monkeypatch):
+    drive = mock.create_autospec(robot_runs.StartDrive, instance=True)
+    drive.done, drive.lateness = False, SimpleNamespace(take_warning=lambda: "")
+    drive.step.side_effect = lambda poses, *sensed: seen.append(poses.tolist()) or np.full((2, 1), 0.1)
+    monkeypatch.setattr(robot_runs, "StartDrive", lambda starts, radius_m: drive)
+    monkeypatch.setattr(robot_runs, "START_LIMIT_S", 1.0)
+    seen, told, stage.max_body_radius_m, stage.lost = [], [], 0.06, "has gone"
+    stage.report_missing, stage.fresh_proximity, stage.drive = told.append, lambda: None, pytest.fail
+    robot_runs._drive_to_starts(stage, stage, np.zeros((1, 3)), stage, "seed 1")
+    assert len(seen) > 1 and np.isnan(seen).all()
+    assert told == [{"hero_3": "has gone"}] * len(seen)
+
+
+def test_the_safety_filter_of_a_trial_knows_the_robots_that_are_not_in_it(stage):
+    places = np.array([[1.0, 2.0, 0.05]])
+    others = SimpleNamespace(read=lambda: places, describe_missing=lambda: "")
+    assert robot_runs._drive(stage, stage, stage, stage, (stage, stage, others))
+    assert stage.safety.others_m is places
