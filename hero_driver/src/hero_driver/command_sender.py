@@ -12,9 +12,10 @@ SILENCE_LIMIT_S = 0.5
 
 
 class CommandSender:
-    """The way out of the driver."""
+    """The commands that wait in the queues of all robots, on their way to the sockets; on the loop's thread."""
 
     def __init__(self, call_later: CallLater, owner: Owner) -> None:
+        """call_later is the loop's; owner takes warnings about robots."""
         self._call_later = call_later
         self._owner = owner
 

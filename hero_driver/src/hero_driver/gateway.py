@@ -174,7 +174,7 @@ class Gateway(LinkHandler):
             peer.link.send_packet(packet)
 
     def close_link(self, link: Link, reason: str) -> None:
-        """Note a departure; the robot's endpoints stay up for the grace period."""
+        """Note that link was closed, for this reason; the robot's endpoints stay up for the grace period."""
         peer: Optional[Peer] = self.peers.pop(link, None)
         if peer is None:
             self.last_refusal = f"{link.address}: {reason}"

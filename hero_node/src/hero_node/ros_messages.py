@@ -45,13 +45,13 @@ SCAN_FORM = "<7fI%dfI%df"
 
 
 def encode_text(text: str) -> bytes:
-    """Return a string field."""
+    """Return a string field: its length in bytes, then the text in UTF-8."""
     data = text.encode()
     return LENGTH.pack(len(data)) + data
 
 
 def encode_header(seq: int, frame_id: str, stamp: Tuple[int, int] = (0, 0)) -> bytes:
-    """Return a std_msgs/Header; stamp: s, ns."""
+    """Return a std_msgs/Header; stamp: s, ns. seq counts modulo 2**32, -1 too."""
     data = frame_id.encode()
     return HEADER.pack(seq & 0xFFFFFFFF, *stamp, len(data)) + data
 

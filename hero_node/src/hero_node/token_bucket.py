@@ -7,9 +7,10 @@ BUCKETS_MAX = 1000
 
 
 class TokenBucket:
-    """Tokens for something limited: `burst` at once, and `per_s` per second after that."""
+    """Tokens for something limited; times are of any clock that never steps back."""
 
     def __init__(self, burst: float, per_s: float, now_s: float) -> None:
+        """Begin full: burst tokens may be taken at once, and per_s more in each second after that."""
         self._burst = burst
         self._per_s = per_s
         self._tokens = burst
@@ -30,9 +31,10 @@ class TokenBucket:
 
 
 class TokenBuckets:
-    """One token bucket for each of many names; those that are full again are forgotten."""
+    """One token bucket for each of many names; of more than BUCKETS_MAX, full or else the oldest ones are forgotten."""
 
     def __init__(self, burst: float, per_s: float) -> None:
+        """burst, per_s: as of each TokenBucket."""
         self._burst = burst
         self._per_s = per_s
         self._buckets: Dict[str, TokenBucket] = {}

@@ -77,7 +77,7 @@ def check_limits(tolerance_m: float, timeout_s: float) -> None:
 
 
 class GoalRequest(NamedTuple):
-    """A goal as received."""
+    """A goal as received from the action, a topic or parameters; checked."""
 
     goal: Goal
     frame: str

@@ -79,6 +79,7 @@ class RobotChoice:
     """The robots of a swarm that a joystick drives: at first all. Their lights show a choice."""
 
     def __init__(self, robots: Sequence[Any], buttons: JoystickMapping) -> None:
+        """robots: those of the swarm, in its order; buttons say which of the joystick's choose."""
         self._robots = list(robots)
         self._buttons = buttons
         self._held: Set[int] = set()
@@ -117,7 +118,7 @@ class JoystickTeleop:
     """Sends the joystick's commands to all robots of a swarm, or those that its buttons choose."""
 
     def __init__(self, swarm: Swarm, mapping: JoystickMapping) -> None:
-        """Start stopped."""
+        """Drive swarm by the axes and buttons of mapping; start stopped."""
         self._choice = RobotChoice(list(swarm), mapping)
         self._presses: Deque[Sequence[int]] = deque(maxlen=PRESSES_MAX)
         self._swarm = swarm

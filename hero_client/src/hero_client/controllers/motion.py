@@ -76,7 +76,7 @@ class MotionController:
     """
 
     def __init__(self, now_s: float, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
-        """Begin at now_s; after timeout_s the motion fails."""
+        """Begin at now_s, by the clock of step(); once timeout_s has passed since then, the motion fails."""
         self.state = State.ACTIVE
         self.reason = ""
         self.distance_m = math.nan

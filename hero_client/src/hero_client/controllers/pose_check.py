@@ -43,7 +43,7 @@ FROZEN = "its wheels turn, but its pose stays the same: is the camera's image fr
 
 
 def is_apart(one: Pose, other: Pose, distance_m: float, angle_rad: float) -> bool:
-    """Return whether two poses are further apart than this."""
+    """Return whether two poses of one frame are further apart than distance_m, or turned by more than angle_rad."""
     return measure_distance(one, other) > distance_m or abs(wrap_angle(one.yaw_rad - other.yaw_rad)) > angle_rad
 
 

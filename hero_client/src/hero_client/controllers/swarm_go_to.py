@@ -49,7 +49,7 @@ class SwarmGoToController:
         step_s: float,
         tolerance_m: float = 0.01,
     ) -> None:
-        """step_s: planned time between two calls of step()."""
+        """goals: x, y (m) of each robot, in its order; step_s: planned time between two calls of step()."""
         self.goals = [(float(x), float(y)) for x, y in goals]
         self.law = law
         self.step_s = step_s

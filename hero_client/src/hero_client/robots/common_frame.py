@@ -18,6 +18,7 @@ class CommonFrame:
     """
 
     def __init__(self, frame: str) -> None:
+        """frame: one in which Robot.pose_in() can tell the pose of each robot, such as map."""
         self.frame = frame
         self.missing: Dict[str, Optional[str]] = {}
         self._checks: Dict[str, FrozenCheck] = defaultdict(FrozenCheck)

@@ -15,7 +15,7 @@ MIN_BLINK_PERIOD_S = 0.2
 
 
 class Light:
-    """The light of one robot."""
+    """The light of one robot, which is told its color again and again as long as it shines."""
 
     def __init__(self, link: RobotLink) -> None:
         self._link = link

@@ -44,6 +44,7 @@ class BaseRobot(RobotReadings):
     """
 
     def __init__(self, robot_id: int, link: RobotLink) -> None:
+        """link leads to the robot with this id, and tells the time by which it is waited for."""
         self.robot_id = robot_id
         self.name = "hero_%d" % robot_id
         self.namespace = "/" + self.name

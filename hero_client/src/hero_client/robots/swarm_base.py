@@ -42,6 +42,7 @@ class BaseSwarm(Group, Generic[AnyRobot]):
     """
 
     def __init__(self, robots: Sequence[AnyRobot], clock: Clock) -> None:
+        """clock is that of the robots' links: their time passes by it."""
         self.robots = list(robots)
         self._clock = clock
         self._members = self.robots

@@ -41,7 +41,7 @@ class StopRequest:
     """One request to all drivers, and which of them have taken it."""
 
     def __init__(self, stopped: bool, made_s: float) -> None:
-        """stopped: whether to stop or to release."""
+        """stopped: whether to stop or to release; made_s: when, by the clock of update()'s now_s."""
         self.stopped = stopped
         self.made_s = made_s
         self.is_over = False

@@ -21,6 +21,7 @@ class BurstGate:
     """The bursts to one robot over one connection."""
 
     def __init__(self, wheels: WheelMotion) -> None:
+        """wheels count the readings of the same connection."""
         self._wheels = wheels
         self._is_outstanding = False
         self._acknowledged_readings: Optional[int] = None  # number of readings when the last burst was
@@ -28,7 +29,7 @@ class BurstGate:
         self._retry_s = 0.0
 
     def note_sent(self, now_s: float) -> None:
-        """A burst was sent."""
+        """Close the gate behind a burst that was sent at now_s (monotonic), until the robot has finished it."""
         self._wait_s = 2.0 * self._wait_s if self._is_outstanding else WAIT_S
         self._retry_s = now_s + self._wait_s
         self._is_outstanding = True

@@ -49,7 +49,7 @@ class CommandQueue:
         self._is_idle = False
 
     def offer(self, name: str, payload: bytes) -> None:
-        """Take anything else."""
+        """Take a message that is no motion, for the topic called name; a full queue drops its oldest."""
         if len(self._waiting) >= QUEUE_LENGTH:
             self._waiting.popleft()
             self.dropped += 1

@@ -50,6 +50,7 @@ class CommandSource:
     """
 
     def __init__(self, sender: object, node: str, source: str) -> None:
+        """sender identifies the connection, node is its name in ROS, source the topic in ROS that it publishes."""
         self.sender = sender
         self.node = node
         self.source = source
@@ -59,7 +60,7 @@ class CommandSource:
         self._intervals_s: Optional[Deque[float]] = None  # None before the first command
 
     def note_command(self, moves: bool, now_s: float) -> None:
-        """Its next command came."""
+        """Note its next command, received at now_s; moves: whether the command moves the robot."""
         interval_s = now_s - self.commanded_s
         # What it does after a silence tells its period anew: the silence itself is none.
         begins = interval_s > MAX_WATCHDOG_S or self.has_fallen_silent(RIVAL_SILENCE_S, now_s)

@@ -45,7 +45,7 @@ class _Mark(NamedTuple):
 
 
 class StopState(enum.Enum):
-    """As in hero_msgs/Robot."""
+    """State of a robot's stop, numbered as STOP_* in hero_msgs/Robot."""
 
     NOT_STOPPED = 0
     STOPPING = 1
@@ -58,7 +58,7 @@ class StopProgress:
     """The stop of one robot over one connection: when to send, and its `state`, which is what is known."""
 
     def __init__(self, now_s: float, wheels: WheelMotion) -> None:
-        """Begin at now_s; wheels are the robot's."""
+        """Begin at now_s (monotonic); wheels show the motion that readings of this connection tell."""
         self.state = StopState.STOPPING
         self._wheels = wheels
         self._began_s = now_s
@@ -105,7 +105,7 @@ class StopProgress:
         return tunes or (self._has_passed(self._watched, MOVES_KEPT, now_s) and self._wheels.go_on)
 
     def note_sent(self, was_burst: bool, now_s: float) -> None:
-        """A stop was sent."""
+        """Note that a stop was sent at now_s, and plan the next one; was_burst: with a burst against self-tuning."""
         if self._stops < STOPS_MIN:
             self._mark = self._wheels.readings
         self._stops += BURST_STOPS if was_burst else 1

@@ -57,6 +57,7 @@ class VelocityShaper:
     """The pending commands of one motion topic of one robot: a stop, which nothing replaces, and one later command."""
 
     def __init__(self, stop_payload: bytes = ZERO_TWIST) -> None:
+        """stop_payload: the message of this topic that stops the robot."""
         self._stop_payload = stop_payload
         self._stop_pending = False
         self._newest: Optional[bytes] = None

@@ -45,7 +45,11 @@ class OdometryCorrector:
         add_transform: AddTransform,
         refuse: Refuse,
     ) -> None:
-        """add_transform() takes the transform from odom to base_link."""
+        """Correct by settings, with wheels of this geometry.
+
+        stamps correct the times of all of the robot's messages; add_transform() takes the transform from odom to
+        base_link, refuse() what cannot be used.
+        """
         self.ticks = TickOdometry(geometry)
         self._stamps = stamps
         self._add_transform = add_transform
@@ -55,7 +59,7 @@ class OdometryCorrector:
         self.restart(False, WheelMotion())
 
     def restart(self, rebooted: bool, wheels: WheelMotion) -> None:
-        """A new connection begins, after a reboot with counters that begin anew; wheels is told of all readings."""
+        """Begin a new connection, after a reboot with counters that begin anew; wheels are told of all its readings."""
         self.wheels = wheels
         self._readings: Optional[int] = None  # of the encoder, on this connection; None before it is declared
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
@@ -102,7 +106,7 @@ class OdometryCorrector:
         self._write_odometry(name, sink, corrected_ns, payload)
 
     def receive_transform(self, head: bytes, tail: bytes) -> None:
-        """Take the robot's own transform from odom to base_link."""
+        """Take the robot's own transform from odom to base_link, in two parts: see TakeOdomTransform."""
         if not self._waiting:
             self._write_transform(head, tail)
         elif len(self._waiting) < WAITING_MAX:

@@ -49,7 +49,7 @@ class RobotCorrections:
         )
 
     def restart(self, rebooted: bool, wheels: WheelMotion) -> None:
-        """A new connection begins; see OdometryCorrector.restart()."""
+        """Begin a new connection, after a reboot or not; wheels are told of all its readings."""
         self.models.restart()
         self.odometry.restart(rebooted, wheels)
 

@@ -62,6 +62,7 @@ class TickOdometry:
     """
 
     def __init__(self, geometry: WheelGeometry) -> None:
+        """Begin at zero, at rest, with wheels of this geometry."""
         self.x_m = self.y_m = self.yaw_rad = 0.0
         self.linear_m_s = self.angular_rad_s = 0.0
         self.resets = 0

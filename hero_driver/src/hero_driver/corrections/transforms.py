@@ -58,7 +58,7 @@ class TransformCorrector:
         self._known_foreign: Set[bytes] = set()
 
     def correct(self, payload: bytes, arrival_ns: int) -> None:
-        """Take a message of transforms that came at arrival_ns."""
+        """Take a tf2_msgs/TFMessage that came at arrival_ns; pass on its transforms, stamps corrected, or refuse it."""
         # Stock robots send one transform in a message, of frames that were seen before.
         frames = payload[TRANSFORM_FRAMES]
         last_ns = self._last_ns.get(frames)

@@ -91,7 +91,7 @@ class WheelMotion:
             self._left_ticks, self._right_ticks = left_ticks, right_ticks
 
     def read_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
-        """Take a velocity from odometry."""
+        """Take a velocity from odometry, of a robot without an encoder topic: a reading, too."""
         if self.is_late:
             return
         self.readings += 1

@@ -52,6 +52,7 @@ class Admission:
     """Counts what each address has and sends, and finds what exceeds the limits."""
 
     def __init__(self, limits: AdmissionLimits) -> None:
+        """limits: the driver's parameters."""
         self._limits = limits
         self._connected: ConnectionTable[Any] = ConnectionTable()
         self._unidentified: ConnectionTable[Any] = ConnectionTable()
@@ -134,6 +135,7 @@ class RateLimit:
     """Limits of one connection's packets and bytes per second: the times up to which the rates are used."""
 
     def __init__(self, max_packets_per_s: int, max_bytes_per_s: int, now_s: float) -> None:
+        """Begin at now_s (monotonic) with nothing counted."""
         self._max_packets_per_s = max_packets_per_s
         self._max_bytes_per_s = max_bytes_per_s
         self._packets_until_s = self._bytes_until_s = now_s

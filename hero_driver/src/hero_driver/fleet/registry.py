@@ -72,7 +72,7 @@ class RobotRecord:
     was_ready: bool = False
 
     def enter(self, state: RobotState, now_s: float) -> bool:
-        """Enter a state; return whether it is another one."""
+        """Enter state at now_s (monotonic); return whether the robot was in another one before."""
         if self.state is state:
             return False
         self.state, self.since_s = state, now_s
@@ -94,6 +94,7 @@ class FleetRegistry:
     """All robots by namespace."""
 
     def __init__(self, grace_s: float) -> None:
+        """grace_s: how long a robot that has left keeps its place and its endpoints."""
         self.robots: Dict[str, RobotRecord] = {}
         self.gone: Dict[str, RobotRecord] = {}
         """Robots that were ready once and have not returned since their grace period, in the order of its end."""

@@ -49,7 +49,7 @@ class Reporter:
         self._status = FleetStatus(0.0, "", False, "", None, 0, 0, "", [], [])
 
     def publish(self, status: FleetStatus) -> None:
-        """Publish ~robots."""
+        """Publish status as ~robots, and keep it for /diagnostics."""
         self._status = status
         ros_now = rospy.Time.now()
         message = RobotArray(listening=status.listening, stopped=status.stopped, stopped_by=status.stopped_by)

@@ -49,7 +49,7 @@ def _drop(payload: bytes) -> None:
 
 
 class RawSubscriber:
-    """One topic's way in."""
+    """The messages of one subscribed topic as bytes, read by the loop instead of by a thread of rospy for each."""
 
     def __init__(
         self,
@@ -180,7 +180,7 @@ class MessageStream(Reader):
         return True
 
     def close(self) -> None:
-        """Resume rospy's thread."""
+        """End, and let the thread of rospy that waits in RawSubscriber end the connection."""
         self._socket.close()
         self.ended.set()
         if self._subscriber.last_sender is self._connection:

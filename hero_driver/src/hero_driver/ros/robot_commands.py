@@ -112,7 +112,7 @@ class RobotCommands:
         return subscriber
 
     def choose_receiver(self, name: str, source: str, ros_type: str) -> Callable[[bytes], None]:
-        """Return what takes the messages that come on source."""
+        """Return what takes the messages of ros_type that come on the ROS topic source, for the topic called name."""
         stop_payload = STOP_PAYLOADS.get(ros_type)
         if stop_payload is None:
             return functools.partial(self._receive_command, name)

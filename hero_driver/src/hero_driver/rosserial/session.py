@@ -113,6 +113,7 @@ class Session:
     """
 
     def __init__(self, limits: SessionLimits, now_s: float) -> None:
+        """Begin at now_s (monotonic), when the connection was opened; the robot is asked for its topics at once."""
         self.topics: Dict[int, Topic] = {}
         self._messages: Dict[int, Topic] = {}  # those of which messages come
         self._receivers: Dict[int, Topic] = {}  # those that the robot receives

@@ -81,6 +81,7 @@ class StopDelivery:
     """The stops of all robots of one driver."""
 
     def __init__(self, call_later: CallLater, owner: Owner) -> None:
+        """call_later is the loop's; owner is told of what changes and what goes wrong."""
         self._call_later = call_later
         self._owner = owner
         self._peers: List[Peer] = []

@@ -48,10 +48,10 @@ class LinkHandler:
         """A connection is open; return a reason to refuse it, or None."""
 
     def receive_data(self, link: "Link", data: bytes, now_s: float) -> None:
-        """Bytes came in."""
+        """Take data that was read from link at now_s (monotonic)."""
 
     def close_link(self, link: "Link", reason: str) -> None:
-        """The connection was closed, by either side."""
+        """Take note that the connection was closed, by either side; reason, for users, says why."""
 
     def poll(self, now_s: float) -> None:
         """Called every POLL_INTERVAL_S, before poll_link() for every other connection."""
@@ -89,6 +89,7 @@ class Link:
     """One TCP connection to one robot."""
 
     def __init__(self, loop: LinkOwner, sock: socket.socket, address: Address) -> None:
+        """loop reads and writes sock, which is connected to address and does not block."""
         self.address = address
         self.closed = False
         self.handed_length = 0  # bytes of all packets given to send_packet()

@@ -33,7 +33,7 @@ class Parameter(NamedTuple):
 
 
 def number(default: float, low: float, high: float, unit: str = "", text: str = "") -> Parameter:
-    """Declare a number in low..high."""
+    """Declare a number in low..high, finite, in this unit; text says what it means, for documents."""
     check = _make_check(lambda value: is_number(value, low, high), float, _describe_limits("a number", low, high, unit))
     return Parameter(default, check, text, unit, (low, high))
 
@@ -49,18 +49,18 @@ def whole_number(default: int, low: int, high: int, unit: str = "", text: str = 
 
 
 def flag(default: bool, text: str = "") -> Parameter:
-    """Declare true or false."""
+    """Declare a parameter that is true or false."""
     return Parameter(default, _make_check(lambda value: isinstance(value, bool), bool, "true or false"), text)
 
 
 def choice(default: str, choices: Sequence[str], text: str = "") -> Parameter:
-    """Declare one of some words."""
+    """Declare a parameter that is one of choices."""
     check = _make_check(lambda value: value in choices, str, "one of: " + ", ".join(choices))
     return Parameter(default, check, text, choices=tuple(choices))
 
 
 def string(default: str, text: str = "") -> Parameter:
-    """Declare a text."""
+    """Declare a parameter that may be any text."""
     return Parameter(default, _make_check(lambda value: isinstance(value, str), str, "a text"), text)
 
 
