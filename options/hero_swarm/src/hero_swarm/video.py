@@ -1,16 +1,17 @@
 """Writes one run as a video, seen from above: .gif with Pillow, all others with ffmpeg."""
 
 import contextlib
+import math
 import os
 import shutil
 import subprocess
-from typing import Any, Iterator, List, Sequence, Tuple
+from typing import Iterator, List, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
 
-from hero_client.values import BODY_RADIUS_M
-from hero_sim.world import Arena, list_outlines
+from hero_sim.scene import ARROW, CYLINDER, TEXT, Shape, draw_arena, draw_objects, draw_robots
+from hero_sim.world import Arena
 
 from .experiments.errors import ExperimentError
 from .trial import OPEN, Trial
@@ -20,7 +21,9 @@ FRAMES_PER_S = 10
 _SIZE, _FINER = 600, 2
 """Side of the frames in pixels, and how many times finer they are drawn, so that edges are smooth."""
 _MARGIN_M = 0.2
-_WALL, _OBJECT, _ROBOT = "#666666", "#c07a2e", "#0072b2"
+_FLOOR, _UNLIT = "#c8c8c8", (0.0, 0.45, 0.7, 1.0)
+"""Colors of bare floor, so that black and white areas show, and of robots without a light."""
+_MIN_WIDTH = 3
 
 
 def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
@@ -35,9 +38,9 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
         raise ExperimentError(f"--video {path}: the folder cannot be written to")
     period_s, arena = speed / FRAMES_PER_S, trial.rows.world.arena
     run = trial.run(time_s, period_s)
-    frames = [(poses[0].copy(), *list_outlines(trial.rows.world.list_objects())) for _, poses in run]
+    frames = [_list_shapes(trial) for _ in run]
     limits_m = _find_limits(arena, frames)
-    images = (draw_frame(arena, limits_m, number * period_s, *frame) for number, frame in enumerate(frames))
+    images = (draw_frame(limits_m, number * period_s, frame) for number, frame in enumerate(frames))
     (_write_gif if is_gif else _write_with_ffmpeg)(path, images)
 
 
@@ -56,42 +59,40 @@ def _write_with_ffmpeg(path: str, images: Iterator[Image.Image]) -> None:
         raise ExperimentError(f"--video {path}: ffmpeg cannot write it")
 
 
-def _find_limits(arena: Arena, frames: List[Any]) -> np.ndarray:
+def _list_shapes(trial: Trial) -> List[Shape]:
+    """Return the shapes of the arena, the objects and the robots, from the floor up."""
+    world, lights = trial.rows.world, trial.rows.lights
+    shown = np.where(lights[:, 3:] > 0.0, lights, _UNLIT).tolist()
+    robots = draw_robots(world, [""] * len(shown), shown)
+    return [*draw_arena(world.arena), *draw_objects(world.list_objects()), *robots]
+
+
+def _find_limits(arena: Arena, frames: Sequence[Sequence[Shape]]) -> np.ndarray:
     """Return the lower left and the upper right corner (2, 2) of what is shown: the arena, or where robots were."""
     if arena is not OPEN:
         return arena.bounds_m.reshape(2, 2) + ((-_MARGIN_M,), (_MARGIN_M,))
-    places_m = np.concatenate([poses[:, :2] for poses, _, _ in frames])
+    places_m = np.array([shape.pose[:2] for shapes in frames for shape in shapes])
     return np.array((places_m.min(axis=0) - _MARGIN_M, places_m.max(axis=0) + _MARGIN_M))
 
 
-def draw_frame(
-    arena: Arena, limits_m: np.ndarray, time_s: float, poses: np.ndarray, edges_m: Sequence[Any], discs_m: Sequence[Any]
-) -> Image.Image:
-    """Return walls, robots, objects (see list_outlines()) and the time as an image."""
+def draw_frame(limits_m: np.ndarray, time_s: float, shapes: Sequence[Shape]) -> Image.Image:
+    """Return shapes and the time as an image."""
     size = _SIZE * _FINER
-    pixels_per_m, middle_m = size / float(np.ptp(limits_m, axis=0).max()), limits_m.mean(axis=0)
-    image = Image.new("RGB", (size, size), "white")
+    pixels_per_m = size / float(np.ptp(limits_m, axis=0).max())
+    middle_x_m, middle_y_m = limits_m.mean(axis=0).tolist()
+    image = Image.new("RGB", (size, size), _FLOOR)
     pen = ImageDraw.Draw(image)
-
-    def find(x_m: float, y_m: float) -> Tuple[float, float]:
-        return size / 2 + pixels_per_m * (x_m - middle_m[0]), size / 2 - pixels_per_m * (y_m - middle_m[1])
-
-    def draw_line(color: str, width: int, x1_m: float, y1_m: float, x2_m: float, y2_m: float) -> None:
-        pen.line([find(x1_m, y1_m), find(x2_m, y2_m)], color, width * _FINER)
-
-    def draw_disc(color: str, x_m: float, y_m: float, radius_m: float) -> None:
-        pen.ellipse([find(x_m - radius_m, y_m + radius_m), find(x_m + radius_m, y_m - radius_m)], color)
-
-    for segment_m in arena.segments_m.tolist():
-        draw_line(_WALL, 3, *segment_m)
-    for edge_m in edges_m:
-        draw_line(_OBJECT, 3, *edge_m)
-    for disc_m in (*arena.circles_m.tolist(), *discs_m):
-        draw_disc(_OBJECT, *disc_m)
-    for x_m, y_m, yaw_rad in poses.tolist():
-        draw_disc(_ROBOT, x_m, y_m, BODY_RADIUS_M)
-        nose_m = x_m + BODY_RADIUS_M * np.cos(yaw_rad), y_m + BODY_RADIUS_M * np.sin(yaw_rad)
-        draw_line("white", 2, x_m, y_m, *nose_m)
+    for shape in shapes:
+        color = tuple(round(255.0 * part) for part in shape.color[:3])
+        (x_m, y_m, yaw_rad), (length_m, width_m, _) = shape.pose, shape.size_m
+        x, y = size / 2 + pixels_per_m * (x_m - middle_x_m), size / 2 - pixels_per_m * (y_m - middle_y_m)
+        half, width = pixels_per_m * length_m / 2.0, max(_MIN_WIDTH * _FINER, round(pixels_per_m * width_m))
+        if shape.kind == CYLINDER:
+            pen.ellipse([x - half, y - half, x + half, y + half], color)
+        elif shape.kind != TEXT:  # along the middle line, of arrows from their start
+            ahead, left = half * math.cos(yaw_rad), half * math.sin(yaw_rad)
+            start, end = (0, 2) if shape.kind == ARROW else (-1, 1)
+            pen.line([x + start * ahead, y - start * left, x + end * ahead, y - end * left], color, width)
     image = image.resize((_SIZE, _SIZE), Image.BOX)
     ImageDraw.Draw(image).text((12, 12), f"{time_s:.1f} s", "black")
     return image

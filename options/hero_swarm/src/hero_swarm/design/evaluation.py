@@ -3,45 +3,48 @@
 import functools
 import math
 import os
-import sys
 import zlib
-from concurrent.futures import BrokenExecutor, CancelledError
 from typing import Any, Callable, Dict, Iterator, List, Sequence, Tuple
 
 import numpy as np
-from tqdm import tqdm
 
 from hero_node.files import read_file
 
 from ..experiments.computing.batch import one_at_a_time, run_trial, take_values
 from ..experiments.computing.cell_setup import set_up
 from ..experiments.computing.code_version import check_suite, hash_suite
+from ..experiments.computing.engines import Engine
+from ..experiments.computing.progress import Progress
 from ..experiments.errors import ExperimentError, report_place
-from ..experiments.runner import REPORT_S, choose_batch
-from .kinds import Kind, plan_machines, plan_networks, plan_numbers
+from ..experiments.experiment_file import Experiment
+from ..experiments.runner import choose_batch
+from .kinds import Kind, Machines, Networks, Numbers
 from .mission import Mission
 from .search import RACE_RUNS, RUNS, adapt, evolve, race
 
 METHODS: Dict[str, Tuple[Callable[[Mission], Kind], Callable[..., np.ndarray], int]] = {
-    "chocolate": (plan_machines, race, RACE_RUNS),
-    "maple": (functools.partial(plan_machines, is_tree=True), race, RACE_RUNS),
-    "evostick": (plan_networks, evolve, 20 * RUNS),
-    "cma": (plan_numbers, adapt, 50 * RUNS),
+    "chocolate": (Machines, race, RACE_RUNS),
+    "maple": (functools.partial(Machines, is_tree=True), race, RACE_RUNS),
+    "evostick": (Networks, evolve, 20 * RUNS),
+    "cma": (Numbers, adapt, 50 * RUNS),
 }
 """Kind of candidates of each method, its search, and the least runs that it needs."""
 
 
-def score_runs(mission: Mission, suite: str, method: str, genomes: np.ndarray, seeds: Sequence[int]) -> List[float]:
+def score_runs(
+    experiment: Experiment, suite: str, kind: Kind, genomes: np.ndarray, seeds: Sequence[int]
+) -> List[float]:
     """Return the scores of runs, each with its candidate (W, G) and seed. Raises: ExperimentError."""
     with one_at_a_time:
         check_suite(suite)
-        experiment = mission.experiment
         with report_place("the mission with seed %d" % seeds[0], experiment.sources):
-            setup = set_up(experiment, experiment.cells[0])._replace(behavior=METHODS[method][0](mission).make(genomes))
-            series, ends = run_trial(experiment, setup.build_trial(seeds))
+            setup = set_up(experiment, experiment.cells[0])
+            trial = setup._replace(behavior=kind.make(genomes, setup.behavior)).build_trial(seeds)
+            series, ends = run_trial(experiment, trial)
         scores = [take_values(experiment, series[: end + 1, world])[0] for world, end in enumerate(ends)]
     if any(map(math.isnan, scores)):
-        raise ExperimentError(f"score {experiment.metrics[0].name}: is nan with seed {seeds[0]}, but must be a number")
+        text = "%s: score %s is nan with seed %d, but must be a number: choose another"
+        raise ExperimentError(text % (experiment.places["metrics"], experiment.metrics[0].name, seeds[0]))
     return scores
 
 
@@ -94,15 +97,14 @@ class History:
 
 
 class Evaluation:
-    """Scores of candidates, larger ones better; bar: budget, time left, and the best mean score of the last step."""
+    """Scores of candidates, larger ones better."""
 
-    def __init__(self, mission: Mission, options: Any, history: History, workers: Any, seed: int) -> None:
-        """Begin; options: method and budget; workers: an executor, and their number; seed: before the first one."""
-        self._common, self._mission, self._history = (mission, hash_suite(), options.method), mission, history
-        self._workers, self._seed, self._is_first = workers, seed, True
-        self._is_stacked = METHODS[options.method][0](mission).is_stacked
-        begun = {"total": options.budget, "initial": len(history.runs), "desc": history.path}
-        self.bar = tqdm(mininterval=0.1 if sys.stderr.isatty() else REPORT_S, unit="run", **begun)
+    def __init__(
+        self, mission: Mission, kind: Kind, history: History, engine: Engine, seed: int, progress: Progress
+    ) -> None:
+        """Begin; kind: of the candidates; seed: before the first one."""
+        self._mission, self._kind, self._history, self._engine = mission, kind, history, engine
+        self._seed, self._is_first, self._progress, self._best = seed, True, progress, ""
 
     def __call__(self, genomes: np.ndarray, seeds: range) -> np.ndarray:
         """Return the scores (C, seeds). Raises: ExperimentError, also if the first ones tell no candidates apart."""
@@ -112,29 +114,26 @@ class Evaluation:
         for own in self._compute(np.repeat(genomes, len(seeds), axis=0), keys, len(scores), len(seeds)):
             self._history.add(keys[len(scores) : len(scores) + len(own)], own)
             scores += own
-            self.bar.update(len(own))
+            self._progress.add(len(own), self._best)
         values = self._mission.sign * np.array(scores).reshape(len(genomes), len(seeds))
         if self._is_first and len(genomes) > 1 and (values == values[0, 0]).all():
-            text = "score: is %g in all %d runs of %d controllers: it tells none apart; change score or mission"
-            raise ExperimentError(text % (scores[0], len(scores), len(genomes)))
+            text = "%s: score is %g in all %d runs of %d controllers: change score or mission, or try a larger --budget"
+            place = self._mission.experiment.places["metrics"]
+            raise ExperimentError(text % (place, scores[0], len(scores), len(genomes)))
         self._is_first = False
-        self.bar.set_postfix(best="%.4g" % (self._mission.sign * values.mean(axis=1).max()), refresh=False)
+        self._best = "best %.4g" % (self._mission.sign * values.mean(axis=1).max())
         return values
 
     def _compute(self, genomes: np.ndarray, keys: List[Any], first: int, each: int) -> Iterator[List[float]]:
         """Yield the scores of all runs from the first one on, in their order. Raises: ExperimentError."""
-        executor, count = self._workers
-        size = max(1, min(choose_batch(self._mission.experiment, 0), math.ceil((len(keys) - first) / count)))
-        ends = range(first + size, len(keys), size) if self._is_stacked else range(0, len(keys), each)
+        size = choose_batch(self._mission.experiment, 0)
+        size = max(1, min(size, math.ceil((len(keys) - first) / self._engine.workers)))
+        ends = range(first + size, len(keys), size) if self._kind.is_stacked else range(0, len(keys), each)
         places = [first, *(end for end in ends if end > first), len(keys)] if first < len(keys) else []
-        parts, seeds = zip(places, places[1:]), [seed for _, seed in keys]
-        futures = [executor.submit(score_runs, *self._common, genomes[a:b], seeds[a:b]) for a, b in parts]
-        try:
-            for future in futures:
-                yield future.result()
-        except (BrokenExecutor, CancelledError) as error:
-            text = "a worker died (%s; out of memory?): start again, what is computed is kept"
-            raise ExperimentError(text % error) from error
-        finally:
-            for future in futures:
-                future.cancel()
+        common, seeds = (self._mission.experiment, hash_suite(), self._kind), [seed for _, seed in keys]
+        tasks = [(*common, genomes[a:b], seeds[a:b]) for a, b in zip(places, places[1:])]
+        done: Dict[int, List[float]] = {}
+        for task, scores in self._engine.compute(score_runs, tasks):
+            done[id(task)] = scores
+            while tasks and id(tasks[0]) in done:
+                yield done.pop(id(tasks.pop(0)))

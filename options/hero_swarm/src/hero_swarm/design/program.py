@@ -13,11 +13,15 @@ import yaml
 
 from hero_node.files import hold_file, read_file, write_file
 from hero_node.parameters import within
+from hero_sim.world import load_arena
 
 from ..behavior import derive_seed
+from ..behaviors import find_behavior
 from ..experiments import runner
 from ..experiments.computing.batch import load_checked
 from ..experiments.computing.code_version import hash_code
+from ..experiments.computing.engines import Engine
+from ..experiments.computing.progress import Progress
 from ..experiments.errors import ExperimentError
 from ..experiments.phantoms import REPLACED
 from ..experiments.report import write_report
@@ -52,7 +56,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     """Run the program."""
     options = parse_options(arguments)
     if options.file.endswith(ENDING):
-        print(draw(options.file))
+        print(check(options.file))
         return
     plan, _, least = METHODS[options.method]
     if options.budget < least:
@@ -62,17 +66,16 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     kind, folder = plan(mission), f"{os.path.splitext(options.file)[0]}_{options.method}"
     mission.experiment.sources.complete()
     os.makedirs(folder, exist_ok=True)
-    opener, count = runner.choose_engine(options)
-    with opener() as executor:
+    with runner.choose_engine(options) as engine:
         for number in range(options.part[0], options.designs + 1, options.part[1]):
-            design(options, mission, kind, f"{folder}/design_{number}", (executor, count))
+            design(options, mission, kind, f"{folder}/design_{number}", engine)
     files = [sorted(glob.glob(f"{folder}/design_{one}_*{kind.ending}")) for one in range(1, options.designs + 1)]
     finalists = [path for own in files for path in own]
     missing = f"{folder}: designs of other parts are still to be made"
     print(compare(options, mission, folder, finalists) if all(files) else missing)
 
 
-def design(options: Any, mission: Mission, kind: Kind, stem: str, workers: Any) -> None:
+def design(options: Any, mission: Mission, kind: Kind, stem: str, engine: Engine) -> None:
     """Make one design, in files that begin with stem. Raises: ExperimentError."""
     experiment, folder, path = mission.experiment, mission.experiment.folder, stem + ".csv"
     number, own = int(stem.rpartition("_")[2]), {"": repr(mission.content).encode()}
@@ -84,18 +87,21 @@ def design(options: Any, mission: Mission, kind: Kind, stem: str, workers: Any) 
         with hold_file(path):
             if options.fresh:
                 os.truncate(path, 0)
-            evaluate = Evaluation(mission, options, History(path, about), workers, number * SEEDS)
-            with evaluate.bar:
+            history = History(path, about)
+            with Progress(options.budget, len(history.runs), path) as progress:
+                evaluate = Evaluation(mission, kind, history, engine, number * SEEDS, progress)
                 random = np.random.RandomState(derive_seed(options.seed, "design %d" % number))
                 found = METHODS[options.method][1](evaluate, kind.genes, options.budget, random)
     except BlockingIOError:
         raise ExperimentError(f"{path}: another program adds to it: wait for its end") from None
     for old in glob.glob(f"{stem}_[1-{FINALISTS}]{kind.ending}") if options.fresh else ():
         os.remove(old)
-    for rank, genome in enumerate(found[:FINALISTS], 1):
+    # Candidates that differ only in numbers that are not used are one controller.
+    contents = dict.fromkeys(kind.dump(genome, arena, f"# Designed by {about}\n") for genome in found)
+    for rank, content in enumerate([*contents][:FINALISTS], 1):
         file = f"{stem}_{rank}{kind.ending}"
         if not os.path.exists(file):  # it may have been edited
-            write_file(file, kind.dump(genome, arena, f"# Designed by {about}\n"))
+            write_file(file, content)
             draw(file)
 
 
@@ -135,6 +141,17 @@ def _run(options: argparse.Namespace, stem: str, content: Dict[str, Any]) -> np.
     (values,) = load(stem).metrics.values()
     medians: np.ndarray = np.median(values, axis=1).reshape(len(behaviors), -1)
     return medians
+
+
+def check(path: str) -> str:
+    """Check all that a controller's file names, and draw it, as draw() does. Raises: ExperimentError, HeroError."""
+    try:
+        arena = find_behavior(path).arena
+    except ValueError as error:
+        raise ExperimentError(str(error)) from None
+    if arena:
+        load_arena(arena)
+    return draw(path)
 
 
 def draw(path: str) -> str:

@@ -7,18 +7,17 @@ import math
 import os
 import sys
 import time
-from concurrent.futures import Executor
 from contextlib import contextmanager
 from operator import itemgetter
-from typing import Any, Callable, Iterable, Iterator, List, Optional, Sequence, Tuple
-
-from tqdm import tqdm
+from typing import Iterator, List, Optional, Sequence, Tuple
 
 from hero_node.parameters import explicit_ids_option, within
 
 from .computing import engines
 from .computing.batch import Batch, compute_batch, load_checked
 from .computing.code_version import describe_machine, hash_code, hash_suite
+from .computing.engines import Engine
+from .computing.progress import Progress
 from .experiment_file import MAX_ROBOTS, MAX_RUNS, Experiment, read_experiment
 from .results_folder import FOLDER, REAL, SIMULATED, ResultsFolder, Run, RunKey
 
@@ -29,9 +28,6 @@ BATCH_ROBOT_S = 240_000.0
 
 _BATCHES_PER_WORKER = 2
 """At least, where there are enough runs: no worker idles long while another computes the last batch."""
-
-REPORT_S = 10.0
-"""Time between two lines on how far a run is, where there is no terminal."""
 
 DASK = "dask:"
 
@@ -104,27 +100,12 @@ def list_batches(
             yield Batch(own, hash_suite(), cell, chosen, os.path.abspath(folder.name_series(cell, chosen)))
 
 
-def choose_engine(options: argparse.Namespace) -> Tuple[Callable[[], Executor], int]:
-    """Return what opens the executor, and its number of workers."""
+def choose_engine(options: argparse.Namespace) -> Engine:
+    """Return the workers that the options name, which a with statement starts."""
     if options.executor is None:
-        return functools.partial(engines.open_pool, options.jobs), options.jobs
+        return Engine(functools.partial(engines.open_pool, options.jobs), options.jobs)
     executor, workers = engines.open_dask(options.executor, hash_suite)
-    return lambda: executor, workers
-
-
-def _watch(done: Iterable[Tuple[Any, List[Run]]], missing: int, begun: int) -> Iterator[List[Run]]:
-    """Yield what is done, and show how far it is and how long it will take: as a bar on a terminal, else as lines."""
-    start_s = told_s = time.monotonic()
-    count = 0
-    with tqdm(total=missing + begun, initial=begun, unit="run", disable=None, file=sys.stderr) as bar:
-        for _, runs in done:
-            yield runs
-            bar.update(len(runs))
-            count += len(runs)
-            now_s = time.monotonic()
-            if bar.disable and now_s >= told_s + REPORT_S and count < missing:
-                told_s, left_s = now_s, (now_s - start_s) * (missing - count) / count
-                print("%d of %d runs, about %.0f s left" % (begun + count, begun + missing, left_s), file=sys.stderr)
+    return Engine(lambda: executor, workers)
 
 
 @contextmanager
@@ -161,11 +142,12 @@ def _run_missing(options: argparse.Namespace, experiment: Experiment, folder: Re
     own = set(folder.list_missing(())[part - 1 :: parts])
     missing = [key for key in folder.list_missing(runs) if key in own]
     if missing:
-        opener, workers = choose_engine(options)
-        batches = list_batches(experiment, missing, options.batch, workers, folder)
         began_s = time.monotonic()
-        for computed in _watch(engines.compute(opener, workers, compute_batch, batches), len(missing), len(runs)):
-            folder.write_batch(computed)
+        with choose_engine(options) as engine, Progress(len(missing) + len(runs), len(runs)) as progress:
+            batches = list_batches(experiment, missing, options.batch, engine.workers, folder)
+            for _, computed in engine.compute(compute_batch, batches):
+                folder.write_batch(computed)
+                progress.add(len(computed))
         print(f"{len(missing)} runs in {time.monotonic() - began_s:.1f} s", file=sys.stderr)
     runs = folder.read_runs()
     left = folder.list_missing(runs)

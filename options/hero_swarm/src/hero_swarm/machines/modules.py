@@ -59,14 +59,16 @@ def follow(children: Sequence[State]) -> List[State]:
 
 
 def draw_dot(states: Sequence[State]) -> str:
-    """Return a machine as a graph in the language of Graphviz; the start has a double rim."""
-    nodes = ['"%s" [label="%s"]' % (state["name"], _describe(state, "do", DO)) for state in states]
-    edges = [
-        '"%s" -> "%s" [label="%s"]' % (state["name"], follows["to"], _describe(follows, "when", WHEN))
-        for state in states
-        for follows in state["next"]
-    ]
-    return "\n".join(['digraph {\n"%s" [peripheries=2]' % states[0]["name"], *nodes, *edges, "}\n"])
+    """Return a machine as a graph in the language of Graphviz: a dot leads to the start; transitions have the numbers
+    of their order."""
+    lines = ["digraph {", 'node [shape=box style=rounded fontname="Helvetica"]', 'edge [fontname="Helvetica"]']
+    lines += ['"" [shape=point width=0.15]', '"" -> "%s"' % states[0]["name"]]
+    for state in states:
+        lines.append('"%s" [label="%s: %s"]' % (state["name"], state["name"], _describe(state, "do", DO)))
+        for number, follows in enumerate(state["next"], 1):
+            told = state["name"], follows["to"], number, _describe(follows, "when", WHEN).replace("\\n", "  \\n  ")
+            lines.append('"%s" -> "%s" [label="  %d. %s  "]' % told)
+    return "\n".join([*lines, "}\n"])
 
 
 def _describe(given: State, kind: str, kinds: Kinds) -> str:

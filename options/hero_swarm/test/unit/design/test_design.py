@@ -1,6 +1,10 @@
 """Program design: from a mission to controllers, with what is computed kept, and wrong input named."""
 
 import os
+import pickle
+import shutil
+import subprocess
+import sys
 import zlib
 from concurrent.futures import BrokenExecutor, Executor, Future
 from pathlib import Path
@@ -8,15 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hero_node.files import EntryError
+from hero_node import HeroError
 from hero_swarm.behaviors import find_behavior
 from hero_swarm.design import evaluation, program
-from hero_swarm.design.kinds import plan_machines, plan_networks, plan_numbers
+from hero_swarm.design.kinds import Machines, Networks, Numbers
 from hero_swarm.design.mission import read_mission
 from hero_swarm.experiments import runner
 from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.computing.cell_setup import set_up
+from hero_swarm.experiments.computing.engines import Engine
 from hero_swarm.experiments.errors import ExperimentError
+from hero_test.waiting import wait_for
 
 MISSIONS = Path(__file__).resolve().parents[3] / "examples" / "missions"
 MISSION = """\
@@ -35,7 +41,7 @@ def write_mission(tmp_path, monkeypatch):
     for name, text in (("m.yaml", MISSION), ("score.py", SCORE), ("arena.yaml", ARENA)):
         (tmp_path / name).write_text(text)
     monkeypatch.chdir(str(tmp_path))
-    monkeypatch.setattr(runner, "choose_engine", lambda options: (InProcess, 2))
+    monkeypatch.setattr(runner, "choose_engine", lambda options: Engine(InProcess, 2))
     return tmp_path / "m.yaml"
 
 
@@ -49,7 +55,7 @@ class InProcess(Executor):
         if InProcess.left == 0:
             raise KeyboardInterrupt
         InProcess.left -= 1
-        future.set_result(function(*arguments))
+        future.set_result(function(*pickle.loads(pickle.dumps(arguments))))
         return future
 
 
@@ -57,7 +63,7 @@ class InProcess(Executor):
 def score_without_simulation(monkeypatch):
     """Scores are a function of the first number and the seed; comparisons are not run."""
 
-    def score(mission, suite, method, genomes, seeds):
+    def score(experiment, suite, kind, genomes, seeds):
         return [float(genome[0]) + (zlib.crc32(b"%d" % seed) % 100) / 50.0 for genome, seed in zip(genomes, seeds)]
 
     monkeypatch.setattr(evaluation, "score_runs", score)
@@ -66,14 +72,14 @@ def score_without_simulation(monkeypatch):
 
 
 def read_all(folder):
-    return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir())}
+    return {path.name: path.read_bytes() for path in sorted(Path(folder).iterdir()) if path.is_file()}
 
 
 @pytest.mark.parametrize("name", ["black_spot", "foraging", "grid_exploration", "aggregation", "coverage", "sorting"])
 def test_missions_that_come_with_it_are_scored_with_their_baseline(name):
     mission = read_mission(str(MISSIONS / (name + ".yaml")))
     load_checked(mission.experiment)
-    plan_numbers(mission) if name in ("coverage", "sorting") else plan_machines(mission)
+    Numbers(mission) if name in ("coverage", "sorting") else Machines(mission)
     assert mission.sign == 1.0 and "baseline" in mission.content
     assert find_behavior(mission.experiment.locate(mission.content["baseline"])) is not None
 
@@ -105,11 +111,10 @@ def test_a_mission_becomes_controllers_that_are_compared(path, capsys, monkeypat
     output = capsys.readouterr().out
     lines = output[output.index("right_mean_of_last_1_s    ") :].splitlines()
     assert lines[0].split()[1:] == ["simulated", "pseudo-reality", "loss", "%"]
-    assert {line.split()[0] for line in lines[1:5]} == {
-        "dispersion",
-        *(f"m_chocolate/design_1_{n}.controller" for n in (1, 2, 3)),
-    }
-    best = lines[5].split()[3].rstrip(";")
+    finalists = [f"m_chocolate/design_1_{n}.controller" for n in (1, 2)]
+    assert {line.split()[0] for line in lines[1:4]} == {"dispersion", *finalists}
+    assert len({Path(name).read_text() for name in finalists}) == 2, "equal ones count once"
+    best = lines[4].split()[3].rstrip(";")
     assert find_behavior(best).arena == "m_chocolate/../arena.yaml" and os.path.isfile(best + ".dot")
     assert output.splitlines()[:2] == ["m_chocolate_simulated", "m_chocolate_pseudo_reality"], "reports are written"
     program.main(options)  # nothing is computed again
@@ -148,6 +153,26 @@ def test_a_killed_design_goes_on_to_the_same_bytes(path, light, capsys):
         program.main(options)
         assert read_all("m_chocolate") == whole
     capsys.readouterr()
+
+
+@pytest.mark.slow
+def test_a_design_that_was_killed_by_sigkill_ends_with_the_same_bytes(path):
+    command = [sys.executable, "-m", "hero_swarm", "design", "m.yaml", "--budget", "200", "--tests", "2", "--jobs", "1"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    history, wholes = Path("m_chocolate/design_1.csv"), []
+    for kills in ((), (3, 100)):
+        for lines in kills:
+            with subprocess.Popen(command, **quiet) as process:
+                wait_for(
+                    lambda n=lines: history.exists() and history.read_text().count("\n") >= n, "runs in the history"
+                )
+                process.kill()
+        subprocess.run(command, check=True, **quiet)
+        wholes.append({**read_all("m_chocolate"), **read_all("m_chocolate_simulated")})
+        assert history.read_text().count("\n") > 150 and "runs.csv" in wholes[-1]
+        for folder in (history.parent, Path("m_chocolate_simulated"), Path("m_chocolate_pseudo_reality")):
+            shutil.rmtree(str(folder))
+    assert wholes[0] == wholes[1]
 
 
 @pytest.mark.slow
@@ -212,14 +237,12 @@ def test_other_options_and_missions_are_not_mixed(path, light):
 @pytest.mark.slow
 def test_candidates_of_a_batch_score_as_they_do_alone(path):
     mission = read_mission("m.yaml")
-    common = mission, evaluation.hash_suite()
-    for method, plan in (("chocolate", plan_machines), ("evostick", plan_networks)):
-        genes = plan(mission).genes
+    for plan in (Machines, Networks):
+        kind = plan(mission)
+        genes, common = kind.genes, (mission.experiment, evaluation.hash_suite(), kind)
         genomes = genes.place(np.random.RandomState(1).random_sample((3, len(genes.low))))
-        together = evaluation.score_runs(*common, method, genomes, [7, 7, 8])
-        alone = [
-            evaluation.score_runs(*common, method, genomes[k : k + 1], [seed])[0] for k, seed in enumerate((7, 7, 8))
-        ]
+        together = evaluation.score_runs(*common, genomes, [7, 7, 8])
+        alone = [evaluation.score_runs(*common, genomes[k : k + 1], [seed])[0] for k, seed in enumerate((7, 7, 8))]
         assert together == alone and len(set(together)) > 1
 
 
@@ -229,17 +252,17 @@ def test_files_do_what_candidates_did(path):
     path.write_text(MISSION + "behavior: dispersion\n")
     own = read_mission("m.yaml")
     for one, plan in (
-        (mission, plan_machines),
-        (mission, lambda m: plan_machines(m, True)),
-        (mission, plan_networks),
-        (own, plan_numbers),
+        (mission, Machines),
+        (mission, lambda m: Machines(m, True)),
+        (mission, Networks),
+        (own, Numbers),
     ):
         kind = plan(one)
         (genome,) = kind.genes.place(np.random.RandomState(3).random_sample((1, len(kind.genes.low))))
         file = "one" + kind.ending
         Path(file).write_bytes(kind.dump(genome, "arena.yaml", "# mine\n"))
         setup, ends = set_up(one.experiment, one.experiment.cells[0]), []
-        for behavior in (kind.make(genome[None]), find_behavior(file)()):
+        for behavior in (kind.make(genome[None], setup.behavior), find_behavior(file)()):
             trial = setup._replace(behavior=behavior).build_trial([5])
             for _ in range(10):
                 trial.step()
@@ -292,7 +315,7 @@ def test_a_score_that_is_nan_or_tells_nothing_is_refused(path):
         program.main(["m.yaml", "--budget", "200"])
     (path.parent / "score.py").write_text(SCORE.replace("mean(axis=1)", "mean(axis=1) * 0.0"))
     with pytest.raises(
-        ExperimentError, match="score: is 0 in all 150 runs of 30 controllers: it tells none apart; change score"
+        ExperimentError, match="m.yaml, line 4: score is 0 in all 150 runs of 30 controllers: change score or mission"
     ):
         program.main(["m.yaml", "--budget", "200", "--fresh"])
     assert len(Path("m_chocolate/design_1.csv").read_text().splitlines()) == 152, "what was computed is kept"
@@ -319,8 +342,22 @@ def test_a_worker_that_dies_keeps_what_is_computed(path, light, monkeypatch):
         raise BrokenExecutor("killed")
 
     monkeypatch.setattr(Future, "result", die)
-    with pytest.raises(ExperimentError, match="a worker died .*start again, what is computed is kept"):
+    with pytest.raises(ExperimentError, match="worker processes died 4 times .*what is done is kept"):
         program.main(["m.yaml", "--budget", "200"])
+
+
+@pytest.mark.parametrize(
+    "text, words",
+    [
+        ("states: [{name: rest, do: rest}]", "line 1: states.do is 'rest'"),
+        ("arena: none.yaml\nstates: [{name: rest, do: stop}]", "arena none.yaml: cannot be read"),
+        ("behavior: aggregation\nnumbers: {speed: 1}", "own.controller: .* has no parameter 'speed'"),
+    ],
+)
+def test_a_wrong_controller_is_named(path, text, words):
+    Path("own.controller").write_text(text + "\n")
+    with pytest.raises(HeroError, match=words):
+        program.main(["own.controller"])
 
 
 def test_a_controller_is_checked_and_drawn(path, capsys):
@@ -328,6 +365,3 @@ def test_a_controller_is_checked_and_drawn(path, capsys):
     program.main(["own.controller"])
     assert capsys.readouterr().out == "own.controller; draw it: dot -Tsvg own.controller.dot\n"
     assert "digraph" in Path("own.controller.dot").read_text()
-    Path("own.controller").write_text("states: [{name: rest, do: rest}]\n")
-    with pytest.raises(EntryError, match="line 1: states.do is 'rest'"):
-        program.main(["own.controller"])

@@ -162,8 +162,8 @@ def test_pages_offer_the_controllers_of_a_folder(folder, capsys):
 
 def test_a_machine_is_drawn_with_its_conditions(folder):
     text = draw_dot(read_controller("a", (folder / "search.controller").read_bytes()).states)
-    assert '"search" [label="exploration\\nturn_steps 20"]' in text and '"search" [peripheries=2]' in text
-    assert '"search" -> "rest" [label="black floor\\nprobability 1"]' in text
+    assert '"search" [label="search: exploration\\nturn_steps 20"]' in text and '"" -> "search"' in text
+    assert '"search" -> "rest" [label="  1. black floor  \\n  probability 1  "]' in text
     assert follow([{"do": "stop", "until": {"when": "black floor", "probability": 1.0}}])[0]["next"][0]["to"] == "0"
 
 

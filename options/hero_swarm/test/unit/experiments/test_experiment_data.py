@@ -11,6 +11,7 @@ import pytest
 
 from hero_node import ProgramError
 from hero_swarm.experiments import load, pack, report, runner, verify
+from hero_swarm.experiments.computing import progress
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.reporting.figures import _choose_style
 from hero_test.nonempty import nonempty
@@ -182,7 +183,9 @@ def test_only_whole_results_of_this_code_are_packed(folder, tmp_path):
 
 def test_without_a_terminal_lines_say_how_far_a_run_is(capsys, monkeypatch):
     clock = iter(range(0, 1000, 6))
-    monkeypatch.setattr(runner, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
-    runs = ["run"] * 2
-    assert list(runner._watch([(None, runs)] * 6, 12, 4)) == [runs] * 6
-    assert capsys.readouterr().err.splitlines() == ["8 of 16 runs, about 24 s left", "12 of 16 runs, about 12 s left"]
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    with progress.Progress(16, 4, "design") as shown:
+        for _ in range(6):
+            shown.add(2, "best 3")
+    lines = ["design: 8 of 16 runs, about 24 s left; best 3", "design: 12 of 16 runs, about 12 s left; best 3"]
+    assert capsys.readouterr().err.splitlines() == lines

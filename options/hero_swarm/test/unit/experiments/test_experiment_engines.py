@@ -37,9 +37,14 @@ def fail(number):
     raise ValueError("of number %d" % number)
 
 
+def compute(open_executor, workers, function, tasks):
+    with engines.Engine(open_executor, workers) as engine:
+        return list(engine.compute(function, tasks))
+
+
 def test_tasks_of_a_killed_worker_run_again_and_all_run_once(tmp_path):
     tasks = [(number, str(tmp_path)) for number in range(8)]
-    done = list(engines.compute(open_one, 1, square_but_die_once, tasks))
+    done = compute(open_one, 1, square_but_die_once, tasks)
     assert sorted(done) == [(task, task[0] * task[0]) for task in tasks]
     assert os.path.exists(str(tmp_path / "died"))
 
@@ -62,19 +67,19 @@ class PoolThatBreaks(Executor):
 @pytest.mark.parametrize("tasks", range(4))
 def test_a_pool_that_breaks_while_it_takes_a_task_loses_none(tasks):
     pools = iter((PoolThatBreaks(tasks), PoolThatBreaks(99)))
-    done = list(engines.compute(lambda: next(pools), 2, square, [(number,) for number in range(6)]))
+    done = compute(lambda: next(pools), 2, square, [(number,) for number in range(6)])
     assert sorted(done) == [((number,), number * number) for number in range(6)]
 
 
 def test_a_task_that_always_kills_its_worker_ends_with_an_error(monkeypatch):
     monkeypatch.setattr(engines, "MAX_NEW_POOLS", 1)
     with pytest.raises(ExperimentError, match="worker processes died 2 times"):
-        list(engines.compute(open_one, 1, die, [(1,)]))
+        compute(open_one, 1, die, [(1,)])
 
 
 def test_an_error_of_the_users_code_reaches_the_program():
     with pytest.raises(ValueError, match="of number 4"):
-        list(engines.compute(open_one, 1, fail, [(4,)]))
+        compute(open_one, 1, fail, [(4,)])
 
 
 def test_without_dask_the_error_names_its_package(monkeypatch):
@@ -93,7 +98,7 @@ class EndedCluster(Executor):
 
 def test_a_cluster_that_ends_meanwhile_is_one_line():
     with pytest.raises(ExperimentError, match="the Dask cluster ended: .* what is done is kept"):
-        list(engines.compute(EndedCluster, 1, square, [(1,)]))
+        compute(EndedCluster, 1, square, [(1,)])
 
 
 class KilledWorker(Exception):  # noqa: N818 - as Dask names it
@@ -109,7 +114,7 @@ class KillingCluster(Executor):
 
 def test_a_batch_that_dask_gives_up_is_one_line():
     with pytest.raises(ExperimentError, match="Dask gave up a batch .*: all those workers died while running it$"):
-        list(engines.compute(KillingCluster, 1, square, [(1,)]))
+        compute(KillingCluster, 1, square, [(1,)])
 
 
 class ArrivalError(Exception):

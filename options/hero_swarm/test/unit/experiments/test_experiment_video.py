@@ -4,12 +4,16 @@ import numpy as np
 import pytest
 
 from hero_client.values import BODY_RADIUS_M
-from hero_sim.world import list_outlines, load_arena
+from hero_node import Pose
+from hero_sim.scene import CYLINDER, Shape
+from hero_sim.world import Area, list_outlines, load_arena
 from hero_swarm import video
 from hero_swarm.behavior import Behavior
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.trial import OPEN, Trial
 from hero_test.nonempty import nonempty
+
+BLUE, FLOOR = [0, 115, 178], [200, 200, 200]
 
 
 class Straight(Behavior):
@@ -37,13 +41,14 @@ def catch_frames(monkeypatch):
 
 def test_frames_are_a_tenth_of_a_second_of_the_video_apart(written, monkeypatch):
     shown, draw = [], video.draw_frame
-    monkeypatch.setattr(video, "draw_frame", lambda *frame: shown.append(frame[2:]) or draw(*frame))
+    monkeypatch.setattr(video, "draw_frame", lambda *frame: shown.append(frame[1:]) or draw(*frame))
     video.write_video(make_trial(), 2.0, 4.0, "run.gif")
     ((writer, path, frames),) = written
     assert (writer, path, len(frames)) == ("_write_gif", "run.gif", 5)
     assert frames[0].shape == (600, 600, 3)
     assert [time_s for time_s, *_ in shown] == pytest.approx([0.0, 0.4, 0.8, 1.2, 1.6])
-    assert shown[0][1][0, 0] == -0.5 and shown[-1][1][0, 0] == pytest.approx(-0.36, abs=0.05)
+    first_m, last_m = (shapes[0].pose.x_m for _, shapes in (shown[0], shown[-1]))
+    assert first_m == -0.5 and last_m == pytest.approx(-0.36, abs=0.05)
     monkeypatch.setattr(video.shutil, "which", lambda name: "/usr/bin/" + name)
     video.write_video(make_trial(), 0.2, 1.0, "run.MP4")
     assert written[1][:2] == ("_write_with_ffmpeg", "run.MP4")
@@ -53,7 +58,8 @@ def test_frames_are_a_tenth_of_a_second_of_the_video_apart(written, monkeypatch)
 
 
 def test_a_video_shows_the_arena_or_where_robots_were():
-    frames = [(np.array([(0.0, 1.0, 0.0), (2.0, -1.0, 0.0)]), None, None), (np.array([(-3.0, 0.5, 0.0)]), None, None)]
+    shape = Shape("robots", 0, CYLINDER, (0.0, 0.0, 0.0, 1.0), Pose(0.0, 1.0, 0.0), 0.0, (0.1, 0.1, 0.1))
+    frames = [[shape, shape._replace(pose=Pose(2.0, -1.0, 0.0))], [shape._replace(pose=Pose(-3.0, 0.5, 0.0))]]
     assert video._find_limits(OPEN, frames).tolist() == [[-3.2, -1.2], [2.2, 1.2]]
     box = load_arena("box")
     (low_m, high_m), bounds_m = video._find_limits(box, frames), box.bounds_m
@@ -71,8 +77,8 @@ def test_obstacles_and_objects_are_shown_where_they_are(name, written):
     ((_, _, (frame,)),) = written
     scale, middle = len(frame) / (float(trial.rows.world.arena.bounds_m[2]) + 0.2) / 2.0, len(frame) // 2
     pixels = [(middle - round(scale * y_m), middle + round(scale * x_m)) for x_m, y_m in places_m]
-    around = [frame[row - 2 : row + 3, column - 2 : column + 3] for row, column in pixels]
-    assert around and all((patch == (0xC0, 0x7A, 0x2E)).all(axis=2).any() for patch in around)
+    around = [frame[row - 2 : row + 3, column - 2 : column + 3].reshape(-1, 3).tolist() for row, column in pixels]
+    assert around and all([204, 128, 51] in patch or [153, 153, 153] in patch for patch in around)
 
 
 def test_each_frame_replaces_the_one_before(written):
@@ -81,19 +87,24 @@ def test_each_frame_replaces_the_one_before(written):
     ((_, _, (first, *_, last)),) = written
     scale, middle = len(first) / (float(trial.rows.world.arena.bounds_m[2]) + 0.2) / 2.0, len(first) // 2
     rear = middle, middle + round(scale * (-0.5 - 0.02))
-    assert first[rear].tolist() == [0x00, 0x72, 0xB2] and last[rear].tolist() == [0xFF] * 3
+    assert first[rear].tolist() == BLUE and last[rear].tolist() == FLOOR
 
 
-def test_a_frame_shows_robots_with_their_noses_and_the_time():
-    limits_m, poses = np.array([(0.0, 0.0), (3.0, 3.0)]), np.array([(1.0, 2.0, 0.0), (2.0, 1.0, np.pi / 2.0)])
-    frame = np.asarray(video.draw_frame(OPEN, limits_m, 1.25, poses, [], []))
-    for x_m, y_m, yaw_rad in nonempty(poses.tolist()):
-        ahead, side = np.array((np.cos(yaw_rad), np.sin(yaw_rad))), np.array((-np.sin(yaw_rad), np.cos(yaw_rad)))
-        for distance_m, color in ((-0.8, (0x00, 0x72, 0xB2)), (0.6, (0xFF, 0xFF, 0xFF)), (-1.5, (0xFF, 0xFF, 0xFF))):
-            column, row = (
-                np.array((x_m, 3.0 - y_m)) * 200.0 + np.array((1, -1)) * 200.0 * distance_m * BODY_RADIUS_M * ahead
-            )
-            assert tuple(frame[int(round(row)), int(round(column))]) == color, distance_m
-        column, row = np.array((x_m, 3.0 - y_m)) * 200.0 + np.array((1, -1)) * 200.0 * 0.6 * BODY_RADIUS_M * side
-        assert tuple(frame[int(round(row)), int(round(column))]) == (0x00, 0x72, 0xB2)
+def test_a_frame_shows_areas_robots_with_noses_and_lights_and_the_time():
+    spot = Area("spot", (0.5, 0.5, 0.3), (0.0, 0.0, 0.0))
+    arena = OPEN._replace(bounds_m=np.array([-1.0, -1.0, 1.0, 1.0]), areas=(spot,))
+    trial = make_trial(arena)
+    trial.rows.send_light(np.array([1]), np.array([(1.0, 0.0, 0.0, 1.0)]))
+    trial.rows.advance(100)
+    frame = np.asarray(video.draw_frame(np.array([(-1.0, -1.0), (1.0, 1.0)]), 1.25, video._list_shapes(trial)))
+    poses = trial.rows.world.poses.tolist()
+
+    def look(x_m, y_m):
+        return frame[round(300 - 300 * y_m), round(300 + 300 * x_m)].tolist()
+
+    assert look(0.5, 0.5) == [0, 0, 0] and look(-0.5, 0.5) == FLOOR
+    for (x_m, y_m, yaw_rad), color in nonempty(list(zip(poses, (BLUE, [255, 0, 0])))):
+        for share, seen in ((-0.8, color), (0.6, [255, 255, 255]), (-1.5, FLOOR)):
+            reach_m = share * BODY_RADIUS_M
+            assert look(x_m + reach_m * np.cos(yaw_rad), y_m + reach_m * np.sin(yaw_rad)) == seen, share
     assert (frame[10:30, 10:60] == 0).any(), "the time"

@@ -103,42 +103,54 @@ def _check_reach(addresses: Iterable[str]) -> None:
             raise ExperimentError(text % address)
 
 
-def compute(
-    open_executor: Callable[[], Executor], workers: int, function: Callable[..., Any], tasks: Iterable[Task]
-) -> Iterator[Tuple[Task, Any]]:
-    """Yield each task with function(*task), as they are done; a broken pool is replaced, and its tasks run again.
+class Engine:
+    """Workers that compute tasks; the executor that open_executor gives is replaced when it breaks."""
 
-    Raises: ExperimentError if pools keep breaking, or the cluster ends; whatever function raises.
-    """
-    left: Deque[Task] = collections.deque(tasks)
-    new_pools = 0
-    while left:
-        executor = open_executor()
-        running: Dict[Future[Any], Task] = {}
-        try:
-            while left or running:
-                while left and len(running) < workers * _WAITING:
-                    running[executor.submit(function, *left[0])] = left[0]
-                    left.popleft()
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    result = future.result()
-                    yield running.pop(future), result
-        except BrokenExecutor as error:
-            new_pools += 1
-            if new_pools > MAX_NEW_POOLS:
-                text = "worker processes died %d times (out of memory?): use fewer --jobs or a smaller --batch"
-                raise ExperimentError(text % new_pools) from error
-            left.extendleft(running.values())
-        except CancelledError as error:
-            text = "the Dask cluster ended: start it again, and then this; what is done is kept"
-            raise ExperimentError(text) from error
-        except Exception as error:
-            # Dask's own errors, without importing it for a pool: above all KilledWorker.
-            if not type(error).__module__.startswith("distributed."):
-                raise
-            text = "Dask gave up a batch (out of memory? use a smaller --batch; what is done is kept): %s"
-            raise ExperimentError(text % one_line(error)) from error
-        finally:
-            for future in running:
-                future.cancel()
-            executor.shutdown(wait=True)
+    def __init__(self, open_executor: Callable[[], Executor], workers: int) -> None:
+        """Start nothing yet; workers: how many an executor has."""
+        self.workers, self._open = workers, open_executor
+
+    def __enter__(self) -> "Engine":
+        self._executor = self._open()
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self._executor.shutdown(wait=True)
+
+    def compute(self, function: Callable[..., Any], tasks: Iterable[Task]) -> Iterator[Tuple[Task, Any]]:
+        """Yield each task with function(*task), as they are done; those of a broken executor run again.
+
+        Raises: ExperimentError if executors keep breaking, or the cluster ends; whatever function raises.
+        """
+        left: Deque[Task] = collections.deque(tasks)
+        replaced = 0
+        while left:
+            running: Dict[Future[Any], Task] = {}
+            try:
+                while left or running:
+                    while left and len(running) < self.workers * _WAITING:
+                        running[self._executor.submit(function, *left[0])] = left[0]
+                        left.popleft()
+                    for future in wait(running, return_when=FIRST_COMPLETED).done:
+                        result = future.result()
+                        yield running.pop(future), result
+            except BrokenExecutor as error:
+                replaced += 1
+                if replaced > MAX_NEW_POOLS:
+                    text = "worker processes died %d times (out of memory?): use fewer --jobs; what is done is kept"
+                    raise ExperimentError(text % replaced) from error
+                left.extendleft(running.values())
+                self.__exit__()
+                self.__enter__()
+            except CancelledError as error:
+                text = "the Dask cluster ended: start it again, and then this; what is done is kept"
+                raise ExperimentError(text) from error
+            except Exception as error:
+                # Dask's own errors, without importing it for a pool: above all KilledWorker.
+                if not type(error).__module__.startswith("distributed."):
+                    raise
+                text = "Dask gave up a batch (out of memory? use a smaller --batch; what is done is kept): %s"
+                raise ExperimentError(text % one_line(error)) from error
+            finally:
+                for future in running:
+                    future.cancel()
