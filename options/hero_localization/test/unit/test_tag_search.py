@@ -2,6 +2,7 @@
 
 import math
 import sys
+from typing import NamedTuple, Optional
 
 import numpy as np
 import pytest
@@ -203,6 +204,35 @@ def test_a_tag_that_is_missed_is_found_by_a_finer_detector_at_once(side_px, monk
 
 
 @pytest.mark.slow
+def test_a_tag_is_looked_for_by_its_print_with_the_heading_that_it_had():
+    made, tags, expected = [], [(1, (800.0, 500.0))], {1: (801.0, 502.0)}
+
+    class Prints(NamedTuple):
+        tag_id: int
+        center: np.ndarray
+        side_px: float
+        corners: Optional[np.ndarray]
+
+        def detect(self, gray, origin=(0, 0)):
+            made.append(self)
+            return []
+
+    detector = SeenTags()
+    search = TagSearch(detector, WIDTH_PX, HEIGHT_PX, [SeenTags(), Prints], 20.0)
+    detector.place(tags)
+    search.search(FRAME, 0.0, expected)
+    (corners,) = [tag.corners for tag in search.search(FRAME, FRAME_S, expected)]
+    assert not made
+    detector.blind = {1}
+    search.search(FRAME, 2.0 * FRAME_S, expected)
+    assert [tuple(print_.center) for print_ in made] == [(800.0, 500.0), (801.0, 502.0)]
+    assert all(print_.corners is corners and print_.tag_id == 1 for print_ in made)
+    made.clear()
+    for index in range(3, 40):
+        search.search(FRAME, index * FRAME_S, expected)
+    assert made[0].corners is corners and made[-1].corners is None and made[-1].side_px == SIDE_PX
+
+
 def test_a_tag_that_is_gone_is_looked_for_by_one_finer_detector_at_times():
     watch, tags = Watch(with_fine=True), everywhere()[:100:4]
     expected = dict(tags)

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import DetectorError
 from ..prints.tag_images import FAMILIES, draw_tag
 from .tag_pose import TagCorners
+from .tag_template import TemplateDetector
 
 _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 """Minimum contrast of black and white, of 255: false detections of 16h5 in noise and floor textures stay below."""
@@ -22,46 +23,26 @@ _MIN_MARGIN = {"36h11": 10.0, "16h5": 30.0}
 MAX_ENLARGED_PX = 200
 """Side of the largest window that is enlarged: tags in larger ones have pixels enough."""
 
-EVEN_SHARE, MIN_SPAN = 0.15, 40
-"""Side of the neighborhood to whose contrast shades are related, by the window's: half a tag's; least contrast."""
-
 
 class Look(NamedTuple):
-    """A preparation of images for what else is missed: enlarged by a factor, then sharpened, then evened out.
+    """A preparation of images for what else is missed: enlarged by a factor, then sharpened.
 
     sharpening, radius_px: amount and radius of an unsharp mask: cells of 2 px are as wide as the blur of a webcam.
-    dark: shade, of 255, from which on ratios of shades count, as evened out by their neighborhood's: white in a shadow
-        may be darker than gray beside it. 0: shades stay as they are.
     """
 
     enlarged: int
     sharpening: float
     radius_px: float
-    dark: float = 0.0
 
     def apply(self, gray: np.ndarray, scale: int) -> np.ndarray:
         """Return an image (H, W) so prepared, scale times as large."""
         if scale > 1:
             gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
         blurred = cv2.GaussianBlur(gray, (0, 0), scale * self.radius_px)
-        gray = cv2.addWeighted(gray, 1.0 + self.sharpening, blurred, -self.sharpening, 0.0)
-        return self._even_out(gray, scale) if self.dark else gray
-
-    def _even_out(self, gray: np.ndarray, scale: int) -> np.ndarray:
-        logarithms = np.log1p(np.arange(256) / self.dark)
-        shades = cv2.LUT(gray, (255.0 / logarithms[-1] * logarithms).astype(np.float32))
-        shades = cv2.GaussianBlur(shades, (0, 0), EVEN_BLUR_PX * scale)
-        side = (max(3, round(EVEN_SHARE * min(gray.shape))) | 1,) * 2
-        around = np.ones(side, np.uint8)
-        low, high = (cv2.blur(part, side) for part in (cv2.erode(shades, around), cv2.dilate(shades, around)))
-        even = 128.0 + EVEN_GAIN * 255.0 * (shades - (low + high) / 2.0) / np.maximum(high - low, MIN_SPAN)
-        evened: np.ndarray = np.clip(even, 0.0, 255.0).astype(np.uint8)
-        return evened
+        return cv2.addWeighted(gray, 1.0 + self.sharpening, blurred, -self.sharpening, 0.0)
 
 
-FINE_LOOKS = (Look(1, 1.0, 1.0), Look(2, 3.0, 1.5), Look(2, 2.5, 1.0, 4.0), Look(2, 6.0, 1.5, 40.0))
-"""The last two for edges of shadows, without and with the gamma of a camera."""
-EVEN_BLUR_PX, EVEN_GAIN = 0.5, 1.2
+FINE_LOOKS = (Look(1, 1.0, 1.0), Look(2, 3.0, 1.5))
 
 EVEN_CONTRAST, EVEN_FROM_PX = 8, 80 * 80
 """Most that means of 4 x 4 px differ by on even ground, of 255; pixels of the smallest image that has much of it."""
@@ -169,10 +150,11 @@ def create_detector(backend: str = DEFAULT_BACKEND, family: str = "36h11", decim
     return BACKENDS[backend](family, decimate)
 
 
-def create_fine_detectors(family: str) -> List[TagDetector]:
+def create_fine_detectors(family: str) -> List[Union[TagDetector, Type[TemplateDetector]]]:
     """Return detectors that find what others miss, at more and more cost: small tags, blur, edges of shadows."""
-    # Enlarged noise looks like tags of 16h5, whose cells are larger anyway.
-    return [AprilTagDetector(family, 1.0, look) for look in (FINE_LOOKS if family == "36h11" else FINE_LOOKS[:1])]
+    if family != "36h11":  # enlarged noise looks like tags of 16h5, whose cells are larger anyway
+        return [AprilTagDetector(family, 1.0, FINE_LOOKS[0])]
+    return [*(AprilTagDetector(family, 1.0, look) for look in FINE_LOOKS), TemplateDetector]
 
 
 def find_print_mistake(gray: np.ndarray, family: str) -> str:

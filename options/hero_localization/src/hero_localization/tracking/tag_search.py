@@ -9,12 +9,13 @@ pixels per second.
 """
 
 import math
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type, Union
 
 import numpy as np
 
 from .detectors import TagDetector
 from .tag_pose import TagCorners
+from .tag_template import TemplateDetector
 
 FINE_BELOW_PX = 36.0
 """In an image at half its size, tags of less than this are missed with blur and gamma."""
@@ -70,6 +71,9 @@ NARROW_S = 0.08
 """After a longer gap, a window for this time is tried first: on a busy machine large ones would make gaps longer."""
 
 
+AnyDetector = Union[TagDetector, TemplateDetector]
+
+
 class _Track(NamedTuple):
     """A tag that was seen: last at stamp_s, and in all frames from first_s on."""
 
@@ -88,7 +92,7 @@ class _Frame:
         self.found: List[TagCorners] = []
         self._gray = gray
 
-    def search(self, detector: TagDetector, left: int, top: int, right: int, bottom: int) -> List[TagCorners]:
+    def search(self, detector: AnyDetector, left: int, top: int, right: int, bottom: int) -> List[TagCorners]:
         """Search a window, and return its tags; those that were not found in another one already are added."""
         seen = detector.detect(self._gray[top:bottom, left:right], (left, top))
         for tag in seen:
@@ -98,7 +102,7 @@ class _Frame:
         return seen
 
     def search_around(
-        self, detector: TagDetector, tag_id: int, center: np.ndarray, side_px: float, half_px: float
+        self, detector: AnyDetector, tag_id: int, center: np.ndarray, side_px: float, half_px: float
     ) -> bool:
         """Search a square for a tag, and return whether it is there."""
         if not np.isfinite(center).all():
@@ -119,13 +123,14 @@ class TagSearch:
         detector: TagDetector,
         width_px: int,
         height_px: int,
-        fine_detectors: Sequence[TagDetector] = (),
+        fine_detectors: Sequence[Union[TagDetector, Type[TemplateDetector]]] = (),
         smallest_px: float = math.inf,
     ) -> None:
         """fine_detectors: find what others miss at more cost; smallest_px: side of the smallest tag expected."""
         self._detector = detector
         self._detectors = [detector, *fine_detectors]
-        self._sweeps = [*fine_detectors[:1], detector] if smallest_px < FINE_BELOW_PX else [detector]
+        finer = [fine for fine in fine_detectors[:1] if not isinstance(fine, type)]
+        self._sweeps = [*finer, detector] if smallest_px < FINE_BELOW_PX else [detector]
         self._tracks: List[_Track] = []
         self._lost: Dict[int, _Track] = {}
         self._size_px = np.array((width_px, height_px))
@@ -136,7 +141,8 @@ class TagSearch:
         self._nearby_px = 0.0
         self._previous_s: Optional[float] = None
         self._smallest_px = smallest_px
-        self._sides_px: Dict[int, float] = {}
+        self._seen: Dict[int, TagCorners] = {}
+        """The tags when they were found last."""
         self._hard: Dict[int, Tuple[int, float]] = {}
         """The detector that found a tag which coarser ones missed, and when; by tag."""
         self._turns: Dict[int, Tuple[int, float]] = {}
@@ -167,7 +173,7 @@ class TagSearch:
         tracked = {track.tag_id for track in self._tracks}
         for tag_id, place in places.items():
             # Lost for long, or too small for the tiles: where it is expected, it costs no more than a window.
-            side_px = self._sides_px.get(tag_id, self._smallest_px)
+            side_px = self._seen[tag_id].side_px if tag_id in self._seen else self._smallest_px
             if tag_id not in tracked and math.isfinite(side_px):
                 self._look_for(frame, tag_id, side_px, [(place, MAX_STEP_S)], math.inf)
         for detector, tile in self._take_tiles(stamp_s):
@@ -185,7 +191,10 @@ class TagSearch:
             for center, elapsed_s in windows:
                 slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
                 half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
-                if frame.search_around(self._detectors[index], tag_id, center, side_px, half_px):
+                made = self._detectors[index]
+                corners = self._seen[tag_id].corners if missed_s <= PATIENCE_S else None
+                detector = made(tag_id, center, side_px, corners) if isinstance(made, type) else made
+                if frame.search_around(detector, tag_id, center, side_px, half_px):
                     first, found_s = self._hard.get(tag_id, (0, -math.inf))
                     if index != first or frame.stamp_s >= found_s + FINE_S:
                         self._hard[tag_id] = index, frame.stamp_s
@@ -251,7 +260,7 @@ class TagSearch:
         self._tracks = []
         for tag in frame.found:
             center, side_px, first_s = tag.center, tag.side_px, stamp_s
-            self._sides_px[tag.tag_id] = side_px
+            self._seen[tag.tag_id] = tag
             same = [track for track in old if track.tag_id == tag.tag_id]
             if same:
                 nearest = min(same, key=lambda track: float(abs(track.center - center).sum()))
