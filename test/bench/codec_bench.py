@@ -5,7 +5,7 @@ import time
 import timeit
 
 import emulated_swarm
-from measuring import measure_machine_us, print_machine
+from measuring import print_machine
 
 from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.corrections.robot_corrections import RobotCorrections
@@ -72,7 +72,7 @@ def main():
             for topic, payload in of_burst:
                 topic.receive(payload, start_ns + index * BURST_NS)
 
-    print_machine(measure_machine_us())
+    print_machine()
     print(f"bytes of a burst: {len(bursts[0])} (odom, 5 transforms, encoder), 29.4 bursts per robot and second")
     print("| layer | us per burst |")
     print("|---|---|")

@@ -1,4 +1,4 @@
-"""Loads a rosserial TCP server with an emulated swarm and prints one table, and JSON with --json.
+"""Loads a rosserial TCP server with an emulated swarm and prints one table.
 
 Starts its own ROS master and the server (with --port it takes those that run), listeners and commanders, each in its
 own process; CPU time comes from the operating system's accounting (/proc). With --against, the driver and the one of
@@ -8,7 +8,6 @@ changes from one run to the next by more than versions differ. Run it with scrip
 
 import argparse
 import contextlib
-import csv
 import json
 import os
 import statistics
@@ -22,7 +21,6 @@ import rosgraph
 from measuring import (
     find_environment,
     find_tree,
-    measure_machine_us,
     percentile_ms,
     print_machine,
     read_all_cpu_s,
@@ -32,7 +30,6 @@ from measuring import (
     start_master,
     stop,
     wait_for_port,
-    write_report,
 )
 
 from hero_test.processes import find_free_port
@@ -234,25 +231,6 @@ def print_run(name, runs):
     )
 
 
-def append_history(path, results, machine_us):
-    """Add a line for each number of robots to the CSV file that shows what commits cost."""
-    commit = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=HERE, capture_output=True, text=True, check=True
-    ).stdout.strip()
-    columns = ["commit", "sum_of_768_bytes_us", "robots", *(key for _, key, _ in ROWS)]
-    with path.open("a+", newline="") as file:
-        file.seek(0)
-        known = next(csv.reader(file), None)
-        if known is not None and known != columns:
-            raise SystemExit(f"bench: {path} has other columns ({', '.join(known)}); give another file")
-        writer = csv.writer(file, lineterminator="\n")
-        if known is None:
-            writer.writerow(columns)
-        for result in results:
-            cells = ["" if result[key] is None else form % result[key] for _, key, form in ROWS]
-            writer.writerow([commit, f"{machine_us:.2f}", result["robots"], *cells])
-
-
 def take_medians(runs):
     """Return one result from several runs of one server with the same number of robots."""
     result = {}
@@ -329,13 +307,9 @@ def main():
         type=int,
         help="a server that runs on this machine, under the ROS master of ROS_MASTER_URI, and has no robots yet",
     )
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
-    parser.add_argument("--history", type=Path, metavar="FILE", help="add the figures to this CSV file")
     options = parser.parse_args()
     if options.port and options.drivers != 1:
         parser.error("--drivers %d: --port measures the one server that runs there" % options.drivers)
-    if options.against and options.history:
-        parser.error("--history is for one driver: leave --against out")
     commands = {"": options.server_command}
     if options.against:
         # Both are started in the same way.
@@ -343,13 +317,8 @@ def main():
             "this driver": f"{find_environment(HERE.parents[1])} {DRIVER_COMMAND}",
             "the other": f"{find_environment(options.against)} {DRIVER_COMMAND}",
         }
-    machine_us = measure_machine_us()
-    print_machine(machine_us)
-    results = measure_all(options, commands)
-    print_table(results)
-    if options.history:
-        append_history(options.history, results, machine_us)
-    write_report(options.json, machine_us, results=results)
+    print_machine()
+    print_table(measure_all(options, commands))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import threading
 import time
 
 import rospy
-from measuring import measure_machine_us, print_machine, read_cpu_s, write_report
+from measuring import print_machine, read_cpu_s
 from running_suite import RunningSuite
 from sensor_msgs.msg import Joy
 
@@ -131,11 +131,8 @@ def main():
     parser.add_argument("--count", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=5.0, help="measured time of each program")
     parser.add_argument("--only", default="", help="only programs whose line contains this")
-    parser.add_argument("--json", help="write the figures to this file, too")
     options = parser.parse_args()
-    machine_us = measure_machine_us()
-    print_machine(machine_us)
-    results = {}
+    print_machine()
     with RunningSuite(options.count, "arena:=empty") as suite:  # no walls before the goals
         commands = CommandCount(options.count)
         truth = SwarmWatch(range(options.count))
@@ -146,13 +143,11 @@ def main():
         for title, case in list_cases(options.count).items():
             if options.only in title:
                 found = measure(suite, case, options.count, options.seconds, commands, truth)
-                results[title] = found
                 print(
                     "| %s | %.1f %% | %.1f..%.1f Hz | %.2f s | %.2f s |"
                     % (title, found["cpu_percent"], *found["rate_hz"], found["ended_s"], found["at_rest_s"]),
                     flush=True,
                 )
-    write_report(options.json, machine_us, robots=options.count, programs=results)
 
 
 if __name__ == "__main__":

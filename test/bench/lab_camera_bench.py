@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from lab_camera import LENS_A, LENS_B, LabCamera, LabLens, LabTag
 from lab_filter import measure_ages, measure_uncertainty
-from measuring import measure_machine_us, print_machine
+from measuring import print_machine
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board
@@ -409,7 +409,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=2, help="scenes of each kind (%(default)s)")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    print_machine(measure_machine_us())
+    print_machine()
     for name in options.only:
         PARTS[name](options.seeds)
 

@@ -16,7 +16,7 @@ from typing import Callable, Dict, List, NamedTuple, Sequence, Tuple, Union
 import cv2
 import numpy as np
 from localization_nodes import measure_nodes
-from measuring import measure_machine_us, print_machine
+from measuring import print_machine
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens
@@ -397,7 +397,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=1, help="of the nodes (%(default)s)")
     options = parser.parse_args()
     cv2.setNumThreads(1)
-    print_machine(measure_machine_us())
+    print_machine()
     if "accuracy" in options.only:
         measure_accuracy(options.seed, options.tape_mm / 1e3)
     if "nodes" in options.only:

@@ -14,7 +14,7 @@ from functools import partial
 from typing import List, Tuple
 
 import numpy as np
-from measuring import measure_machine_us, print_machine, read_cpu_s, write_report
+from measuring import print_machine, read_cpu_s
 from running_suite import RunningSuite
 
 from hero_client import CommonFrame, ProgramError
@@ -153,8 +153,7 @@ def measure_cpu(robots, seconds):
 
 
 def report_formations(seeds):
-    """Print how well robots form up by odometry and in the map, and return the worst of each run, mm."""
-    figures = {}
+    """Print how well robots form up by odometry and in the map."""
     for shape in SPACING_M:
         for frame in ("world", "map"):
             runs = [measure_formation(shape, frame, seed) for seed in seeds]
@@ -163,33 +162,25 @@ def report_formations(seeds):
             print("%s in %s: all within 10 mm in %d of %d seeds" % (shape, frame, (worst_mm < 10.0).sum(), len(seeds)))
             print(f"  median {np.median([off_mm for off_mm, _ in runs]):.1f} mm, worst {worst_mm.max():.1f} mm")
             print(f"  in place after {min(times_s):.0f} to {max(times_s):.0f} s")
-            figures[f"{shape} in {frame}"] = worst_mm.tolist()
-    return figures
 
 
 def report_goals(seeds):
-    """Print how well robots reach one goal after the other by odometry and in the map, and return all, mm."""
-    figures = {}
+    """Print how well robots reach one goal after the other by odometry and in the map."""
     for frame in ("world", "map"):
         runs = np.array([measure_goals(frame, seed) for seed in seeds])
         for number in (1, GOALS):
             off_mm = runs[:, number - 1]
             print("goal %d in %s: median %.1f mm, worst %.1f mm" % (number, frame, np.median(off_mm), off_mm.max()))
-        figures[frame] = runs.tolist()
-    return figures
 
 
 def report_maps(seeds):
-    """Print how much of the obstacles arena is mapped by when, and return the shares."""
-    figures = {}
+    """Print how much of the obstacles arena is mapped by when."""
     for program in ("explore", "random_walk"):
         runs = np.array([measure_map(program, seed, TIMES_S) for seed in seeds])
         for time_s, (walls, cells) in zip(TIMES_S, np.moveaxis(100.0 * runs, 0, -1)):
             print(f"map by {program} after {time_s:.0f} s, mean and worst of the seeds:")
             print(f"  {walls.mean():.1f} and {walls.min():.1f} % of the wall, ", end="")
             print(f"{cells.mean():.1f} and {cells.min():.1f} % of the cells are wall")
-        figures[program] = runs.tolist()
-    return figures
 
 
 def main():
@@ -199,21 +190,18 @@ def main():
     parser.add_argument("--count", type=int, default=20, help="robots whose map_arena is measured (%(default)s)")
     parser.add_argument("--seconds", type=float, default=20.0, help="for so long (%(default)s)")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
-    parser.add_argument("--json", metavar="FILE", help="write the figures to FILE")
     options = parser.parse_args()
-    machine_us, seeds, figures = measure_machine_us(), range(options.seeds), {}
-    print_machine(machine_us)
+    seeds = range(options.seeds)
+    print_machine()
     if "formations" in options.only:
-        figures["formations"] = report_formations(seeds)
+        report_formations(seeds)
     if "goals" in options.only:
-        figures["goals"] = report_goals(seeds)
+        report_goals(seeds)
     if "maps" in options.only:
-        figures["maps"] = report_maps(seeds)
+        report_maps(seeds)
     if "cpu" in options.only:
         shares = measure_cpu(options.count, options.seconds)
         print("CPU with %d robots: localize %.1f %%, map_arena %.1f %%" % (options.count, *(100.0 * s for s in shares)))
-        figures["cpu"] = shares
-    write_report(options.json, machine_us, **figures)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """Shared by the benchmarks: processes, their CPU time and memory, the speed of the machine, the report."""
 
 import contextlib
-import json
 import os
 import signal
 import socket
@@ -135,13 +134,6 @@ def start_master():
         stop(master)
 
 
-def print_machine(machine_us):
+def print_machine():
     """Print the line by which tables of different machines and hours are compared."""
-    print(f"sum of 768 bytes: {machine_us:.2f} us, load of the last minute: {os.getloadavg()[0]:.2f}")
-
-
-def write_report(path, machine_us, **figures):
-    """Write the figures to the JSON file at path, unless it is None."""
-    if path is not None:
-        report = {"sum_of_768_bytes_us": machine_us, "load_average": os.getloadavg(), **figures}
-        Path(path).write_text(json.dumps(report, indent=2) + "\n")
+    print(f"sum of 768 bytes: {measure_machine_us():.2f} us, load of the last minute: {os.getloadavg()[0]:.2f}")

@@ -11,7 +11,6 @@ import subprocess
 import time
 
 from measuring import (
-    measure_machine_us,
     print_machine,
     read_cpu_s,
     read_memory_mb,
@@ -19,7 +18,6 @@ from measuring import (
     start_master,
     stop,
     wait_for_port,
-    write_report,
 )
 from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
@@ -76,25 +74,23 @@ async def measure(title, monitor, clients, seconds):
     updates = f"{min(frames):.1f}" if frames else "-"
     memory_mb = read_memory_mb(monitor.pid)
     print(f"| {title} | {cpu:.1f} % | {updates} | {length / 1000.0:.1f} kB/s | {memory_mb:.0f} MB |", flush=True)
-    return {"title": title, "cpu_percent": cpu, "updates_hz": frames, "bytes_per_s": length}
 
 
 async def measure_all(monitor, port, options):
-    """Return all rows."""
-    rows = [await measure("no page", monitor, [], options.seconds)]
+    """Print all rows."""
+    await measure("no page", monitor, [], options.seconds)
     clients = [Client(port) for _ in range(5)]
     await clients[0].open()
     deadline_s = time.monotonic() + JOIN_TIMEOUT_S
     while clients[0].ready < options.count and time.monotonic() < deadline_s:
         await asyncio.sleep(0.1)
     print("robots that are ready and send odometry: %d" % clients[0].ready)
-    rows.append(await measure("one page", monitor, clients[:1], options.seconds))
+    await measure("one page", monitor, clients[:1], options.seconds)
     for client in clients[1:]:
         await client.open()
-    rows.append(await measure("five pages", monitor, clients, options.seconds))
+    await measure("five pages", monitor, clients, options.seconds)
     for client in clients:
         client.close()
-    return rows
 
 
 def main():
@@ -102,10 +98,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--seconds", type=float, default=10.0, help="measured time of each row")
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
     options = parser.parse_args()
-    machine_us = measure_machine_us()
-    print_machine(machine_us)
+    print_machine()
     driver_port, port = find_free_port(), find_free_port()
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with start_master() as environment, contextlib.ExitStack() as started:
@@ -128,8 +122,7 @@ def main():
         wait_for_port(port, monitor)
         print("| %d robots | CPU of one core | updates/s of each page | to each page | memory |" % options.count)
         print("|---|---|---|---|---|")
-        rows = asyncio.run(measure_all(monitor, port, options))
-    write_report(options.json, machine_us, robots=options.count, rows=rows)
+        asyncio.run(measure_all(monitor, port, options))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import List, NamedTuple
 
 import numpy as np
-from measuring import find_environment, measure_machine_us, print_machine, read_cpu_s, start, stop
+from measuring import find_environment, print_machine, read_cpu_s, start, stop
 
 from hero_driver.rosserial import packets, payloads
 from hero_sim.build import build_swarm
@@ -211,7 +211,7 @@ def main() -> None:
     simulators = {"this": [sys.executable]}
     if options.against:
         simulators["the other"] = [find_environment(options.against), sys.executable]
-    print_machine(measure_machine_us())
+    print_machine()
     if "sockets" in options.only:
         print("| behind sockets | simulator | CPU of one core | odoms of the stock rate |\n|---|---|---|---|")
         for robots in options.count:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Dict, List, Tuple
 
 import rospy
-from measuring import measure_machine_us, print_machine, stop, wait_for_port, write_report
+from measuring import print_machine, stop, wait_for_port
 from running_suite import RunningSuite
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -291,12 +291,9 @@ def main():
     parser.add_argument("--rounds", type=int, default=20, help="stops of each kind (20)")
     parser.add_argument("--via", nargs="*", metavar="METHOD", choices=METHODS, default=METHODS)
     parser.add_argument("--modes", nargs="*", metavar="MODE", choices=MODES, default=MODES)
-    parser.add_argument("--json", metavar="FILE", help="write the figures there")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # ends what was started
-    machine_us = measure_machine_us()
-    print_machine(machine_us)
-    rows = []
+    print_machine()
     with StopSuite() as suite:
         suite.add_requests(options.via)
         suite.add_robots(options.each)
@@ -305,8 +302,6 @@ def main():
         for mode in options.modes:
             for row in measure_mode(suite, mode, options.via, options.rounds):
                 print_row(row)
-                rows.append(row)
-            write_report(options.json, machine_us, rows=rows)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Dict, Optional, Sequence, Tuple
 
 import numpy as np
-from measuring import measure_machine_us, print_machine
+from measuring import print_machine
 
 from hero_client.controllers import steer
 from hero_client.values import BODY_RADIUS_M
@@ -208,7 +208,7 @@ def main() -> None:
     parser.add_argument("--drive", choices=("velocity", "pulses"), help="instead of each behavior's own")
     options = parser.parse_args()
     seeds = range(options.seeds)
-    print_machine(measure_machine_us())
+    print_machine()
     if "aggregation" in options.only:
         measure_aggregation(seeds, options.drive, options.robots)
     for name in _GENOMES if "genomes" in options.only else ():

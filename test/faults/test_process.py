@@ -245,22 +245,26 @@ def test_a_driver_bug_in_one_connection_closes_only_that_one(start_driver, recor
 def test_a_broken_event_loop_stops_the_robots_and_ends_the_driver(start_driver, record, tmp_path):
     trigger = tmp_path / "break"
     driver = start_driver(prefix=[sys.executable, str(HERE / "broken_driver.py"), "loop", str(trigger)])
-    robot = FakeRobot(1, read_cycle_s=READ_CYCLE_S, has_motors=True).connect(driver.address)
-    driver.fleet.wait_ready("/hero_1")
-    publisher = make_publisher("/hero_1/velocity_controller/cmd_vel", Twist)
+    robots = [FakeRobot(number, read_cycle_s=READ_CYCLE_S, has_motors=True) for number in (92, 93)]
+    for robot in robots:
+        robot.connect(driver.address)
+        driver.fleet.wait_ready(robot.namespace)
+    robots[0].start_tuning()
     command = Twist()
     command.linear.x = SPEED_M_S
-    publisher.publish(command)
-    wait_for(lambda: robot.motors.is_turning, "motion")
+    make_publisher("/hero_93/velocity_controller/cmd_vel", Twist).publish(command)
+    wait_for(lambda: robots[1].motors.is_turning, "motion")
     trigger.write_text("")
     code = driver.wait_end()
-    wait_for(lambda: robot.ended, "the end of the connection")
-    stops = [velocity.is_zero for velocity in robot.velocities if "velocity_controller" in velocity.name]
-    robot.close()
+    wait_for(lambda: all(robot.ended for robot in nonempty(robots)), "the end of the connections")
+    stops = [velocity.is_zero for velocity in robots[1].velocities if "velocity_controller" in velocity.name]
+    for robot in robots:
+        robot.close()
+    assert code == 1 and stops[-2:] == [True, True]
     assert driver.find_lines("the driver broke: RuntimeError")
     record(
-        "an exception in the loop of the sockets",
-        1,
-        int(code == 1 and stops[-2:] == [True, True] and not robot.motors.is_turning),
+        "an exception in the loop of the sockets, a robot that tunes itself and one that drives",
+        2,
+        sum(not robot.motors.is_turning for robot in robots),
         "the driver",
     )

@@ -54,15 +54,6 @@ class RobotMotionsTest(unittest.TestCase):
             Swarm([3, CORNERED]).go_to(0.1, 0.0, frame="robot")
         wait_for(lambda: abs(self.measure_way_m(3, before) - 0.1) < 0.015, "hero_3 at its goal")
 
-    def test_a_started_motion_ends_by_cancel_and_by_stop(self):
-        robot = self.swarm[0]
-        for end in (lambda motion: motion.cancel(), lambda motion: robot.stop()):
-            motion = self.start_driving(robot)
-            end(motion)
-            with self.assertRaisesRegex(GoalError, "cancelled"):
-                motion.result(DEADLINE_S)
-            wait_for(lambda: self.watch.at_rest(0), "rest")
-
     def test_while_all_robots_are_stopped_motions_fail_and_commands_warn(self):
         robot = self.swarm[0]
         self.assertFalse(robot.is_stopped)

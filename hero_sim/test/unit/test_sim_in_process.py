@@ -24,6 +24,7 @@ with Swarm.discover() as swarm, Swarm([0, 1]) as pair:
 """
 
 
+@pytest.mark.slow
 def run(tmp_path, text, *options, arguments=("argument",)):
     script = tmp_path / "script.py"
     script.write_text(text)
@@ -71,6 +72,7 @@ run(drive)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [
@@ -85,6 +87,7 @@ def test_a_program_with_parameters_runs_until_its_time_is_over(tmp_path, argumen
     assert message in ended.stderr and "Traceback" not in ended.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "message"),
     [

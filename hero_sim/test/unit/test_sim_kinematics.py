@@ -21,6 +21,7 @@ def test_without_travel_an_arc_is_a_rotation_on_the_spot():
     assert heading == pytest.approx(np.array([[math.cos(0.1)], [math.sin(0.1)]]), abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [70, 360, 100000])
 def test_a_full_circle_comes_back_whatever_the_step(steps):
     half = np.full((steps // 2, 1), 1.0)

@@ -24,6 +24,7 @@ def run_simulator(*arguments, stdout):
 PRINTING = (["--help"], ["--print-errors"], ["--port", "9"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", PRINTING)
 def test_a_closed_pipe_ends_it_silently(arguments):
     read_end, write_end = os.pipe()

@@ -100,6 +100,7 @@ class Stage:
         return self.swarm.rows.world.poses[None, :, :2].copy()
 
 
+@pytest.mark.slow
 @pytest.fixture(name="stage")
 def make_stage(monkeypatch):
     return Stage(monkeypatch)
@@ -291,6 +292,7 @@ class Leave(Behavior):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [1.0, 20.0])
 def test_robots_stay_in_the_fence_whatever_the_rate_and_speed(stage, tmp_path, rate_hz):
     (tmp_path / "leave.py").write_text(LEAVE % rate_hz)
@@ -322,6 +324,7 @@ class Chase(Behavior):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_m_s", [0.0, 0.06])
 def test_robots_of_others_are_avoided_by_their_own_radii(stage, tmp_path, speed_m_s):
     goal = stage.swarm.robots[5].true_pose
@@ -367,6 +370,7 @@ def test_robots_that_localize_alone_knows_are_avoided_in_its_frame(stage, monkey
     assert others.describe_missing() == "not avoided, for want of a pose in the frame map: hero_4"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "words"),
     [

@@ -227,6 +227,7 @@ def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
         assert ends_m == pytest.approx(np.full((2, paths), 0.2), abs=1e-6)
 
 
+@pytest.mark.slow
 @functools.lru_cache(maxsize=None)
 def drive_in_square(side_m, avoids, time_s=60.0):
     """Return the recording of a robot that wanders in a square, with or without a look at its walls."""
@@ -302,6 +303,7 @@ def write_fit(tmp_path, monkeypatch, recordings):
         return None, out.read_text()
 
 
+@pytest.mark.slow
 def test_a_fit_that_predicts_worse_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(robot_fit, "predict_ends", lambda *arguments: np.array([[0.031], [0.045]]))
     assert write_fit(tmp_path, monkeypatch, {3: [record(VELOCITY, 40.0)]}) == (None, "slip=0\n")

@@ -150,6 +150,7 @@ def leave_together(rate_hz, delay_s, direction=1.0):
     return min(nearest_m) - 2.0 * BODY_RADIUS_M, max(farthest_m) + BODY_RADIUS_M - 0.7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [1.0, 20.0])
 def test_behaviors_that_decide_seldom_are_filtered_as_often_as_others(rate_hz):
     gap_m, outside_m = leave_together(rate_hz, 0.0)

@@ -95,6 +95,7 @@ def measure(mission, poses, times=1):
     return values[0, 0]
 
 
+@pytest.mark.slow
 def test_scores_count_what_they_say():
     assert measure("black_spot", [(0.0, 0.6, 0.0)]) == 20.0 and measure("black_spot", [(0.0, 0.0, 0.0)]) == 0.0
     source, between, nest = (0.75, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.9, 0.0)
@@ -104,6 +105,7 @@ def test_scores_count_what_they_say():
     assert measure("sorting", [(0.0, 0.0, 0.0)]) == 0.45, "all are near robot 0, which is near robot 1"
 
 
+@pytest.mark.slow
 def test_a_mission_becomes_controllers_that_are_compared(path, capsys, monkeypatch):
     monkeypatch.setattr(program, "write_report", print)
     options = ["m.yaml", "--budget", "200", "--tests", "2"]
@@ -282,6 +284,7 @@ def test_cma_designs_the_numbers_of_a_behavior(path, light, monkeypatch):
     assert behavior.spacing_m < 0.2 and behavior.near.range_m != 1.0, "a falling metric is made small"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "old, new, words",
     [

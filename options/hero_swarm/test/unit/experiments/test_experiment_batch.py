@@ -34,6 +34,7 @@ def take(text, series):
     return take_values(parse_experiment(FILE.replace("nearest_neighbor: 2", text), "e.yaml"), series)
 
 
+@pytest.mark.slow
 def test_columns_are_a_last_sample_a_mean_or_the_first_time_below_a_bound():
     # Of each second: dispersion, dispersion_ratio, nearest_neighbor.
     series = np.array([(1.0, 2.0, 10.0), (2.0, 1.6, 20.0), (3.0, 1.4, 40.0), (4.0, 1.7, 80.0), (5.0, 1.3, 160.0)])

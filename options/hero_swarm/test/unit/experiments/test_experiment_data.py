@@ -55,6 +55,7 @@ def run_experiment(tmp_path_factory):
     return base / "work" / "e"
 
 
+@pytest.mark.slow
 def read(path):
     with open(str(path), newline="") as file:
         return list(csv.DictReader(file))
@@ -96,6 +97,7 @@ def test_the_index_names_the_file_and_place_of_each_run(folder):
         assert np.load(str(folder / row["poses"])).shape[1] in (1, 2)
 
 
+@pytest.mark.slow
 def test_the_table_over_time_has_a_row_for_each_run_and_second(folder, tmp_path, monkeypatch):
     rows = read(folder.parent.parent / "series.csv")
     assert len(rows) == 4 * 3 * 4 and list(rows[0]) == [

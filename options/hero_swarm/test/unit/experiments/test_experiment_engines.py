@@ -33,6 +33,7 @@ def die(number):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 def fail(number):
     raise ValueError("of number %d" % number)
 
@@ -64,6 +65,7 @@ class PoolThatBreaks(Executor):
         return future
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tasks", range(4))
 def test_a_pool_that_breaks_while_it_takes_a_task_loses_none(tasks):
     pools = iter((PoolThatBreaks(tasks), PoolThatBreaks(99)))
@@ -71,6 +73,7 @@ def test_a_pool_that_breaks_while_it_takes_a_task_loses_none(tasks):
     assert sorted(done) == [((number,), number * number) for number in range(6)]
 
 
+@pytest.mark.slow
 def test_a_task_that_always_kills_its_worker_ends_with_an_error(monkeypatch):
     monkeypatch.setattr(engines, "MAX_NEW_POOLS", 1)
     with pytest.raises(ExperimentError, match="worker processes died 2 times"):

@@ -249,6 +249,7 @@ def test_a_trial_that_counts_replaces_one_that_does_not(tmp_path):
         assert open_folder(path)[0].read_runs() == [good]
 
 
+@pytest.mark.slow
 def test_the_folder_says_what_made_it(tmp_path):
     open_folder(tmp_path)
     assert (tmp_path / "experiment.yaml").read_text() == FILE

@@ -154,6 +154,7 @@ def test_the_report_stands_alone_and_names_every_cell_and_remark(finished):
     assert float(own["median"]) == np.median(values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -25,6 +25,7 @@ metrics: [consensus_error, {time_until: {consensus_error: 0.25}}]
 STARTS = np.array([(0.0, 0.0, 0.0), (0.6, 0.0, 2.0), (0.0, 0.6, -1.0)])
 
 
+@pytest.mark.slow
 def drive(text=FILE, lost_s=math.inf):
     """Return the trial, when it ended, and the poses then; robot 1 has no pose from lost_s on."""
     experiment = parse_experiment(text, "e.yaml")
@@ -85,6 +86,7 @@ def test_a_trial_with_objects_needs_the_poses_of_all():
     assert trial.remark == "poses of 0 of the arena's 1 objects" and end_s == 0.0
 
 
+@pytest.mark.slow
 def drive_to(places, lost_s=(0.0, 0.0)):
     """Return where robots that began at STARTS are, and when; robot 1 has no pose between two times."""
     start_drive = StartDrive(places)
@@ -136,6 +138,7 @@ def test_robots_drive_to_their_starts_slower_while_poses_are_old():
     assert 0.0 < slow_m_s < 0.5 * usual_m_s and stopped_m_s == 0.0
 
 
+@pytest.mark.slow
 def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
     monkeypatch.setitem(METRICS, "consensus_error", lambda poses, velocities, *rest: velocities[:, 0, 0])
     experiment = parse_experiment(FILE, "e.yaml")
