@@ -63,6 +63,18 @@ const cut = (one) => one.clientWidth > 0 && one.scrollWidth > one.clientWidth + 
 return [document.body, ...document.querySelectorAll("header, main section, .scroll, .filters, #tabs, .counts")]
   .filter(cut).map((one) => one.id + one.className + " " + one.scrollWidth + " > " + one.clientWidth);
 """
+COUNT_WALL = """
+const canvas = document.getElementById("canvas"), ratio = devicePixelRatio, frame = canvas.getBoundingClientRect();
+const { left, top, right, bottom } = document.getElementById("invite").getBoundingClientRect();
+const { data, width } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+const counts = { behind: 0, elsewhere: 0 };
+for (let index = 0; index < data.length; index += 4) {
+  if (data[index] !== 0x7b || data[index + 1] !== 0x86 || data[index + 2] !== 0x96) continue;
+  const x = frame.left + ((index / 4) % width) / ratio, y = frame.top + Math.floor(index / 4 / width) / ratio;
+  counts[x >= left && x <= right && y >= top && y <= bottom ? "behind" : "elsewhere"] += 1;
+}
+return counts;
+"""
 READ_COLORS = """
 const tags = [...document.querySelectorAll("tbody [data-state]")];
 return tags.map((tag) => getComputedStyle(tag).backgroundColor);
@@ -221,6 +233,20 @@ class ViewTest(unittest.TestCase):
         self.page.click("#projector")
         wait_for(lambda: self.page.find("#fleet").is_displayed(), "the whole page")
         self.assertEqual(self.page.find("#stop").rect, place)
+
+    def test_no_wall_is_drawn_behind_the_class_code_of_the_projector(self):
+        walls = [[0, 0, 0, 1800, 20], [0, 1800, 0, 1800, 20], [-900, 900, 1.5708, 1800, 20], [900, 900, 1.5708, 1800, 20]]
+        lesson = {"code": "123456", "link": "http://lab:8088/", "qr": ["10" * 12] * 25, "drivers": [], "users": []}
+        self.addCleanup(self.page.resize, 1440, 900)
+        self.addCleanup(self.monitor.show, lesson=None, arena={"boxes": [], "circles": []})
+        self.monitor.show(lesson=lesson, arena={"boxes": walls, "circles": []})
+        self.page.click("#projector")
+        for size in ((768, 1024), (320, 640), (1280, 800)):
+            self.page.resize(*size)
+            found = wait_for(lambda: [self.page.run(COUNT_WALL)] * (self.page.run("return innerWidth") == size[0]), size)
+            self.assertEqual(found[0]["behind"], 0, size)
+            self.assertGreater(found[0]["elsewhere"], 100, size)
+        self.page.click("#projector")
 
     def send_until(self, kind, act, program=None):
         """Act, again where a busy PC let the page take it for a late input; return the request, that for a program.

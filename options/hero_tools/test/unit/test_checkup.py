@@ -148,9 +148,10 @@ def test_a_module_that_a_package_declares_and_is_missing_is_named(monkeypatch, t
         return str(tmp_path)
 
     monkeypatch.setattr(computer.rospkg, "RosPack", lambda: SimpleNamespace(get_path=get_path))
-    assert computer.find_lacking_modules() == {"no-such": [package]}
+    assert computer.find_lacking_dependencies() == {"python3-no-such": [package]}
     finding = computer.check_python()
-    assert finding.state == state and f"lacks no-such (for {package})" in finding.text
+    assert finding.state == state and f"lacks python3-no-such (for {package})" in finding.text
+    assert finding.remedy[0] == "Debian: sudo apt install python3-no-such"
 
 
 def test_modules_of_all_declared_packages_are_found_by_their_names():

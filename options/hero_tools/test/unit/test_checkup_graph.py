@@ -201,7 +201,7 @@ def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
     answers = {"/usr/bin/other": None}
     monkeypatch.setattr(computer.shutil, "which", lambda name: "/usr/bin/other")
     monkeypatch.setattr(computer, "ask_system", lambda command: answers[command[0]])
-    monkeypatch.setattr(computer, "find_lacking_modules", dict)
+    monkeypatch.setattr(computer, "find_lacking_dependencies", dict)
     finding = computer.check_python()
     assert (
         finding.state == WARN and "/usr/bin/other, has no rospy" in finding.text and sys.executable in finding.remedy[0]

@@ -45,18 +45,20 @@ MODULES = {
 AUTHOR = "HeRo suite maintainers"
 LOW_DISK_GB, FULL_DISK_GB = 2.0, 0.2
 LOW_BATTERY_PERCENT = 30
-INSTALL = "Debian: script/bootstrap; elsewhere: rosdep install --from-paths src --ignore-src -y"
+INSTALL = "elsewhere: rosdep install --from-paths src --ignore-src -y"
 SOURCE = "source the workspace in this terminal: source devel/setup.bash"
 
 
 def check_python() -> Finding:
     """Check this interpreter, its modules, and the python3 that is first on PATH."""
     version = platform.python_version()
-    lacking = find_lacking_modules()
+    lacking = find_lacking_dependencies()
     if lacking:
-        listed = ", ".join(f"{module} (for {', '.join(packages)})" for module, packages in lacking.items())
+        listed = ", ".join(f"{key} (for {', '.join(packages)})" for key, packages in lacking.items())
         tell = fail if set(CORE).intersection(*lacking.values()) else warn
-        return tell(f"Python {version} ({sys.executable}) lacks {listed}", INSTALL)
+        debian = [key if key.startswith("python3-") else "python3-" + key.replace("_", "-") for key in lacking]
+        remedy = f"Debian: sudo apt install {' '.join(debian)}"
+        return tell(f"Python {version} ({sys.executable}) lacks {listed}", remedy, INSTALL)
     text = f"Python {version} ({sys.executable}) has all modules"
     other = shutil.which("python3")
     if other and os.path.realpath(other) != os.path.realpath(sys.executable):
@@ -70,8 +72,8 @@ def check_python() -> Finding:
     return ok(text)
 
 
-def find_lacking_modules() -> Dict[str, List[str]]:
-    """Return the Python modules that cannot be imported, with the packages of the suite that declare them."""
+def find_lacking_dependencies() -> Dict[str, List[str]]:
+    """Return dependencies whose Python modules cannot be imported, with the packages of the suite that declare them."""
     finder, lacking = rospkg.RosPack(), {}  # type: rospkg.RosPack, Dict[str, List[str]]
     for name in CORE + OPTIONS:
         try:
@@ -81,7 +83,7 @@ def find_lacking_modules() -> Dict[str, List[str]]:
         for key in {dependency.name for dependency in needed}:
             module = MODULES.get(key, key[len("python3-") :] if key.startswith("python3-") else "")
             if module and not importlib.util.find_spec(module):
-                lacking.setdefault(module, []).append(name)
+                lacking.setdefault(key, []).append(name)
     return lacking
 
 

@@ -237,16 +237,17 @@ export class FleetMap {
     const [xs, ys] = [0, 1].map((axis) => places.map((place) => place[axis]));
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     const room = 1 - MARGIN;
-    const { offsetWidth } = element("invite"); // of the class code, for an audience: nothing is drawn behind it
-    const side = this.width > 3 * offsetWidth ? offsetWidth : 0;
+    const { offsetWidth, offsetHeight } = element("invite"); // of the class code, for an audience: nothing is drawn behind it
+    const [side, below] = this.width > 3 * offsetWidth ? [offsetWidth, 0] : [0, offsetHeight];
     const edge = Math.min(this.height / 4, Math.max(EDGE_PX, element("frame").offsetHeight + LABEL_PX));
     this.view.x = (left + right) / 2;
     this.view.y = (low + high) / 2;
     this.view.scale = Math.min(
       ((this.width - side) * room) / Math.max(right - left, 300),
-      ((this.height - 2 * edge) * room) / Math.max(high - low, 300),
+      ((this.height - 2 * edge - below) * room) / Math.max(high - low, 300),
     );
     this.view.x -= side / 2 / this.view.scale;
+    this.view.y -= below / 2 / this.view.scale;
     this.draw();
     return true;
   }

@@ -170,7 +170,7 @@ export class RobotPanel {
     const isAllowed = mayDrive(state, names);
     element("control").hidden = !isKnown || !state.hello.control || !isAllowed;
     element("advice").hidden = robots.length === 0 || (state.hello.control && isAllowed);
-    setText(element("advice"), !state.hello.control ? VIEW_ONLY : `You are ${roleOf(state.user)}: others drive these robots.`);
+    setText(element("advice"), !state.hello.control ? VIEW_ONLY : `You are ${state.user.title === "driver" ? "the" : "a"} ${roleOf({ ...state.user, name: "" })}: others drive these robots.`);
     const problem = robot ? healthOf(robot) : "";
     element("problem").hidden = !problem;
     element("problem").textContent = problem;
