@@ -484,6 +484,7 @@ def test_parts_follow_each_other_and_robots_are_placed_where_they_need_it(calls,
     text = capsys.readouterr().out
     assert "hero_0: ok\n  motors    measured\n  %s\n" % store.name_file(str(tmp_path), 0) in text
     assert text.endswith("ended early: robots hold what the table shows, and keep the rest\n")
+    assert run(INFRARED, ask=end) == (130, [wall]) and "hero_0: not measured\n" in capsys.readouterr().out
 
 
 def test_a_folder_that_is_full_fails_the_robot_in_its_line(calls, tmp_path, monkeypatch, capsys):
