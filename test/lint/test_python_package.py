@@ -51,7 +51,11 @@ def built(tmp_path_factory):
 def test_every_module_and_data_file_is_in_the_package(built):
     for package in PACKAGES:
         source = sources.PACKAGES[package] / "src" / package
-        kept = {path.relative_to(source) for path in source.rglob("*") if path.suffix in (".py", ".yaml", ".typed")}
+        kept = {
+            path.relative_to(source)
+            for path in source.rglob("*")
+            if path.suffix in (".py", ".yaml", ".typed", ".controller")
+        }
         assert kept == {path.relative_to(built / package) for path in (built / package).rglob("*") if path.is_file()}
 
 

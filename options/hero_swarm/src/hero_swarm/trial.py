@@ -16,6 +16,7 @@ from hero_sim.world import Arena, PushedBody, is_free, measure_clearance
 from .behavior import PULSES, Behavior, Random, derive_seed, lock
 from .control import Control
 from .metrics.own import State
+from .points import PointRows
 from .safety import SafetyFilter
 from .wheel_pulses import find_pulses, list_dead_zones
 
@@ -112,6 +113,7 @@ class Trial:
         objects: Optional[Sequence[Sequence[PushedBody]]] = None,
         known_errors: Sequence[str] = (),
         wifi: str = "ideal",
+        is_point: bool = False,
     ) -> None:
         """Put robots at starts (W, N, 3), or scatter them over size_m, or over the arena. Each seed is one world.
 
@@ -120,6 +122,7 @@ class Trial:
         with it robots are slow where delay_s is more than 0.1 s, and do not move beyond 0.5 s.
         objects: of each world; None: those of the arena, where it has them. known_errors: of robots 0 to N - 1, as
         hero_sim --error takes them. wifi: quality of the network, as hero_sim --wifi.
+        is_point: put points in place of robots (points.py).
         """
         x_min, y_min, x_max, y_max = arena.bounds_m
         width_m, height_m = (x_max - x_min, y_max - y_min) if size_m is None else size_m
@@ -134,7 +137,8 @@ class Trial:
         for seed in seeds if wifi != "ideal" else ():
             drawn = [derive_seed(seed, f"radio {robot}") for robot in range(robots)]
             radios += build_network(*parse_wifi(wifi), drawn)
-        self.rows = RobotRows(place_worlds(arena, starts, seeds, errors, objects, known_errors), radios)
+        world = place_worlds(arena, starts, seeds, errors, objects, known_errors)
+        self.rows: Any = PointRows(world) if is_point else RobotRows(world, radios)
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
         self.poses, self.velocities = lock(np.array(starts)), lock(np.zeros_like(starts))
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
@@ -191,7 +195,7 @@ class Trial:
         seen_s, poses = self._seen[0]
         ages_s = np.full(poses.shape[:2], now_s - seen_s) if self._is_filtered else None
         linear_m_s, angular_rad_s = self._control.step(now_s, poses, self.things, ages_s)
-        if self.behavior.drive == PULSES:
+        if self.behavior.drive == PULSES and not isinstance(rows, PointRows):
             rows.send_pulses(self._all, *find_pulses(linear_m_s, angular_rad_s, self._dead_zones_us))
         else:
             rows.send_velocity(self._all, linear_m_s, angular_rad_s)

@@ -143,6 +143,8 @@ CASES = {
     "flocking": (measure_flock, 0.9, True, 12, 30, OPEN, (1.0, 1.0)),
     "dispersion": (by_name("nearest_neighbor"), 0.45, True, 16, 30, OPEN, (0.6, 0.6)),
     "segregation": (measure_mixing, 0.1, False, 12, 40, OPEN, (1.2, 1.2)),
+    "potential_segregation": (measure_mixing, 0.1, False, 12, 40, OPEN, (1.2, 1.2)),
+    "random_fields": (measure_mixing, 0.1, False, 12, 60, SQUARE, None),
     "rendezvous": (by_name("consensus_error"), 0.2, False, 10, 30, OPEN, (2.0, 2.0)),
     "leader_followers": (measure_gap_error, 0.06, False, 5, 60, OPEN, (1.0, 1.0)),
     "formation": (measure_side_error, 0.1, False, 6, 90, OPEN, (1.2, 1.2)),

@@ -32,6 +32,8 @@ _MODULES: Dict[str, str] = {
     "flocking": "flocking.Flocking",
     "dispersion": "spacing.Dispersion",
     "segregation": "spacing.Segregation",
+    "potential_segregation": "spacing.PotentialSegregation",
+    "random_fields": "random_fields.RandomFields",
     "rendezvous": "consensus.Rendezvous",
     "leader_followers": "consensus.LeaderFollowers",
     "formation": "consensus.Formation",

@@ -7,7 +7,7 @@ import numpy as np
 from hero_client.controllers import steer
 from hero_node.parameters import whole_number
 
-from ..behavior import GAIN, RANGE, SPEED, Behavior, Command, Neighbors, Random, Sensed
+from ..behavior import GAIN, RANGE, SPEED, Behavior, Command, Neighborhood, Neighbors, Random, Sensed
 from .clearance import keep_apart
 
 
@@ -42,6 +42,7 @@ class Segregation(Behavior):
     gain_1_s = 0.1
     wander_m_s = 0.03
     max_linear_m_s = 0.1
+    max_angular_rad_s = 2.5
     settings = {"groups": whole_number(2, 2, 6), "own_m": RANGE, "others_m": RANGE, "max_linear_m_s": SPEED}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
@@ -49,15 +50,39 @@ class Segregation(Behavior):
         near, group = sensed.near, sensed.numbers % int(self.groups)
         range_m = np.maximum(near.range_m, 1e-6)
         is_own = group[near.rows] == group[:, None]
-        rest_m = np.where(is_own, self.own_m, self.others_m)
-        off_m = range_m - rest_m
-        force = self.gain_1_s * np.where(is_own, off_m, np.minimum(off_m, 0.0)) * near.seen / range_m
-        scale = 4.0 / np.maximum(near.counts, 1) ** 0.5
-        forward_m_s = scale * (force * near.forward_m).sum(axis=1) + self.wander_m_s * random.normal()
-        left_m_s = scale * (force * near.left_m).sum(axis=1) + self.wander_m_s * random.normal()
-        return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), group)
+        share = self.find_pull(near, range_m, is_own) * near.seen / range_m
+        forward_m_s = (share * near.forward_m).sum(axis=1) + self.wander_m_s * random.normal()
+        left_m_s = (share * near.left_m).sum(axis=1) + self.wander_m_s * random.normal()
+        return (*steer(forward_m_s, left_m_s, self.max_linear_m_s, max_angular_rad_s=self.max_angular_rad_s), group)
+
+    def find_pull(self, near: Neighborhood, range_m: np.ndarray, is_own: np.ndarray) -> np.ndarray:
+        """Return the speed (m/s) towards each neighbor (R, N), of the same group where is_own."""
+        off_m = range_m - np.where(is_own, self.own_m, self.others_m)
+        scale = 4.0 * self.gain_1_s / np.maximum(near.counts, 1) ** 0.5
+        pull_m_s: np.ndarray = scale[:, None] * np.where(is_own, off_m, np.minimum(off_m, 0.0))
+        return pull_m_s
 
     def colors(self, memory: Any) -> np.ndarray:
         palette = np.array([(1, 0, 0), (0, 0, 1), (0, 1, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)], dtype=float)
         shown: np.ndarray = palette[memory % len(palette)]
         return shown
+
+
+class PotentialSegregation(Segregation):
+    """Robots take the distance own_m in their group, and others_m from other groups, by a potential that is convex.
+
+    After V. Santos et al., Spatial segregative behaviors in robotic swarms using differential potentials, Swarm
+    Intelligence 2020. Its robots are accelerated by the forces of all neighbors and damped by the velocities of all;
+    ours take at once the velocities at which these balance.
+    """
+
+    unit_m = 0.1  # of the potential's lengths
+    own_m, others_m = 0.2, 1.0
+    gain_1_s = 1.0
+    wander_m_s = 0.0
+
+    def find_pull(self, near: Neighborhood, range_m: np.ndarray, is_own: np.ndarray) -> np.ndarray:
+        apart, rest = range_m / self.unit_m, np.where(is_own, self.own_m, self.others_m) / self.unit_m
+        force = (apart - rest) * (1.0 + apart**-2)
+        pull_m_s: np.ndarray = self.gain_1_s * self.unit_m * force / near.seen.shape[1]
+        return pull_m_s

@@ -34,7 +34,7 @@ START_KEYS: Dict[str, Tuple[Tuple[str, ...], Tuple[str, ...]]] = {
     "file": (("file",), ()),
     "arena": ((), ()),
 }
-SETTINGS = ("robots", "errors", "delay_s", "arena", "objects", "wifi")
+SETTINGS = ("robots", "body", "errors", "delay_s", "arena", "objects", "wifi")
 ERRORS = {"perfect": 0.0, "default": 1.0}
 """Differences between robots, as an option of the simulator: shares of the usual ones."""
 MAX_ERRORS = 10.0
@@ -42,6 +42,8 @@ ERROR_KEYS = tuple("errors." + key for key in KINDS)
 """Differences that are the same for all robots, as hero_sim --error takes them."""
 OBJECTS = ("arena", "scattered")
 """Places of the objects at the start: as in the arena, or drawn from each seed."""
+ROBOT, POINT = BODIES = ("robot", "point")
+"""Bodies: those of robots, or points (points.py)."""
 TESTS = ("wilcoxon",)
 _REQUIRED = ("time_s", "seeds", "metrics")
 _KEYS = (
@@ -107,8 +109,8 @@ class Cell(NamedTuple):
 
     Attributes:
         varied: name -> value, in the order of the file: the columns of the results.
-        settings: robots, errors, delay_s (age of the poses that robots sense each other by), arena, objects, wifi, and
-            differences of all robots by ERROR_KEYS.
+        settings: robots, body, errors, delay_s (age of the poses that robots sense each other by), arena, objects,
+            wifi, and differences of all robots by ERROR_KEYS.
         parameters: name -> value, of the behavior; of a sensor, SENSOR.FIELD.
         own: names of parameters that are given with the behavior, which must have them.
     """
@@ -327,6 +329,8 @@ def _parse_setting(name: str, entry: Entry) -> Any:
         return entry.whole(1, MAX_ROBOTS)
     if name == "delay_s":
         return entry.number(0.0, 10.0, "s")
+    if name == "body":
+        return entry.choice(BODIES)
     if name == "objects":
         return entry.choice(OBJECTS)
     return entry.text()

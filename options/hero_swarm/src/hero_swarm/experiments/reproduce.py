@@ -5,13 +5,13 @@ published ones is shown beside the verdict. Published figures and their sources:
 """
 
 import argparse
+import difflib
 import os
 import shutil
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
-import yaml
 
 from hero_node.files import Entry, load_entries, write_file
 from hero_node.parameters import within
@@ -26,12 +26,10 @@ from .reporting.summary import format_interval
 from .results import Results, load
 
 SHIPPED = Path(__file__).resolve().parents[1] / PUBLISHED
-_FIGURES = "published.yaml"
+FIGURES = "published.yaml"
 
-WITHIN, OUTSIDE, NO_FIGURE, NO_RUN = "within", "no", "no published figure", "no run yet"
+WITHIN, OPEN, OUTSIDE, NO_FIGURE, NO_RUN = "within", "open", "no", "no published figure", "no run yet"
 """Verdicts."""
-
-QUICK_SEEDS = 2
 
 TOLERANCE = 0.1
 """A published value without a spread is taken to be exact to this share."""
@@ -41,12 +39,11 @@ class Figure(NamedTuple):
     """A published figure.
 
     Attributes:
-        name: what it is, for users.
         metric: the column of the results, or a metric over time.
-        at_s: when the metric is taken (s); None: the column.
+        at_s: when the metric is taken (s); None: it is a column.
         cells: values that vary, of the cells that the figure is about.
-        published: as the source has it, for users.
-        low, high: between what a median agrees with it; None: none was published.
+        published: as the source has it.
+        bounds: between what a median agrees with it; None: none was published.
     """
 
     name: str
@@ -54,12 +51,11 @@ class Figure(NamedTuple):
     at_s: Optional[float]
     cells: Dict[str, Any]
     published: str
-    low: Optional[float]
-    high: Optional[float]
+    bounds: Optional[Tuple[float, float]]
 
 
 class Publication(NamedTuple):
-    """A published experiment: a sentence, where its figures come from, why ours may differ, and minutes of CPU."""
+    """A published experiment: what it shows, where its figures come from, why ours may differ, minutes of CPU."""
 
     name: str
     sentence: str
@@ -67,11 +63,6 @@ class Publication(NamedTuple):
     differs: str
     minutes: float
     figures: Tuple[Figure, ...]
-
-    @property
-    def path(self) -> Path:
-        """The experiment's file."""
-        return SHIPPED / f"{self.name}.yaml"
 
 
 class Verdict(NamedTuple):
@@ -84,81 +75,57 @@ class Verdict(NamedTuple):
 
     @property
     def word(self) -> str:
-        """Return the verdict: the interval of our median meets what was published, or not."""
-        figure, own = self.figure, self.interval
-        if own is None:
-            return NO_RUN
-        if figure.low is None or figure.high is None:
-            return NO_FIGURE
-        return WITHIN if own.low <= figure.high and own.high >= figure.low else OUTSIDE
+        """The verdict: our median is within what was published, or its interval misses it; else it is open."""
+        if self.interval is None or self.figure.bounds is None:
+            return NO_RUN if self.interval is None else NO_FIGURE
+        low, high = self.figure.bounds
+        if low <= self.interval.median <= high:
+            return WITHIN
+        return OPEN if self.interval.low <= high and self.interval.high >= low else OUTSIDE
 
 
-def read_publications(path: Path = SHIPPED / _FIGURES) -> List[Publication]:
-    """Return all published experiments. Raises: EntryError with the line of what is wrong."""
-    keys = ("sentence", "source", "differs", "minutes", "figures")
-    publications = []
-    for name, entry in load_entries(str(path), "gauci_aggregation: ...").mapping().items():
-        given = entry.mapping(keys, keys)
-        sentence, source, differs = (given[key].text() for key in keys[:3])
-        minutes = given["minutes"].number(0.0, 1e4, "min")
+def read_publications() -> Dict[str, Publication]:
+    """Return all published experiments by name. Raises: EntryError with the line of what is wrong."""
+    publications = {}
+    for name, entry in load_entries(str(SHIPPED / FIGURES), "gauci_aggregation: ...").mapping().items():
+        given = entry.mapping(Publication._fields[1:], Publication._fields[1:])
+        sentence, source, differs = (given[key].text() for key in ("sentence", "source", "differs"))
         figures = tuple(map(_parse_figure, given["figures"].entries()))
-        publications.append(Publication(name, sentence, source, differs, minutes, figures))
+        minutes = given["minutes"].number(0.0, 1e4, "min")
+        publications[name] = Publication(name, sentence, source, differs, minutes, figures)
     return publications
 
 
 def _parse_figure(entry: Entry) -> Figure:
-    given = entry.mapping(("name", "metric", "at_s", "cells", "published", "claim"), ("name", "metric", "published"))
+    given = entry.mapping(Figure._fields[:-1], ("name", "metric", "published"))
     at_s = given["at_s"].number(0.0, 1e6, "s") if "at_s" in given else None
-    cells = given["cells"].plain() if "cells" in given else {}
-    low, high, shown = None, None, "none"
-    if isinstance(given["published"].value, list):
-        low, high = given["published"].numbers(2, -np.inf, np.inf, "a number, [low, high] or null")
-        shown = f"{low:g} to {high:g}"
-    elif given["published"].value is not None:
-        value = given["published"].number(-np.inf, np.inf, "")
-        low, high = sorted((value * (1.0 - TOLERANCE), value * (1.0 + TOLERANCE)))
-        shown = f"{value:g}"
-    if "claim" in given:
-        shown = f"{given['claim'].text()} ({shown})"
-    return Figure(given["name"].text(), given["metric"].text(), at_s, cells, shown, low, high)
-
-
-def find_publication(name: str) -> Publication:
-    """Return the published experiment of this name. Raises: ExperimentError that names those that there are."""
-    known = {publication.name: publication for publication in read_publications()}
-    if name not in known:
-        raise ExperimentError(f"{name!r} is no published experiment; there are {', '.join(known)}")
-    return known[name]
+    cells, published, bounds, shown = given.get("cells"), given["published"], None, "none"
+    if isinstance(published.value, list):
+        low, high = published.numbers(2, -np.inf, np.inf, "a number, [low, high] or null")
+        bounds, shown = (low, high), f"{low:g} to {high:g}"
+    elif published.value is not None:
+        value = published.number(-np.inf, np.inf, "")
+        bounds, shown = (value - TOLERANCE * abs(value), value + TOLERANCE * abs(value)), f"{value:g}"
+    return Figure(given["name"].text(), given["metric"].text(), at_s, cells.plain() if cells else {}, shown, bounds)
 
 
 def copy_files(folder: str) -> None:
     """Copy the experiments, and what they need, to a folder; files that are there stay as they are."""
     os.makedirs(folder, exist_ok=True)
     for path in SHIPPED.iterdir():
-        if path.is_file() and path.name != _FIGURES and not os.path.exists(os.path.join(folder, path.name)):
+        if path.is_file() and path.name != FIGURES and not os.path.exists(os.path.join(folder, path.name)):
             shutil.copyfile(str(path), os.path.join(folder, path.name))
 
 
-def list_changes(publication: Publication, file: str) -> List[str]:
-    """Return what differs in the user's file, and in those beside it, from what is published."""
-    texts = [Path(path).read_text(encoding="utf-8") for path in (publication.path, file)]
-    published, own = (dict(_flatten(yaml.safe_load(text))) for text in texts)
-    names = [name for name in {**published, **own} if published.get(name) != own.get(name)]
-    changes = [f"{name} {own.get(name, 'left out')} (published: {published.get(name, 'none')})" for name in names]
+def list_changes(file: str) -> List[str]:
+    """Return the lines of the user's file, and of those beside it that it names, that differ from what is published."""
+    changes, shipped = [], SHIPPED / os.path.basename(file)
     for path in sorted(SHIPPED.iterdir()):
-        beside = Path(file).parent / path.name
-        if path.name in texts[1] and beside.is_file() and beside.read_bytes() != path.read_bytes():
-            changes.append(f"{path.name} is another one")
+        own = Path(file).parent / path.name
+        if own.is_file() and (path == shipped or path.name in shipped.read_text()):
+            lines = difflib.ndiff(path.read_text().splitlines(), own.read_text(errors="replace").splitlines())
+            changes += [f"{path.name}: {line}" for line in lines if line[0] in "-+"]
     return changes
-
-
-def _flatten(value: Any, name: str = "") -> Iterator[Tuple[str, Any]]:
-    """Yield the values of a file by names such as seeds.count."""
-    if not isinstance(value, dict):
-        yield name, value
-        return
-    for key, inner in value.items():
-        yield from _flatten(inner, f"{name}.{key}" if name else str(key))
 
 
 def judge(publication: Publication, experiment: Experiment, results: Results) -> List[Verdict]:
@@ -181,44 +148,44 @@ def judge(publication: Publication, experiment: Experiment, results: Results) ->
 def describe(publication: Publication, verdicts: Sequence[Verdict], changes: Sequence[str]) -> str:
     """Return the verdicts as text for a terminal."""
     lines = [f"{publication.name}: {publication.sentence}"]
-    told = None
-    for verdict in verdicts:
-        if verdict.figure != told:
-            told = verdict.figure
-            lines.append(f"  {told.name}: published {told.published}")
-        own = "-" if verdict.interval is None else f"{format_interval(verdict.interval)}, {verdict.runs} runs"
-        lines.append(f"    {verdict.label:36} {own:40} {verdict.word}")
+    for figure, label, runs, interval in verdicts:
+        told = f"  {figure.name}: published {figure.published}"
+        lines += [told] if told not in lines else []
+        own = "-" if interval is None else f"{format_interval(interval)}, {runs} runs"
+        lines.append(f"    {label:36} {own:40} {Verdict(figure, label, runs, interval).word}")
     lines += [f"  changed: {change}" for change in changes]
     return "\n".join([*lines, f"  may differ: {publication.differs}", f"  source: {publication.source}"])
 
 
 def reproduce(name: str, options: argparse.Namespace) -> str:
     """Run what is missing of a published experiment, and return the verdicts as text. Raises: ExperimentError."""
-    publication = find_publication(name)
+    publications = read_publications()
+    if name not in publications:
+        raise ExperimentError(f"{name!r} is no published experiment; there are {', '.join(publications)}")
     copy_files(options.folder)
     file = os.path.join(options.folder, name + ".yaml")
     try:
         _, experiment = read_experiment(file)
     except ExperimentError as error:
         raise ExperimentError(f"{error}; delete {file} to have the published one again") from error
-    given = {**vars(options), "file": file, "out": None, "batch": None, "robots": None}
-    runner.run_experiment(argparse.Namespace(**given))
-    verdicts = judge(publication, experiment, load(os.path.splitext(file)[0]))
-    return describe(publication, verdicts, list_changes(publication, file))
+    runner.run_experiment(
+        argparse.Namespace(**{**vars(options), "file": file, "out": None, "batch": None}, robots=None)
+    )
+    verdicts = judge(publications[name], experiment, load(os.path.splitext(file)[0]))
+    return describe(publications[name], verdicts, list_changes(file))
 
 
 def write_page(path: str, folder: str) -> None:
     """Write the page of all experiments that have runs in folder, and a picture of each beside it."""
     done = []
-    for publication in read_publications():
-        file = os.path.join(folder, publication.name + ".yaml")
-        if os.path.isdir(os.path.splitext(file)[0]):
-            results, (_, experiment) = load(os.path.splitext(file)[0]), read_experiment(file)
-            verdicts = judge(publication, experiment, results)
-            picture = os.path.join("pictures", f"reproduction_{publication.name}.png")
+    for name, publication in read_publications().items():
+        file = os.path.join(folder, name + ".yaml")
+        if os.path.isdir(os.path.join(folder, name)):
+            results, (_, experiment) = load(os.path.join(folder, name)), read_experiment(file)
+            picture = os.path.join("pictures", f"reproduction_{name}.png")
             groups = [int(cell.parameters.get("groups", 1)) for cell in experiment.cells]
             write_file(os.path.join(os.path.dirname(path), picture), draw_picture(results, groups))
-            done.append((publication, verdicts, list_changes(publication, file), picture))
+            done.append((publication, judge(publication, experiment, results), list_changes(file), picture))
     write_file(path, format_page(done).encode())
 
 
@@ -229,7 +196,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     add("names", nargs="*", metavar="NAME", help="published experiments (list them)")
     add("--folder", default="reproduction", help="of files and results (%(default)s)")
     add("--seeds", type=within(1, MAX_RUNS, int), metavar="N", help="only the first N seeds")
-    add("--quick", dest="seeds", action="store_const", const=QUICK_SEEDS, help=f"as --seeds {QUICK_SEEDS}")
+    add("--quick", dest="seeds", action="store_const", const=2, help="as --seeds 2")
     runner.add_engine_options(parser)
     add("--fresh", action="store_true", help="delete earlier runs of these experiments")
     add("--page", metavar="FILE.md", help="write a page and pictures of what was run")
@@ -244,6 +211,5 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     if options.page:
         write_page(options.page, options.folder)
         print(options.page)
-    elif not options.names:
-        for publication in read_publications():
-            print(f"{publication.name:24} {publication.sentence} ({publication.minutes:g} min of CPU)")
+    for one in read_publications().values() if not options.names and not options.page else ():
+        print(f"{one.name:24} {one.sentence} ({one.minutes:g} min of CPU)")

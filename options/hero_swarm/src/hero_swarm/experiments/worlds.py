@@ -32,6 +32,7 @@ WORLDS: Dict[str, Dict[str, Any]] = {
 """Settings of an experiment by the name of the world."""
 
 OF_PAPERS: Dict[str, Dict[str, Any]] = {
+    "points": {**_NOMINAL, "body": "point"},
     "discs": {**_NOMINAL, "errors.lag_s": 0.001},
 }
-"""Robots as papers have them: discs whose wheels follow at once."""
+"""Robots as papers have them: points that move at once as they want, and discs whose wheels follow at once."""

@@ -24,6 +24,8 @@ const ABOUT = {
   behavior_dispersion: ["gather, spread", "Robots push each other away to a spacing.", SPREAD],
   behavior_coverage: ["gather, spread", "Robots share the area evenly.", SPREAD, "M13 0v24M27 0v24M0 12h40"],
   behavior_segregation: ["gather, spread", "Groups come together and keep apart from each other.", [...ring(3, 3, [10, 12]), ...ring(3, 3, [30, 12])], "M20 2v20"],
+  behavior_potential_segregation: ["gather, spread", "Groups take distances inside and between them.", [...ring(3, 3, [10, 12]), ...ring(3, 3, [30, 12])], "M20 2v20"],
+  behavior_random_fields: ["gather, spread", "Groups move together, by velocities drawn at random.", [...ring(3, 3, [10, 12]), ...ring(3, 3, [30, 12])], "M20 2v20M34 12h4"],
   behavior_flocking: ["move together", "Robots drive together in one direction.", [[8, 8], [8, 16], [15, 12], [16, 5], [16, 19]], "M22 12h12M31 9l4 3-4 3"],
   behavior_cyclic_pursuit: ["move together", "Robots follow each other on one ring.", ring(6, 9), "M20 3a9 9 0 0 1 8 5M20 21a9 9 0 0 1-8-5"],
   behavior_milling: ["move together", "Robots circle a common center, like fish.", [...ring(6, 9), ...ring(3, 4)]],

@@ -13,7 +13,7 @@ from ...behavior import Behavior, Objects
 from ...behaviors import find_behavior
 from ...trial import OPEN, Trial, scatter_objects
 from ..errors import ExperimentError
-from ..experiment_file import ERROR_KEYS, ERRORS, Cell, Experiment
+from ..experiment_file import ERROR_KEYS, ERRORS, POINT, Cell, Experiment
 from .starts import place_all
 
 
@@ -51,7 +51,7 @@ class CellSetup(NamedTuple):
             scale = ERRORS.get(scale, ERRORS["default"]) if isinstance(scale, str) else scale
             return Trial(
                 self.behavior, self.arena, settings["robots"], seeds, starts=starts, objects=objects,
-                errors=scale, known_errors=known, delay_s=delay_s, wifi=wifi,
+                errors=scale, known_errors=known, delay_s=delay_s, wifi=wifi, is_point=settings.get("body") == POINT,
             )  # fmt: skip
 
 

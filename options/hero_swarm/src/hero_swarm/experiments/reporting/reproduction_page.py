@@ -14,10 +14,10 @@ from .summary import format_interval
 _HEAD = """\
 # Published experiments, reproduced
 
-Written by `rosrun hero_swarm reproduce --page docs/reproduction.md`. A figure is **within** if the 95 % interval of our
-median meets the published interval, or a published value without one to 10 %. World `discs`: robots as papers have
-them; [the others](experiments.md#would-it-survive): HeRo. Intervals of few seeds are wide, and those of two or three no
-more than their range.
+Written by `rosrun hero_swarm reproduce --page docs/reproduction.md`. A figure is **within** if our median is in the
+published interval, or meets a published value without one to 10 %; **open** if only its 95 % interval does: more seeds
+would tell. Intervals of few seeds are wide, those of two or three no more than their range. Worlds `points` and
+`discs`: robots as papers have them; [the others](experiments.md#would-it-survive): HeRo.
 """
 
 _MAX_PANELS = 12
