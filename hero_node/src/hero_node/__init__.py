@@ -36,7 +36,6 @@ from .ros_messages import (
     encode_pose,
     encode_scan,
     encode_text,
-    encode_transform,
     encode_transforms,
     encode_turn_scan,
     encode_twist,

@@ -4,7 +4,10 @@ import math
 import struct
 from typing import Iterable, Sequence, Tuple
 
-from .geometry import Pose
+Numbers = Sequence[float]
+
+Stamp = Tuple[int, int]
+"""Seconds and nanoseconds."""
 
 MD5SUMS = {
     "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
@@ -50,8 +53,8 @@ def encode_text(text: str) -> bytes:
     return LENGTH.pack(len(data)) + data
 
 
-def encode_header(seq: int, frame_id: str, stamp: Tuple[int, int] = (0, 0)) -> bytes:
-    """Return a std_msgs/Header; stamp: s, ns. seq counts modulo 2**32, -1 too."""
+def encode_header(seq: int, frame_id: str, stamp: Stamp = (0, 0)) -> bytes:
+    """Return a std_msgs/Header; seq counts modulo 2**32, -1 too."""
     data = frame_id.encode()
     return HEADER.pack(seq & 0xFFFFFFFF, *stamp, len(data)) + data
 
@@ -67,20 +70,21 @@ def encode_twist(linear_m_s: float, angular_rad_s: float) -> bytes:
     return TWIST_FORM.pack(linear_m_s, 0.0, 0.0, 0.0, 0.0, angular_rad_s)
 
 
-def encode_odometry(header: bytes, child_frame_id: str, pose: bytes, twist: bytes) -> bytes:
-    """Return a nav_msgs/Odometry without covariances, from the bytes of its parts."""
-    return b"".join((header, encode_text(child_frame_id), pose, NO_COVARIANCE, twist, NO_COVARIANCE))
+def encode_odometry(
+    frame_id: str, child_frame_id: str, stamp: Stamp, pose: Numbers, velocity: Numbers, seq: int = 0
+) -> bytes:
+    """Return a nav_msgs/Odometry without covariances; pose: arguments of encode_pose(); velocity: m/s, rad/s."""
+    head = encode_header(seq, frame_id, stamp) + encode_text(child_frame_id)
+    return b"".join((head, encode_pose(*pose), NO_COVARIANCE, encode_twist(*velocity), NO_COVARIANCE))
 
 
-def encode_transform(header: bytes, child_frame_id: str, pose: bytes) -> bytes:
-    """Return a geometry_msgs/TransformStamped, from the bytes of its parts."""
-    return header + encode_text(child_frame_id) + pose
+def encode_transforms(stamp: Stamp, transforms: Iterable[Tuple[str, str, Numbers]]) -> bytes:
+    """Return a tf2_msgs/TFMessage; each transform: parent, child, arguments of encode_pose() for child in parent."""
+    return encode_list([_encode_transform(stamp, *transform) for transform in transforms])
 
 
-def encode_transforms(stamp: Tuple[int, int], transforms: Iterable[Tuple[str, str, Pose]]) -> bytes:
-    """Return a tf2_msgs/TFMessage; each transform: parent, child, pose of the child in the parent. stamp: s, ns."""
-    headed = [(encode_header(0, parent, stamp), child, encode_pose(*pose)) for parent, child, pose in transforms]
-    return encode_list([encode_transform(*parts) for parts in headed])
+def _encode_transform(stamp: Stamp, parent: str, child: str, pose: Numbers) -> bytes:
+    return encode_header(0, parent, stamp) + encode_text(child) + encode_pose(*pose)
 
 
 def encode_list(items: Sequence[bytes]) -> bytes:
@@ -88,9 +92,7 @@ def encode_list(items: Sequence[bytes]) -> bytes:
     return LENGTH.pack(len(items)) + b"".join(items)
 
 
-def encode_scan(
-    header: bytes, settings: Sequence[float], ranges_m: Sequence[float], intensities: Sequence[float] = ()
-) -> bytes:
+def encode_scan(header: bytes, settings: Numbers, ranges_m: Numbers, intensities: Numbers = ()) -> bytes:
     """Return a sensor_msgs/LaserScan.
 
     settings: angle_min, angle_max, angle_increment (rad), time_increment, scan_time (s), range_min, range_max (m).
@@ -100,11 +102,7 @@ def encode_scan(
 
 
 def encode_turn_scan(
-    header: bytes,
-    scan_time_s: float,
-    limits_m: Tuple[float, float],
-    ranges_m: Sequence[float],
-    intensities: Sequence[float] = (),
+    header: bytes, scan_time_s: float, limits_m: Tuple[float, float], ranges_m: Numbers, intensities: Numbers = ()
 ) -> bytes:
     """Return a sensor_msgs/LaserScan of a whole turn, rear first and counter-clockwise; limits_m: least, greatest."""
     step_rad = 2.0 * math.pi / len(ranges_m)

@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from hero_node import Pose, encode_header, encode_odometry, encode_pose, encode_transforms, encode_twist
+from hero_node import Pose, encode_odometry, encode_transforms
 
 from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robots, encode_markers
 from .simulator import Simulator
@@ -74,8 +74,8 @@ class GroundTruth:
         speeds = self._swarm.world.measure_body_speeds().tolist()
         for index in watched:
             robot = self._swarm.robots[index]
-            header, pose = encode_header(0, FRAME, (stamp.secs, stamp.nsecs)), encode_pose(*robot.body.true_pose)
-            content = encode_odometry(header, robot.name + "/base_link", pose, encode_twist(*speeds[index]))
+            place = FRAME, robot.name + "/base_link", (stamp.secs, stamp.nsecs), robot.body.true_pose
+            content = encode_odometry(*place, speeds[index])
             self._poses[index].publish(Odometry().deserialize(content))
 
     def _publish_objects(self, stamp: rospy.Time) -> None:

@@ -18,11 +18,10 @@ from hero_node import (
     TWIST_FORM,
     Pose,
     encode_header,
-    encode_list,
     encode_odometry,
     encode_scan,
     encode_text,
-    encode_transform,
+    encode_transforms,
 )
 
 from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
@@ -84,8 +83,7 @@ class CycleMessages:
         """Build the templates of the robot called name (hero_N)."""
         self._encoder_form = _PLUS_ENCODER if model.is_plus else ENCODER_FORM
         odom_id, base_id = name + "/odom", name + "/base_link"
-        header = encode_header(SEQ_NEVER_COUNTED, odom_id)
-        odom = encode_odometry(header, base_id, bytes(POSE_FORM.size), bytes(TWIST_FORM.size))
+        odom = encode_odometry(odom_id, base_id, (0, 0), Pose(0.0, 0.0, 0.0), (0.0, 0.0), SEQ_NEVER_COUNTED)
         encoder = encode_header(SEQ_NEVER_COUNTED, name + "/encoder") + bytes(self._encoder_form.size)
         transforms = [
             _build_transform(odom_id, base_id, (0.0, 0.0, 0.0)),
@@ -146,8 +144,8 @@ class CycleMessages:
 
 def _build_transform(parent: str, child: str, place_m: Sequence[float]) -> bytes:
     """Return a tfMessage with one transform, without rotation."""
-    values = round_to_float32((*place_m, 0.0, 0.0, 0.0, 1.0))
-    return encode_list([encode_transform(encode_header(0, parent), child, POSE_FORM.pack(*values))])
+    x_m, y_m, z_m = round_to_float32(place_m)
+    return encode_transforms((0, 0), [(parent, child, (x_m, y_m, 0.0, z_m))])
 
 
 def _wheel_half_angle(ticks: float) -> float:

@@ -14,7 +14,6 @@ from hero_node import (
     Pose,
     encode_header,
     encode_odometry,
-    encode_pose,
     encode_transforms,
     encode_turn_scan,
     encode_twist,
@@ -109,8 +108,7 @@ class StepTopics:
                 ("odom", odom, poses[row], velocities[row]),
                 ("ground_truth", FRAME, true_poses[row], true_velocities[row]),
             ):
-                header = encode_header(0, frame, stamp)
-                send(f"/{name}/{topic}", encode_odometry(header, base, encode_pose(*pose), encode_twist(*velocity)))
+                send(f"/{name}/{topic}", encode_odometry(frame, base, stamp, pose, velocity))
             transforms.append((odom, base, poses[row]))
             if commands[row] != self._commands[row].tolist():
                 self._commands[row] = commands[row]
