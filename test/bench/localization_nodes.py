@@ -19,6 +19,7 @@ from measuring import read_cpu_s, start, start_master, stop
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image
 
+from hero_localization.camera.frame_source import keep_freed_memory
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import PrintedTag
 from hero_localization.tracking.settings import describe_camera, update
@@ -119,6 +120,7 @@ def _sleep_until(time_s):
 
 def measure_nodes(options, count, seconds, rounds):
     """Print CPU (of one core) of track and localize, and the ages of images and poses, in each of some rounds."""
+    keep_freed_memory()
     images = render_turn(options, place_robots(count))
     with contextlib.ExitStack() as stack:
         environment = stack.enter_context(start_master())

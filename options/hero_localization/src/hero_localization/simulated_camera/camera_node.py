@@ -21,6 +21,7 @@ from hero_node.parameters import within
 from hero_node.ros import check_master, read_duration_clock_s
 from hero_sim.world import Arena, build_default, load_arena
 
+from ..camera.frame_source import keep_freed_memory
 from ..errors import SettingsError
 from ..prints.tag_images import FAMILIES
 from .renderer import CameraRenderer
@@ -217,5 +218,6 @@ def main() -> None:
         print(describe_references(list_references(_load_arena(options), options.family)))
         return
     check_master()
+    keep_freed_memory()
     rospy.init_node(NODE)
     CameraNode(options).run()
