@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_sim.robot_constants import BODY_RADIUS_M
-from hero_sim.world import compiled, contacts
+from hero_sim.world import body_loops, compiled, contacts
 from hero_sim.world.arena import build_default, build_rectangle, place_robots
 from hero_sim.world.arena_file import SHIPPED, load_arena
 from hero_sim.world.kinematics import split_to_wheels
@@ -172,10 +172,10 @@ def test_nothing_is_compiled_at_the_first_contact(monkeypatch):
     """Robots in real time would pause meanwhile."""
     monkeypatch.setattr(compiled, "COMPILED_ROWS", 0)
     build_world([(0.0, 0.0, 0.0)]).step()
-    loops = vars(compiled.compile_loops(1))
+    loops = vars(compiled.compile_loops(body_loops, 1))
     known = {name: list(loop.signatures) for name, loop in loops.items()}
     press(20, math.pi / 4, 30)
-    assert known["solve_contacts"] and known == {name: list(loop.signatures) for name, loop in loops.items()}
+    assert known["move_worlds"] and known == {name: list(loop.signatures) for name, loop in loops.items()}
 
 
 def test_the_order_of_rows_matters_less_than_a_tenth_of_a_millimeter():

@@ -37,6 +37,7 @@ from ..world.world import STEP_MS, View, World
 from .rules.command_shaper import CommandShaper, Rows, Values
 from .rules.radio_rows import RadioRows
 from .rules.readings import DISTANCE, SCAN, WHEELS, Readings
+from .rules.robot_mask import simplify
 from .rules.servo_pulses import ServoPulses
 from .rules.tick_odometry import TickOdometryRows
 from .rules.wheel_controllers import WheelControllers
@@ -352,7 +353,7 @@ class RobotRows:
     def _receive_pulses(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
         pulses_us, which = np.zeros((2, len(self._rows))), np.zeros(len(self._rows), dtype=bool)
         pulses_us[:, rows], which[rows] = values, True
-        self._servos.write(now_ms, pulses_us, which)
+        self._servos.write(now_ms, pulses_us, simplify(which))
 
 
 def correct_ranges(ranges_m: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from .arena import BARE_GRAY, Area, Arena, Segments, build_default, is_free, measure_clearance, place_robots
 from .arena_file import SHIPPED, load_arena
+from .compiled import compile_loops
 from .kinematics import join_wheels, split_to_wheels
 from .pushing.shapes import PushedBody, list_outlines
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS, NOISE_COUNTS, Sight

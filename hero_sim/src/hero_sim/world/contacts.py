@@ -110,7 +110,7 @@ class Contacts:
         self._bodies = self._list_bodies(errors, step_s)
         self.poses, self.headings = self._bodies[X : THETA + 1, :rows], self._bodies[COSINE : COSINE + 2, :rows]
         self.poses[:], self.headings[:] = poses, find_heading(poses[2])
-        compiled = compile_loops(rows)
+        compiled = compile_loops(body_loops, rows)
         self._loops: Any = compiled or body_loops
         self._hold = np.ascontiguousarray if compiled else np.ndarray.tolist
         self._obstacles = self._hold(obstacles)

@@ -11,6 +11,7 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple, U
 
 import numpy as np
 
+from . import wheel_loops
 from .arena import Arena, Segments
 from .compiled import compile_loops
 from .contacts import Contacts
@@ -138,11 +139,13 @@ class World:
         self.travels_m, self.speeds_m_s = self._travels.T, self._speeds.T
         # Below its center the left wheel rolls forward.
         self.servo_gains_m_s_us = errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US)
+        servos = errors.servo_center_us, errors.dead_zone_us, self.servo_gains_m_s_us
+        self._servos = [np.asfortranarray(values) for values in servos]  # robots last, as in what is computed with them
         # The share of the difference to its command by which a servo's speed changes in one step.
         shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32).astype(float)
         each = errors.ripple_m_s.T, errors.slip.T, errors.wheel_scale.T * _STEP_S, shares
         self._spreads = np.vstack([np.broadcast_to(values, (2, rows)) for values in each])  # see roll_wheels()
-        self._loops = compile_loops(rows)
+        self._loops = compile_loops(wheel_loops, rows)
         # Of the steps in a block, those that the wheels have taken, and the bodies: these wait until they are read.
         self._block_step = self._body_step = _BLOCK_STEPS
         self._ground_m = np.empty((_BLOCK_STEPS, 2, rows))
@@ -163,8 +166,7 @@ class World:
 
     def write_pulses(self, rows: Rows, pulses_us: np.ndarray) -> None:
         """Set the servos' pulses, left and right (..., 2), of rows: one or several."""
-        servos = self.errors.servo_center_us[rows], self.errors.dead_zone_us[rows], self.servo_gains_m_s_us[rows]
-        self.commands_m_s[rows] = drive_servos(pulses_us, *servos)
+        self.commands_m_s[rows] = drive_servos(pulses_us, *(values[rows] for values in self._servos))
 
     def release(self, rows: Rows) -> None:
         """Stop the pulses of rows: their wheels come to rest."""

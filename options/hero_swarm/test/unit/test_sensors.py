@@ -5,8 +5,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from hero_sim.world import compiled
 from hero_sim.world.arena import build_rectangle
-from hero_swarm.behavior import Behavior, Distance, NeighborColors, Neighbors, Odometry, Proximity
+from hero_swarm.behavior import Behavior, Binary, Distance, NeighborColors, Neighbors, Odometry, Proximity, Random
+from hero_swarm.sensors import Surroundings, read_sensor
 from hero_swarm.trial import Trial
 
 STARTS = np.array([[(0.1, 0.0, 0.0), (-0.5, 0.3, 1.0)]] * 2)
@@ -99,3 +101,18 @@ def test_a_sensor_that_gives_no_row_per_robot_is_named(given, monkeypatch):
     trial = Trial(Turning(), robots=2, seeds=[1, 2], starts=STARTS)
     with pytest.raises(ValueError, match=r"sensor compass gives .*: read\(\) must return an array .* each of 4 robots"):
         trial.step()
+
+
+@pytest.mark.option("numba")
+@pytest.mark.parametrize("sensor", [Binary(), Binary(range_m=0.3), Binary(range_m=0.0), Binary(half_angle_rad=0.1)])
+def test_compiled_beams_see_what_others_see(monkeypatch, sensor):
+    """Also of robots that touch, of some without a pose, and with errors."""
+    poses = np.random.RandomState(0).uniform(-0.4, 0.4, (20, 15, 3)) * (1.0, 1.0, 10.0)
+    poses[0, 3] = np.nan
+    for error in (0.0, 0.2):
+        seen = []
+        for rows in (10**9, 0):
+            monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
+            around = Surroundings(0.0, poses, Random(range(20), 15))
+            seen.append(read_sensor("sees", sensor._replace(error=error), around).tolist())
+        assert seen[0] == seen[1] and len(set(seen[0])) == 2

@@ -91,8 +91,10 @@ class CommandShaper:
             self._collected.clear()
             self._shape(self._collected_ms, rows, values)
 
-    def _shape(self, now_ms: int, rows: np.ndarray, values: np.ndarray) -> None:
+    def _shape(self, now_ms: int, rows: Any, values: np.ndarray) -> None:
         self._send_due(now_ms)
+        if len(rows) == len(self._repeats) and (rows[1:] > rows[:-1]).all() and rows[0] >= 0:
+            rows = slice(None)  # all of them: much faster than by number
         # What is offered to a robot that waits for nothing goes at once.
         self._next_ms[rows] = np.maximum(self._next_ms[rows], now_ms)
         stops = np.logical_and(*(values == self._stop))

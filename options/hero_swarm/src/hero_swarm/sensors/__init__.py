@@ -19,7 +19,9 @@ from hero_client.values import (
     sense_objects,
     sense_sight,
 )
-from hero_sim.world import Arena
+from hero_sim.world import Arena, compile_loops
+
+from . import beam_loops
 
 
 class Surroundings(NamedTuple):
@@ -50,8 +52,13 @@ class Surroundings(NamedTuple):
     kept: Dict[str, Any] = {}
 
 
+def _sense_binary(sensor: Binary, around: Surroundings) -> np.ndarray:
+    loops = compile_loops(beam_loops, around.poses.shape[0] * around.poses.shape[1])
+    return sense_binary(around.poses, sensor, around.random, loops and loops.find_touched)
+
+
 _READERS: Dict[type, Callable[[Any, Surroundings], Any]] = {
-    Binary: lambda sensor, around: sense_binary(around.poses, sensor, around.random),
+    Binary: _sense_binary,
     Neighbors: lambda sensor, around: sense_neighbors(around.poses, sensor, around.random),
     Objects: lambda sensor, around: sense_objects(around.poses, around.things, sensor),
     Sight: lambda sensor, around: sense_sight(around.poses, around.things, sensor),

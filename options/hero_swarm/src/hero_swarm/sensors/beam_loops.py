@@ -1,0 +1,28 @@
+"""Loop over the beams of all robots, used where numba compiles it, which gives what sense_binary() gives. Pure."""
+
+import math
+from typing import Any
+
+
+def find_touched(places_m: Any, cosines: Any, sines: Any, radius_m: float, range_m: float, touched: Any) -> None:
+    """Set touched (W, N) for robots whose beam, from the front rim, touches another body of the same world.
+
+    places_m: x and y (2, W, N); cosines, sines (W, N): of the headings; NaN where a pose is not known.
+    """
+    _, worlds, robots = places_m.shape
+    x_m, y_m, square_m2 = places_m[0], places_m[1], radius_m * radius_m
+    for world in range(worlds):
+        for i in range(robots):
+            own_x_m, own_y_m, cosine, sine = x_m[world, i], y_m[world, i], cosines[world, i], sines[world, i]
+            for j in range(robots):
+                to_x_m, to_y_m = x_m[world, j] - own_x_m, y_m[world, j] - own_y_m
+                left_m = cosine * to_y_m - sine * to_x_m
+                if i == j or not abs(left_m) <= radius_m:
+                    continue
+                ahead_m = cosine * to_x_m + sine * to_y_m - radius_m
+                gap_m = ahead_m - math.sqrt(max(square_m2 - left_m * left_m, 0.0))
+                if ahead_m * ahead_m + left_m * left_m <= square_m2 or (
+                    abs(left_m) < radius_m and ahead_m > 0.0 and gap_m <= range_m
+                ):
+                    touched[world, i] = True
+                    break
