@@ -72,7 +72,7 @@ class Entry(NamedTuple):
     def entries(self) -> List["Entry"]:
         """Return the entries of a list that is not empty."""
         if not isinstance(self.value, list) or not self.value:
-            self.refuse("a list such as [a, b]")
+            self.refuse("a list such as [a, b], not an empty one")
         return list(self.value)
 
     def numbers(self, count: int, low: float, high: float, what: str) -> List[float]:

@@ -3,8 +3,6 @@
 from hero_node import run_named
 
 if __name__ == "__main__":
-    experiments = {name: f"experiments.{name}" for name in ("pack", "report", "reproduce", "verify")}
-    run_named(
-        "hero_swarm",
-        {"describe": "describe", "design": "design.program", "fit": "fit", "run": "run", "show": "show", **experiments},
-    )
+    own = {name: f"experiments.{name}" for name in ("pack", "phantoms", "report", "reproduce", "verify")}
+    own.update({name: name for name in ("describe", "fit", "run", "show")}, design="design.program")
+    run_named("hero_swarm", own)

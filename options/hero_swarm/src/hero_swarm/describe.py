@@ -1,7 +1,6 @@
 """Prints the behaviors that pages may start as JSON: python3 -m hero_swarm describe [FOLDER ...].
 
-Those that come with the suite, those of files in the folders, and those that installed packages export in package.xml:
-<export><hero_swarm behaviors="${prefix}/behaviors"/></export>.
+Those that come with the suite, and those of files in the folders.
 """
 
 import argparse
@@ -23,21 +22,7 @@ def main() -> None:
     """Run the program."""
     parser = argparse.ArgumentParser(prog="python3 -m hero_swarm describe", description=__doc__.partition("\n")[0])
     parser.add_argument("folders", nargs="*", help="folders of Python files with behaviors")
-    print(json.dumps(describe_behaviors([*parser.parse_args().folders, *find_exported()])))
-
-
-def find_exported() -> List[str]:
-    """Return the folders of behaviors in installed packages; none without ROS."""
-    try:
-        import rospkg
-    except ImportError:
-        return []
-    packages = rospkg.RosPack()
-    return [
-        folder.replace("${prefix}", packages.get_path(name))
-        for name in packages.get_depends_on("hero_swarm", implicit=False)
-        for folder in packages.get_manifest(name).get_export("hero_swarm", "behaviors")
-    ]
+    print(json.dumps(describe_behaviors(parser.parse_args().folders)))
 
 
 def describe_behaviors(folders: Sequence[str] = ()) -> List[Dict[str, Any]]:

@@ -24,7 +24,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     parser.add_argument("--cell", type=int, default=1, metavar="K", help="number of the cell, from 1 (1)")
     parser.add_argument("--speed", type=within(0.01, 100.0), default=1.0, help="simulated seconds per second (1)")
     instead = parser.add_mutually_exclusive_group()
-    instead.add_argument("--video", metavar="FILE", help="write an .mp4 or .gif instead, without ROS")
+    instead.add_argument("--video", metavar="FILE", help="write an animated .gif instead, without ROS")
     instead.add_argument("--bag", metavar="FILE", help="write a bag instead, without ROS")
     return parser.parse_args(arguments)
 

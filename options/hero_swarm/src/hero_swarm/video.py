@@ -1,11 +1,8 @@
-"""Writes one run as a video, seen from above: .gif with Pillow, all others with ffmpeg."""
+"""Writes one run as an animated GIF, seen from above."""
 
-import contextlib
 import math
 import os
-import shutil
-import subprocess
-from typing import Iterator, List, Sequence
+from typing import List, Sequence
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -29,34 +26,17 @@ _MIN_WIDTH = 3
 def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
     """Run trial, of one world, for time_s, and write it to path, speed times as fast as it was.
 
-    Raises: ExperimentError if the format needs ffmpeg, or the file cannot be written.
+    Raises: ExperimentError if the file has another ending, or cannot be written.
     """
-    is_gif = path.lower().endswith(".gif")
-    if not is_gif and shutil.which("ffmpeg") is None:
-        raise ExperimentError(f"--video {path}: apt install ffmpeg, or write a .gif")
+    if not path.lower().endswith(".gif"):
+        raise ExperimentError(f"--video {path}: must end with .gif; ffmpeg -i FILE.gif FILE.mp4 makes others")
     if not os.access(os.path.dirname(path) or ".", os.W_OK):
         raise ExperimentError(f"--video {path}: the folder cannot be written to")
     period_s, arena = speed / FRAMES_PER_S, trial.rows.world.arena
-    run = trial.run(time_s, period_s)
-    frames = [_list_shapes(trial) for _ in run]
+    frames = [_list_shapes(trial) for _ in trial.run(time_s, period_s)]
     limits_m = _find_limits(arena, frames)
     images = (draw_frame(limits_m, number * period_s, frame) for number, frame in enumerate(frames))
-    (_write_gif if is_gif else _write_with_ffmpeg)(path, images)
-
-
-def _write_gif(path: str, images: Iterator[Image.Image]) -> None:
     next(images).save(path, save_all=True, append_images=images, duration=1000 // FRAMES_PER_S, loop=0)
-
-
-def _write_with_ffmpeg(path: str, images: Iterator[Image.Image]) -> None:
-    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{_SIZE}x{_SIZE}"]
-    command += ["-r", str(FRAMES_PER_S), "-i", "-", "-pix_fmt", "yuv420p", path]
-    # Where ffmpeg ends early, it says why.
-    with contextlib.suppress(BrokenPipeError), subprocess.Popen(command, stdin=subprocess.PIPE) as process:
-        for image in images:
-            process.stdin.write(image.tobytes())  # type: ignore[union-attr]
-    if process.returncode:
-        raise ExperimentError(f"--video {path}: ffmpeg cannot write it")
 
 
 def _list_shapes(trial: Trial) -> List[Shape]:

@@ -52,13 +52,13 @@ def list_names() -> List[str]:
 
 
 def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior]:
-    """Return a behavior by its name, its module.Class, FILE.py, FILE.py:Class, POLICY.npz or MACHINE.controller.
+    """Return a behavior by its name, FILE.py, FILE.py:Class, POLICY.npz or MACHINE.controller.
 
     sources: None: read anew. Raises: ValueError that says what there is.
     """
     sources = sources or Sources()
-    if name in _MODULES or name in _MODULES.values():
-        module, class_name = _MODULES.get(name, name).split(".")
+    if name in _MODULES:
+        module, class_name = _MODULES[name].split(".")
         found: Type[Behavior] = getattr(importlib.import_module(__name__ + "." + module), class_name)
         return found
     path, _, class_name = name.partition(":")

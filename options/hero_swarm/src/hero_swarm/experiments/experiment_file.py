@@ -233,7 +233,7 @@ def parse_experiment(
     Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
     """
     try:
-        entry = read_entries(text, file, "behavior: aggregation.Aggregation")
+        entry = read_entries(text, file, "behavior: aggregation")
         return check_experiment(entry, os.path.dirname(file) if folder is None else folder, sources or Sources())
     except EntryError as error:
         raise ExperimentError(str(error)) from None

@@ -65,6 +65,7 @@ def measure_metric(name: str, state: State, sources: Optional[Sources] = None) -
     metric = getattr(load_file("metric", path, sources or Sources()), function, None)
     if not callable(metric):
         raise ValueError(f"metric {name}: the file has no function {function}")
+    name += " (line %d)" % metric.__code__.co_firstlineno if hasattr(metric, "__code__") else ""
     given = metric(state)
     try:
         values = np.asarray(given, dtype=float)

@@ -7,7 +7,7 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Bound, Start, parse_experiment
 
 FILE = """\
-behavior: aggregation.Aggregation
+behavior: aggregation
 vary: {robots: [10, 25], errors: [perfect, default]}
 start: {kind: uniform, cover: 0.02, gap_m: 0.0}
 time_s: 300
@@ -67,7 +67,7 @@ def test_a_cell_is_described_by_everything_that_its_runs_depend_on():
         FILE.replace("cover: 0.02", "cover: 0.03"),
         FILE.replace("1.15", "1.2"),
         FILE.replace("time_s: 300", "time_s: 300\nuntil: {dispersion: 2}"),
-        FILE.replace("aggregation.Aggregation", "aggregation.Other"),
+        FILE.replace("behavior: aggregation", "behavior: milling"),
         FILE.replace("hz: 1", "hz: 2"),
     ]
     described = {parse(text).describe_cell(parse(text).cells[0]) for text in texts}
@@ -85,7 +85,7 @@ def test_a_cell_is_described_by_everything_that_its_runs_depend_on():
         ("time_s: 300", "time_s: true", 4, "time_s is True"),
         ("time_s: 300", "time_s: .inf", 4, "time_s is inf"),
         ("time_s: 300\n", "", 1, "time_s is missing"),
-        ("behavior: aggregation.Aggregation\n", "", 1, "behavior is missing: give behavior: milling, or vary it"),
+        ("behavior: aggregation\n", "", 1, "behavior is missing: give behavior: milling, or vary it"),
         ("perfect, default", "perfect, 11", 2, "vary.errors is 11, but must be a number from 0 to 10 times"),
         (
             "errors: [perfect, default]",

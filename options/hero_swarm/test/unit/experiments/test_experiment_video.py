@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from hero_client.values import BODY_RADIUS_M
 from hero_node import Pose
@@ -28,32 +29,29 @@ def make_trial(arena=OPEN):
     return Trial(Straight(), arena, 2, (1,), starts=starts, errors=0.0)
 
 
-@pytest.fixture(name="written")
-def catch_frames(monkeypatch):
-    """What the writers of files are given: [(path, frames), ...]."""
-    written = []
-    for name in ("_write_gif", "_write_with_ffmpeg"):
-        monkeypatch.setattr(
-            video, name, lambda path, images, name=name: written.append((name, path, list(map(np.asarray, images))))
-        )
-    return written
+@pytest.fixture(name="drawn")
+def catch_frames(tmp_path, monkeypatch):
+    """Frames that are drawn, each with its time and shapes; files are written in a folder of the test."""
+    drawn, draw = [], video.draw_frame
+
+    def draw_and_keep(limits_m, time_s, shapes):
+        image = draw(limits_m, time_s, shapes)
+        drawn.append((np.asarray(image), time_s, shapes))
+        return image
+
+    monkeypatch.setattr(video, "draw_frame", draw_and_keep)
+    monkeypatch.chdir(str(tmp_path))
+    return drawn
 
 
-def test_frames_are_a_tenth_of_a_second_of_the_video_apart(written, monkeypatch):
-    shown, draw = [], video.draw_frame
-    monkeypatch.setattr(video, "draw_frame", lambda *frame: shown.append(frame[1:]) or draw(*frame))
-    video.write_video(make_trial(), 2.0, 4.0, "run.gif")
-    ((writer, path, frames),) = written
-    assert (writer, path, len(frames)) == ("_write_gif", "run.gif", 5)
-    assert frames[0].shape == (600, 600, 3)
-    assert [time_s for time_s, *_ in shown] == pytest.approx([0.0, 0.4, 0.8, 1.2, 1.6])
-    first_m, last_m = (shapes[0].pose.x_m for _, shapes in (shown[0], shown[-1]))
+def test_frames_are_a_tenth_of_a_second_of_the_video_apart(drawn):
+    video.write_video(make_trial(), 2.0, 4.0, "run.GIF")
+    assert [time_s for _, time_s, _ in drawn] == pytest.approx([0.0, 0.4, 0.8, 1.2, 1.6])
+    first_m, last_m = (drawn[number][2][0].pose.x_m for number in (0, -1))
     assert first_m == -0.5 and last_m == pytest.approx(-0.36, abs=0.05)
-    monkeypatch.setattr(video.shutil, "which", lambda name: "/usr/bin/" + name)
-    video.write_video(make_trial(), 0.2, 1.0, "run.MP4")
-    assert written[1][:2] == ("_write_with_ffmpeg", "run.MP4")
-    monkeypatch.setattr(video.shutil, "which", lambda name: None)
-    with pytest.raises(ExperimentError, match="apt install ffmpeg, or write a .gif"):
+    with Image.open("run.GIF") as written:
+        assert (written.size, written.n_frames, written.info["duration"]) == ((600, 600), 5, 100)
+    with pytest.raises(ExperimentError, match="--video run.mp4: must end with .gif; ffmpeg -i"):
         video.write_video(make_trial(), 0.2, 1.0, "run.mp4")
 
 
@@ -67,24 +65,24 @@ def test_a_video_shows_the_arena_or_where_robots_were():
 
 
 @pytest.mark.parametrize("name", ["obstacles", "discs", "box"])
-def test_obstacles_and_objects_are_shown_where_they_are(name, written):
+def test_obstacles_and_objects_are_shown_where_they_are(name, drawn):
     trial = make_trial(load_arena(name))
     edges_m, discs_m = list_outlines(trial.rows.world.list_objects())
     circles_m = [*trial.rows.world.arena.circles_m.tolist(), *discs_m]
     places_m = [circle_m[:2] for circle_m in circles_m]
     places_m += [((x1_m + x2_m) / 2.0, (y1_m + y2_m) / 2.0) for x1_m, y1_m, x2_m, y2_m in edges_m]
     video.write_video(trial, 0.05, 1.0, "run.gif")
-    ((_, _, (frame,)),) = written
+    ((frame, _, _),) = drawn
     scale, middle = len(frame) / (float(trial.rows.world.arena.bounds_m[2]) + 0.2) / 2.0, len(frame) // 2
     pixels = [(middle - round(scale * y_m), middle + round(scale * x_m)) for x_m, y_m in places_m]
     around = [frame[row - 2 : row + 3, column - 2 : column + 3].reshape(-1, 3).tolist() for row, column in pixels]
     assert around and all([204, 128, 51] in patch or [153, 153, 153] in patch for patch in around)
 
 
-def test_each_frame_replaces_the_one_before(written):
+def test_each_frame_replaces_the_one_before(drawn):
     trial = make_trial(load_arena("empty"))
     video.write_video(trial, 3.0, 10.0, "run.gif")
-    ((_, _, (first, *_, last)),) = written
+    (first, *_), *_, (last, *_) = drawn
     scale, middle = len(first) / (float(trial.rows.world.arena.bounds_m[2]) + 0.2) / 2.0, len(first) // 2
     rear = middle, middle + round(scale * (-0.5 - 0.02))
     assert first[rear].tolist() == BLUE and last[rear].tolist() == FLOOR
