@@ -48,18 +48,6 @@ def test_a_world_of_a_batch_gives_the_same_bytes_as_alone():
     assert run([1, 2, 3], 1) == run([2], 0)
 
 
-def test_an_array_of_commands_does_what_single_ones_do():
-    together, single = RobotRows(build_world(3, 0)), RobotRows(build_world(3, 0))
-    speeds_m_s = np.array([0.1, 0.05, -0.1])
-    for _ in range(20):
-        together.send_velocity([0, 1, 2], speeds_m_s, 0.5)
-        for row, speed_m_s in enumerate(speeds_m_s.tolist()):
-            single.send_velocity(row, speed_m_s, 0.5)
-        for robots in (together, single):
-            robots.advance(robots.now_ms + 70)
-    assert together.ticks.tolist() == single.ticks.tolist() and together.ticks.any(axis=1).all()
-
-
 def test_commands_that_are_not_finite_are_refused_with_their_rows():
     robots = RobotRows(build_world(3, 0))
     with pytest.raises(ValueError, match="row 2 must be finite, not nan and 0.0"):
@@ -105,46 +93,6 @@ def test_sensors_that_are_not_calibrated_show_nan():
     robots.set_infrared_calibration(1, [np.nan] * 8)
     robots.advance(300)
     assert np.isnan(robots.proximity_m[1]).all() and not np.isnan(robots.proximity_m[0]).any()
-
-
-def measure_distance(send, wait_ms=0):
-    """Return how far one command drives a robot that is given it at a time within its cycles."""
-    robots = RobotRows(build_world(1, 0, scale=0.0))
-    robots.advance(1000 + wait_ms)
-    send(robots)
-    robots.advance(robots.now_ms + 4500)
-    return robots.world.travels_m.mean()
-
-
-@pytest.mark.slow
-def test_one_velocity_command_drives_as_far_as_the_stock_robot():
-    distances_m = [measure_distance(lambda robots: robots.send_velocity(0, 0.1, 0.0), 73 * wait) for wait in range(20)]
-    assert np.mean(distances_m) == pytest.approx(0.16, abs=0.01) and np.std(distances_m) < 0.03
-
-
-def test_one_position_command_drives_for_a_second_of_its_speed():
-    assert measure_distance(lambda robots: robots.send_position(0, 0.1, 0.0)) == pytest.approx(0.101, abs=0.002)
-
-
-@pytest.mark.slow
-def test_a_velocity_is_held_and_a_stop_takes_a_fifth_of_a_second():
-    robots = RobotRows(build_world(1, 0, scale=0.0))
-    for _ in range(30):
-        robots.send_velocity(0, 0.1, 0.0)
-        robots.advance(robots.now_ms + 100)
-    start_m, start_ms = robots.world.travels_m[0, 0], robots.now_ms
-    for _ in range(50):
-        robots.send_velocity(0, 0.1, 0.0)
-        robots.advance(robots.now_ms + 100)
-    driven_m, elapsed_s = robots.world.travels_m[0, 0] - start_m, (robots.now_ms - start_ms) / 1000.0
-    assert driven_m / elapsed_s == pytest.approx(0.102, abs=0.003)
-    robots.send_velocity(0, 0.0, 0.0)
-    while robots.world.commands_m_s.any():
-        robots.advance(robots.now_ms + 1)
-    speed_m_s, start_ms = robots.world.speeds_m_s[0, 0], robots.now_ms
-    while robots.world.speeds_m_s[0, 0] > 0.1 * speed_m_s:
-        robots.advance(robots.now_ms + 1)
-    assert 170 <= robots.now_ms - start_ms <= 210
 
 
 @pytest.mark.slow

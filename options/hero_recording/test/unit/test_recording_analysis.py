@@ -161,15 +161,6 @@ def test_the_table_holds_rate_gaps_delays_and_error(two_robots):
     assert float(cells["COMMAND TO MOTION"].split()[0]) == pytest.approx(1e3 * MOTION_DELAY_S, abs=1.5e3 * PERIOD_S)
 
 
-@pytest.mark.slow
-def test_without_an_origin_odometry_is_aligned_with_ground_truth(two_robots):
-    robot = observe(two_robots).robots[3]
-    robot.origins.clear()
-    errors = analysis.compute_odometry_errors(robot)
-    assert errors.position_m.max() < 1e-5
-    assert errors.yaw_rad == pytest.approx(0.0, abs=1e-5)
-
-
 def test_a_true_heading_that_passes_pi_between_two_readings_is_no_error():
     robot = RobotObservations()
     robot.origins.append(Origin(0.0, 0.0, 0.0, 0.0))
@@ -192,14 +183,6 @@ def test_poses_by_localization_have_errors_of_their_own(two_robots):
     assert plot.describe_robot(robot)["LOCALIZATION RMS"] == "5.0 mm"
 
 
-def test_commands_to_a_moving_robot_have_no_motion_delay():
-    robot = RobotObservations()
-    for reading in range(300):
-        robot.encoder.add(reading * PERIOD_S, float(reading), float(reading))
-    robot.commands.add(5.0, 0.1, 0.0)
-    assert len(analysis.compute_motion_delays(robot)) == 0
-
-
 def test_messages_with_absurd_numbers_are_skipped_and_counted():
     observations = Observations()
     for x_m in (0.0, math.nan, math.inf, 1e30, 0.1):
@@ -218,13 +201,6 @@ def test_states_become_spans_with_gaps_where_the_driver_was_silent():
         StateReport(10.0, "ready", 1),
     ]
     assert analysis.find_spans(reports) == [(0.0, 1.5, "ready"), (1.5, 2.5, "away"), (10.0, 10.0, "ready")]
-
-
-def test_a_command_that_is_not_repeated_ends_with_the_watchdog():
-    times_s, linear, angular = analysis.end_commands(np.array([0.0, 1.0, 9.0]), np.array([0.1, 0.2, 0.3]), np.zeros(3))
-    assert times_s.tolist() == [0.0, 1.0, 3.0, 9.0, 11.0]
-    assert np.allclose(linear, [0.1, 0.2, 0.0, 0.3, 0.0])
-    assert len(angular) == 5
 
 
 def test_few_robots_have_distinct_colors_and_many_a_scale():
