@@ -12,7 +12,6 @@ from hero_node import Pose
 
 from .background import Background
 from .control.activity import Activity
-from .control.client_commands import find_press, read_command
 from .control.drive_requests import DriveRequests
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
 from .control.programs import PROGRAMS_MAX, ChildProcess, Programs
@@ -22,7 +21,6 @@ from .parameters import Parameters
 from .serving.lesson import Lesson
 
 if TYPE_CHECKING:
-    from .foxglove.hub import Client
     from .serving.server import PageSocket
 
 Request = Dict[str, Any]
@@ -95,25 +93,7 @@ class PageRequests:
             if do == "drive":
                 page.end_hold(request["pressed_ms"])
 
-    def publish(self, client: "Client", topic: str, message_type: str, content: bytes) -> str:
-        """Carry out a message of a Foxglove client by the rules of the page; return why it is refused, empty if not."""
-        request = read_command(topic, message_type, content)
-        if request is None:
-            return f"{topic}: only /hero_N/cmd_vel (geometry_msgs/Twist) and stop_request (std_msgs/Bool) are taken"
-        if request["do"] == "release":
-            return "robots are released on the page only"
-        request["heard_ms"] = client.heard_ms
-        if request["do"] == "end_drive":
-            client.presses.pop(request["robots"][0], None)
-        elif request["do"] == "drive":
-            request["pressed_ms"] = find_press(client.presses, request["robots"][0], client.heard_ms)
-        try:
-            self._carry_out(client, request)
-        except RefusedError as error:
-            return str(error)
-        return ""
-
-    def _carry_out(self, page: Union["PageSocket", "Client"], request: Request) -> None:
+    def _carry_out(self, page: "PageSocket", request: Request) -> None:
         """Carry out a request, if it may be made now. Raises: RefusedError or FormationError."""
         if not is_fresh(request, read_clock_ms()):
             raise LateError("the request was delayed: nothing was done")

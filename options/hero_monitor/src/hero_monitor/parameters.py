@@ -43,7 +43,6 @@ class Parameters:
     record_folder: str = declare(string("~/hero_recordings"))
     behavior_folder: str = declare(string("~/hero_behaviors"))
     foxglove_origins: Sequence[str] = declare(Parameter("", _read_words))
-    foxglove_publish: bool = declare(flag(False))
     classroom: bool = declare(flag(False))
 
 

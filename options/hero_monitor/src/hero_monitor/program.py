@@ -5,7 +5,7 @@
 Everything runs on tornado's thread, except what may block (background).
 """
 
-from typing import Any, Dict, Set
+from typing import TYPE_CHECKING, Any, Dict, Set
 
 import rospy
 
@@ -25,6 +25,9 @@ from .serving.access import Access
 from .serving.client_limits import CONNECTIONS_MAX, ClientLimits
 from .serving.invitation import Invitation, make_link
 from .serving.lesson import TEACHER, Lesson
+
+if TYPE_CHECKING:
+    from .serving.server import PageSocket
 
 LINGER_S = 10.0
 """Time that subscriptions outlive the last page, which may only reload."""
@@ -46,7 +49,6 @@ class Monitor:
         import tornado.ioloop
 
         from .foxglove.endpoint import FoxgloveEndpoint
-        from .foxglove.hub import Publisher
         from .foxglove.ros_topics import RosTopics
         from .serving.server import Actions, MonotonicLoop, Server
 
@@ -70,19 +72,14 @@ class Monitor:
         declared = [[topic.name, topic.unit] for topic in self._feed.lab_file.topics]
         self._feed.page_state.put("hello", {"control": parameters.control, "topics": declared})
         actions = Actions(
-            lambda page: self._enter(page.number),
+            self._enter,
             self._requests.receive,
             self._leave,
             lambda: self._feed.picture.jpeg,
         )
         # The other half of the files is for ROS: some per robot.
         limits = ClientLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
-        publisher = Publisher(self._enter, self._requests.publish, self._leave)
-        self._foxglove = FoxgloveEndpoint(
-            RosTopics(self._background),
-            parameters.foxglove_origins,
-            publisher if parameters.foxglove_publish else None,
-        )
+        self._foxglove = FoxgloveEndpoint(RosTopics(self._background), parameters.foxglove_origins)
         token = read_token(parameters.host, parameters.token_file)
         access = Access(token, list_host_names(parameters), self._lesson)
         self._server = Server(access, limits, actions, self._foxglove.route)
@@ -95,7 +92,7 @@ class Monitor:
             )
         ]
         self._end_check = tornado.ioloop.PeriodicCallback(self._check_end, 1000.0 * END_CHECK_PERIOD_S)
-        self._present: Set[int] = set()  # pages, and clients that may publish
+        self._present: Set[int] = set()
         self._resting: Any = None
 
     def run(self) -> None:
@@ -142,9 +139,9 @@ class Monitor:
 
     # ---------------------------------------------------------------- pages come and go
 
-    def _enter(self, number: int) -> None:
-        """A page is there, or a client that may publish: robots are watched, and stopped when it falls silent."""
-        self._present.add(number)
+    def _enter(self, page: "PageSocket") -> None:
+        """A page is there: robots are watched, and stopped when it falls silent."""
+        self._present.add(page.number)
         if self._resting is not None:
             self._loop.remove_timeout(self._resting)
             self._resting = None
@@ -198,7 +195,6 @@ class Monitor:
                     page.shown_user = user
                     message["user"] = {"name": user.name, "title": user.role.title, "robots": sorted(user.role.robots)}
                 page.send(encode(message))
-        self._foxglove.send_clock(read_clock_ms())
 
     def _broadcast_updates(self) -> None:
         """Send the pages what is new to them; a page that is still receiving the last update gets it later."""

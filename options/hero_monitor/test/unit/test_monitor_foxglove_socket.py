@@ -10,7 +10,7 @@ import tornado.web
 
 from hero_monitor.foxglove import endpoint as module
 from hero_monitor.foxglove.endpoint import CLIENTS_MAX, FoxgloveEndpoint, FoxgloveSocket
-from hero_monitor.foxglove.hub import Client, Publisher, TopicMessage, TopicType
+from hero_monitor.foxglove.hub import Client, TopicMessage, TopicType
 from hero_monitor.foxglove.ros_topics import RosTopics
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
@@ -112,10 +112,10 @@ def test_the_newest_protocol_that_a_client_offers_is_taken():
         assert FoxgloveSocket.select_subprotocol(None, offered) == taken
 
 
-def make_socket(number=1):
+def make_socket():
     socket = FoxgloveSocket.__new__(FoxgloveSocket)
     socket.texts, socket.written, socket.is_sent = [], [], True
-    socket.client, socket._sending = Client(socket.texts.append, number), None
+    socket.client, socket._sending = Client(socket.texts.append), None
 
     def write(data):
         socket.written.append(data)
@@ -126,11 +126,9 @@ def make_socket(number=1):
 
 
 def test_topics_are_subscribed_to_while_there_is_a_client(topics):
-    opened, closed = [], []
-    publisher = Publisher(opened.append, lambda *message: "", closed.append)
-    endpoint, socket = FoxgloveEndpoint(topics.source, [], publisher), make_socket(7)
+    endpoint, socket = FoxgloveEndpoint(topics.source, []), make_socket()
     endpoint.add(socket)
-    assert endpoint._tick.is_on and opened == [7]
+    assert endpoint._tick.is_on
     endpoint._update()
     endpoint.hub.receive(socket.client, '{"op": "subscribe", "subscriptions": [{"id": 3, "channelId": 1}]}')
     topics.messages = [TopicMessage("/a", b"\1", 5, "")]
@@ -138,32 +136,13 @@ def test_topics_are_subscribed_to_while_there_is_a_client(topics):
     assert topics.wanted[-1] == {"/a"} and len(socket.written) == 1
     for _ in range(2):
         endpoint.remove(socket)
-    assert closed == [7] and endpoint.hub.clients == set()
+    assert endpoint.hub.clients == set()
     topics.is_done, topics.types = False, {}
     endpoint._update()
     assert endpoint._tick.is_on and topics.wanted[-1] == set(), "until it is unsubscribed"
     topics.is_done = True
     endpoint._update()
     assert not endpoint._tick.is_on
-    reading = FoxgloveEndpoint(topics.source, [])
-    reading.add(make_socket())
-    reading.remove(next(iter(reading._sockets)))
-    assert opened == [7] and closed == [7], "without a publisher nothing is opened or closed"
-
-
-def test_clients_that_may_publish_return_the_clock_that_they_have_heard(topics):
-    for publisher, pings in ((Publisher(*[lambda *message: ""] * 3), [b"5000"]), (None, [])):
-        endpoint, socket = FoxgloveEndpoint(topics.source, [], publisher), make_socket()
-        sent = []
-        socket.ping = sent.append
-        endpoint.add(socket)
-        endpoint.send_clock(5000)
-        assert sent == pings
-    socket.on_pong(b"5000")
-    assert socket.client.heard_ms == 5000
-    for foreign in (b"", b"-5", b"hello"):
-        socket.on_pong(foreign)
-    assert socket.client.heard_ms == 5000
 
 
 def test_a_client_that_still_receives_gets_the_rest_in_one_write_later():

@@ -2,7 +2,6 @@
 
 import json
 import math
-import struct
 from types import SimpleNamespace
 from unittest.mock import Mock
 
@@ -12,13 +11,11 @@ from hero_client.apps.formations import FormationError
 from hero_client.ros import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import drive_requests as commander_module
-from hero_monitor.control.client_commands import PRESS_GAP_MS
 from hero_monitor.control.dead_man import HOLD_TIMEOUT_S
 from hero_monitor.control.drive_requests import LISTENER_TIMEOUT_S, DriveRequests
 from hero_monitor.control.programs import PROGRAMS_MAX
 from hero_monitor.control.requests import AGE_MAX_S
 from hero_monitor.fleet_feed.placement import Placement
-from hero_monitor.foxglove.hub import Client
 from hero_monitor.page_requests import GOALS_AT_ONCE, INERT_S, PageRequests
 from hero_monitor.serving.lesson import TEACHER, User
 from hero_node import NodeError, Pose
@@ -305,59 +302,6 @@ def test_a_recording_begins_once_and_ends_on_request(desk, monkeypatch):
 def test_a_page_says_what_it_shows(desk):
     assert desk.ask("show", page=1, picture=True, visible=False) == []
     assert (desk.pages[1].picture, desk.pages[1].visible) == (True, False)
-
-
-def test_foxglove_clients_drive_and_stop_by_the_rules_of_pages(desk, monkeypatch):
-    client = Client(lambda text: None, 9)
-    client.heard_ms = NOW_MS
-
-    def publish(topic, kind, content):
-        return desk.requests.publish(client, topic, kind, content)
-
-    def drive(*velocity):
-        return publish(
-            "/hero_0/cmd_vel", "geometry_msgs/Twist", struct.pack("<6d", velocity[0], 0, 0, 0, 0, velocity[1])
-        )
-
-    assert drive(0.1, 0.0) == "" == drive(0.0, 0.5)
-    assert desk.take() == [("drive", 9, "hero_0", 0.1, 0.0), ("drive", 9, "hero_0", 0.0, 0.5)]
-    assert drive(0.0, 0.0) == "" and desk.take() == [("end_drive", 9, "hero_0")]
-    desk.taken = {"hero_0"}
-    assert drive(0.1, 0.0) == "hero_0 is driven from another page"
-    desk.feed.stopped = True
-    desk.take()
-    assert drive(0.1, 0.0) == "all robots are stopped: release them first" and desk.take() == []
-    assert drive(0.0, 0.0) == "", "a stop is taken"
-    desk.take()
-    assert publish("/hero_driver/stop_request", "std_msgs/Bool", b"\0") == "robots are released on the page only"
-    assert desk.take() == []
-    assert publish("/hero_driver/stop_request", "std_msgs/Bool", b"\1") == ""
-    assert desk.take()[:2] == [("request_stop", True), ("end_all",)]
-    desk.feed.stopped, desk.taken = False, set()
-    client.heard_ms = NOW_MS - round(1e3 * AGE_MAX_S["drive"]) - 1
-    assert drive(0.1, 0.0) == "the request was delayed: nothing was done" and desk.take() == []
-    assert publish("/hero_driver/stop_request", "std_msgs/Bool", b"\1") == "", "a stop counts at any age"
-    assert "/chatter: only /hero_N/cmd_vel" in publish("/chatter", "std_msgs/String", b"")
-
-
-def test_a_foxglove_client_drives_after_a_stop_once_it_has_let_go(desk):
-    client = Client(lambda text: None, 9)
-    content = struct.pack("<6d", 0.1, 0, 0, 0, 0, 0)
-
-    def drive_after(pause_ms, content=content):
-        desk.now_ms += pause_ms
-        client.heard_ms = desk.now_ms
-        return desk.requests.publish(client, "/hero_0/cmd_vel", "geometry_msgs/Twist", content)
-
-    refusal = "hero_0 was stopped: let go, and press again to drive"
-    assert drive_after(0) == "" == drive_after(100)
-    desk.ended_ms["hero_0"] = desk.now_ms
-    assert {drive_after(100) for _ in range(50)} == {refusal}
-    assert drive_after(PRESS_GAP_MS) == refusal, "one that sends a velocity a second has not let go"
-    assert drive_after(PRESS_GAP_MS + 1) == ""
-    desk.ended_ms["hero_0"] = desk.now_ms
-    assert drive_after(100) == refusal
-    assert drive_after(100, bytes(48)) == "" == drive_after(100), "a zero is letting go"
 
 
 class Ros:

@@ -10,7 +10,7 @@ from hero_monitor import parameters as parameters_module
 from hero_monitor.background import Background
 from hero_monitor.control.offers import OFFERS, describe_offers, read_behaviors
 from hero_monitor.foxglove import hub as hub_module
-from hero_monitor.foxglove.hub import Client, Hub, Publisher, TopicType
+from hero_monitor.foxglove.hub import Client, Hub, TopicType
 from hero_monitor.parameters import list_host_names, load_parameters, read_token
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
@@ -56,7 +56,7 @@ def test_parameters_are_checked_and_name_this_pc(monkeypatch):
     defaults = load_parameters()
     assert (defaults.host, defaults.port, defaults.token_file, defaults.control) == ("127.0.0.1", 8088, "", False)
     assert list_host_names(defaults) == ["pc.lab", "pc.local", "127.0.0.1"]
-    assert (defaults.map_frame, defaults.foxglove_origins, defaults.foxglove_publish) == ("world", [], False)
+    assert (defaults.map_frame, defaults.foxglove_origins) == ("world", [])
     given.update(
         host_names=" a, b c", map_frame="/map", foxglove_origins="https://a.example, https://b.example", control=True
     )
@@ -129,11 +129,10 @@ def test_warnings_wait_for_no_terminal(monkeypatch):
     background.shutdown()
 
 
-def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):
+def test_a_client_has_so_many_subscriptions(monkeypatch):
     monkeypatch.setattr(hub_module, "SUBSCRIPTIONS_MAX", 2)
-    monkeypatch.setattr(hub_module, "PUBLISHED_MAX", 2)
     texts = []
-    hub = Hub(Publisher(texts.append, lambda *message: "", texts.append))
+    hub = Hub()
     client = Client(lambda text: texts.append(json.loads(text)))
     hub.update_topics({"/a": TopicType("std_msgs/Bool", "bool data")})
     hub.add(client)
@@ -150,12 +149,6 @@ def test_a_client_has_so_many_subscriptions_and_topics_of_its_own(monkeypatch):
     assert ask(op="subscribe", subscriptions=[{"id": 6, "channelId": 1}, {"id": 8, "channelId": 2}]) == [
         "subscriptions refused: [6, 8]"
     ]
-    channels = [{"id": number, "topic": "/b", "schemaName": "std_msgs/Bool", "encoding": "ros1"} for number in range(3)]
-    assert ask(op="advertise", channels=channels) == [] and list(client.published) == [0, 1]
-    ask(op="advertise", channels=channels[2:])
-    assert len(client.published) == 2
-    ask(op="unadvertise", channelIds=[0])
-    assert 0 not in client.published
 
 
 def test_limits_of_what_pages_may_set_are_the_ends_of_their_fields():

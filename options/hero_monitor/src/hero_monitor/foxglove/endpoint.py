@@ -8,9 +8,9 @@ import tornado.iostream
 import tornado.web
 import tornado.websocket
 
-from ..serving.lesson import VIEWER, User
-from ..serving.server import BaseHandler, PageSocket, Route
-from .hub import Client, Hub, Publisher
+from ..serving.lesson import User
+from ..serving.server import BaseHandler, Route
+from .hub import Client, Hub
 from .protocol import SUBPROTOCOLS
 
 if TYPE_CHECKING:
@@ -65,9 +65,7 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Greet a client."""
         self._sending: Any = None
         self.set_nodelay(True)
-        self.client = Client(self._write, next(PageSocket.numbers))
-        self.client.user = self.find_user() or User("", VIEWER)
-        self.client.who = self.client.user.describe(f"Foxglove client at {self.request.remote_ip}")
+        self.client = Client(self._write)
         self.endpoint.add(self)
 
     def on_message(self, message: Union[str, bytes]) -> None:
@@ -77,11 +75,6 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     def on_close(self) -> None:
         """Forget a client."""
         self.endpoint.remove(self)
-
-    def on_pong(self, data: bytes) -> None:
-        """Note the clock that the client has heard: what comes next was sent after that."""
-        if data.isdigit():
-            self.client.heard_ms = int(data)
 
     def send_waiting(self) -> None:
         """Send what waits, unless the client is still receiving the last of it."""
@@ -102,9 +95,9 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 class FoxgloveEndpoint:
     """All clients; topics are looked up and subscribed to only while there is one."""
 
-    def __init__(self, source: "RosTopics", origins: Sequence[str], publisher: Optional[Publisher] = None) -> None:
-        """origins: of other servers whose pages may connect; publisher: takes messages, None: clients only read."""
-        self.hub = Hub(publisher)
+    def __init__(self, source: "RosTopics", origins: Sequence[str]) -> None:
+        """origins: of other servers whose pages may connect."""
+        self.hub = Hub()
         self._source = source
         self._sockets: Set[FoxgloveSocket] = set()
         self._tick = tornado.ioloop.PeriodicCallback(self._update, 1000.0 * FLUSH_PERIOD_S)
@@ -122,12 +115,6 @@ class FoxgloveEndpoint:
         """Serve a client no longer; may be called twice."""
         self._sockets.discard(socket)
         self.hub.remove(socket.client)
-
-    def send_clock(self, clock_ms: int) -> None:
-        """Tell clients that may publish the time, as pages: every client returns the content of a ping."""
-        for socket in self._sockets if self.hub.takes_messages else ():
-            with contextlib.suppress(tornado.websocket.WebSocketClosedError):
-                socket.ping(str(clock_ms).encode())
 
     def _update(self) -> None:
         is_done = self._source.want(self.hub.wanted_topics)

@@ -7,16 +7,12 @@ from typing import Any, Callable, DefaultDict, Deque, Dict, Iterable, List, Name
 from hero_node import shorten
 from hero_node.parameters import is_whole_number
 
-from ..serving.lesson import TEACHER, User
-from .protocol import WARNING, Channel, describe_channel, encode_message, read_message
+from .protocol import WARNING, Channel, describe_channel, encode_message
 
 QUEUE_BYTES_MAX = 4_000_000
 """Queue limit of one client: about a second of a large swarm with a camera's images."""
 
 SUBSCRIPTIONS_MAX = 10_000
-PUBLISHED_MAX = 1_000
-
-NO_PUBLISHING = "this server takes no messages: start the monitor with foxglove_publish:=true"
 
 
 class TopicType(NamedTuple):
@@ -39,15 +35,9 @@ class TopicMessage(NamedTuple):
 class Client:
     """One connection: its subscriptions, and what waits to be sent; beyond QUEUE_BYTES_MAX the oldest is dropped."""
 
-    def __init__(self, send_text: Callable[[str], None], number: int = 0) -> None:
-        """number: no other client's, and no page's."""
+    def __init__(self, send_text: Callable[[str], None]) -> None:
         self.send_text = send_text
-        self.number = number
-        self.published: Dict[int, Channel] = {}
-        self.refusal = ""  # why the last message was refused; said once
-        self.user, self.who = User("", TEACHER), "a Foxglove client"
-        self.heard_ms = 0  # the monitor's clock, as the client had heard it when it sent what came last
-        self.presses: Dict[str, Tuple[int, int]] = {}  # of robots that it drives (client_commands)
+        self.refusal = ""  # of its last request; said once in a row
         self.subscriptions: Dict[int, Channel] = {}
         self._queue: Deque[bytes] = deque()
         self._queued_bytes = 0
@@ -80,30 +70,14 @@ class Client:
         return frames
 
 
-class Publisher(NamedTuple):
-    """Receiver of clients' messages; all return at once."""
-
-    open_client: Callable[[int], None]
-    publish: Callable[[Client, str, str, bytes], str]
-    """Takes topic, type and content of a message; returns why it is refused, empty if it is not."""
-    close_client: Callable[[int], None]
-
-
 class Hub:
     """All clients and channels."""
 
-    def __init__(self, publisher: Optional[Publisher] = None) -> None:
-        """publisher: takes messages of clients; None: they only read."""
-        self._publisher = publisher
+    def __init__(self) -> None:
         self.clients: Set[Client] = set()
         self._channels: Dict[str, Channel] = {}
         self._latched: Dict[str, Dict[str, TopicMessage]] = {}
         self._next_id = 1
-
-    @property
-    def takes_messages(self) -> bool:
-        """Return whether clients may publish."""
-        return self._publisher is not None
 
     @property
     def wanted_topics(self) -> Set[str]:
@@ -113,18 +87,12 @@ class Hub:
     def add(self, client: Client) -> None:
         """Greet a client."""
         self.clients.add(client)
-        capabilities = ["clientPublish"] if self.takes_messages else []
-        info = {"name": "hero_monitor", "metadata": {}, "supportedEncodings": ["ros1"], "capabilities": capabilities}
-        client.send("serverInfo", **info)
+        client.send("serverInfo", name="hero_monitor", metadata={}, supportedEncodings=["ros1"], capabilities=[])
         if self._channels:
             client.send("advertise", channels=list(map(describe_channel, self._channels.values())))
-        if self._publisher is not None:
-            self._publisher.open_client(client.number)
 
     def remove(self, client: Client) -> None:
         """Forget a client; may be called twice."""
-        if client in self.clients and self._publisher is not None:
-            self._publisher.close_client(client.number)
         self.clients.discard(client)
 
     def update_topics(self, topics: Dict[str, TopicType]) -> None:
@@ -149,15 +117,13 @@ class Hub:
 
     def receive(self, client: Client, message: Union[str, bytes]) -> None:
         """Carry out a client's request, or tell it why not."""
-        if isinstance(message, bytes):
-            refusal = self._pass_on(client, message)
-        else:
-            try:
-                refusal = self._carry_out(client, json.loads(message))
-            except (ValueError, TypeError, KeyError, RecursionError) as error:
-                refusal = f"invalid request: {type(error).__name__}"
-        if refusal:
+        try:
+            refusal = self._carry_out(client, {"op": "publish"} if isinstance(message, bytes) else json.loads(message))
+        except (ValueError, TypeError, KeyError, RecursionError) as error:
+            refusal = f"invalid request: {type(error).__name__}"
+        if refusal and refusal != client.refusal:
             client.warn(refusal)
+        client.refusal = refusal
 
     def _carry_out(self, client: Client, request: Any) -> str:
         """Carry out a request as the protocol names its fields; return why not, empty if it is done.
@@ -173,34 +139,9 @@ class Hub:
         if op == "unsubscribe":
             for number in request["subscriptionIds"]:
                 client.subscriptions.pop(number, None)
-        elif self._publisher is None:
-            return NO_PUBLISHING
-        elif op == "advertise":
-            for each in request["channels"]:
-                topic, kind, encoding = (str(each[name]) for name in ("topic", "schemaName", "encoding"))
-                if encoding != "ros1":
-                    return f"{shorten(topic)}: this server takes messages as ros1, not as {shorten(encoding)}"
-                if len(client.published) < PUBLISHED_MAX:
-                    client.published[each["id"]] = Channel(each["id"], topic, kind, "")
-        elif op == "unadvertise":
-            for number in request["channelIds"]:
-                client.published.pop(number, None)
         else:
-            return f"this server does not know {shorten(op)}"
+            return f"{shorten(op)}: clients of this server only read"
         return ""
-
-    def _pass_on(self, client: Client, frame: bytes) -> str:
-        """Pass a message on; return why not, said once."""
-        channel_id, content = read_message(frame)
-        channel = client.published.get(channel_id)
-        if self._publisher is None:
-            refusal = NO_PUBLISHING
-        elif channel is None:
-            refusal = "channel %d is not advertised" % channel_id
-        else:
-            refusal = self._publisher.publish(client, channel.topic, channel.type, content)
-        is_said, client.refusal = refusal == client.refusal, refusal
-        return "" if is_said else refusal
 
     def _subscribe(self, client: Client, number: Any, channel: Optional[Channel]) -> bool:
         is_free = is_whole_number(number, 0, 2**32 - 1) and number not in client.subscriptions

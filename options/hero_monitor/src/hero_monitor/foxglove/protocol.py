@@ -14,13 +14,12 @@ WARNING = 1
 
 MESSAGE_DATA = 0x01
 _HEADER = struct.Struct("<BIQ")  # opcode, id of the subscription, time of arrival in ns
-_CLIENT_HEADER = struct.Struct("<BI")  # opcode, id of the client's channel
 _BINARY = 0x82  # first byte of a WebSocket frame that is a whole binary message
 _SHORT_FRAME, _FRAME, _LONG_FRAME = struct.Struct("!BB"), struct.Struct("!BBH"), struct.Struct("!BBQ")
 
 
 class Channel(NamedTuple):
-    """A topic that clients can subscribe to, or that a client publishes."""
+    """A topic that clients can subscribe to."""
 
     id: int
     topic: str
@@ -44,10 +43,3 @@ def encode_message(subscription: int, time_ns: int, content: bytes) -> bytes:
     else:
         head = _LONG_FRAME.pack(_BINARY, 127, length)
     return head + _HEADER.pack(MESSAGE_DATA, subscription, time_ns) + content
-
-
-def read_message(frame: bytes) -> Tuple[int, bytes]:
-    """Return the channel and the content of a message of a client; channel -1 for what is no message."""
-    if len(frame) < _CLIENT_HEADER.size or frame[0] != MESSAGE_DATA:
-        return -1, b""
-    return _CLIENT_HEADER.unpack_from(frame)[1], frame[_CLIENT_HEADER.size :]
