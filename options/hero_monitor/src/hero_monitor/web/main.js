@@ -61,7 +61,7 @@ const connection = new Connection({
   },
   onPause() {
     panel.endDrive();
-    notice("info", "This page was suspended. What it shows is up to date again; press again to drive.");
+    notice("info", "This page was suspended: press again to drive.");
   },
 });
 
