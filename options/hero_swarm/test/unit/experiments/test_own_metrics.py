@@ -90,10 +90,10 @@ def test_an_edited_metric_or_module_of_it_is_other_code(path):
     [
         (
             "return state.poses.mean()",
-            r"steps gives an array of shape \(\), but must give one number .* 2 worlds \(2,\)",
+            r"steps \(line \d+\) gives an array of shape \(\), but must give one number .* 2 worlds \(2,\)",
         ),
-        ("return 'many'", "steps gives 'many', but must give numbers"),
-        ("return state.poses[:, 0, 0] * np.nan", r"steps gives nan at 0 s, .*\(hero_swarm/metrics/own.py"),
+        ("return 'many'", r"steps \(line \d+\) gives 'many', but must give numbers"),
+        ("return state.poses[:, 0, 0] * np.nan", r"steps \(line \d+\) gives nan at 0 s, .*\(hero_swarm/metrics/own.py"),
         ("return state.memory['x']", r"IndexError: .*\(own.py, line 16\)"),
         ("state.poses[:] = 0.0", r"ValueError: .*read-only \(own.py, line 16\)"),
         ("raise SystemError('no')", r"SystemError: no \(own.py, line 16\)"),
