@@ -11,7 +11,7 @@ import sources
 from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_monitor.control import guard as module
 from hero_monitor.control import programs as programs_module
-from hero_monitor.control.offers import OFFERS, read_behaviors
+from hero_monitor.control.offers import OFFERS
 from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import MAX_GOAL_M, MAX_TEXT_LENGTH, RequestError, read_request
 from hero_monitor.fleet_feed import master_link as master_link_module
@@ -20,10 +20,7 @@ from hero_monitor.fleet_feed.master_link import MasterLink
 from hero_monitor.fleet_feed.page_state import LogRing, PageState
 from hero_monitor.fleet_feed.placement import Placement
 from hero_node import Pose
-from hero_swarm.describe import describe_behaviors
 from hero_test.nonempty import nonempty
-
-OFFERS.update(read_behaviors(describe_behaviors()))
 
 
 def run_guard(monkeypatch, signs, ends_after=10**6, code=0):

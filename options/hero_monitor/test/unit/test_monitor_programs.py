@@ -14,14 +14,11 @@ import yaml
 import sources
 from hero_client.apps.formations import FormationError
 from hero_monitor.control import programs as programs_module
-from hero_monitor.control.offers import OFFERS, check_values, make_arguments, place_robots, read_behaviors
+from hero_monitor.control.offers import OFFERS, check_values, make_arguments, place_robots
 from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import RequestError
 from hero_swarm.behaviors import list_names
-from hero_swarm.describe import describe_behaviors
 from hero_test.waiting import wait_for
-
-OFFERS.update(read_behaviors(describe_behaviors()))
 
 DEADLINE_S = 300.0
 
@@ -220,6 +217,7 @@ def test_all_programs_are_told_to_end_before_one_is_waited_for(started, monkeypa
     children = [started.start(OBEDIENT, robots=["hero_%d" % number]) for number in range(2)]
     assert [read(), read()] == [b"runs\n"] * 2
     told = []
+    started.programs._hand_over = lambda *_: None  # as in a monitor, whose thread is in close()
     started.programs._on_end = lambda _: told.append([child.is_ending for child in children])
     started.programs.close(DEADLINE_S)
     assert told[0] == [True, True]

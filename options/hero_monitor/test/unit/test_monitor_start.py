@@ -8,7 +8,7 @@ import pytest
 from hero_monitor import background as background_module
 from hero_monitor import parameters as parameters_module
 from hero_monitor.background import Background
-from hero_monitor.control.offers import OFFERS, describe_offers, read_behaviors
+from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.foxglove import hub as hub_module
 from hero_monitor.foxglove.hub import Client, Hub, TopicType
 from hero_monitor.parameters import list_host_names, load_parameters, read_token
@@ -17,11 +17,7 @@ from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
 from hero_monitor.serving.server import STUCK_S, WAITING_MAX, PageSocket
 from hero_node import ProgramError
 from hero_node.parameters import check_parameters
-from hero_swarm.describe import describe_behaviors
 from hero_test.nonempty import nonempty
-
-OFFERS.update(read_behaviors(describe_behaviors()))
-
 
 TOKEN = "x" * TOKEN_LENGTH_MIN
 
