@@ -3,8 +3,5 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import find_packages, setup
 
-setup(
-    **generate_distutils_setup(
-        packages=find_packages("src"), package_dir={"": "src"}, package_data={"hero_swarm": ["published/*"]}
-    )
-)
+data = {"hero_swarm": ["published/*"]}
+setup(**generate_distutils_setup(packages=find_packages("src"), package_dir={"": "src"}, package_data=data))

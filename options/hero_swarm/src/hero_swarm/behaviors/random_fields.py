@@ -98,6 +98,3 @@ class RandomFields(Segregation):
                 total += velocities[chosen, robots]
         mean: np.ndarray = total / (SAMPLES - BURNED)
         return mean
-
-    def colors(self, memory: Any) -> np.ndarray:
-        return super().colors(memory[:, 2].astype(int))

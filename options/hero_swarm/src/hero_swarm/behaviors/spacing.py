@@ -64,7 +64,8 @@ class Segregation(Behavior):
 
     def colors(self, memory: Any) -> np.ndarray:
         palette = np.array([(1, 0, 0), (0, 0, 1), (0, 1, 0), (1, 1, 0), (1, 0, 1), (0, 1, 1)], dtype=float)
-        shown: np.ndarray = palette[memory % len(palette)]
+        group = np.reshape(memory, (len(memory), -1))[:, -1].astype(int)  # alone, or last
+        shown: np.ndarray = palette[group % len(palette)]
         return shown
 
 

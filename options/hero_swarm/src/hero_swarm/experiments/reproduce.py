@@ -6,6 +6,7 @@ published ones is shown beside the verdict. Published figures and their sources:
 
 import argparse
 import difflib
+import io
 import os
 import shutil
 from pathlib import Path
@@ -17,22 +18,25 @@ from hero_node.files import Entry, load_entries, write_file
 from hero_node.parameters import within
 
 from . import runner
-from .computing.code_version import PUBLISHED
 from .errors import ExperimentError
 from .experiment_file import MAX_RUNS, Experiment, read_experiment
-from .reporting.reproduction_page import draw_picture, format_page
+from .reporting.figures import draw_runs
 from .reporting.statistics import Interval, bootstrap_median
 from .reporting.summary import format_interval
 from .results import Results, load
 
-SHIPPED = Path(__file__).resolve().parents[1] / PUBLISHED
+SHIPPED = Path(__file__).resolve().parents[1] / "published"
 FIGURES = "published.yaml"
 
-WITHIN, OPEN, OUTSIDE, NO_FIGURE, NO_RUN = "within", "open", "no", "no published figure", "no run yet"
+WITHIN, OPEN, OUTSIDE, NO_FIGURE = "within", "open", "no", "no published figure"
 """Verdicts."""
 
-TOLERANCE = 0.1
-"""A published value without a spread is taken to be exact to this share."""
+_HEAD = """\
+# Published experiments, reproduced
+
+Written by `rosrun hero_swarm reproduce --page docs/reproduction.md`. **within**: our median is in the published
+interval, or meets a published value without one to 10 %; **open**: only its 95 % interval does, more seeds would tell.
+Those of two or three seeds are their range. In the worlds `points` and `discs` robots are as papers have them."""
 
 
 class Figure(NamedTuple):
@@ -57,7 +61,6 @@ class Figure(NamedTuple):
 class Publication(NamedTuple):
     """A published experiment: what it shows, where its figures come from, why ours may differ, minutes of CPU."""
 
-    name: str
     sentence: str
     source: str
     differs: str
@@ -66,46 +69,46 @@ class Publication(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """Outcome of a figure in one cell: the values of the cell, its runs, and our median; None without a run."""
+    """Outcome of a figure in one cell: the values of the cell, its runs, and our median."""
 
     figure: Figure
     label: str
     runs: int
-    interval: Optional[Interval]
+    interval: Interval
 
     @property
     def word(self) -> str:
         """The verdict: our median is within what was published, or its interval misses it; else it is open."""
-        if self.interval is None or self.figure.bounds is None:
-            return NO_RUN if self.interval is None else NO_FIGURE
-        low, high = self.figure.bounds
-        if low <= self.interval.median <= high:
+        if self.figure.bounds is None:
+            return NO_FIGURE
+        (low, high), own = self.figure.bounds, self.interval
+        if low <= own.median <= high:
             return WITHIN
-        return OPEN if self.interval.low <= high and self.interval.high >= low else OUTSIDE
+        return OPEN if own.low <= high and own.high >= low else OUTSIDE
 
 
 def read_publications() -> Dict[str, Publication]:
     """Return all published experiments by name. Raises: EntryError with the line of what is wrong."""
     publications = {}
     for name, entry in load_entries(str(SHIPPED / FIGURES), "gauci_aggregation: ...").mapping().items():
-        given = entry.mapping(Publication._fields[1:], Publication._fields[1:])
-        sentence, source, differs = (given[key].text() for key in ("sentence", "source", "differs"))
+        given = entry.mapping(Publication._fields, Publication._fields)
+        texts = {key: given[key].text() for key in ("sentence", "source", "differs")}
         figures = tuple(map(_parse_figure, given["figures"].entries()))
-        minutes = given["minutes"].number(0.0, 1e4, "min")
-        publications[name] = Publication(name, sentence, source, differs, minutes, figures)
+        publications[name] = Publication(minutes=given["minutes"].number(0.0, 1e4, "min"), figures=figures, **texts)
     return publications
 
 
 def _parse_figure(entry: Entry) -> Figure:
     given = entry.mapping(Figure._fields[:-1], ("name", "metric", "published"))
     at_s = given["at_s"].number(0.0, 1e6, "s") if "at_s" in given else None
-    cells, published, bounds, shown = given.get("cells"), given["published"], None, "none"
+    cells, published, bounds = given.get("cells"), given["published"], None
     if isinstance(published.value, list):
         low, high = published.numbers(2, -np.inf, np.inf, "a number, [low, high] or null")
-        bounds, shown = (low, high), f"{low:g} to {high:g}"
+        bounds = low, high
     elif published.value is not None:
         value = published.number(-np.inf, np.inf, "")
-        bounds, shown = (value - TOLERANCE * abs(value), value + TOLERANCE * abs(value)), f"{value:g}"
+        bounds = value - 0.1 * abs(value), value + 0.1 * abs(value)
+    shown = "none" if bounds is None else str(published.plain())
     return Figure(given["name"].text(), given["metric"].text(), at_s, cells.plain() if cells else {}, shown, bounds)
 
 
@@ -129,7 +132,7 @@ def list_changes(file: str) -> List[str]:
 
 
 def judge(publication: Publication, experiment: Experiment, results: Results) -> List[Verdict]:
-    """Return the verdict on each figure in each of its cells."""
+    """Return the verdict on each figure in each of its cells that has runs."""
     verdicts = []
     for figure in publication.figures:
         for cell in results.find(**figure.cells):
@@ -138,23 +141,24 @@ def judge(publication: Publication, experiment: Experiment, results: Results) ->
             else:
                 values = results.series[figure.metric][cell][:, round(figure.at_s)]
             values = values[~np.isnan(values)]  # of runs that are missing
-            interval = bootstrap_median(values.tolist()) if len(values) else None
             settings = {"robots": experiment.cells[cell].settings["robots"], **results.cells[cell]}
             label = ", ".join(f"{key} {value}" for key, value in settings.items())
-            verdicts.append(Verdict(figure, label, len(values), interval))
+            if len(values):
+                verdicts.append(Verdict(figure, label, len(values), bootstrap_median(values.tolist())))
     return verdicts
 
 
 def describe(publication: Publication, verdicts: Sequence[Verdict], changes: Sequence[str]) -> str:
-    """Return the verdicts as text for a terminal."""
-    lines = [f"{publication.name}: {publication.sentence}"]
-    for figure, label, runs, interval in verdicts:
-        told = f"  {figure.name}: published {figure.published}"
-        lines += [told] if told not in lines else []
-        own = "-" if interval is None else f"{format_interval(interval)}, {runs} runs"
-        lines.append(f"    {label:36} {own:40} {Verdict(figure, label, runs, interval).word}")
-    lines += [f"  changed: {change}" for change in changes]
-    return "\n".join([*lines, f"  may differ: {publication.differs}", f"  source: {publication.source}"])
+    """Return the verdicts as a table of Markdown, which a terminal shows, too, with what else a reader should know."""
+    rows = [("figure", "cell", "published", "ours, median (95 % interval)", "runs", "verdict")]
+    for verdict in verdicts:
+        figure, own = verdict.figure, format_interval(verdict.interval)
+        rows.append((figure.name, verdict.label, figure.published, own, str(verdict.runs), verdict.word))
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    lines = [f"| {' | '.join(map(str.ljust, row, widths))} |" for row in rows]
+    lines.insert(1, f"|{'|'.join('-' * (width + 2) for width in widths)}|")
+    texts = [f"{publication.sentence}. Published: {publication.source}.", f"May differ: {publication.differs}."]
+    return "\n\n".join([texts[0], "\n".join(lines), texts[1], *(f"Changed: `{change}`" for change in changes)])
 
 
 def reproduce(name: str, options: argparse.Namespace) -> str:
@@ -176,21 +180,24 @@ def reproduce(name: str, options: argparse.Namespace) -> str:
 
 
 def write_page(path: str, folder: str) -> None:
-    """Write the page of all experiments that have runs in folder, and a picture of each beside it."""
-    done = []
+    """Write the page of all experiments with runs in folder, and beside it a picture of each by its first metric."""
+    parts = [_HEAD]
     for name, publication in read_publications().items():
-        file = os.path.join(folder, name + ".yaml")
-        if os.path.isdir(os.path.join(folder, name)):
-            results, (_, experiment) = load(os.path.join(folder, name)), read_experiment(file)
-            picture = os.path.join("pictures", f"reproduction_{name}.png")
-            groups = [int(cell.parameters.get("groups", 1)) for cell in experiment.cells]
-            write_file(os.path.join(os.path.dirname(path), picture), draw_picture(results, groups))
-            done.append((publication, judge(publication, experiment, results), list_changes(file), picture))
-    write_file(path, format_page(done).encode())
+        stem = os.path.join(folder, name)
+        if os.path.isdir(stem):
+            results, (_, experiment) = load(stem), read_experiment(stem + ".yaml")
+            values = [own[~np.isnan(own)].tolist() for own in results.metrics[experiment.metrics[0].name]]
+            content, picture = io.BytesIO(), f"pictures/reproduction_{name}.png"
+            own = zip(*((label, runs, bootstrap_median(runs)) for label, runs in zip(results.labels, values) if runs))
+            draw_runs(experiment.metrics[0].name, *own).savefig(content, format="png", dpi=70)
+            write_file(os.path.join(os.path.dirname(path), picture), content.getvalue())
+            text = describe(publication, judge(publication, experiment, results), list_changes(stem + ".yaml"))
+            parts += [f"## {name.replace('_', ' ').capitalize()}", text, f"![Every run of each cell]({picture})"]
+    write_file(path, "\n\n".join([*parts, ""]).encode())
 
 
-def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
-    """Read the command line."""
+def main(arguments: Optional[Sequence[str]] = None) -> None:
+    """Run the program."""
     parser = argparse.ArgumentParser(prog="reproduce", description="Run published experiments and compare figures.")
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help="published experiments (list them)")
@@ -200,16 +207,11 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     runner.add_engine_options(parser)
     add("--fresh", action="store_true", help="delete earlier runs of these experiments")
     add("--page", metavar="FILE.md", help="write a page and pictures of what was run")
-    return parser.parse_args(arguments)
-
-
-def main(arguments: Optional[Sequence[str]] = None) -> None:
-    """Run the program."""
-    options = parse_options(arguments)
+    options = parser.parse_args(arguments)
     for name in options.names:
         print(reproduce(name, options))
     if options.page:
         write_page(options.page, options.folder)
         print(options.page)
-    for one in read_publications().values() if not options.names and not options.page else ():
-        print(f"{one.name:24} {one.sentence} ({one.minutes:g} min of CPU)")
+    for name, one in read_publications().items() if not options.names and not options.page else ():
+        print(f"{name:24} {one.sentence} ({one.minutes:g} min of CPU)")

@@ -12,7 +12,7 @@ from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import read_experiment
 from hero_swarm.experiments.reporting.statistics import Interval
-from hero_swarm.experiments.reproduce import NO_FIGURE, NO_RUN, OPEN, OUTSIDE, WITHIN, Figure, Verdict
+from hero_swarm.experiments.reproduce import NO_FIGURE, OPEN, OUTSIDE, WITHIN, Figure, Verdict
 from hero_swarm.experiments.results import load
 from hero_test.nonempty import nonempty
 
@@ -76,7 +76,6 @@ def run(capsys, *options):
         (Interval(5.0, 4.1, math.inf), (3.0, 4.0), OUTSIDE),
         (Interval(math.inf, 4.0, math.inf), (3.0, 4.0), OPEN),
         (Interval(2.0, 1.0, 3.0), None, NO_FIGURE),
-        (None, (3.0, 4.0), NO_RUN),
     ],
 )
 def test_a_median_is_within_or_its_interval_leaves_it_open_or_not(interval, published, word):
@@ -84,25 +83,28 @@ def test_a_median_is_within_or_its_interval_leaves_it_open_or_not(interval, publ
     assert Verdict(figure, "all", 9, interval).word == word
 
 
+def read_rows(text):
+    """Return the cells of the rows of a table in Markdown, without its head."""
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if line.startswith("|")]
+    return rows[2:]
+
+
 def test_each_figure_is_shown_with_ours_its_runs_and_the_verdict(shipped, capsys):
-    lines = [line.split() for line in run(capsys, "--quick").out.splitlines()]
-    assert lines[0] == ["ahead:", "Robots", "drive", "ahead"]
-    assert lines[1:3] == [
-        ["before:", "published", "0.274"],
-        ["robots", "2", "0.2737", "(0.2737", "to", "0.2737),", "2", "runs", WITHIN],
-    ]
-    assert lines[3] == ["after:", "published", "5", "to", "6"] and lines[4][-1] == OUTSIDE
-    assert [" ".join(line[-3:]) for line in lines[6:8]] == [NO_FIGURE] * 2, "a row for each of the two cells"
-    assert lines[8] == ["none:", "published", "0", "to", "1"]
-    assert lines[-2:] == [["may", "differ:", "they", "have", "wheels"], ["source:", "none"]]
-    assert not any(line[0] == "changed:" for line in lines)
+    text = run(capsys, "--quick").out
+    rows = read_rows(text)
+    assert rows[0] == ["before", "robots 2", "0.274", "0.2737 (0.2737 to 0.2737)", "2", WITHIN]
+    assert rows[1][:3] == ["after", "robots 2", "[5, 6]"] and rows[1][-1] == OUTSIDE
+    assert [row[1:3] + row[-1:] for row in rows[2:4]] == [[f"robots {n}", "none", NO_FIGURE] for n in (2, 3)]
+    assert rows[4][:3] == ["none", "robots 3", "[0, 1]"] and len(rows) == 5
+    assert text.startswith("Robots drive ahead. Published: none.")
+    assert text.endswith("May differ: they have wheels.\n"), "nothing was changed"
 
 
 def test_an_interrupted_run_goes_on_with_the_seeds_of_its_file(shipped, capsys):
     assert "2 runs in" in run(capsys, "--seeds", "1").err
     assert "4 runs in" in run(capsys).err
     again = run(capsys)
-    assert "runs in" not in again.err and " 3 runs " in again.out
+    assert "runs in" not in again.err and {row[-2] for row in read_rows(again.out)} == {"3"}
     assert load("reproduction/ahead").seeds.tolist() == [7, 8, 9]
 
 
@@ -114,12 +116,12 @@ def test_what_was_changed_by_hand_is_shown_beside_the_verdict(shipped, capsys):
     with pytest.raises(ExperimentError, match="--fresh"):
         run(capsys, "--quick")
     lines = run(capsys, "--quick", "--fresh").out.splitlines()
-    assert [line.strip() for line in lines if "changed:" in line] == [
-        "changed: ahead.py: -         return 0.1, 0.0, memory",
-        "changed: ahead.py: +         return 0.2, 0.0, memory",
-        "changed: ahead.yaml: - time_s: 2",
-        "changed: ahead.yaml: + time_s: 1",
-        "changed: ahead.yaml: + errors.friction: 0.1",
+    assert [line for line in lines if line.startswith("Changed")] == [
+        "Changed: `ahead.py: -         return 0.1, 0.0, memory`",
+        "Changed: `ahead.py: +         return 0.2, 0.0, memory`",
+        "Changed: `ahead.yaml: - time_s: 2`",
+        "Changed: `ahead.yaml: + time_s: 1`",
+        "Changed: `ahead.yaml: + errors.friction: 0.1`",
     ]
     assert (shipped / "ahead.yaml").read_text() == FILE
 
@@ -139,14 +141,13 @@ def test_a_name_or_a_file_that_is_wrong_is_told_with_a_remedy(shipped, capsys):
         run(capsys)
 
 
-def test_the_page_has_a_row_for_each_verdict_and_a_picture(shipped, capsys, tmp_path):
-    run(capsys, "--quick")
+def test_the_page_has_the_table_and_a_picture_of_each_experiment(shipped, capsys, tmp_path):
+    table = read_rows(run(capsys, "--quick").out)
     (tmp_path / "docs" / "pictures").mkdir(parents=True)
     reproduce.main(["--page", "docs/reproduction.md"])
     page = (tmp_path / "docs" / "reproduction.md").read_text()
-    rows = [line for line in page.splitlines() if line.startswith(("| before", "| cluster"))]
-    assert [row.rsplit("| ", 1)[1] for row in rows] == ["within |"] + ["no published figure |"] * 2
-    assert "![Where the robots of one run of each cell ended](pictures/reproduction_ahead.png)" in page
+    assert read_rows(page) == table and "## Ahead\n" in page
+    assert "![Every run of each cell](pictures/reproduction_ahead.png)" in page
     assert (tmp_path / "docs" / "pictures" / "reproduction_ahead.png").read_bytes()[:4] == b"\x89PNG"
 
 

@@ -17,9 +17,6 @@ from ..errors import ExperimentError
 PACKAGES = ("hero_client", "hero_driver", "hero_node", "hero_sim", "hero_swarm")
 """All whose modules a simulated run may use."""
 
-PUBLISHED = "published"
-"""Folder of the experiments of reproduce, whose copies are a user's own files."""
-
 _SUFFIXES = (".py", ".yaml")
 """Modules and arenas."""
 
@@ -51,7 +48,7 @@ def list_suite() -> Dict[str, bytes]:
         # In a devel space of catkin, the first folder holds but an __init__.py that leads to the second one.
         folder = next(folder for folder in folders if {path.name for path in folder.glob("*.py")} > {"__init__.py"})
         for path in sorted(folder.rglob("*")):
-            if path.suffix in _SUFFIXES and not {"__pycache__", PUBLISHED}.intersection(path.parts):
+            if path.suffix in _SUFFIXES and not {"__pycache__", "published"}.intersection(path.parts):
                 contents[f"{package}/{path.relative_to(folder)}"] = path.read_bytes()
     return contents
 

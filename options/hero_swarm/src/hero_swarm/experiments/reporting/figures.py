@@ -20,16 +20,16 @@ _POINT_SPREAD = 0.12
 """Points of a cell are spread over this share of its width, in the order of their seeds."""
 
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 _DASHES = (1.0, 1.5, 3.0, 5.0)
 
 
 def _choose_style(index: int) -> Dict[str, Any]:
     """Return a color and a line style that no other index has."""
-    dashes = index // len(COLORS)
+    dashes = index // len(_COLORS)
     lengths = [length for dash in range(dashes) for length in (_DASHES[dash % len(_DASHES)], 1.5)]
-    return {"color": COLORS[index % len(COLORS)], "linestyle": (0, lengths) if lengths else "-"}
+    return {"color": _COLORS[index % len(_COLORS)], "linestyle": (0, lengths) if lengths else "-"}
 
 
 def draw_all(report: Report, results: Results) -> Dict[str, Figure]:
@@ -100,7 +100,7 @@ def draw_runs(
     """Draw every run of each cell beside its median and interval; infinite values are counted in words."""
     figure, axes = _begin(1.2 + 0.45 * len(labels))
     for row, (runs, interval) in enumerate(zip(values, intervals)):
-        color = COLORS[row % len(COLORS)]
+        color = _COLORS[row % len(_COLORS)]
         finite = [value for value in runs if np.isfinite(value)]
         places = row + 0.12 + _POINT_SPREAD * np.linspace(0.0, 1.0, len(finite))
         axes.plot(finite, places, ".", color=color, alpha=0.5, markersize=5)
