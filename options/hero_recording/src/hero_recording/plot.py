@@ -96,7 +96,6 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
     intervals_s = np.diff(path.times_s)
     steady_s = intervals_s[intervals_s <= analysis.ODOMETRY_GAP_S]
     delays_ms = analysis.compute_message_delays(robot) * 1e3
-    motion_delays_ms = analysis.compute_motion_delays(robot) * 1e3
     errors = analysis.compute_odometry_errors(robot)
     localization = analysis.compute_localization_errors(robot)
     error = "-"
@@ -110,7 +109,6 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
         "LONGEST GAP": f"{intervals_s.max():.2f} s" if len(intervals_s) else "-",
         "MESSAGE DELAY": f"{np.median(delays_ms):.0f} ms" if len(delays_ms) else "-",
         "99 %": f"{np.percentile(delays_ms, 99):.0f} ms" if len(delays_ms) else "-",
-        "COMMAND TO MOTION": f"{np.median(motion_delays_ms):.0f} ms" if len(motion_delays_ms) else "-",
         "RECONNECTS": "%d" % robot.states[-1].reconnects if robot.states else "-",
         "FINAL ERROR": error,
         "LOCALIZATION RMS": "-"

@@ -158,7 +158,6 @@ def test_the_table_holds_rate_gaps_delays_and_error(two_robots):
     assert float(cells["LONGEST GAP"].split()[0]) == pytest.approx(2.0, abs=0.05)
     assert cells["MESSAGE DELAY"] == cells["99 %"] == "%.0f ms" % (1e3 * DELAY_S)
     assert cells["FINAL ERROR"].startswith("%.0f mm (" % (1e3 * ERROR_M))
-    assert float(cells["COMMAND TO MOTION"].split()[0]) == pytest.approx(1e3 * MOTION_DELAY_S, abs=1.5e3 * PERIOD_S)
 
 
 def test_a_true_heading_that_passes_pi_between_two_readings_is_no_error():

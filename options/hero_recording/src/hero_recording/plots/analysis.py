@@ -9,14 +9,8 @@ import numpy as np
 
 from .observations import Origin, RobotObservations, Series, StateReport
 
-STANDSTILL_S = 0.5
-"""A robot whose wheels have not turned for this long is at rest."""
-
 COMMAND_TIMEOUT_S = 2.0
-"""The robot's watchdog stops it this long after a command; a robot that has not moved by then did not get it."""
-
-MOVED_TICKS = 2.0
-"""Sum of both wheels that counts as motion; a single tick may be a wheel that settles."""
+"""The robot's watchdog stops it this long after a command."""
 
 REPORT_GAP_S = 3.0
 """The driver reports every second; after a longer silence the state is unknown."""
@@ -131,30 +125,6 @@ def compute_message_delays(robot: RobotObservations) -> np.ndarray:
     """Return arrival minus stamp of every odometry message (s)."""
     arrival_s, stamp_s, *_ = robot.odometry.columns()
     return arrival_s - stamp_s
-
-
-def compute_motion_delays(robot: RobotObservations) -> np.ndarray:
-    """Return the delays (s) from a command to the first motion of a robot at rest, as the recorder received both."""
-    command_s, linear_m_s, angular_rad_s = robot.commands.columns()
-    encoder_s, left_ticks, right_ticks = robot.encoder.columns()
-    if not len(command_s):
-        return np.zeros(0)
-    moving = (linear_m_s != 0.0) | (angular_rad_s != 0.0)
-    is_first = np.concatenate(([True], ~moving[:-1] | (np.diff(command_s) > COMMAND_TIMEOUT_S)))
-    turned = np.abs(np.diff(left_ticks)) + np.abs(np.diff(right_ticks))
-    delays = []
-    for start_s in command_s[moving & is_first]:
-        before = np.searchsorted(encoder_s, start_s)
-        first = np.searchsorted(encoder_s, start_s - STANDSTILL_S)
-        if before - first < 5 or turned[first : before - 1].any():
-            continue  # it was moving already, or too few readings tell
-        last = np.searchsorted(encoder_s, start_s + COMMAND_TIMEOUT_S)
-        ticks = np.abs(left_ticks[before:last] - left_ticks[before - 1])
-        ticks = ticks + np.abs(right_ticks[before:last] - right_ticks[before - 1])
-        moved = np.flatnonzero(ticks >= MOVED_TICKS)
-        if len(moved):
-            delays.append(encoder_s[before + moved[0]] - start_s)
-    return np.array(delays)
 
 
 def find_spans(reports: Sequence[StateReport]) -> List[Span]:

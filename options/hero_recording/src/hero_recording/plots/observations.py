@@ -22,7 +22,7 @@ from ..bags.topics import (
     is_fleet_topic,
 )
 
-KINDS = ("odometry", "ground_truth", "pose", "encoder", "velocity_command", "position_command")
+KINDS = ("odometry", "ground_truth", "pose", "velocity_command", "position_command")
 CUBE, CYLINDER = 1, 3
 """Types of visualization_msgs/Marker that walls and round obstacles are drawn with."""
 
@@ -83,7 +83,6 @@ class RobotObservations:
     Attributes:
         odometry, ground_truth: rows of arrival s, stamp s, x m, y m, yaw rad, linear m/s, angular rad/s.
         poses: rows of arrival s, stamp s, x m, y m, yaw rad, by localization.
-        encoder: rows of arrival s, left ticks, right ticks.
         commands: rows of arrival s, linear m/s, angular rad/s, of both controllers.
         origins: poses of its odom frame in the frame that all robots share.
         states: reports of the driver.
@@ -93,7 +92,6 @@ class RobotObservations:
         self.odometry = Series(2, 5)
         self.ground_truth = Series(2, 5)
         self.poses = Series(2, 3)
-        self.encoder = Series(3, 0)  # ticks grow beyond any limit
         self.commands = Series(1, 2)
         self.origins: List[Origin] = []
         self.states: List[StateReport] = []
@@ -103,9 +101,6 @@ class RobotObservations:
         if kind == "status":
             columns = dict(zip(TABLES["status"], row[1:]))
             self.states.append(StateReport(row[0], columns["state"], columns["reconnects"]))
-        elif kind == "encoder":
-            time_s, _, left_ticks, right_ticks, *_ = row
-            self.encoder.add(time_s, left_ticks, right_ticks)
         elif kind == "pose":
             self.poses.add(*row[:5])
         else:
