@@ -184,12 +184,14 @@ def write_page(path: str, folder: str) -> None:
     parts = [_HEAD]
     for name, publication in read_publications().items():
         stem = os.path.join(folder, name)
-        if os.path.isdir(stem):
-            results, (_, experiment) = load(stem), read_experiment(stem + ".yaml")
-            values = [own[~np.isnan(own)].tolist() for own in results.metrics[experiment.metrics[0].name]]
+        if not os.path.isdir(stem):
+            continue
+        results, (_, experiment) = load(stem), read_experiment(stem + ".yaml")
+        values = [own[~np.isnan(own)].tolist() for own in results.metrics[experiment.metrics[0].name]]
+        drawn = [(label, runs, bootstrap_median(runs)) for label, runs in zip(results.labels, values) if runs]
+        if drawn:
             content, picture = io.BytesIO(), f"pictures/reproduction_{name}.png"
-            own = zip(*((label, runs, bootstrap_median(runs)) for label, runs in zip(results.labels, values) if runs))
-            draw_runs(experiment.metrics[0].name, *own).savefig(content, format="png", dpi=70)
+            draw_runs(experiment.metrics[0].name, *zip(*drawn)).savefig(content, format="png", dpi=70)
             write_file(os.path.join(os.path.dirname(path), picture), content.getvalue())
             text = describe(publication, judge(publication, experiment, results), list_changes(stem + ".yaml"))
             parts += [f"## {name.replace('_', ' ').capitalize()}", text, f"![Every run of each cell]({picture})"]

@@ -142,11 +142,16 @@ def test_a_name_or_a_file_that_is_wrong_is_told_with_a_remedy(shipped, capsys):
 
 
 def test_the_page_has_the_table_and_a_picture_of_each_experiment(shipped, capsys, tmp_path):
+    for name in ("early", "other"):
+        (shipped / f"{name}.yaml").write_text(FILE)
+        (shipped / "published.yaml").open("a").write(FIGURES.replace("ahead:", f"{name}:"))
     table = read_rows(run(capsys, "--quick").out)
+    with runner.open_folder(runner.parse_options(["reproduction/early.yaml"])):
+        pass  # ended before its first run
     (tmp_path / "docs" / "pictures").mkdir(parents=True)
     reproduce.main(["--page", "docs/reproduction.md"])
     page = (tmp_path / "docs" / "reproduction.md").read_text()
-    assert read_rows(page) == table and "## Ahead\n" in page
+    assert read_rows(page) == table and page.count("## ") == 1 and "## Ahead\n" in page
     assert "![Every run of each cell](pictures/reproduction_ahead.png)" in page
     assert (tmp_path / "docs" / "pictures" / "reproduction_ahead.png").read_bytes()[:4] == b"\x89PNG"
 
