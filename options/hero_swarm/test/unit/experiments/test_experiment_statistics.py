@@ -117,7 +117,7 @@ def test_runs_are_drawn_beside_their_interval_or_counted_as_not_reached():
 def test_medians_over_time_lie_in_the_middle_half_up_to_the_last_run():
     times_s, ended = np.arange(4.0), math.nan
     first = np.array([(1.0, 2.0, 3.0, 4.0, 5.0), (2.0, 4.0, 6.0, 8.0, 10.0), (1.0, 1.0, 1.0, 3.0, ended), (ended,) * 5])
-    (axes,) = draw_over_time("order", "m", ["a", "b"], times_s, [first, np.full((4, 2), 0.5)]).axes
+    (axes,) = draw_over_time("order (m)", ["a", "b"], times_s, [first, np.full((4, 2), 0.5)]).axes
     assert [line.get_xydata().tolist() for line in axes.lines] == [
         [[0.0, 3.0], [1.0, 6.0], [2.0, 1.0]],
         [[0.0, 0.5], [1.0, 0.5], [2.0, 0.5], [3.0, 0.5]],
@@ -126,5 +126,5 @@ def test_medians_over_time_lie_in_the_middle_half_up_to_the_last_run():
     assert {(0.0, 2.0), (0.0, 4.0), (1.0, 4.0), (1.0, 8.0), (2.0, 1.0), (2.0, 1.5)} == middle_half
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_ylim()[0]) == ("time (s)", "order (m)", 0.0)
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["a", "b"]
-    (below,) = draw_over_time("order", "", ["a"], times_s, [first - 5.0]).axes
+    (below,) = draw_over_time("order", ["a"], times_s, [first - 5.0]).axes
     assert below.get_ylabel() == "order" and below.get_ylim()[0] < -4.0

@@ -37,17 +37,21 @@ def draw_all(report: Report, results: Results) -> Dict[str, Figure]:
     figures: Dict[str, Figure] = {}
     for metric in report.experiment.metrics:
         summaries = report.summaries[metric.name]
-        unit = UNITS.get(metric.source, "") if metric.bound is None else "s"
+        label = _label(metric.name, UNITS.get(metric.source, "") if metric.bound is None else "s")
         cells, values, intervals = zip(*summaries)
-        figures[metric.name] = draw_runs(unit, [cell.label for cell in cells], values, intervals)
+        figures[metric.name] = draw_runs(label, [cell.label for cell in cells], values, intervals)
         if _spans_a_map(summaries):
-            figures[metric.name + MAP] = draw_map(metric.name, unit, summaries)
+            figures[metric.name + MAP] = draw_map(label, summaries)
     for name, series in results.series.items():
         own = {label: runs.T for label, runs in zip(results.labels, series) if not np.isnan(runs).all()}
         if own:
-            unit = UNITS.get(name, "")
-            figures[name + OVER_TIME] = draw_over_time(name, unit, list(own), results.times_s, list(own.values()))
+            label = _label(name, UNITS.get(name, ""))
+            figures[name + OVER_TIME] = draw_over_time(label, list(own), results.times_s, list(own.values()))
     return figures
+
+
+def _label(metric: str, unit: str) -> str:
+    return f"{metric} ({unit})" if unit else metric
 
 
 def _spans_a_map(summaries: Sequence[Summary]) -> bool:
@@ -59,7 +63,7 @@ def _spans_a_map(summaries: Sequence[Summary]) -> bool:
     return min(counts) > 1 and len(summaries) == counts[0] * counts[1]
 
 
-def draw_map(metric: str, unit: str, summaries: Sequence[Summary]) -> Figure:
+def draw_map(metric: str, summaries: Sequence[Summary]) -> Figure:
     """Draw the medians of all combinations of two numbers as colors with their values."""
     figure, axes = _begin(4.5)
     (first, rows), (second, columns) = (
@@ -79,7 +83,7 @@ def draw_map(metric: str, unit: str, summaries: Sequence[Summary]) -> Figure:
         axis.set_ticks(range(len(values)))
         axis.set_ticklabels(["%g" % value for value in values])
         axis.set_label_text(name)
-    figure.colorbar(image, label="median %s%s" % (metric, " (%s)" % unit if unit else ""))
+    figure.colorbar(image, label=f"median {metric}")
     return figure
 
 
@@ -92,7 +96,7 @@ def _begin(height_in: float) -> Tuple[Figure, Any]:
 
 
 def draw_runs(
-    unit: str,
+    metric: str,
     labels: Sequence[str],
     values: Sequence[Sequence[float]],
     intervals: Sequence[Interval],
@@ -117,12 +121,12 @@ def draw_runs(
     axes.set_yticks(range(len(labels)))
     axes.set_yticklabels(labels, fontsize=8)
     axes.set_ylim(len(labels) - 0.4, -0.6)
-    axes.set_xlabel(unit, fontsize=9)
+    axes.set_xlabel(metric, fontsize=9)
     return figure
 
 
 def draw_over_time(
-    metric: str, unit: str, labels: Sequence[str], times_s: np.ndarray, values: Sequence[np.ndarray]
+    metric: str, labels: Sequence[str], times_s: np.ndarray, values: Sequence[np.ndarray]
 ) -> Figure:
     """Draw the median and the middle half of each cell's runs, values (T, runs), nan after a run's end."""
     figure, axes = _begin(3.6)
@@ -133,7 +137,7 @@ def draw_over_time(
         axes.plot(times_s[has_runs], middle, label=label, **style)
         axes.fill_between(times_s[has_runs], low, high, color=style["color"], alpha=0.2, linewidth=0.0)
     axes.set_xlabel("time (s)", fontsize=9)
-    axes.set_ylabel("%s%s" % (metric, " (%s)" % unit if unit else ""), fontsize=9)
+    axes.set_ylabel(metric, fontsize=9)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))  # beside the lines
     return figure
