@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """A stop of all robots while a driver hangs, while the ROS master hangs, and what people see of it."""
 
-import json
 import math
 import signal
 import socket
@@ -18,11 +17,11 @@ from sensor_msgs.msg import Joy
 
 from hero_client.ros import Drivers
 from hero_client.swarm import Swarm
-from hero_msgs.msg import Robot, RobotArray
+from hero_msgs.msg import RobotArray
 from hero_node import NodeError
 from hero_node.ros.ros_node import start_ros_node
 from hero_test.processes import ExampleProgram, find_pid, find_program, suspended
-from hero_test.program_terminal import ProgramTerminal, run_fleet
+from hero_test.program_terminal import ProgramTerminal
 from hero_test.waiting import wait_for
 
 AT_REST = ("info", "stopped, all wheels at rest", True)
@@ -35,22 +34,14 @@ class Reports:
 
     def __init__(self, driver):
         self.newest = None
-        self.forged = 0
         self._subscriber = rospy.Subscriber(driver + "/robots", RobotArray, self._receive, tcp_nodelay=True)
 
     def _receive(self, report):
-        if report._connection_header["callerid"] == rospy.get_name():
-            self.forged += 1
-        else:
-            self.newest = report
+        self.newest = report
 
     @property
     def requests(self):
         return int(self.newest.listening.rpartition(":")[2])
-
-
-def refuse_constant(name):
-    raise AssertionError("%s is not JSON" % name)
 
 
 def connect_without_header():
@@ -94,11 +85,6 @@ class StopRequestTest(unittest.TestCase):
         self.addCleanup(table.close)
         table.wait_for(b"2 of 2 robots ready")
         return table
-
-    def test_a_stop_of_all_is_told_as_at_rest(self):
-        self.drivers.request_stop(True)
-        wait_for(lambda: self.drivers.stop_status() == AT_REST, self.drivers.stop_status)
-        self.wait_for_report(True)
 
     def test_a_hung_driver_is_named_and_stopped_when_it_goes_on(self):
         with suspended(self.hung_pid):
@@ -211,22 +197,6 @@ class StopRequestTest(unittest.TestCase):
             wait_for(lambda: swarm.release_stop() == RELEASED, swarm.drivers.stop_status)
             self.wait_for_report(False)
 
-    def test_lists_that_are_not_published_by_a_driver_are_ignored(self):
-        listener = Drivers()
-        self.addCleanup(listener.close)
-        wait_for(lambda: listener.read() and listener.is_settled, "the drivers")
-        forged = RobotArray(robots=[Robot(id=9, namespace="/hero_9", state=Robot.READY)])
-        for topic in ("/hero_driver/robots", "/hero_9/robots"):
-            publisher = rospy.Publisher(topic, RobotArray, queue_size=1)
-            self.addCleanup(publisher.unregister)
-            reports = self.healthy if topic == "/hero_driver/robots" else Reports("/hero_9")
-            wait_for(publisher.get_num_connections, "somebody who listens to the forger")
-            for count in range(1, 20):
-                publisher.publish(forged)
-                wait_for(lambda reports=reports, count=count: reports.forged == count, "a forged list")
-                self.assertEqual([robot.id for robot in listener.read().robots], [0, 1])
-        self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
-
     def test_drivers_are_unknown_until_the_master_has_answered(self):
         known = set(threading.enumerate())
         settled = []
@@ -243,12 +213,6 @@ class StopRequestTest(unittest.TestCase):
         self.assertFalse(settled[1])
         wait_for(lambda: listener.is_settled, "reports of both drivers")
         self.assertEqual(listener.names(), ["/hero_driver", "/hero_driver_b"])
-
-    def test_numbers_that_are_none_leave_the_json_valid(self):
-        code, output, errors = run_fleet("--once", "--json")
-        self.assertEqual(code, 0, errors)
-        robots = json.loads(output, parse_constant=refuse_constant)["robots"]
-        self.assertEqual([robot["bytes_per_s"] for robot in robots], [88.0, 0.0])
 
 
 if __name__ == "__main__":

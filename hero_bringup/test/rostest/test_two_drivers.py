@@ -14,7 +14,7 @@ from hero_client.ros import Drivers
 from hero_client.swarm import Swarm
 from hero_monitor.background import Background
 from hero_monitor.control.drive_requests import DriveRequests
-from hero_test.processes import find_pid, suspended
+from hero_test.processes import find_pid
 from hero_test.program_terminal import ProgramTerminal, run_fleet
 from hero_test.waiting import wait_for
 from hero_test.watches.swarm_watch import SwarmWatch
@@ -115,16 +115,7 @@ class TwoDriversTest(unittest.TestCase):
         commander.close()
         self.release()
 
-    def test_5_a_driver_that_hangs_keeps_no_other_from_its_stop(self):
-        self.wait_until_all_move()
-        with suspended(find_pid("/hero_driver_b")):
-            self.drivers.request_stop(True)
-            self.watch.wait_until_stopped_despite(self.drive, 0, 1)
-            self.wait_for_status("error", "NOT STOPPED: driver hero_driver_b does not answer", False)
-        self.wait_for_status("info", "stopped, all wheels at rest", True)
-        self.release()
-
-    def test_6_a_driver_that_died_without_a_word_is_not_waited_for(self):
+    def test_5_a_driver_that_died_without_a_word_is_not_waited_for(self):
         os.kill(find_pid("/hero_driver_b"), signal.SIGKILL)
         self.assertEqual([robot["id"] for robot in read_fleet()["robots"]], [0, 1])
         # Who listened before forgets its robots.

@@ -191,18 +191,6 @@ def test_an_ordinary_stop_ends_a_tuning_that_the_driver_knows_of(controller, nam
         assert not robot.bridge.commands.tunes(clock.now_s)
 
 
-def test_a_command_of_before_the_robot_was_there_does_not_move_it():
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        robot.publish_velocity(0.1, is_old=True)
-        clock.run(1.0)
-        assert robot.taken == []
-        assert "/hero_1/velocity_controller/cmd_vel was refused" in robot.lines[0]
-        robot.publish_velocity(0.0, is_old=True)
-        clock.run(1.0)
-        assert [speed for _, speed in robot.list_speeds()] == [0.0, 0.0]
-
-
 def test_after_a_pause_of_the_driver_a_command_that_waited_is_forgotten():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock, network_s=0.3, has_readings=True)
@@ -211,15 +199,6 @@ def test_after_a_pause_of_the_driver_a_command_that_waited_is_forgotten():
         robot.bridge.commands.queue.discard_motion(clock.now_s)
         clock.run(2.0)
     assert [speed for _, speed in robot.list_speeds()] == [0.05]
-
-
-def test_a_tuning_is_over_when_the_robot_has_not_logged_for_a_second():
-    with Clock().is_the_drivers() as clock:
-        commands = CommandedRobot(clock).bridge.commands
-        commands.note_tuning(True)
-        assert commands.tunes(clock.now_s + 0.99) and not commands.tunes(clock.now_s + 1.0)
-        commands.note_tuning(False)
-        assert not commands.tunes(clock.now_s)
 
 
 @pytest.mark.parametrize(("turn_s", "warnings"), [(0.2, 1), (0.984375, 1), (1.0, 0), (1.5, 0)])
@@ -231,30 +210,6 @@ def test_programs_take_turns_if_one_commands_again_within_a_second(turn_s, warni
             clock.run(turn_s)
     expected = "hero_1 is commanded by /first and /second at once and obeys the newest command: end one of them"
     assert robot.lines == [expected] * warnings
-
-
-@pytest.mark.parametrize(
-    ("gone_s", "other", "stops"),
-    [(0.5, None, True), (3.6, None, True), (4.1, None, False), (0.5, VELOCITY, False), (0.5, POSITION, True)],
-)
-def test_a_robot_is_stopped_when_the_program_that_moves_it_ends(gone_s, other, stops):
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        commands = robot.bridge.commands
-        commands._loop, stopped = clock, []
-        robot.stop_robot = stopped.append
-        robot.publish_velocity(0.1)
-        clock.run(gone_s)
-        commands._lose_sender(VELOCITY, "/cmd_vel")
-        clock.run(0.3)
-        assert stopped == [], "another topic's publisher"
-        commands._lose_sender(VELOCITY, VELOCITY)
-        if other is not None:
-            robot.publish_velocity(0.1, name=other, node="/other")
-        clock.run(0.24)
-        assert stopped == []
-        clock.run(0.02)
-        assert stopped == [robot.peer] * stops
 
 
 def test_motion_counts_until_the_firmware_has_ended_it():

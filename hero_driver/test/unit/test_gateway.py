@@ -120,14 +120,6 @@ def test_parameters_limit_the_topics_and_the_packets_of_a_robot(monkeypatch):
         assert bad_packets() == expected
 
 
-def test_a_robot_that_connects_again_is_found_by_its_new_link(driver):
-    old = driver.join(HOST)
-    driver.now_s += 10.0
-    new = driver.join(HOST)
-    assert old.closed
-    assert driver.find_link() is new
-
-
 def test_a_robot_that_was_just_heard_keeps_its_id_from_another_host(driver):
     first = driver.join(HOST)
     driver.now_s += 60.0
@@ -142,20 +134,3 @@ def test_a_robot_that_was_just_heard_keeps_its_id_from_another_host(driver):
     driver.receive(first)
     driver.join(OTHER_HOST)
     assert driver.keys == keys, "a duplicate that keeps dialling is one line"
-
-
-def test_a_robot_that_fell_silent_loses_its_id_to_another_host(driver):
-    first = driver.join(HOST)
-    driver.now_s += 60.0
-    second = driver.join(OTHER_HOST)
-    assert first.closed
-    assert driver.find_link() is second
-
-
-def test_a_report_counts_what_a_robots_link_brought(driver):
-    driver.join(HOST)
-    driver.join(OTHER_HOST)
-    (status,) = driver.gateway.list_robots(driver.now_s)
-    assert status.message.address == "10.42.0.17:50000"
-    assert status.packets == len(PUBLISHED)
-    assert [address for address, _, _ in status.duplicates] == ["10.42.0.18:50000"]

@@ -15,7 +15,7 @@ from hero_test.nonempty import nonempty
 
 pytest.importorskip("rospy", reason="the scripts' robots are on ROS")
 
-WORLDS = 12
+WORLDS = 4
 
 
 def step_all(swarm, step):
@@ -28,7 +28,7 @@ def step_all(swarm, step):
     return step_each
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_move_drives_forward_and_turns_left(seed):
     with StepSwarm(1, seed=seed) as swarm:
         before = swarm[0].true_pose
@@ -49,7 +49,7 @@ def test_read_sensors_turns_and_prints_what_is_seen(capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_square_is_closed_and_the_light_blinks(seed):
     with StepSwarm(1, seed=seed) as swarm:
         log = swarm.log()
@@ -71,16 +71,6 @@ def test_avoid_keeps_driving_and_touches_nothing_that_it_sees():
     for path in nonempty(paths):
         assert true_paths.list_touches(path, load_arena("obstacles")) == []
         assert true_paths.measure_lengths(path).min() > 1.0
-
-
-@pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_avoid_turns_away_from_the_side_on_which_something_is(tmp_path, sign):
-    arena = tmp_path / "wall.yaml"
-    arena.write_text(f"walls_m: [[[-2, {0.2 * sign}], [2, {0.2 * sign}]]]\nstarts_m_deg: [[0, 0, {30.0 * sign}]]\n")
-    with StepSwarm(1, arena=str(arena), worlds=WORLDS) as swarm:
-        paths = true_paths.run(swarm, step_all(swarm, avoid.step), 6.0)
-    for path in nonempty(paths):
-        assert (path[-1, 0, 2] - path[0, 0, 2]) * sign < -0.3
 
 
 @pytest.mark.slow

@@ -105,29 +105,6 @@ def test_a_robot_without_calibrated_centers_creeps_until_they_are_set():
     assert world.speeds_m_s[0] == pytest.approx([0.0, 0.0], abs=1e-3)
 
 
-@pytest.mark.slow
-def test_the_proportional_gain_alone_leaves_the_error_of_control_theory():
-    driver = start("--error", "dead_zone_us=0")
-    for gain in (600.0, 1200.0):
-        set_velocity_gains(driver, gain, 0.0, 0.0)
-        measure_mean_speed(driver)
-        loop = gain * 0.25 / 220
-        # The filter and the whole ticks behind which the controller sees the speed cost some per cent.
-        assert measure_mean_speed(driver) == pytest.approx([0.1 * loop / (1.0 + loop)] * 2, rel=0.08)
-
-
-@pytest.mark.slow
-def test_the_integral_gain_closes_the_gap_the_sooner_the_larger_it_is():
-    distances_m = []
-    for integral in (1000.0, 2300.0):
-        driver = start()
-        set_velocity_gains(driver, 1200.0, integral, 0.1)
-        distances_m.append(measure_mean_speed(driver, 1)[0])
-        measure_mean_speed(driver, 6)
-        assert measure_mean_speed(driver)[0] == pytest.approx(0.1, abs=0.006)
-    assert distances_m[1] > 1.15 * distances_m[0]
-
-
 def test_each_wheel_has_gains_of_its_own():
     driver = start()
     driver.send(0, RECEIVED["velocity_controller/pid_parameters"], struct.pack("<6f", 1200, 2300, 0.1, 1e-3, 0, 0))

@@ -120,7 +120,7 @@ def test_motion_pulses_and_a_lost_connection_do_not_end_self_tuning(controller):
 def test_a_zero_behind_50_ms_of_packets_in_one_send_ends_it(controller, filler, count, length):
     data = end_with([controller], filler, count)
     assert len(data) == length
-    assert count_ended(controller, data, 51) == 51
+    assert count_ended(controller, data, 17) == 17
 
 
 @pytest.mark.slow

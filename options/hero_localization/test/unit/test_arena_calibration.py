@@ -168,12 +168,6 @@ def test_places_by_a_tape_that_is_wrong_are_refused_by_the_tags_size(scale):
         calibrate_arena(LENS, see_all(), wrong)
 
 
-def test_places_in_millimeters_are_refused_as_such():
-    wrong = {tag_id: Pose(1e3 * pose.x_m, 1e3 * pose.y_m, 0.0) for tag_id, pose in REFERENCES.items()}
-    with pytest.raises(CalibrationError, match="lie 2400 m apart: write their places in m, not in mm"):
-        calibrate_arena(LENS, see_all(), wrong)
-
-
 @pytest.mark.parametrize("count", [4, 6])
 def test_y_the_wrong_way_is_named(count):
     ids = tuple(PLACES)[:count]
@@ -222,12 +216,6 @@ def test_reference_tags_that_are_not_seen_are_named():
 def test_too_few_reference_tags_are_refused():
     with pytest.raises(CalibrationError, match="sees 3 of 6 reference tags, not 103, 104, 105"):
         calibrate_arena(LENS, [*see_all(ids=(100, 101, 102)), see(7, Pose(0.0, 0.0, 0.0))], REFERENCES)
-
-
-def test_reference_tags_in_a_row_are_refused():
-    row = {tag_id: Pose(0.3 * tag_id, 0.1, 0.0) for tag_id in range(4)}
-    with pytest.raises(CalibrationError, match="in a row"):
-        calibrate_arena(LENS, [see(tag_id, pose) for tag_id, pose in row.items()], row)
 
 
 def test_average_leaves_out_tags_that_are_seen_rarely_or_twice():

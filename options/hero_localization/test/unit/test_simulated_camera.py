@@ -126,15 +126,6 @@ def test_floor_tags_lie_on_the_floor_and_robots_hide_them():
     assert ((read_cells(above, SMALL.geometry, floor_tag, (0.0, 0.0, 0.0)) > 120) != cells).any()
 
 
-def test_robot_without_a_tag_shows_only_its_body():
-    assert shade_at(render([(0.2, 0.1, 0.0)], (None,)), SMALL.geometry, (0.2, 0.1, 0.076)) < 60
-
-
-def test_walls_are_darker_than_the_floor():
-    image = render(np.empty((0, 3)), ())
-    assert shade_at(image, SMALL.geometry, (1.2, 0.0, 0.0)) < 90 < shade_at(image, SMALL.geometry, (1.0, 0.0, 0.0))
-
-
 def test_moving_robot_smears_along_its_motion_only():
     still, smeared = (
         render([(0.0, 0.0, 0.0)], options=SMALL._replace(exposure_s=0.08), speeds=np.array([(speed, 0.0)]))
@@ -146,25 +137,6 @@ def test_moving_robot_smears_along_its_motion_only():
     (still_down, still_across), (smeared_down, smeared_across) = steepest
     assert smeared_across < 0.8 * still_across
     assert smeared_down > 0.85 * still_down
-
-
-@pytest.mark.slow
-def test_blurred_motion_is_centered_on_the_pose_given():
-    poses, options = [(0.1, 0.1, 0.7)], SMALL._replace(exposure_s=0.08)
-    weights = []
-    for speed in (0.0, 0.2):
-        seen = render(poses, options=options, speeds=np.array([(speed, 0.0)])).astype(float)
-        empty = render(np.empty((0, 3)), (), options).astype(float)
-        # The body itself is not smeared: what the top adds to it is compared.
-        difference = (seen - empty)[120:210, 280:390].clip(0.0)
-        rows, columns = np.indices(difference.shape)
-        weights.append(np.array(((rows * difference).sum(), (columns * difference).sum())) / difference.sum())
-    assert np.abs(weights[0] - weights[1]).max() < 0.35
-
-
-def test_light_falls_off_by_the_share_given():
-    image = render(np.empty((0, 3)), (), SMALL._replace(light_gradient=0.5))
-    assert image[-10:, -10:].mean() / image[:10, :10].mean() == pytest.approx(0.5, abs=0.05)
 
 
 def test_noise_has_the_deviation_given_and_differs_between_frames():

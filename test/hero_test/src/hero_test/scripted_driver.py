@@ -1,8 +1,7 @@
 """A driver without connections: takes stop requests, and reports of its robots what a test tells it to.
 
 ~ids lists the robots, ~gone those that have not returned, as JSON; ~twin_of is an id that a second robot wants. ~behave
-(std_msgs/String) takes JSON: which robots move though stopped, and whether the others come to rest at all. ~rate is
-that of each robot, a word for a float.
+(std_msgs/String) takes JSON: which robots move though stopped, and whether the others come to rest at all.
 The port on which it says that it listens is the number of stop requests so far.
 """
 
@@ -24,7 +23,6 @@ class ScriptedDriver:
     def __init__(self):
         self.ids = json.loads(rospy.get_param("~ids"))
         self.twin_of = rospy.get_param("~twin_of", None)
-        self.rate = float(rospy.get_param("~rate", "88"))
         self.requests = 0
         self.gone = json.loads(rospy.get_param("~gone", "[]"))
         self.lock = threading.Lock()
@@ -69,8 +67,7 @@ class ScriptedDriver:
 
     def report(self):
         with self.lock:
-            rates = {"packets_per_s": self.rate, "bytes_per_s": self.rate}
-            make = partial(Robot, since=rospy.Time.now(), firmware="v3.8", **rates)
+            make = partial(Robot, since=rospy.Time.now(), firmware="v3.8", packets_per_s=88.0, bytes_per_s=88.0)
             report = RobotArray(listening="127.0.0.1:%d" % self.requests, stopped=self.stop_time_s is not None)
             report.header.stamp = rospy.Time.now()
             report.stopped_by = self.stopped_by
