@@ -95,7 +95,7 @@ def start_swarms(options, count, servers, environment):
         command = [sys.executable, str(HERE / "emulated_swarm.py"), "--port", str(port)]
         command += ["--first-id", str(first), "--count", str(end - first), "--speed", str(options.speed)]
         seconds = find_settling_s(count) + options.seconds + SETTLE_S
-        command += ["--seconds", str(seconds)] + ["--nagle"] * options.nagle + ["--warn"] * options.warn
+        command += ["--seconds", str(seconds)]
         swarms.append(start(command, environment, stdout=subprocess.PIPE))
     return swarms
 
@@ -131,7 +131,7 @@ def run_once(options, server_command, count, environment) -> Generator[float, No
     with serve(options, server_command, environment) as servers:
         # The probe of the port was a connection too: let the server forget it.
         yield 1.0
-        arguments = ["--count", str(0 if options.unheard else count)]
+        arguments = ["--count", str(count)]
         listener = start([*load, "listen", *arguments], environment, stdout=subprocess.PIPE)
         commander = start([*load, "command", *arguments], environment, stdout=subprocess.PIPE)
         yield SETTLE_S
@@ -291,9 +291,6 @@ def main():
     parser.add_argument("--rounds", type=int, default=1, help="runs of each server, whose median is printed")
     parser.add_argument("--drivers", type=int, default=1, help="servers, each with its share of the robots")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies the rates of the robots")
-    parser.add_argument("--unheard", action="store_true", help="no subscribers or commands, but for /tf")
-    parser.add_argument("--nagle", action="store_true", help="robots' TCP holds small writes back, as HeRo's does")
-    parser.add_argument("--warn", action="store_true", help="each robot sends one warning per second")
     server = parser.add_mutually_exclusive_group()
     server.add_argument("--server-command", default=DRIVER_COMMAND, help="{port} is replaced by the port")
     server.add_argument(

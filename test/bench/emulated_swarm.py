@@ -99,20 +99,18 @@ class Templates:
 class EmulatedRobot:
     """One connection."""
 
-    def __init__(self, number, address, nagle, keeps_times=True):
+    def __init__(self, number, address, keeps_times=True):
         """keeps_times: without it stamps_s and commands_s stay empty."""
         self.number = number
-        self._nagle = nagle
         self._keeps_times = keeps_times
         self.templates = Templates(number)
         self.reader = packets.PacketReader()
         self.socket = socket.create_connection(address)
-        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, not nagle)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, True)
         self.socket.setblocking(False)
         self.synchronized_s = None
         self.closed = False
-        self.bursts = self.lasers = self.stalls = 0
-        self.commands = 0
+        self.bursts = self.commands = 0
         self.stamps_s = []  # when bursts were sent
         self.commands_s = []  # pairs: when a command was sent, when it came
 
@@ -121,22 +119,16 @@ class EmulatedRobot:
         return 0.0 if self.synchronized_s is None else (now_s - self.synchronized_s) / BURST_PERIOD_S
 
     def send(self, data):
-        """Send all of data; a server that does not read is counted and waited for."""
+        """Send all of data; a server that does not read is waited for."""
         view = memoryview(data)
         while view:
             try:
                 view = view[self.socket.send(view) :]
             except BlockingIOError:
-                self.stalls += 1
                 time.sleep(0.001)
             except OSError:
                 self.closed = True
                 return
-
-    def send_burst(self, parts):
-        """Send the packets of a burst: at once, or one by one as the robot does, whose TCP then has its way."""
-        for data in parts if self._nagle else (b"".join(parts),):
-            self.send(data)
 
     def receive(self, now_s):
         """Take what the server sends; return whether the handshake was completed by it."""
@@ -163,13 +155,10 @@ class EmulatedRobot:
         return is_new
 
 
-def run(address, count, seconds, speed, first=0, nagle=False, keeps_times=True, is_ended=lambda: False, warns=False):
-    """Return the result of count robots for seconds after all have joined, or until is_ended().
-
-    warns: the log line that each robot sends every second is a warning.
-    """
+def run(address, count, seconds, speed, first=0, keeps_times=True, is_ended=lambda: False):
+    """Return the result of count robots for seconds after all have joined, or until is_ended()."""
     started_s = time.monotonic()
-    robots = [EmulatedRobot(first + index, address, nagle, keeps_times) for index in range(count)]
+    robots = [EmulatedRobot(first + index, address, keeps_times) for index in range(count)]
     selector = selectors.DefaultSelector()
     for robot in robots:
         selector.register(robot.socket, selectors.EVENT_READ, robot)
@@ -204,21 +193,18 @@ def run(address, count, seconds, speed, first=0, nagle=False, keeps_times=True, 
             time_ns = time.time_ns()
             stamp = struct.pack("<II", *divmod(time_ns, 10**9))
             if kind == "burst":
-                robot.send_burst(robot.templates.make_burst(robot.bursts, stamp))
+                robot.send(b"".join(robot.templates.make_burst(robot.bursts, stamp)))
                 robot.bursts += 1
                 if keeps_times:
                     robot.stamps_s.append(time_ns / 1e9)
                 period_s = BURST_PERIOD_S
             elif kind == "laser":
                 robot.send(robot.templates.make_laser(stamp))
-                robot.lasers += 1
                 period_s = LASER_PERIOD_S
             elif kind == "log":
                 line = "\x1b[96m[/hero_%d] Conected at time %d\x1b[0m" % (robot.number, now_s * 1000 % 10**9)
-                log = payloads.Log(payloads.LOG_INFO, line)
-                if warns:
-                    log = payloads.Log(payloads.LOG_WARN, "warning %d" % now_s)
-                robot.send(packets.encode_packet(packets.ID_LOG, payloads.encode_log(log)))
+                log = payloads.encode_log(payloads.Log(payloads.LOG_INFO, line))
+                robot.send(packets.encode_packet(packets.ID_LOG, log))
                 period_s = LOG_PERIOD_S
             else:
                 robot.send(packets.encode_packet(packets.ID_TIME, bytes(8)))
@@ -233,8 +219,6 @@ def run(address, count, seconds, speed, first=0, nagle=False, keeps_times=True, 
         "bursts_due": sum(robot.count_due(now_s) * speed for robot in robots),
         "thrown_out": sum(robot.closed for robot in robots),
         "transforms": 5 * sum(robot.bursts for robot in robots),
-        "lasers": sum(robot.lasers for robot in robots),
-        "stalls": sum(robot.stalls for robot in robots),
         "commands": sum(robot.commands for robot in robots),
         "odom_stamps_s": [stamp_s for robot in robots for stamp_s in robot.stamps_s],
         "commands_s": [pair for robot in robots for pair in robot.commands_s],
@@ -250,9 +234,7 @@ def main():
     parser.add_argument("--first-id", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=10.0, help="time after the last robot has joined")
     parser.add_argument("--speed", type=float, default=1.0, help="multiplies all rates")
-    parser.add_argument("--nagle", action="store_true", help="packets one by one and TCP without NODELAY")
     parser.add_argument("--counts", action="store_true", help="keep no times, for runs of hours")
-    parser.add_argument("--warn", action="store_true", help="each robot sends one warning per second")
     options = parser.parse_args()
     ended = threading.Event()
     signal.signal(signal.SIGINT, lambda *_: ended.set())
@@ -263,10 +245,8 @@ def main():
         options.seconds,
         options.speed,
         options.first_id,
-        options.nagle,
         not options.counts,
         ended.is_set,
-        options.warn,
     )
     print(json.dumps(result))
 
