@@ -1,9 +1,9 @@
 """Loads a rosserial TCP server with an emulated swarm and prints one table.
 
-Starts its own ROS master and the server (with --port it takes those that run), listeners and commanders, each in its
-own process; CPU time comes from the operating system's accounting (/proc). With --against, the driver and the one of
-another workspace are measured at the same time, each with its own master and robots: the speed of a virtual machine
-changes from one run to the next by more than versions differ. Run it with script/bench driver.
+Starts its own ROS master and the server, listeners and commanders, each in its own process; CPU time comes from the
+operating system's accounting (/proc). With --against, the driver and the one of another workspace are measured at the
+same time, each with its own master and robots: the speed of a virtual machine changes from one run to the next by more
+than versions differ. Run it with script/bench driver.
 """
 
 import argparse
@@ -17,7 +17,6 @@ import time
 from pathlib import Path
 from typing import Any, Dict, Generator, List
 
-import rosgraph
 from measuring import (
     find_environment,
     find_tree,
@@ -34,7 +33,6 @@ from measuring import (
 
 from hero_test.processes import find_free_port
 
-LISTENING = "0A"  # state of a socket in /proc/net/tcp, TCP_LISTEN of the kernel
 HERE = Path(__file__).resolve().parent
 SETTLE_S = 3.0
 
@@ -46,29 +44,9 @@ def find_settling_s(count):
     return SETTLE_S + 0.05 * count
 
 
-def find_listener(port):
-    """Return the process that listens on a TCP port of this machine."""
-    sockets = set()
-    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
-        with contextlib.suppress(FileNotFoundError):
-            for line in Path(table).read_text().splitlines()[1:]:
-                fields = line.split()
-                if fields[3] == LISTENING and int(fields[1].rpartition(":")[2], 16) == port:
-                    sockets.add(f"socket:[{fields[9]}]")
-    for entry in Path("/proc").iterdir():
-        # A process that ends, or that of another user, shows no files.
-        with contextlib.suppress(OSError):
-            if entry.name.isdigit() and any(os.readlink(file) in sockets for file in (entry / "fd").iterdir()):
-                return int(entry.name)
-    raise SystemExit("bench: no process that may be looked at listens on port %d; start it, as the same user" % port)
-
-
 @contextlib.contextmanager
 def serve(options, server_command, environment):
-    """Give pairs of process id and port of the servers, which listen; those started here end afterwards."""
-    if options.port:
-        yield [(find_listener(options.port), options.port)]
-        return
+    """Give pairs of process id and port of the servers, which listen and end afterwards."""
     servers = []
     try:
         for index in range(options.drivers):
@@ -244,7 +222,7 @@ def measure_all(options, commands):
     """Return the medians for each number of robots and server."""
     results = []
     with contextlib.ExitStack() as stack:
-        environments = {name: stack.enter_context(use_master(options)) for name in commands}
+        environments = {name: stack.enter_context(start_master()) for name in commands}
         for count in options.count:
             runs: Dict[str, List[dict]] = {name: [] for name in commands}
             for _ in range(options.rounds):
@@ -256,31 +234,6 @@ def measure_all(options, commands):
                     print_run(name, runs[name])
             results += [{"server": name, **take_medians(runs[name])} for name in commands]
     return results
-
-
-@contextlib.contextmanager
-def use_master(options):
-    """Give the environment in which the ROS master is found: with --port the one that runs, else one for this only."""
-    if options.port:
-        refuse_robots()
-        yield dict(os.environ)
-        return
-    with start_master() as environment:
-        yield environment
-
-
-def refuse_robots():
-    """End where robots are there already: the commands of the benchmark would drive them."""
-    try:
-        topics = rosgraph.Master("/driver_bench").getPublishedTopics("/")
-    except OSError as error:
-        raise SystemExit(f"bench: no ROS master at {rosgraph.get_master_uri()} ({error})") from error
-    robots = [name for name, _ in topics if name.endswith("/odom")]
-    if robots:
-        raise SystemExit(
-            "bench: there are robots already (%s), which the commands of the benchmark would drive; switch them off,"
-            " wait until the server has taken their topics down, or start it again" % ", ".join(sorted(robots)[:5])
-        )
 
 
 def main():
@@ -299,14 +252,7 @@ def main():
         metavar="DIR",
         help="measure the driver of the workspace DIR, or of the checkout DIR, at the same time as this one",
     )
-    server.add_argument(
-        "--port",
-        type=int,
-        help="a server that runs on this machine, under the ROS master of ROS_MASTER_URI, and has no robots yet",
-    )
     options = parser.parse_args()
-    if options.port and options.drivers != 1:
-        parser.error("--drivers %d: --port measures the one server that runs there" % options.drivers)
     commands = {"": options.server_command}
     if options.against:
         # Both are started in the same way.
