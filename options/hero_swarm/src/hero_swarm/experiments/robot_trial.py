@@ -23,6 +23,9 @@ from .errors import report_place
 PERIOD_S = 0.05
 """Time between two steps of a StartDrive."""
 
+MAX_GAP_S = 2.0
+"""Without poses robots wait for so long; a busy PC pauses for half a second now and then, which ended each such trial."""
+
 _REST_STEPS = 10
 """Motors follow late: robots have arrived when all were there for this many steps."""
 
@@ -92,7 +95,7 @@ class RobotTrial:
         self._samples: List[np.ndarray] = []
         self._kept: Dict[str, Any] = {}
         self._last: Optional[Tuple[float, np.ndarray]] = None
-        self._reached = False
+        self._reached, self._known_s = False, 0.0
 
     @property
     def rate_hz(self) -> float:
@@ -104,13 +107,18 @@ class RobotTrial:
     ) -> Optional[Tuple[np.ndarray, np.ndarray]]:
         """Return the speeds of all robots, m/s and rad/s (N,), at poses (N, 3); None: the trial has ended.
 
-        A robot without a pose, NaN, or an object of the arena without one ends the trial with a remark.
+        While a robot has no pose, NaN, all robots wait: for MAX_GAP_S, then the trial ends with a remark, as it does for
+        an object of the arena without one.
         Raises: ExperimentError for whatever the behavior raises.
         """
         lost = [name for name, pose in zip(self._names, poses) if not np.isfinite(pose).all()]
+        if lost and time_s < self._known_s + MAX_GAP_S:
+            self.lateness.step(time_s)
+            return np.zeros(len(poses)), np.zeros(len(poses))
         if lost:
-            self.remark = f"no pose of {', '.join(lost)} at {time_s:.1f} s"
+            self.remark = f"no pose of {', '.join(lost)} for {MAX_GAP_S:g} s at {time_s:.1f} s"
             return None
+        self._known_s = time_s
         if len(things.radii_m) < len(self._arena.objects):
             self.remark = "poses of %d of the arena's %d objects" % (len(things.radii_m), len(self._arena.objects))
             return None

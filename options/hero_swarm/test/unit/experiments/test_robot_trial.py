@@ -26,18 +26,20 @@ STARTS = np.array([(0.0, 0.0, 0.0), (0.6, 0.0, 2.0), (0.0, 0.6, -1.0)])
 
 
 @pytest.mark.slow
-def drive(text=FILE, lost_s=math.inf):
-    """Return the trial, when it ended, and the poses then; robot 1 has no pose from lost_s on."""
+def drive(text=FILE, lost_s=math.inf, found_s=math.inf):
+    """Return the trial, when it ended, and the poses then; robot 1 has no pose from lost_s to found_s."""
     experiment = parse_experiment(text, "e.yaml")
     names = ["hero_%d" % number for number in range(3)]
     trial = RobotTrial(set_up(experiment, experiment.cells[0]), 1, names, SafetyFilter(ROBOTS))
     rows = RobotRows(place_worlds(OPEN, STARTS[None], [1], 1.0))
     while True:
         time_s, poses = rows.now_ms / 1000.0, rows.world.poses.copy()
-        poses[1] += math.nan if time_s >= lost_s else 0.0
+        is_lost = lost_s <= time_s < found_s
+        poses[1] += math.nan if is_lost else 0.0
         speeds = trial.step(time_s, poses, np.zeros(3))
         if speeds is None:
             return trial, time_s, poses
+        assert not (is_lost and np.any(speeds)), "all wait"
         rows.send_velocity(np.arange(3), *speeds)
         rows.advance(rows.now_ms + round(1000.0 / trial.rate_hz))
 
@@ -72,8 +74,14 @@ def test_a_trial_ends_when_its_condition_holds():
 @pytest.mark.slow
 def test_a_lost_pose_ends_the_trial_with_a_remark():
     trial, end_s, _ = drive(lost_s=2.5)
-    assert trial.remark == "no pose of hero_1 at 2.5 s" and end_s == pytest.approx(2.5)
+    assert trial.remark == "no pose of hero_1 for 2 s at 4.5 s" and end_s == pytest.approx(4.5, abs=0.06)
     assert trial.list_values()[1] == math.inf
+
+
+def test_robots_wait_for_a_pose_and_the_trial_goes_on():
+    trial, end_s, poses = drive(lost_s=2.5, found_s=4.4)
+    assert end_s == pytest.approx(12.0) and trial.remark == "" and not np.isnan(trial.list_values()).any()
+    assert METRICS["consensus_error"](poses[None], None)[0] < 0.2, "they go on"
 
 
 def test_a_trial_that_never_began_has_no_values():
