@@ -188,10 +188,10 @@ class TagSearch:
     ) -> None:
         """Search windows for a tag that was missed for this long: around places, seen so many seconds ago."""
         for index in self._choose_detectors(tag_id, frame.stamp_s, missed_s):
-            for center, elapsed_s in windows:
+            made = self._detectors[index]
+            for center, elapsed_s in windows[-1:] if isinstance(made, type) else windows:
                 slack_sides = min(SLACK_SIDES_S * max(elapsed_s, 0.0), MAX_SLACK_SIDES)
                 half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
-                made = self._detectors[index]
                 corners = self._seen[tag_id].corners if missed_s <= PATIENCE_S else None
                 detector = made(tag_id, center, side_px, corners) if isinstance(made, type) else made
                 if frame.search_around(detector, tag_id, center, side_px, half_px):
