@@ -114,7 +114,10 @@ override_dh_auto_install:
 \tinstall -D -m 644 debian/hero.default debian/{SERVICES_PACKAGE}/etc/default/hero
 """
 
-INSTALL = "\tDESTDIR=$(CURDIR)/debian/{name} cmake -P obj-$(DEB_HOST_GNU_TYPE)/{ros_name}/cmake_install.cmake\n"
+INSTALL = """\
+\tDESTDIR=$(CURDIR)/debian/{name} cmake -P obj-$(DEB_HOST_GNU_TYPE)/{ros_name}/cmake_install.cmake
+\tinstall -D -m 644 -t debian/{name}/usr/share/doc/{name} src/{ros_name}/CHANGELOG.rst
+"""
 
 
 def make_name(ros_name):
