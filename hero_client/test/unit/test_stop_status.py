@@ -177,6 +177,12 @@ def test_a_driver_that_falls_silent_after_the_stop_is_named():
     assert show(request, [silent(A)], LATE_S).text == "NOT STOPPED: driver hero_driver does not answer"
 
 
+def test_a_driver_that_falls_silent_after_the_release_has_released():
+    request = StopRequest(False, 0.0)
+    update(request, [make_reply(A, stopped=False)], True, SOON_S)
+    assert show(request, [silent(A)], LATE_S) == ("info", "released: robots may move again", True)
+
+
 @pytest.mark.parametrize(("stopped", "is_asked_again"), [(True, True), (False, False)])
 def test_a_stop_is_asked_for_again_and_a_release_is_not(stopped, is_asked_again):
     request = StopRequest(stopped, 0.0)

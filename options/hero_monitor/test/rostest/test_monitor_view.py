@@ -236,6 +236,11 @@ class ViewTest(unittest.TestCase):
         wait_for(lambda: self.page.find("#fleet").is_displayed(), "the whole page")
         self.assertEqual(self.page.find("#stop").rect, place)
 
+    def test_an_empty_page_names_the_address_that_robots_connect_to(self):
+        for listening, shown in (("0.0.0.0:11411", "to this PC, port 11411"), ("10.42.0.1:11411", "to 10.42.0.1:11411")):
+            self.show([], listening=listening)
+            self.page.wait_for_text("#empty", shown)
+
     def test_no_wall_is_drawn_behind_the_class_code_of_the_projector(self):
         walls = [[0, 0, 0, 1800, 20], [0, 1800, 0, 1800, 20], [-900, 900, 1571, 1800, 20], [900, 900, 1571, 1800, 20]]
         lesson = {"code": "123456", "link": "http://lab:8088/", "qr": ["10" * 12] * 25, "drivers": [], "users": []}

@@ -141,8 +141,9 @@ function showHead() {
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";
   document.body.classList.toggle("stale", !state.isFresh);
   const isLocal = /^(127\.|localhost|\[?::1)/.test(listening);
+  const place = listening.replace(/^(0\.0\.0\.0|\[?::\]?):/, "this PC, port ");
   const more = "simulated ones: roslaunch hero_sim hero_sim.launch count:=4";
-  setText(element("empty"), isLocal ? `No robots. Start ${more}` : `No robots. Switch some on: they connect to ${listening}. Or start ${more}`);
+  setText(element("empty"), isLocal ? `No robots. Start ${more}` : `No robots. Switch some on: they connect to ${place}. Or start ${more}`);
   element("empty").hidden = robots.length > 0 || !isLive || Object.keys(state.replay).length > 0;
   showLosses(state, connection, () => connection.send({ do: "dismiss" }));
 }
