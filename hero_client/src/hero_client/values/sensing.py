@@ -124,7 +124,8 @@ def sense_binary(
         sees = np.concatenate([_find_touched(some, sensor) for some in worlds])
     if sensor.error > 0.0 and random is not None:
         sees ^= random.random() < sensor.error
-    return sees & np.isfinite(poses).all(axis=2).ravel()
+        sees &= np.isfinite(poses).all(axis=2).ravel()
+    return sees
 
 
 def _find_touched(poses: np.ndarray, sensor: Binary) -> np.ndarray:

@@ -367,13 +367,10 @@ def list_near(
     for i in range(begin, end):
         for o in range(obstacles.shape[1]):
             to_x, to_y = x[i] - obstacles[START_X, o], y[i] - obstacles[START_Y, o]
-            along_x, along_y, reach_m = (
-                obstacles[ALONG_X, o],
-                obstacles[ALONG_Y, o],
-                radius[i] + obstacles[THICKNESS, o],
-            )
+            along_x, along_y = obstacles[ALONG_X, o], obstacles[ALONG_Y, o]
             along = min(max((to_x * along_x + to_y * along_y) / obstacles[LENGTH2, o], 0.0), 1.0)
-            away_x, away_y, reach_m = to_x - along * along_x, to_y - along * along_y, reach_m + near_m
+            away_x, away_y = to_x - along * along_x, to_y - along * along_y
+            reach_m = radius[i] + obstacles[THICKNESS, o] + near_m
             if away_x * away_x + away_y * away_y < reach_m * reach_m:
                 if found == room:
                     return False
@@ -429,19 +426,8 @@ def move_worlds(
             if gap_m[world] <= fastest_m and reach_m[world] < fastest_m:
                 near_m = SHIFT_M + margin_m + fastest_m
                 if not list_near(
-                    begin,
-                    end,
-                    near_m,
-                    ends[world],
-                    first,
-                    second,
-                    obstacle,
-                    own,
-                    bodies,
-                    obstacles,
-                    spare,
-                    spare_forces,
-                ):
+                    begin, end, near_m, ends[world], first, second, obstacle, own, bodies, obstacles, spare, spare_forces,
+                ):  # fmt: skip
                     return False
                 reach_m[world] = margin_m + fastest_m
             begun[world] += 1

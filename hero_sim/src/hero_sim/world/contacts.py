@@ -13,40 +13,9 @@ import numpy as np
 from . import body_loops
 from .arena import Arena, list_obstacles, measure_clearance, square_length
 from .body_loops import (
-    BODY_ROWS,
-    CASTER_N,
-    CONTACT_ROWS,
-    COSINE,
-    CREEP,
-    FRICTION,
-    GAP,
-    GIVE,
-    GRAVITY_M_S2,
-    HALF,
-    HELD_N,
-    KEPT_ROWS,
-    LEFT,
-    LEVER_1,
-    LEVER_2,
-    MOVED_X,
-    MOVING_ROWS,
-    ON_ROBOT,
-    ON_WALL,
-    PRESSURE,
-    RADIUS,
-    SHARE,
-    SHIFT_M,
-    STEP_X,
-    THETA,
-    THING_CREEP_M_S,
-    TOUCH_M,
-    TOUCHING,
-    TURN,
-    TURNED,
-    WHEEL_N,
-    X,
-    follow_arc,
-    shape_arc,
+    BODY_ROWS, CASTER_N, CONTACT_ROWS, COSINE, CREEP, FRICTION, GAP, GIVE, GRAVITY_M_S2, HALF, HELD_N, KEPT_ROWS, LEFT,
+    LEVER_1, LEVER_2, MOVED_X, MOVING_ROWS, ON_ROBOT, ON_WALL, PRESSURE, RADIUS, SHARE, SHIFT_M, STEP_X, THETA,
+    THING_CREEP_M_S, TOUCH_M, TOUCHING, TURN, TURNED, WHEEL_N, X, follow_arc, shape_arc,
 )  # fmt: skip
 from .compiled import compile_loops
 from .kinematics import find_heading, join_wheels
@@ -121,10 +90,8 @@ class Contacts:
         self._reach_m, self._gap_m = np.full((2, worlds if self._is_compiled else 1), -np.inf)
         if self._is_compiled:
             self._ends = np.zeros((worlds, 2), dtype=np.int64)
-            self._numbers, self._contacts = (
-                np.zeros((worlds, 4, 0), dtype=np.int64),
-                np.zeros((worlds, CONTACT_ROWS, 0)),
-            )
+            self._numbers = np.zeros((worlds, 4, 0), dtype=np.int64)
+            self._contacts = np.zeros((worlds, CONTACT_ROWS, 0))
             self._make_room(_MANY * self._robots)
             self.move(np.empty((0, 2, rows)))  # loads what is compiled now: robots in real time would pause
 
@@ -265,13 +232,8 @@ class Contacts:
         for world, touches in enumerate(things):
             for thing in self._list_things(world):
                 if touches and bodies[LEFT][number] >= bodies[CREEP][number]:
-                    thing.move(
-                        (
-                            float(bodies[MOVED_X][number]),
-                            float(bodies[MOVED_X + 1][number]),
-                            float(bodies[TURNED][number]),
-                        )
-                    )
+                    x_m, y_m, turn_rad = (float(bodies[row][number]) for row in range(MOVED_X, TURNED + 1))
+                    thing.move((x_m, y_m, turn_rad))
                 number += 1
 
     def _list_near(self, before: Optional[_Near]) -> _Near:

@@ -92,7 +92,7 @@ class Sensed:
         worlds, self.count, _ = poses.shape
         self.time_s = time_s
         self.poses = lock(poses.reshape(-1, 3).copy())
-        self.is_known = lock(np.isfinite(self.poses).all(axis=1))
+        self.is_known = lock(np.isfinite(self.poses[:, 0] + self.poses[:, 1] + self.poses[:, 2]))
         self.numbers = lock(np.tile(np.arange(self.count), worlds))
         self._readings = {
             name: type(reading)(*map(lock, reading)) if isinstance(reading, tuple) else lock(reading)
@@ -186,9 +186,10 @@ def sense(
     """
     kept = around.pop("kept", {})
     common = Surroundings(time_s, poses, random, things, **around)
+    names = list(kept or behavior.sensors())  # to look for them again in each step would take long
     readings = {
-        name: read_sensor(name, sensor, common._replace(kept=kept.setdefault(name, {})))
-        for name, sensor in behavior.sensors().items()
+        name: read_sensor(name, getattr(behavior, name), common._replace(kept=kept.setdefault(name, {})))
+        for name in names
     }
     return Sensed(time_s, poses, readings)
 
