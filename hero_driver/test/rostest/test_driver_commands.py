@@ -22,7 +22,6 @@ from hero_test.processes import Program
 from hero_test.waiting import wait_for
 
 VELOCITY = "velocity_controller/cmd_vel"
-POSITION = "position_controller/cmd_vel"
 
 
 class TestDriverCommands(DriverCase):
@@ -52,14 +51,6 @@ class TestDriverCommands(DriverCase):
             for robot in robots:
                 self.wait_stopped(robot)
                 del robot.velocities[:]
-
-    def test_velocity_and_position_control_are_shaped_each_on_its_own(self):
-        robot = self.join(9)
-        publishers = [make_publisher("/hero_9/" + name, Twist) for name in (VELOCITY, POSITION)]
-        for publisher in publishers:
-            publisher.publish(make_command(0.0))
-        for name in (VELOCITY, POSITION):
-            self.assertEqual(wait_payloads(robot, name, 2), [bytes(48)] * 2)
 
     def test_other_commands_are_not_shaped_and_do_not_wait_for_motion(self):
         robot = self.join(10)
@@ -161,17 +152,6 @@ class TestDriverCommands(DriverCase):
         for publisher, robot in zip(publishers, robots):
             publisher.publish(make_command(0.07))
             wait_for(lambda r=robot: r.velocities[-1].linear_m_s == 0.07, "the motion")
-
-    def test_the_stop_applies_to_robots_that_join_later(self):
-        self.call_stop(True)
-        robot = self.join(15)
-        publisher = make_publisher("/hero_15/" + VELOCITY, Twist)
-        publisher.publish(make_command(0.1))
-        self.fleet.wait("/hero_15", Robot.READY, "the refusal", lambda e: e.dropped_messages == 1)
-        self.assertEqual([v for v in robot.velocities if not v.is_zero], [])
-        self.call_stop(False)
-        publisher.publish(make_command(0.1))
-        wait_for(lambda: any(not v.is_zero for v in list(robot.velocities)), "the motion")
 
     def test_a_robot_that_does_not_read_gets_the_newest_command_and_no_backlog(self):
         stalled = self.join(19, receive_buffer_length=4096)

@@ -187,14 +187,6 @@ class SimulatorTest(unittest.TestCase):
         wait_for(lambda: self.is_ready(1), "return of hero_1")
         odom.wait_for_more()
 
-    def test_a_robot_that_leaves_and_returns_is_ready_again(self):
-        odom = Newest("/hero_2/odom", Odometry)
-        odom.wait()
-        reconnects = self.find(2).reconnects
-        self.inject("leave:robot=2,for=1")
-        wait_for(lambda: self.is_ready(2) and self.find(2).reconnects > reconnects, "return of hero_2")
-        odom.wait_for_more()
-
     def test_a_handshake_without_topics_is_repaired(self):
         odom = Newest("/hero_3/odom", Odometry)
         odom.wait()
@@ -245,13 +237,6 @@ class SimulatorTest(unittest.TestCase):
         wait_for(lambda: (rospy.Time.now() - odom.message.header.stamp).to_sec() > 1.0, "silence of hero_2")
         odom.wait_for_more(40)
         self.assertTrue(self.is_ready(2))
-
-    def test_a_frozen_robot_goes_on_afterwards(self):
-        odom = Newest("/hero_5/odom", Odometry)
-        odom.wait()
-        self.inject("frozen:robot=5,for=4")
-        wait_for(lambda: (rospy.Time.now() - odom.message.header.stamp).to_sec() > 0.6, "silence of hero_5")
-        odom.wait_for_more()
 
 
 if __name__ == "__main__":

@@ -51,8 +51,10 @@ def test_faults_come_in_order_of_time_to_the_robots_that_they_name():
     reports, acts = [], []
     simulator, injector = build_simulator(parse_options("--port", "9", "--count", "2"), lambda line: None)
     injector._report = lambda line: reports.append((now_ms, line))
+    simulator.leave = lambda index, for_ms: acts.append((index, for_ms))
     for text in ("frozen@3:for=2", "stall@1:robot=1,for=4", "clock-jump@2:robot=0,by=-7.5", "slow-service:by=0.25"):
         injector.add(faults.parse_fault(text))
+    injector.add(faults.parse_fault("leave@2.5:robot=1,for=1.5"))
     for now_ms in range(0, 3100, 50):
         simulator.swarm.robots[0].clock.jump = acts.append
         injector.run(now_ms)
@@ -62,10 +64,11 @@ def test_faults_come_in_order_of_time_to_the_robots_that_they_name():
         (0, "fault slow-service for hero_1"),
         (1000, "fault stall for hero_1"),
         (2000, "fault clock-jump for hero_0"),
+        (2500, "fault leave for hero_1"),
         (3000, "fault frozen for hero_0"),
         (3000, "fault frozen for hero_1"),
     ]
     robots, start_ms = simulator.swarm.robots, simulator.swarm.now_ms
-    assert acts == [-7.5] and [robot.answer_delay_ms for robot in robots] == [250, 250]
+    assert acts == [-7.5, (1, 1500)] and [robot.answer_delay_ms for robot in robots] == [250, 250]
     assert [radio.stalled_until_ms for radio in simulator.radios] == [0, start_ms + 4000]
     assert [robot.due_ms for robot in robots] == [start_ms + 2000] * 2
