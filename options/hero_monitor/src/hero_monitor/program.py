@@ -70,7 +70,8 @@ class Monitor:
         )
         self._programs = self._requests.programs
         declared = [[topic.name, topic.unit] for topic in self._feed.lab_file.topics]
-        self._feed.page_state.put("hello", {"control": parameters.control, "topics": declared})
+        hello = {"control": parameters.control, "topics": declared, "node": rospy.get_name().strip("/")}
+        self._feed.page_state.put("hello", hello)
         actions = Actions(
             self._enter,
             self._requests.receive,

@@ -79,7 +79,8 @@ class ScriptedMonitor:
     def __init__(self):
         self.requests = []
         offers = {"programs": describe_offers(list(OFFERS)), "record": True}
-        self.state = {"hello": {"control": True}, "offers": offers, "fleet": make_fleet(), "losses": [], "stop": None}
+        hello = {"control": True, "node": "hero_monitor"}
+        self.state = {"hello": hello, "offers": offers, "fleet": make_fleet(), "losses": [], "stop": None}
         self.served = True
         self.is_silent = False
         self._ready = threading.Event()

@@ -363,10 +363,11 @@ class ViewTest(unittest.TestCase):
     def test_messages_that_differ_only_in_numbers_are_one_line(self):
         texts = ["hero_%d: silent for %d.5 s" % (number % 3, number) for number in range(6)]
         lines = [[number, 0.0, 4, "hero_driver", text[:6], text] for number, text in enumerate(texts)]
-        self.monitor.tell(log={"missed": 0, "lines": [*lines, [7, 0.0, 4, "other", "", "ends"]]})
+        lines += [[number, 0.0, 2, "hero_monitor", "", "Kim: drive hero_%d" % number] for number in (6, 7)]
+        self.monitor.tell(log={"missed": 0, "lines": [*lines, [8, 0.0, 4, "other", "", "ends"]]})
         wait_for(lambda: self.page.text("#lines").endswith("ends"), "the lines")
         shown = self.page.run("return [...document.querySelectorAll('#lines li')].map((one) => one.innerText)")
-        self.assertEqual(len(shown), 2)
+        self.assertEqual(len(shown), 4, "a user drives two robots, which is told of each")
         for text in ("3 robots", "silent for 5.5 s", "6 times"):
             self.assertIn(text, shown[0])
 

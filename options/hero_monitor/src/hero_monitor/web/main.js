@@ -166,6 +166,7 @@ function receive(updates) {
     if (name in updates) state[name] = updates[name];
   }
   if ("user" in updates) stop.mayRelease = updates.user.title === "teacher";
+  if ("hello" in updates) log.ownNode = updates.hello.node;
   if (updates.hello?.topics?.length && !hasTopics) {
     hasTopics = true;
     addTopics(updates.hello.topics);

@@ -19,6 +19,7 @@ export class LogView {
   constructor() {
     [this.list, this.level, this.mine, this.words] = ["lines", "level", "mine", "words"].map(element);
     this.chosen = new Set();
+    this.ownNode = ""; // of the monitor, whose lines tell who drives and stops
     this.groups = new Map(); // the line that shows a message, by its text without numbers
     for (const input of [this.level, this.mine, this.words]) {
       input.addEventListener("input", () => this.filter());
@@ -46,9 +47,9 @@ export class LogView {
     if (atEnd) this.list.scrollTop = this.list.scrollHeight;
   }
 
-  /** Show a line in its place; what differs from one before only in numbers joins it. */
+  /** Show a line in its place; what differs from one before only in numbers joins it, unless these tell users apart. */
   add({ seconds, level, node, robot, text }) {
-    const key = `${level} ${node} ${text.replace(NUMBER, "#")}`;
+    const key = `${level} ${node} ${node === this.ownNode ? text : text.replace(NUMBER, "#")}`;
     const former = this.groups.get(key);
     former?.remove();
     if (isLate(seconds, former?.entry)) seconds = former.entry.seconds;
