@@ -16,6 +16,7 @@ from typing import List, Tuple
 import numpy as np
 from measuring import print_machine, read_cpu_s
 from running_suite import RunningSuite
+from stepped_localization import StepLocalization
 
 from hero_client import CommonFrame, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
@@ -24,7 +25,6 @@ from hero_examples.driving.random_walk import Walker
 from hero_examples.swarm.explore import Explorer, explore_together
 from hero_examples.swarm.swarm_go_to import STEP_HZ, Formation
 from hero_localization.mapping.occupancy_grid import OccupancyGrid, SwarmMap
-from hero_localization.stepped_localization import StepLocalization
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
 

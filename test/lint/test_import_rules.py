@@ -101,7 +101,6 @@ PURE_ROOMS = (
     "hero_localization.filter",
     "hero_localization.mapping",
     "hero_localization.prints",
-    "hero_localization.stepped_localization",
     "hero_localization.tracking",
     "hero_swarm.behavior",
     "hero_swarm.behaviors",
@@ -211,7 +210,7 @@ def test_nothing_imports_a_node():
 
 
 def test_real_cameras_and_their_calibration_need_no_simulator():
-    package, simulated = "hero_localization", {"simulated_camera", "stepped_localization"}
+    package, simulated = "hero_localization", {"simulated_camera"}
     others = [name for name in modules_below(package) if part_of(name, package) not in simulated]
     check(describe(name, found) for name in others for found in imports_of(name) if found.top == "hero_sim")
 

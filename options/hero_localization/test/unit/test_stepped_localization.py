@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from stepped_localization import CameraModel, StepLocalization
 
 from hero_client.values import FrameError
 from hero_client.values.errors import GoalError
-from hero_localization.stepped_localization import CameraModel, StepLocalization
 from hero_node import Pose
 from hero_sim.stepped import StepSwarm
 from hero_test.nonempty import nonempty

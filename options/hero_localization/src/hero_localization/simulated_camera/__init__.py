@@ -1,1 +1,1 @@
-"""A camera above simulated robots: the only room, besides stepped robots, that needs hero_sim."""
+"""A camera above simulated robots: the only room that needs hero_sim."""

@@ -12,12 +12,11 @@ from typing import Deque, List, NamedTuple, Optional, Tuple
 import numpy as np
 
 from hero_client.values import FrameError
+from hero_localization.filter.pose_filter import PoseFilter, make_covariance
+from hero_localization.filter.pose_hypothesis import StampedPose
+from hero_localization.filter.swarm_localizer import PUBLISH_RATE_HZ
 from hero_node import Pose
 from hero_sim.stepped import StepSwarm
-
-from .filter.pose_filter import PoseFilter, make_covariance
-from .filter.pose_hypothesis import StampedPose
-from .filter.swarm_localizer import PUBLISH_RATE_HZ
 
 
 class CameraModel(NamedTuple):
