@@ -78,6 +78,16 @@ def test_small_shift_of_a_camera_is_named_and_corrected_slowly(shift, count):
 
 
 @pytest.mark.slow
+def test_a_camera_that_tilted_a_little_blames_no_tag_before_all_agree():
+    for direction in range(12):
+        turn_rad = direction * math.pi / 6.0
+        shifted = Shifted(turned_deg=(0.1 * math.cos(turn_rad), 0.1 * math.sin(turn_rad), 0.0))
+        for _ in range(6):
+            shifted.run(0.6)
+            assert not any("this reference tag" in text for text in shifted.texts), shifted.texts
+        assert any("the camera has moved" in text for text in shifted.texts)
+
+
 def test_a_camera_that_did_not_move_stays_as_it_is():
     for count in (4, 6):
         shifted = Shifted(count, corner_px=0.15)

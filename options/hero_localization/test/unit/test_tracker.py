@@ -161,7 +161,7 @@ def test_what_is_missed_moved_or_missing_counts_from_its_limit_on():
             tags = [] if frame < missed else [see(0, 0.0, 0.0)]
             tracker.take([*tags, *see_references(0.0)], frame / 30.0, frame, tracker.project({0: Pose(0.0, 0.0, 0.0)}))
         assert len(tracker.list_problems()) == count, missed
-    for last_s, count in ((0.45, 0), (0.55, 1)):
+    for last_s, count in ((1.95, 0), (2.05, 1)):
         tracker = make_tracker()
         for stamp_s in (0.0, 0.2, last_s):
             tracker.take(see_references(0.01, [101]) + see_references(0.0, [100, 102]), stamp_s, 0)

@@ -21,8 +21,8 @@ KEPT_S = 2.0
 MOVED_M = 0.005
 """A camera turned by a tenth of a degree shifts everything by 4 mm."""
 
-MOVED_S = 0.5
-"""A camera that shakes is no camera that moved."""
+MOVED_S, TAG_MOVED_S = 0.5, 2.0
+"""A camera that shakes is no camera that moved; a tag did not where all tags show a small shift of the camera by then."""
 
 MIN_REFERENCES = 2
 """Reference tags in one image that are needed to tell whether the camera moved."""
@@ -213,7 +213,8 @@ class Tracker:
         if WRONG_M < off_m <= MOVED_M:
             text = "this reference tag moved by %.0f mm, and does not count: put it back, or calibrate the arena again"
             add(text % (1e3 * off_m), wrong_id)
-        moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - MOVED_S]
+        moved_s = MOVED_S if self.is_moved else TAG_MOVED_S
+        moved = [tag_id for tag_id, since_s in self._moved_since_s.items() if since_s <= newest_s - moved_s]
         if moved and self.is_moved:
             add("reference tags are not where they were: the camera moved; calibrate the arena again", is_error=True)
         for tag_id in [] if self.is_moved else moved:
