@@ -103,6 +103,14 @@ def test_a_sensor_that_gives_no_row_per_robot_is_named(given, monkeypatch):
         trial.step()
 
 
+def test_a_sensor_that_a_page_sets_meanwhile_is_read_as_set():
+    trial, sensed = watch(1)
+    assert sensed.near.seen.any()
+    trial.behavior.near = Neighbors(range_m=0.05)
+    trial.step()
+    assert not trial.state.sensed.near.seen.any()
+
+
 @pytest.mark.option("numba")
 @pytest.mark.parametrize("sensor", [Binary(), Binary(range_m=0.3), Binary(range_m=0.0), Binary(half_angle_rad=0.1)])
 def test_compiled_beams_see_what_others_see(monkeypatch, sensor):
