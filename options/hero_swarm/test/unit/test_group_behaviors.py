@@ -36,6 +36,7 @@ def test_points_move_to_any_side_and_stop_at_the_bounds():
     assert trial.poses[0, 0] == pytest.approx((1.0, 1.0, 0.0)) and trial.poses[0, 1, 0] == -1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("groups", "rest_m"), [(1, 0.2), (2, 1.0)])
 def test_two_robots_rest_at_the_distance_of_their_groups(groups, rest_m):
     starts = np.array([[(0.0, 0.0, 1.0), (0.5, 0.0, 2.0)]])

@@ -100,6 +100,7 @@ def test_each_figure_is_shown_with_ours_its_runs_and_the_verdict(shipped, capsys
     assert text.endswith("May differ: they have wheels.\n"), "nothing was changed"
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_with_the_seeds_of_its_file(shipped, capsys):
     assert "2 runs in" in run(capsys, "--seeds", "1").err
     assert "4 runs in" in run(capsys).err
@@ -108,6 +109,7 @@ def test_an_interrupted_run_goes_on_with_the_seeds_of_its_file(shipped, capsys):
     assert load("reproduction/ahead").seeds.tolist() == [7, 8, 9]
 
 
+@pytest.mark.slow
 def test_what_was_changed_by_hand_is_shown_beside_the_verdict(shipped, capsys):
     run(capsys, "--quick")
     own = Path("reproduction")
@@ -141,6 +143,7 @@ def test_a_name_or_a_file_that_is_wrong_is_told_with_a_remedy(shipped, capsys):
         run(capsys)
 
 
+@pytest.mark.slow
 def test_the_page_has_the_table_and_a_picture_of_each_experiment(shipped, capsys, tmp_path):
     for name in ("early", "other"):
         (shipped / f"{name}.yaml").write_text(FILE)
@@ -162,6 +165,7 @@ def test_without_a_name_the_experiments_are_listed_and_nothing_is_run(shipped, c
     assert not Path("reproduction").exists()
 
 
+@pytest.mark.slow
 def test_run_computes_the_first_seeds_only(shipped, capsys):
     reproduce.copy_files(".")
     runner.run_experiment(runner.parse_options(["ahead.yaml", "--seeds", "2", "--jobs", "1"]))
