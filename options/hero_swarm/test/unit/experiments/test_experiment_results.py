@@ -299,8 +299,9 @@ def test_a_report_compares_runs_of_one_seed_and_says_what_is_missing():
     assert cells == list(experiment.cells) and comparison.pairs == 1
     assert comparison.difference.median == 2.0 and comparison.delta == 1.0
     assert [summary.values for summary in found.summaries["dispersion"]] == [(1.0, 1.0), (3.0, 6.0, 9.0)]
+    assert found.seeds == [5, 6, 7]
     remarks = "\n".join(found.remarks)
-    for words in ("2 of 8 runs are still missing", "4 seeds: ", "1 runs are left out", "not reached in 1 runs"):
+    for words in ("2 of 8 runs are still missing", "3 seeds: ", "1 runs are left out", "not reached in 1 runs"):
         assert words in remarks
 
 

@@ -39,12 +39,14 @@ class Report(NamedTuple):
         compared: of each two cells that differ in one value only: the first, the second, and their comparison, of which
             the p-value is corrected for the number of comparisons.
         remarks: what a reader should know before believing it.
+        seeds: of the runs that count, sorted.
     """
 
     experiment: Experiment
     summaries: Dict[str, List[Summary]]
     compared: List[Tuple[Cell, Cell, Comparison]]
     remarks: List[str]
+    seeds: List[int]
 
 
 def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
@@ -58,7 +60,8 @@ def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
             values = tuple(run.values[index] for run in counted if run.cell == cell)
             own.append(Summary(experiment.cells[cell], values, bootstrap_median(values)))
     compared = [] if experiment.compare is None else _compare(experiment, experiment.compare, counted)
-    return Report(experiment, summaries, compared, _remark(experiment, runs))
+    seeds = sorted({run.seed for run in counted})
+    return Report(experiment, summaries, compared, _remark(experiment, runs), seeds)
 
 
 def _compare(experiment: Experiment, wanted: Comparing, runs: Sequence[Run]) -> List[Tuple[Cell, Cell, Comparison]]:
@@ -88,10 +91,9 @@ def _remark(experiment: Experiment, runs: Sequence[Run]) -> List[str]:
     counted = [run for run in runs if not run.remark]
     if len(runs) < wanted:
         remarks.append("%d of %d runs are still missing" % (wanted - len(runs), wanted))
-    if len(experiment.seeds) < FEW_SEEDS:
-        remarks.append(
-            "%d seeds: intervals of fewer than %d are narrower than they claim" % (len(experiment.seeds), FEW_SEEDS)
-        )
+    seeds = {run.seed for run in counted}
+    if len(seeds) < FEW_SEEDS:
+        remarks.append("%d seeds: intervals of fewer than %d are narrower than they claim" % (len(seeds), FEW_SEEDS))
     if len(counted) < len(runs):
         remarks.append("%d runs are left out: see the column remark" % (len(runs) - len(counted)))
     for index, metric in enumerate(experiment.metrics):
@@ -118,7 +120,7 @@ def describe(report: Report) -> str:
 def describe_method(report: Report, about: Mapping[str, str]) -> str:
     """Return how the numbers were found, as a sentence for a paper."""
     experiment = report.experiment
-    seeds, names = experiment.seeds, list(experiment.cells[0].varied)
+    seeds, names = report.seeds, list(experiment.cells[0].varied)
     text = (
         "Each of %d combinations%s was run with the seeds %d to %d, which start alike in all combinations%s; medians"
         " have %.0f %% percentile bootstrap intervals (%d resamples)%s. Computed with HeRo's ROS suite, commit %s, code"
