@@ -116,8 +116,9 @@ def copy_files(folder: str) -> None:
     """Copy the experiments, and what they need, to a folder; files that are there stay as they are."""
     os.makedirs(folder, exist_ok=True)
     for path in SHIPPED.iterdir():
-        if path.is_file() and path.name != FIGURES and not os.path.exists(os.path.join(folder, path.name)):
-            shutil.copyfile(str(path), os.path.join(folder, path.name))
+        own = os.path.join(folder, path.name)
+        if path.is_file() and path.name != FIGURES and not os.path.exists(own):
+            shutil.copyfile(str(path), own)
 
 
 def list_changes(file: str) -> List[str]:
@@ -140,11 +141,10 @@ def judge(publication: Publication, experiment: Experiment, results: Results) ->
                 values = results.metrics[figure.metric][cell]
             else:
                 values = results.series[figure.metric][cell][:, round(figure.at_s)]
-            values = values[~np.isnan(values)]  # of runs that are missing
+            done = values[~np.isnan(values)].tolist()
             settings = {"robots": experiment.cells[cell].settings["robots"], **results.cells[cell]}
             label = ", ".join(f"{key} {value}" for key, value in settings.items())
-            if len(values):
-                verdicts.append(Verdict(figure, label, len(values), bootstrap_median(values.tolist())))
+            verdicts += [Verdict(figure, label, len(done), bootstrap_median(done))] if done else []
     return verdicts
 
 
@@ -172,9 +172,7 @@ def reproduce(name: str, options: argparse.Namespace) -> str:
         _, experiment = read_experiment(file)
     except ExperimentError as error:
         raise ExperimentError(f"{error}; delete {file} to have the published one again") from error
-    runner.run_experiment(
-        argparse.Namespace(**{**vars(options), "file": file, "out": None, "batch": None}, robots=None)
-    )
+    runner.run_experiment(argparse.Namespace(**vars(options), file=file))
     verdicts = judge(publications[name], experiment, load(os.path.splitext(file)[0]))
     return describe(publications[name], verdicts, list_changes(file))
 
@@ -209,6 +207,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     runner.add_engine_options(parser)
     add("--fresh", action="store_true", help="delete earlier runs of these experiments")
     add("--page", metavar="FILE.md", help="write a page and pictures of what was run")
+    parser.set_defaults(out=None, batch=None, robots=None)
     options = parser.parse_args(arguments)
     for name in options.names:
         print(reproduce(name, options))
