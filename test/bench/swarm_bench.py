@@ -1,7 +1,7 @@
 """Quality and cost of swarm behaviors on stepped robots with default errors. Run it with script/bench swarm.
 
 aggregation: 100 robots scattered over 4.64 m (2 % cover) without walls, poses 50 ms old, 300 s. genomes: published ones
-in 1.71 m x 1.42 m, with friction and without. behaviors: all built-in ones as their unit tests run them, some for longer.
+in 1.71 m x 1.42 m, with friction and without. behaviors: all built-in ones as their unit tests, some for longer.
 chance: random genomes. filter: of 12 robots at random in a fence of 2 m x 2 m for 30 s, and of ten that cross a circle
 of 1.2 m; which touch, and the time. speed: CPU seconds of 20 milling robots in 100 worlds for 120 s, and of one step of
 the filter for 100 dense robots.

@@ -26,7 +26,7 @@ class Swarm:
 
     def join(self):
         """Dial, declare, wait for the answer to the first time request, and send one burst."""
-        links = [emulated_swarm.EmulatedRobot(number, self._address, nagle=False) for number in self._numbers]
+        links = [emulated_swarm.EmulatedRobot(number, self._address) for number in self._numbers]
         for link in links:
             link.socket.setblocking(True)
             link.socket.settimeout(60.0)

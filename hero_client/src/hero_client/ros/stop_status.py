@@ -82,7 +82,9 @@ class StopRequest:
         if now_s - self.made_s < CROSSING_S:
             return StopStatus("warn", "stopping" if self.stopped else "releasing", False)
         # A driver that falls silent later has released its robots, but what stopped ones do is then unknown.
-        silent = [driver for driver, report in replies.items() if not report and (self.stopped or driver not in self._taken)]
+        silent = [
+            driver for driver, report in replies.items() if not report and (self.stopped or driver not in self._taken)
+        ]
         failures = [f"driver {_show(driver)} does not answer" for driver in silent]
         refusing: List[str] = []
         changed: List[str] = []

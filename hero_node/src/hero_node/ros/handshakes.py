@@ -7,7 +7,7 @@ import time
 from typing import Any, Callable
 
 from ..connection_table import ConnectionTable
-from ..tcpros import LENGTH
+from ..ros_messages import LENGTH
 
 THREAD_TRIES, THREAD_RETRY_S = 40, 0.05
 """Tries to get a thread, and s between two: one may end soon, and a program that is refused may never come again."""

@@ -426,7 +426,8 @@ def move_worlds(
             if gap_m[world] <= fastest_m and reach_m[world] < fastest_m:
                 near_m = SHIFT_M + margin_m + fastest_m
                 if not list_near(
-                    begin, end, near_m, ends[world], first, second, obstacle, own, bodies, obstacles, spare, spare_forces,
+                    begin, end, near_m, ends[world], first, second, obstacle, own, bodies, obstacles, spare,
+                    spare_forces,
                 ):  # fmt: skip
                     return False
                 reach_m[world] = margin_m + fastest_m

@@ -138,7 +138,7 @@ class World:
         self.commands_m_s = self._commands.T
         self.travels_m, self.speeds_m_s = self._travels.T, self._speeds.T
         # Below its center the left wheel rolls forward.
-        self.servo_gains_m_s_us = errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US)
+        self.servo_gains_m_s_us = np.asfortranarray(errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US))
         servos = errors.servo_center_us, errors.dead_zone_us, self.servo_gains_m_s_us
         self._servos = [np.asfortranarray(values) for values in servos]  # robots last, as in what is computed with them
         # The share of the difference to its command by which a servo's speed changes in one step.

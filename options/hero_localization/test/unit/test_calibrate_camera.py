@@ -75,6 +75,7 @@ def test_tags_that_are_higher_than_the_file_says_are_named_in_one_line(calibrate
     assert capsys.readouterr().out.count(text) == 1
 
 
+@pytest.mark.slow
 def test_the_height_of_a_tag_follows_from_its_size_beside_references():
     """Whatever the printer's scale: here, all are 2.5 % too large."""
     references = [PrintedTag(100 + index, 0.1025, 0.0, x_m, 0.3) for index, x_m in enumerate((-0.4, 0.0, 0.4))]

@@ -17,8 +17,8 @@ from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, tag_corners
 from hero_localization.tracking import detectors
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors, find_print_mistake
-from hero_localization.tracking.tag_template import TemplateDetector
 from hero_localization.tracking.tag_pose import TagCorners
+from hero_localization.tracking.tag_template import TemplateDetector
 from hero_sim.world.arena import build_rectangle
 from hero_test.nonempty import maybe_empty, nonempty
 
@@ -156,6 +156,7 @@ def test_tags_are_found_by_their_print_in_edges_of_shadows(side_px, shade, share
     assert found >= share * 12
 
 
+@pytest.mark.slow
 def test_a_print_is_found_neither_by_other_ids_nor_in_noise():
     image, random = photograph(3, 0.4, side_px=17.0), np.random.RandomState(0)
     assert expect_tag(3, image, 17.0).detect(image) != []

@@ -127,7 +127,8 @@ def count_page_faults(prepare):
     """Return how many pages a process maps to hold four copies of a 4K image in color once more."""
     program = (
         "import resource\nfrom hero_localization.camera.frame_source import keep_freed_memory\n%s\n"
-        "def count():\n    len([b'x' * 24883200 for _ in range(4)])\n    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+        "def count():\n    len([b'x' * 24883200 for _ in range(4)])\n"
+        "    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
         "count()\nbefore = count()\nprint(count() - before)"
     )
     return int(subprocess.check_output([sys.executable, "-c", program % prepare]))

@@ -237,7 +237,10 @@ class ViewTest(unittest.TestCase):
         self.assertEqual(self.page.find("#stop").rect, place)
 
     def test_an_empty_page_names_the_address_that_robots_connect_to(self):
-        for listening, shown in (("0.0.0.0:11411", "to this PC, port 11411"), ("10.42.0.1:11411", "to 10.42.0.1:11411")):
+        for listening, shown in (
+            ("0.0.0.0:11411", "to this PC, port 11411"),
+            ("10.42.0.1:11411", "to 10.42.0.1:11411"),
+        ):
             self.show([], listening=listening)
             self.page.wait_for_text("#empty", shown)
 

@@ -1,6 +1,7 @@
 """Program export: writes recordings as tables (CSV), a folder per robot and a file per kind of message.
 
-What is written is in OUT.part until it is complete. No file stays open: a recording of 100 robots has a thousand tables.
+What is written is in OUT.part until it is complete. No file stays open: a recording of 100 robots has a thousand
+tables.
 """
 
 import argparse

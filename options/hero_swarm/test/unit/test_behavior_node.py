@@ -106,6 +106,7 @@ def make_stage(monkeypatch):
     return Stage(monkeypatch)
 
 
+@pytest.mark.slow
 def test_robots_meet_and_the_metric_says_so(stage):
     stage.start("rendezvous")
     stage.run(0.5)

@@ -87,6 +87,7 @@ def test_hidden_errors_come_back_and_predict_paths_not_seen():
     assert fit.after_m < fit.before_m / 3.0 and fit.after_m < 0.01
 
 
+@pytest.mark.slow
 def test_velocities_tell_the_body_but_no_motors():
     fit = fit_robot([record(VELOCITY, 40.0)])
     assert set(fit.values) == {"left_wheel", "right_wheel", "wheel_separation_m", "slip"}
@@ -257,6 +258,7 @@ def drive_in_square(side_m, avoids, time_s=60.0):
     return Recording(np.array(commands), np.array(odometry) - shift, np.array(poses) - shift)
 
 
+@pytest.mark.slow
 def test_stretches_in_which_wheels_turn_at_a_wall_are_left_out():
     pushing, free = drive_in_square(0.4, avoids=False), drive_in_square(1.5, avoids=True)
     assert len(find_slips(pushing)) * 0.05 > 15.0, "it pushes walls for a third of the time"
@@ -313,6 +315,7 @@ def test_a_fit_that_predicts_worse_is_refused_and_nothing_is_written(tmp_path, m
     )
 
 
+@pytest.mark.slow
 def test_a_nominal_robot_has_nothing_to_correct(tmp_path, monkeypatch):
     ends_m = iter(([[0.0049], [0.006]], [[0.001], [0.001]]))
     monkeypatch.setattr(robot_fit, "predict_ends", lambda *arguments: np.array(next(ends_m)))

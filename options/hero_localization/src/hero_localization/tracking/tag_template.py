@@ -112,7 +112,7 @@ class TagTemplate:
         return first, second / np.linalg.norm(second, axis=1, keepdims=True)
 
     def find(self, gray: np.ndarray, center: np.ndarray, shapes: np.ndarray) -> Optional[np.ndarray]:
-        """Return the corners (4, 2) of the tag within about 1.5 cells of a place in gray (H, W), 8 bit; None: not there.
+        """Return the corners (4, 2) of the tag within 1.5 cells or so of a place in gray (H, W, 8 bit), or None.
 
         shapes: (N, 2, 2), px per cell: headings, sizes and slants to begin with, the likeliest first.
         """

@@ -22,7 +22,7 @@ MOVED_M = 0.005
 """A camera turned by a tenth of a degree shifts everything by 4 mm."""
 
 MOVED_S, TAG_MOVED_S = 0.5, 2.0
-"""A camera that shakes is no camera that moved; a tag did not where all tags show a small shift of the camera by then."""
+"""A camera that shakes is no camera that moved; nor did a tag, where all show a small shift of the camera by then."""
 
 MIN_REFERENCES = 2
 """Reference tags in one image that are needed to tell whether the camera moved."""

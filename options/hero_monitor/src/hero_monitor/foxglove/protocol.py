@@ -4,7 +4,7 @@ Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 """
 
 import struct
-from typing import Any, Dict, NamedTuple, Tuple
+from typing import Any, Dict, NamedTuple
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 """Both carry the messages below."""

@@ -24,7 +24,7 @@ PERIOD_S = 0.05
 """Time between two steps of a StartDrive."""
 
 MAX_GAP_S = 2.0
-"""Without poses robots wait for so long; a busy PC pauses for half a second now and then, which ended each such trial."""
+"""Without poses robots wait for so long: a busy PC pauses for half a second now and then."""
 
 _REST_STEPS = 10
 """Motors follow late: robots have arrived when all were there for this many steps."""
@@ -107,8 +107,8 @@ class RobotTrial:
     ) -> Optional[Tuple[np.ndarray, np.ndarray]]:
         """Return the speeds of all robots, m/s and rad/s (N,), at poses (N, 3); None: the trial has ended.
 
-        While a robot has no pose, NaN, all robots wait: for MAX_GAP_S, then the trial ends with a remark, as it does for
-        an object of the arena without one.
+        While a robot has no pose, NaN, all robots wait, for MAX_GAP_S; then the trial ends with a remark, as for an
+        object of the arena without one.
         Raises: ExperimentError for whatever the behavior raises.
         """
         lost = [name for name, pose in zip(self._names, poses) if not np.isfinite(pose).all()]

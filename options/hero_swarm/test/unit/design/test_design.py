@@ -135,6 +135,7 @@ def test_a_mission_becomes_controllers_that_are_compared(path, capsys, monkeypat
     assert "errors: robots.errors" in text and "wifi: router" in text and "world" not in text
 
 
+@pytest.mark.slow
 def test_a_killed_design_goes_on_to_the_same_bytes(path, light, capsys):
     options = ["m.yaml", "--budget", "500", "--designs", "2"]
     program.main(options)

@@ -49,6 +49,7 @@ def load(path, text=FILE):
     return experiment
 
 
+@pytest.mark.slow
 def test_a_baseline_is_compared_with_a_controller_over_its_sensor_range(path, capsys):
     runner.run_experiment(runner.parse_options([str(path), "--jobs", "1"]))
     with open(str(path.with_suffix("") / "runs.csv")) as file:

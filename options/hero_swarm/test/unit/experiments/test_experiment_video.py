@@ -98,7 +98,7 @@ def test_a_frame_shows_areas_robots_with_noses_and_lights_and_the_time():
     poses = trial.rows.world.poses.tolist()
 
     def look(x_m, y_m):
-        return frame[round(300 - 300 * y_m), round(300 + 300 * x_m)].tolist()
+        return frame[int(round(300 - 300 * y_m)), int(round(300 + 300 * x_m))].tolist()
 
     assert look(0.5, 0.5) == [0, 0, 0] and look(-0.5, 0.5) == FLOOR
     for (x_m, y_m, yaw_rad), color in nonempty(list(zip(poses, (BLUE, [255, 0, 0])))):

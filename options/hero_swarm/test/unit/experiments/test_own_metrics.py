@@ -65,6 +65,7 @@ def run(path, *options):
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_own_metrics_see_memory_sensors_and_colors_and_are_columns(path, capsys):
     rows = run(path)
     assert len(rows) == 4

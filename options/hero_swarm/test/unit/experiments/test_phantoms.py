@@ -42,6 +42,7 @@ def write_files(tmp_path, monkeypatch):
     return tmp_path / "e.yaml"
 
 
+@pytest.mark.slow
 def test_an_experiment_is_run_in_all_worlds_in_place_of_its_own(path, capsys):
     phantoms.main([str(path), "--seeds", "2", "--jobs", "1"])
     made = yaml.safe_load((path.parent / "e_phantoms.yaml").read_text())

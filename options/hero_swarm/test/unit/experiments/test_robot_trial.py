@@ -78,6 +78,7 @@ def test_a_lost_pose_ends_the_trial_with_a_remark():
     assert trial.list_values()[1] == math.inf
 
 
+@pytest.mark.slow
 def test_robots_wait_for_a_pose_and_the_trial_goes_on():
     trial, end_s, poses = drive(lost_s=2.5, found_s=4.4)
     assert end_s == pytest.approx(12.0) and trial.remark == "" and not np.isnan(trial.list_values()).any()
@@ -110,6 +111,7 @@ def drive_to(places, lost_s=(0.0, 0.0)):
     return rows.world.poses.copy(), rows.now_ms / 1000.0
 
 
+@pytest.mark.slow
 def test_robots_that_change_places_drive_around_each_other_and_turn():
     places = STARTS[[1, 2, 0]] + (0.0, 0.0, 1.0)
     poses, _ = drive_to(places)

@@ -125,9 +125,7 @@ def draw_runs(
     return figure
 
 
-def draw_over_time(
-    metric: str, labels: Sequence[str], times_s: np.ndarray, values: Sequence[np.ndarray]
-) -> Figure:
+def draw_over_time(metric: str, labels: Sequence[str], times_s: np.ndarray, values: Sequence[np.ndarray]) -> Figure:
     """Draw the median and the middle half of each cell's runs, values (T, runs), nan after a run's end."""
     figure, axes = _begin(3.6)
     for index, (label, runs) in enumerate(zip(labels, values)):
