@@ -33,7 +33,7 @@ class Swarm:
             while link.synchronized_s is None and not link.closed:
                 link.receive(1.0)
             assert not link.closed, link.number
-            link.send_burst(link.templates.make_burst(0, struct.pack("<II", 1, 0)))
+            link.send(b"".join(link.templates.make_burst(0, struct.pack("<II", 1, 0))))
         old, self._links = self._links, links
         return old
 
