@@ -39,3 +39,13 @@ def test_a_detector_that_a_requested_end_ends_first_is_no_error(end_detector):
 def test_a_detector_that_ends_by_itself_ends_track_with_an_error(end_detector):
     with pytest.raises(DetectorError, match="ended"):
         end_detector(is_requested=False)
+
+
+def test_a_camera_is_not_called_uncalibrated_while_its_file_may_be_on_its_way(monkeypatch):
+    node = track.TrackNode.__new__(track.TrackNode)
+    node._tracker, node._path, node._opened_s = None, "camera.yaml", 5.0
+    seen = []
+    for now_s in (5.0, 5.0 + track.FILE_PATIENCE_S - 0.01, 5.0 + track.FILE_PATIENCE_S):
+        monkeypatch.setattr(track, "time", SimpleNamespace(monotonic=lambda now_s=now_s: now_s))
+        seen.append([(name, is_error) for name, _, is_error in node._list_problems(0.0)])
+    assert seen == [[], [], [("camera", True)]]

@@ -7,6 +7,7 @@ rosrun hero_localization track _device:=/dev/video0
 
 import math
 import re
+import time
 from typing import Any, Dict, List, Optional, Tuple
 
 import cv2
@@ -35,6 +36,9 @@ DIAGNOSTICS_PERIOD_S = 1.0
 WAIT_S = 0.1
 LOG_PERIOD_S = 30.0
 """Time between two lines on one problem."""
+
+FILE_PATIENCE_S = 10.0
+"""The pose of a camera is missed only after that: the simulated camera may just be writing its file."""
 
 PICTURE_PERIOD_S = 0.2
 JPEG_QUALITY = 75
@@ -95,6 +99,7 @@ class TrackNode:
         self._process: Optional[DetectorProcess] = None
         self._expected: Dict[int, Pose] = {}
         self._diagnosed_s = -math.inf
+        self._opened_s = time.monotonic()
         self._logged_s: Dict[str, float] = {}
         self._publisher = rospy.Publisher("~measured_poses", RobotPoses, queue_size=5)
         self._objects = rospy.Publisher("~objects", ObjectPoses, queue_size=5)
@@ -186,6 +191,8 @@ class TrackNode:
 
     def _list_problems(self, now_s: float) -> List[Tuple[str, str, bool]]:
         if self._tracker is None:
+            if time.monotonic() < self._opened_s + FILE_PATIENCE_S:
+                return []
             text = "not calibrated: %s has no camera pose (extrinsics); rosrun hero_localization calibrate_camera"
             return [("camera", text % self._path, True)]
         if self._source.problem:
