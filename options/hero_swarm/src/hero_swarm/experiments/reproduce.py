@@ -180,6 +180,7 @@ def reproduce(name: str, options: argparse.Namespace) -> str:
 def write_page(path: str, folder: str) -> None:
     """Write the page of all experiments with runs in folder, and beside it a picture of each by its first metric."""
     parts = [_HEAD]
+    os.makedirs(os.path.join(os.path.dirname(path), "pictures"), exist_ok=True)
     for name, publication in read_publications().items():
         stem = os.path.join(folder, name)
         if not os.path.isdir(stem):

@@ -151,7 +151,7 @@ def test_the_page_has_the_table_and_a_picture_of_each_experiment(shipped, capsys
     table = read_rows(run(capsys, "--quick").out)
     with runner.open_folder(runner.parse_options(["reproduction/early.yaml"])):
         pass  # ended before its first run
-    (tmp_path / "docs" / "pictures").mkdir(parents=True)
+    (tmp_path / "docs").mkdir()
     reproduce.main(["--page", "docs/reproduction.md"])
     page = (tmp_path / "docs" / "reproduction.md").read_text()
     assert read_rows(page) == table and page.count("## ") == 1 and "## Ahead\n" in page
