@@ -41,7 +41,7 @@ def test_a_detector_that_ends_by_itself_ends_track_with_an_error(end_detector):
         end_detector(is_requested=False)
 
 
-def test_a_camera_is_not_called_uncalibrated_while_its_file_may_be_on_its_way(monkeypatch):
+def test_a_camera_is_not_called_uncalibrated_before_its_file_may_be_there(monkeypatch):
     node = track.TrackNode.__new__(track.TrackNode)
     node._tracker, node._path, node._opened_s = None, "camera.yaml", 5.0
     seen = []
