@@ -47,9 +47,8 @@ def calibrate_parts(
         for probe in session.probes:
             found = {part: by_robot[probe.robot_id] for part, by_robot in results.items() if probe.robot_id in by_robot}
             paths = _save(probe, folder, found) if found else []
-            lines.append(
-                f"{probe.name}: {'FAILED: ' + probe.failure if probe.failure else 'ok' if found else 'not measured'}"
-            )
+            outcome = "ok" if found else "not measured"
+            lines.append(f"{probe.name}: {'FAILED: ' + probe.failure if probe.failure else outcome}")
             lines += [f"  {part:9} {result.describe()}" for part, result in found.items()]
             lines += ["  " + path for path in paths]
     say("\n" + "\n".join(lines))

@@ -139,6 +139,7 @@ class Trial:
             radios += build_network(*parse_wifi(wifi), drawn)
         world = place_worlds(arena, starts, seeds, errors, objects, known_errors)
         self.rows: Any = PointRows(world) if is_point else RobotRows(world, radios)
+        self._drives_by_pulses = behavior.drive == PULSES and not is_point
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
         self.poses, self.velocities = lock(np.array(starts)), lock(np.zeros_like(starts))
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
@@ -195,7 +196,7 @@ class Trial:
         seen_s, poses = self._seen[0]
         ages_s = np.full(poses.shape[:2], now_s - seen_s) if self._is_filtered else None
         linear_m_s, angular_rad_s = self._control.step(now_s, poses, self.things, ages_s)
-        if self.behavior.drive == PULSES and not isinstance(rows, PointRows):
+        if self._drives_by_pulses:
             rows.send_pulses(self._all, *find_pulses(linear_m_s, angular_rad_s, self._dead_zones_us))
         else:
             rows.send_velocity(self._all, linear_m_s, angular_rad_s)

@@ -105,8 +105,9 @@ def keep_freed_memory() -> None:
 
     rospy copies each image four times, of which new memory, mapped page by page, takes two thirds of the time.
     """
-    for option, value in _MEMORY:
-        getattr(ctypes.CDLL(None), "mallopt", lambda *_: None)(option, value)  # other C libraries have none
+    mallopt: Any = getattr(ctypes.CDLL(None), "mallopt", None)
+    for option, value in _MEMORY if mallopt else ():  # other C libraries have none
+        mallopt(option, value)
 
 
 class TopicSource(FrameSource):

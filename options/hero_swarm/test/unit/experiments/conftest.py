@@ -7,6 +7,16 @@ import pytest
 
 from hero_swarm.experiments.computing import engines
 
+AHEAD = """\
+from hero_swarm.behavior import Behavior
+
+class Ahead(Behavior):
+    metric = "dispersion"
+
+    def step(self, sensed, memory, random):
+        return 0.1, 0.0, memory
+"""
+
 
 class InProcess(Executor):
     """Takes tasks as a worker process does, as copies."""
@@ -21,6 +31,12 @@ class InProcess(Executor):
 def compute_in_this_process(request, monkeypatch):
     if "workers" not in request.fixturenames:
         monkeypatch.setattr(engines, "open_pool", lambda jobs: InProcess())
+
+
+@pytest.fixture(name="ahead")
+def give_ahead():
+    """Return the file of a behavior that drives ahead."""
+    return AHEAD
 
 
 @pytest.fixture(name="workers")

@@ -11,15 +11,6 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import Metric, parse_experiment, read_experiment
 from hero_swarm.experiments.worlds import WORLDS
 
-PUSH = """\
-from hero_swarm.behavior import Behavior
-
-class Ahead(Behavior):
-    metric = "dispersion"
-
-    def step(self, sensed, memory, random):
-        return 0.1, 0.0, memory
-"""
 FILE = """\
 behavior: ahead.py
 vary: {robots: [2], errors: [perfect, default]}
@@ -35,8 +26,8 @@ compare: {metric: dispersion, between: errors}
 
 
 @pytest.fixture(name="path")
-def write_files(tmp_path, monkeypatch):
-    (tmp_path / "ahead.py").write_text(PUSH)
+def write_files(tmp_path, monkeypatch, ahead):
+    (tmp_path / "ahead.py").write_text(ahead)
     (tmp_path / "e.yaml").write_text(FILE)
     monkeypatch.chdir(str(tmp_path))
     return tmp_path / "e.yaml"

@@ -16,15 +16,6 @@ from hero_swarm.experiments.reproduce import NO_FIGURE, OPEN, OUTSIDE, WITHIN, F
 from hero_swarm.experiments.results import load
 from hero_test.nonempty import nonempty
 
-AHEAD = """\
-from hero_swarm.behavior import Behavior
-
-class Ahead(Behavior):
-    metric = "dispersion"
-
-    def step(self, sensed, memory, random):
-        return 0.1, 0.0, memory
-"""
 FILE = """\
 behavior: ahead.py
 vary: {robots: [2, 3]}
@@ -50,11 +41,11 @@ ahead:
 
 
 @pytest.fixture(name="shipped")
-def ship(tmp_path, monkeypatch):
+def ship(tmp_path, monkeypatch, ahead):
     """Give the folder of published experiments, with one; the user's folder is the working one."""
     folder = tmp_path / "published"
     folder.mkdir()
-    for name, text in (("ahead.py", AHEAD), ("ahead.yaml", FILE), ("published.yaml", FIGURES)):
+    for name, text in (("ahead.py", ahead), ("ahead.yaml", FILE), ("published.yaml", FIGURES)):
         (folder / name).write_text(text)
     monkeypatch.setattr(reproduce, "SHIPPED", folder)
     monkeypatch.chdir(str(tmp_path))
@@ -110,11 +101,11 @@ def test_an_interrupted_run_goes_on_with_the_seeds_of_its_file(shipped, capsys):
 
 
 @pytest.mark.slow
-def test_what_was_changed_by_hand_is_shown_beside_the_verdict(shipped, capsys):
+def test_what_was_changed_by_hand_is_shown_beside_the_verdict(shipped, capsys, ahead):
     run(capsys, "--quick")
     own = Path("reproduction")
     (own / "ahead.yaml").write_text(FILE.replace("time_s: 2", "time_s: 1") + "errors.friction: 0.1\n")
-    (own / "ahead.py").write_text(AHEAD.replace("0.1, 0.0", "0.2, 0.0"))
+    (own / "ahead.py").write_text(ahead.replace("0.1, 0.0", "0.2, 0.0"))
     with pytest.raises(ExperimentError, match="--fresh"):
         run(capsys, "--quick")
     lines = run(capsys, "--quick", "--fresh").out.splitlines()

@@ -61,7 +61,7 @@ def build_report(experiment: Experiment, runs: Sequence[Run]) -> Report:
             own.append(Summary(experiment.cells[cell], values, bootstrap_median(values)))
     compared = [] if experiment.compare is None else _compare(experiment, experiment.compare, counted)
     seeds = sorted({run.seed for run in counted})
-    return Report(experiment, summaries, compared, _remark(experiment, runs), seeds)
+    return Report(experiment, summaries, compared, _remark(experiment, runs, counted, len(seeds)), seeds)
 
 
 def _compare(experiment: Experiment, wanted: Comparing, runs: Sequence[Run]) -> List[Tuple[Cell, Cell, Comparison]]:
@@ -85,15 +85,13 @@ def _compare(experiment: Experiment, wanted: Comparing, runs: Sequence[Run]) -> 
     return [(first, second, one._replace(p_value=p)) for (first, second, one), p in zip(compared, corrected)]
 
 
-def _remark(experiment: Experiment, runs: Sequence[Run]) -> List[str]:
+def _remark(experiment: Experiment, runs: Sequence[Run], counted: Sequence[Run], seeds: int) -> List[str]:
     remarks = []
     wanted = len(experiment.cells) * len(experiment.seeds)
-    counted = [run for run in runs if not run.remark]
     if len(runs) < wanted:
         remarks.append("%d of %d runs are still missing" % (wanted - len(runs), wanted))
-    seeds = {run.seed for run in counted}
-    if len(seeds) < FEW_SEEDS:
-        remarks.append("%d seeds: intervals of fewer than %d are narrower than they claim" % (len(seeds), FEW_SEEDS))
+    if seeds < FEW_SEEDS:
+        remarks.append("%d seeds: intervals of fewer than %d are narrower than they claim" % (seeds, FEW_SEEDS))
     if len(counted) < len(runs):
         remarks.append("%d runs are left out: see the column remark" % (len(runs) - len(counted)))
     for index, metric in enumerate(experiment.metrics):
