@@ -17,7 +17,7 @@ SOCKET_OWNERS = (
     "hero_monitor.serving.server",
     "hero_monitor.serving.invitation",
     "hero_monitor.foxglove.endpoint",
-    "hero_monitor.foxglove.topic_streams",
+    "hero_monitor.foxglove.streams",
     "hero_monitor.serving.fair_stream",
     "hero_monitor.program",
 )
@@ -83,8 +83,6 @@ PURE_ROOMS = (
     "hero_client.controllers",
     "hero_client.robots",
     "hero_client.apps.formations",
-    "hero_monitor.foxglove.hub",
-    "hero_monitor.foxglove.protocol",
     "hero_node.files.calibration_file",
     "hero_node.clock",
     "hero_node.errors",

@@ -49,7 +49,7 @@ class Monitor:
         import tornado.ioloop
 
         from .foxglove.endpoint import FoxgloveEndpoint
-        from .foxglove.ros_topics import RosTopics
+        from .foxglove.topics import RosTopics
         from .serving.server import Actions, MonotonicLoop, Server
 
         self._parameters = parameters

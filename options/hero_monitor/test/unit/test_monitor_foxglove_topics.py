@@ -8,10 +8,10 @@ import pytest
 from rosgraph.network import encode_ros_handshake_header
 from std_msgs.msg import Bool
 
-from hero_monitor.foxglove import ros_topics as module
-from hero_monitor.foxglove import topic_streams
-from hero_monitor.foxglove.ros_topics import LOOK_UP_PERIOD_S, OPENING_MAX, RosTopics
-from hero_monitor.foxglove.topic_streams import MESSAGE_LENGTH_MAX, READ_LENGTH, Source, Stream, StreamSet
+from hero_monitor.foxglove import streams
+from hero_monitor.foxglove import topics as module
+from hero_monitor.foxglove.streams import MESSAGE_LENGTH_MAX, READ_LENGTH, Stream
+from hero_monitor.foxglove.topics import LOOK_UP_PERIOD_S, RosTopics
 
 LATCHED = {"md5sum": Bool._md5sum, "latching": "1", "callerid": "/node"}
 
@@ -58,21 +58,6 @@ def test_a_publisher_that_announces_too_much_is_left(ends):
     assert stream.read() == [b"last"] and not stream.is_open
 
 
-def test_a_set_reads_what_is_ready_and_what_came_with_the_header(ends):
-    streams = StreamSet()
-    (first, publisher), (second, other) = ends(begun=frame(b"latched")), ends()
-    streams.add(Source("/a", "/x"), first)
-    streams.add(Source("/b", "/y"), second)
-    assert streams.read() == [(Source("/a", "/x"), LATCHED, [b"latched"])]
-    assert streams.read() == []
-    other.send(frame(b"1"))
-    publisher.close()
-    assert streams.read() == [(Source("/b", "/y"), LATCHED, [b"1"])]
-    assert list(streams) == [Source("/b", "/y")], "the publisher of /a has gone"
-    streams.drop(Source("/b", "/y"))
-    assert other.recv(1) == b""
-
-
 class Ros:
     """A master, publishers and workers."""
 
@@ -81,8 +66,9 @@ class Ros:
         self.jobs, self.publishers, self.failing = [], {}, set()
         self.types = [["/odd", "no_such/Type"], ["/flag", "std_msgs/Bool"]]
         self.nodes = [["/odd", ["/node"]], ["/flag", ["/node"]]]
+        self.header = LATCHED
         self._ends = ends
-        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s, time_ns=lambda: 7))
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now_s))
         monkeypatch.setattr(module, "ask_master", self.ask)
         monkeypatch.setattr(module, "open_stream", self.open)
 
@@ -94,12 +80,12 @@ class Ros:
         (node,) = uri
         if node in self.failing:
             raise OSError("hangs")
-        stream, self.publishers[topic, node] = self._ends()
+        stream, self.publishers[topic, node] = self._ends(self.header)
         return stream
 
     def submit(self, function, *arguments):
-        self.jobs.append((function, arguments))
-        job = self.jobs[-1]
+        job = (function, arguments)
+        self.jobs.append(job)
         return SimpleNamespace(done=lambda: job not in self.jobs)
 
     def work(self):
@@ -115,74 +101,102 @@ def make_ros(monkeypatch, ends):
 
 @pytest.fixture(name="topics")
 def make_topics(ros):
+    """Topics that were looked up once."""
     topics = RosTopics(SimpleNamespace(submit=ros.submit, warn=lambda *said: None))
-    topics.find_types()
+    topics.look_up()
     return topics
+
+
+def find_channel(topics, topic):
+    return next(channel for channel in topics.channels.values() if channel.topic == topic)
+
+
+def connect(ros, topics, topic="/flag"):
+    """Have a topic read; return its channel."""
+    ros.work()
+    channel = find_channel(topics, topic)
+    assert not topics.want({channel})
+    ros.work()
+    return channel
+
+
+def look_up_again(ros, topics):
+    ros.now_s += 1.1 * LOOK_UP_PERIOD_S
+    topics.look_up()
+    ros.work()
 
 
 def test_topics_are_looked_up_in_the_background_if_their_type_is_known(ros, topics):
     ros.now_s += 2.0 * LOOK_UP_PERIOD_S
-    assert topics.find_types() == {} and len(ros.jobs) == 1, "the master is asked one question at a time"
+    topics.look_up()
+    assert topics.channels == {} and len(ros.jobs) == 1, "the master is asked one question at a time"
     ros.work()
-    assert set(topics.find_types()) == {"/flag"}
+    assert [channel.topic for channel in topics.channels.values()] == ["/flag"]
+    topics.look_up()
     ros.work()
     ros.now_s += 0.9 * LOOK_UP_PERIOD_S
-    topics.find_types()
+    topics.look_up()
     assert ros.jobs == []
 
 
+def test_a_topic_stays_a_channel_until_it_has_another_type(ros, topics):
+    ros.work()
+    before = find_channel(topics, "/flag")
+    look_up_again(ros, topics)
+    assert find_channel(topics, "/flag") is before
+    ros.types = [["/flag", "std_msgs/String"]]
+    look_up_again(ros, topics)
+    now = find_channel(topics, "/flag")
+    assert now.id != before.id and (now.type, now.definition) == ("std_msgs/String", "string data\n")
+
+
 def test_a_wanted_topic_is_read_until_it_is_wanted_no_more(ros, topics):
-    ros.work()
-    assert not topics.want({"/flag"})
-    ros.work()
-    assert topics.want({"/flag"})
+    channel = connect(ros, topics)
+    assert topics.want({channel})
     ros.publishers["/flag", "/node"].send(frame(b"\1"))
-    assert topics.take() == [("/flag", b"\1", 7, "/node")] and topics.take() == []
+    assert list(topics.take()) == [(channel, b"\1")] and list(topics.take()) == []
     assert topics.want(set())
     assert ros.publishers["/flag", "/node"].recv(1) == b""
 
 
 def test_bytes_of_another_definition_are_dropped(ros, topics):
-    ros.work()
-    topics._md5["/flag"] = "another"
-    topics.want({"/flag"})
-    ros.work()
-    topics.want({"/flag"})
+    ros.header = {**LATCHED, "md5sum": "another"}
+    channel = connect(ros, topics)
     ros.publishers["/flag", "/node"].send(frame(b"\1"))
-    assert topics.take() == []
+    assert list(topics.take()) == [] and topics.find_latched(channel) == []
 
 
-def test_a_publisher_that_restarts_is_found_by_the_next_look_up(ros, topics):
-    ros.work()
-    topics.want({"/flag"})
-    ros.work()
-    topics.want({"/flag"})
+@pytest.mark.parametrize(("latching", "kept"), [("1", [b"new"]), ("0", [])])
+def test_the_newest_latched_message_is_kept_while_its_topic_is_read(ros, topics, latching, kept):
+    ros.header = {**LATCHED, "latching": latching}
+    channel = connect(ros, topics)
+    ros.publishers["/flag", "/node"].send(frame(b"old") + frame(b"new"))
+    assert [content for _, content in topics.take()] == [b"old", b"new"]
+    assert topics.find_latched(channel) == kept
+    topics.want(set())
+    assert topics.find_latched(channel) == []
+
+
+def test_a_publisher_that_restarts_is_connected_to_again(ros, topics):
+    channel = connect(ros, topics)
     ros.publishers["/flag", "/node"].close()
-    topics.take()
-    ros.now_s += 1.1 * LOOK_UP_PERIOD_S
-    topics.find_types()
+    assert list(topics.take()) == []
+    assert not topics.want({channel})
     ros.work()
-    topics.want({"/flag"})
     ros.publishers["/flag", "/node"].send(frame(b"\0"))
-    assert [message.content for message in topics.take()] == [b"\0"]
+    assert list(topics.take()) == [(channel, b"\0")]
 
 
-def test_nodes_that_fail_leave_workers_to_others_and_are_tried_later(ros, topics):
+def test_nodes_that_fail_hinder_no_others_and_are_tried_again(ros, topics):
     ros.nodes = [["/flag", ["/a", "/b", "/c", "/d"]]]
     ros.failing = {"/a", "/b", "/c"}
-    ros.work()
-    topics.want({"/flag"})
-    assert len(ros.jobs) == OPENING_MAX
-    for _ in range(3):
-        ros.work()
-        topics.want({"/flag"})
-    assert set(ros.publishers) == {("/flag", "/d")} and ros.jobs == []
+    channel = connect(ros, topics)
+    assert set(ros.publishers) == {("/flag", "/d")}
     ros.failing = set()
-    ros.now_s += 1.1 * LOOK_UP_PERIOD_S
-    topics.find_types()
+    assert not topics.want({channel}) and not topics.want({channel})
+    assert len(ros.jobs) == 1
     ros.work()
-    topics.want({"/flag"})
-    assert len(ros.publishers) == 4
+    assert len(ros.publishers) == 4 and topics.want({channel})
 
 
 class Node:
@@ -205,23 +219,23 @@ class Node:
 
 
 def test_a_refusal_of_a_publisher_is_an_error(monkeypatch):
-    monkeypatch.setattr(topic_streams.xmlrpc.client, "ServerProxy", Node((0, "not a publisher of [/flag]", 0)))
+    monkeypatch.setattr(streams.xmlrpc.client, "ServerProxy", Node((0, "not a publisher of [/flag]", 0)))
     with pytest.raises(OSError, match="not a publisher"):
-        topic_streams.open_stream("/flag", "http://localhost:1", "/monitor")
+        streams.open_stream("/flag", "http://localhost:1", "/monitor")
 
 
 def test_a_connection_stays_open_unless_its_header_is_an_error(monkeypatch):
-    monkeypatch.setattr(topic_streams.xmlrpc.client, "ServerProxy", Node((1, "", ["TCPROS", "localhost", 1])))
+    monkeypatch.setattr(streams.xmlrpc.client, "ServerProxy", Node((1, "", ["TCPROS", "localhost", 1])))
     for header in (LATCHED, {"error": "another md5sum"}):
         ours, theirs = socket.socketpair()
-        monkeypatch.setattr(topic_streams.socket, "create_connection", lambda *arguments, ours=ours: ours)
+        monkeypatch.setattr(streams.socket, "create_connection", lambda *arguments, ours=ours: ours)
         theirs.sendall(encode_ros_handshake_header(header) + frame(b"latched"))
         if "error" in header:
             with pytest.raises(OSError, match="another md5sum"):
-                topic_streams.open_stream("/flag", "http://localhost:1", "/monitor")
+                streams.open_stream("/flag", "http://localhost:1", "/monitor")
             assert ours.fileno() == -1
         else:
-            stream = topic_streams.open_stream("/flag", "http://localhost:1", "/monitor")
+            stream = streams.open_stream("/flag", "http://localhost:1", "/monitor")
             assert stream.header == header and stream.read() == [b"latched"]
             stream.close()
         theirs.close()

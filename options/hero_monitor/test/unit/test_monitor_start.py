@@ -9,8 +9,6 @@ from hero_monitor import background as background_module
 from hero_monitor import parameters as parameters_module
 from hero_monitor.background import Background
 from hero_monitor.control.offers import OFFERS, describe_offers
-from hero_monitor.foxglove import hub as hub_module
-from hero_monitor.foxglove.hub import Client, Hub, TopicType
 from hero_monitor.parameters import list_host_names, load_parameters, read_token
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
@@ -123,28 +121,6 @@ def test_warnings_wait_for_no_terminal(monkeypatch):
     background.warn("third")
     assert jobs[1:] == [(0.0, "third")]
     background.shutdown()
-
-
-def test_a_client_has_so_many_subscriptions(monkeypatch):
-    monkeypatch.setattr(hub_module, "SUBSCRIPTIONS_MAX", 2)
-    texts = []
-    hub = Hub()
-    client = Client(lambda text: texts.append(json.loads(text)))
-    hub.update_topics({"/a": TopicType("std_msgs/Bool", "bool data")})
-    hub.add(client)
-
-    def ask(**request):
-        texts.clear()
-        hub.receive(client, json.dumps(request))
-        return [text["message"] for text in texts]
-
-    assert ask(op="subscribe", subscriptions=[{"id": number, "channelId": 1} for number in (5, 6, 7)]) == [
-        "subscriptions refused: [7]"
-    ]
-    assert ask(op="unsubscribe", subscriptionIds=[5]) == [] and list(client.subscriptions) == [6]
-    assert ask(op="subscribe", subscriptions=[{"id": 6, "channelId": 1}, {"id": 8, "channelId": 2}]) == [
-        "subscriptions refused: [6, 8]"
-    ]
 
 
 def test_limits_of_what_pages_may_set_are_the_ends_of_their_fields():
