@@ -37,7 +37,7 @@ ROOMS = {
     "hero_driver.stops": {"commands", "corrections", "peer", "ros", "rosserial", "transport"},
     "hero_driver.reports": {"commands", "corrections", "fleet", "peer", "ros", "rosserial", "transport"},
     "hero_node.files": {"errors", "parameters", "texts"},
-    "hero_node.parameters": {"errors"},
+    "hero_node.parameters": {"errors", "texts"},
     "hero_sim.world": SIM_GROUND,
     "hero_sim.robot": SIM_GROUND | {"world"},
     "hero_sim.link": SIM_GROUND,

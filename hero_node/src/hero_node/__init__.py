@@ -41,5 +41,5 @@ from .ros_messages import (
     encode_twist,
 )
 from .tcpros import TooLongError, find_messages
-from .texts import list_names, make_printable, one_line, shorten
+from .texts import list_names, make_printable, one_line, shorten, suggest
 from .token_bucket import TokenBucket, TokenBuckets

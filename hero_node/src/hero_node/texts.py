@@ -1,7 +1,8 @@
 """Texts from robots, files and other programs, made fit for one line of a terminal. Pure."""
 
+import difflib
 import reprlib
-from typing import Any, Sequence
+from typing import Any, Iterable, Sequence
 
 NAMES_SHOWN = 10
 
@@ -29,3 +30,11 @@ def list_names(names: Sequence[str], most: int = NAMES_SHOWN) -> str:
     """Return names as text, and of many only how many more there are."""
     more = len(names) - most
     return ", ".join(names[:most]) + (" and %d more" % more if more > 0 else "")
+
+
+def suggest(name: Any, known: Iterable[str], mark: str = "") -> str:
+    """Return "; did you mean ...?" with the known name that is spelled most alike; empty if none is near.
+
+    mark: what users write before a name, such as ~.
+    """
+    return "".join(f"; did you mean {mark}{near}?" for near in difflib.get_close_matches(str(name), list(known), 1))

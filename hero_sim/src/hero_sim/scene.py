@@ -1,8 +1,11 @@
 """Shapes of the simulated world as viewers draw them: arena, objects and robots, in the frame `world`. Pure."""
 
+import itertools
 import math
 import struct
-from typing import Iterable, List, NamedTuple, Sequence, Tuple
+from typing import Iterable, Iterator, List, NamedTuple, Sequence, Tuple
+
+import numpy as np
 
 from hero_node import Pose, encode_header, encode_list, encode_pose, encode_text
 
@@ -30,6 +33,8 @@ _WALL_COLOR = (0.6, 0.6, 0.6, 1.0)
 _OBJECT_COLOR = (0.8, 0.5, 0.2, 1.0)
 _LAMP_COLOR, _LAMP_M = (1.0, 0.85, 0.2, 1.0), 0.02
 _PLATE_M = 0.0005
+_MAX_CELLS, _LEVELS = 32, 20
+"""Rows and columns in which pictures on the floor are drawn, and steps of gray between black and white."""
 _DARK_COLOR = (0.15, 0.15, 0.15, 1.0)
 _NOSE_COLOR = (1.0, 1.0, 1.0, 1.0)
 
@@ -73,7 +78,7 @@ def draw_objects(bodies: Sequence[PushedBody]) -> List[Shape]:
 
 def draw_arena(arena: Arena) -> List[Shape]:
     """Return areas, lamps, walls and obstacles."""
-    floor = [_draw_area(*item) for item in enumerate(arena.areas)]
+    floor = [_draw_area(number, *item) for number, item in enumerate(_list_plates(arena.areas))]
     lamps = [
         _draw_circle("lamps", number, (*lamp_m, _LAMP_M), _LAMP_COLOR)
         for number, lamp_m in enumerate(arena.lamps_m.tolist())
@@ -87,10 +92,30 @@ def draw_arena(arena: Arena) -> List[Shape]:
     )
 
 
-def _draw_area(number: int, area: Area) -> Shape:
+def _list_plates(areas: Sequence[Area]) -> Iterator[Tuple[int, Area]]:
+    """Yield areas with their places in the order, from 1; a picture as rectangles of one gray, in coarser steps."""
+    for order, area in enumerate(areas, 1):
+        if area.gray is None:
+            yield order, area
+            continue
+        rows, columns = (np.linspace(0, count, min(count, _MAX_CELLS) + 1).astype(int) for count in area.gray.shape)
+        x_min, y_min, x_max, y_max = area.shape_m
+        x_m = (x_min + (x_max - x_min) * columns / columns[-1]).tolist()
+        y_m = (y_max - (y_max - y_min) * rows / rows[-1]).tolist()
+        sums = np.add.reduceat(np.add.reduceat(area.gray, rows[:-1]), columns[:-1], axis=1)
+        grays = np.rint(sums / np.outer(np.diff(rows), np.diff(columns)) * _LEVELS) / _LEVELS
+        for row, strip in enumerate(grays.tolist()):
+            first = 0
+            for gray, run in itertools.groupby(strip):
+                end = first + len(list(run))
+                yield order, Area(area.name, (x_m[first], y_m[row + 1], x_m[end], y_m[row]), (gray,) * 3)
+                first = end
+
+
+def _draw_area(number: int, order: int, area: Area) -> Shape:
     """Return a thin plate, later ones above earlier ones."""
     color = (*area.color, 1.0)
-    z_m = _PLATE_M * (number + 1)
+    z_m = _PLATE_M * order
     if len(area.shape_m) == 3:
         x_m, y_m, radius_m = area.shape_m
         return Shape(

@@ -11,7 +11,7 @@ import yaml
 
 from ..errors import HeroError
 from ..parameters.number_checks import is_number, is_whole_number
-from ..texts import make_printable, one_line, shorten
+from ..texts import make_printable, one_line, shorten, suggest
 from .safe_file import read_file
 from .yaml_text import MAX_CHARACTERS, YamlError, decode_text
 
@@ -66,7 +66,7 @@ class Entry(NamedTuple):
     def choice(self, choices: Collection[str]) -> str:
         """Return one of choices."""
         if not isinstance(self.value, str) or self.value not in choices:
-            self.refuse(f"one of: {', '.join(choices)}")
+            self.refuse(f"one of: {', '.join(choices)}{suggest(self.value, choices)}")
         return str(self.value)
 
     def entries(self) -> List["Entry"]:
@@ -87,15 +87,21 @@ class Entry(NamedTuple):
             return {name: entry.plain() for name, entry in self.value.items()}
         return [entry.plain() for entry in self.value] if isinstance(self.value, list) else self.value
 
-    def mapping(self, allowed: Optional[Collection[str]] = None, required: Collection[str] = ()) -> Dict[str, "Entry"]:
-        """Return name -> entry of a mapping with only the allowed names (None: any), and all the required ones."""
+    def mapping(
+        self, allowed: Optional[Collection[str]] = None, required: Collection[str] = (), remedy: str = ""
+    ) -> Dict[str, "Entry"]:
+        """Return name -> entry of a mapping with only the allowed names (None: any), and all the required ones.
+
+        remedy: where other names belong, for the error that refuses one.
+        """
         if not isinstance(self.value, dict):
             self.refuse("a mapping such as {%s: ...}" % next(iter(allowed or ("name",))))
         where = f" in {self.name}" if self.name else ""
         for name, entry in self.value.items():
             if allowed is not None and name not in allowed:
-                text = "%s: unknown %s%s; allowed are: %s"
-                raise EntryError(text % (entry.place, shorten(name), where, ", ".join(allowed)))
+                hint = suggest(name, allowed) + (remedy and f"; {remedy}")
+                text = "%s: unknown %s%s; allowed are: %s%s"
+                raise EntryError(text % (entry.place, shorten(name), where, ", ".join(allowed), hint))
         for name in required:
             if name not in self.value:
                 raise EntryError(f"{self.place}: {name} is missing{where}")

@@ -2,11 +2,11 @@
 
 import argparse
 import dataclasses
-import difflib
 import math
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type, TypeVar
 
 from ..errors import ProgramError
+from ..texts import suggest
 from .number_checks import is_number
 
 T = TypeVar("T")
@@ -97,9 +97,10 @@ def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> D
     declared: name -> a Parameter, or a default that needs no check. Raises: ProgramError, also for other names.
     """
     for name in sorted(set(given) - set(declared)):
-        hint = "".join(f"; did you mean ~{near}?" for near in difflib.get_close_matches(name, declared, 1))
         shown = name if name.isprintable() else ascii(name)
-        raise ProgramError(f"unknown parameter ~{shown}{hint}; known are: {', '.join(sorted(declared))}")
+        raise ProgramError(
+            f"unknown parameter ~{shown}{suggest(name, declared, '~')}; known are: {', '.join(sorted(declared))}"
+        )
     return {
         name: parameter.check(name, given.get(name, parameter.default))
         if isinstance(parameter, Parameter)

@@ -4,7 +4,7 @@ Pure: numpy only; files are read in arena_file. Frame `world`: x right, y up, m;
 """
 
 import math
-from typing import List, NamedTuple, Sequence, Tuple, Union
+from typing import List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -29,11 +29,13 @@ class Area(NamedTuple):
 
     Attributes:
         color: red green blue from 0 to 1.
+        gray: levels of a picture that fills the rectangle, from 0 to 1 (rows from the upper one, columns); None: color.
     """
 
     name: str
     shape_m: Tuple[float, ...]
     color: Tuple[float, float, float]
+    gray: Optional[np.ndarray] = None
 
     def covers(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Return which points (R,) lie on it."""
@@ -44,6 +46,17 @@ class Area(NamedTuple):
         x_min, y_min, x_max, y_max = self.shape_m
         rectangle: np.ndarray = (x_m >= x_min) & (x_m <= x_max) & (y_m >= y_min) & (y_m <= y_max)
         return rectangle
+
+    def find_colors(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        """Return red green blue from 0 to 1 of points on it (R, 3)."""
+        if self.gray is None:
+            return np.broadcast_to(self.color, (len(x_m), 3))
+        x_min, y_min, x_max, y_max = self.shape_m
+        shares = (y_max - y_m) / (y_max - y_min), (x_m - x_min) / (x_max - x_min)
+        row, column = (
+            np.minimum((share * count).astype(int), count - 1) for share, count in zip(shares, self.gray.shape)
+        )
+        return np.repeat(self.gray[row, column, None], 3, axis=1)
 
 
 class Arena(NamedTuple):

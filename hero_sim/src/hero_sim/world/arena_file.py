@@ -26,7 +26,7 @@ SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
 _MAX_COORDINATE_M = 1000.0
 _MAX_STARTS = 1000
 _KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "objects", "starts_m_deg", "areas", "lamps_m")
-_AREA_KEYS = ("name", "circle_m", "rectangle_m", "color")
+_AREA_KEYS = ("name", "circle_m", "rectangle_m", "color", "picture")
 _OBJECT_KEYS = ("circle_m", "polygon_m", "mass_kg", "friction")
 
 
@@ -43,7 +43,7 @@ def load_arena(name: str, read: Callable[[str], bytes] = read_file) -> Arena:
         root = load_entries(path, "bounds_m: [-1, -1, 1, 1]", as_texts=True, read=read)
         if "image" in root.value:
             return _build_from_map(root.value, path, read)
-        return _build_arena(root, os.path.basename(path))
+        return _build_arena(root, path, read)
     except EntryError as error:
         hint = f"; shipped are {', '.join(SHIPPED)}" if isinstance(error.__cause__, OSError) else ""
         raise OptionError(f"arena {error}{hint}") from error
@@ -53,27 +53,37 @@ def load_arena(name: str, read: Callable[[str], bytes] = read_file) -> Arena:
 
 def _build_from_map(content: Dict[str, Entry], path: str, read: Callable[[str], bytes]) -> Arena:
     """Return the arena of a map of map_server. Raises: EntryError, ValueError."""
+    return build_map_arena(os.path.basename(path), content, _read_picture(content["image"], path, read))
+
+
+def _read_picture(entry: Entry, path: str, read: Callable[[str], bytes]) -> np.ndarray:
+    """Return the gray levels of a picture from 0, black, to 1, white (rows, columns), the upper row first.
+
+    entry: its file, relative to that of the arena, path. Raises: EntryError for one that cannot be used.
+    """
     try:
         from PIL import Image, UnidentifiedImageError
     except ImportError:
-        raise ValueError("pictures of maps need python3-pil: install it") from None
-    picture = os.path.join(os.path.dirname(path), content["image"].text())
+        raise EntryError(f"{entry.place}: pictures need python3-pil: install it") from None
+    picture = os.path.join(os.path.dirname(path), entry.text())
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # check_size() refuses it
             image = Image.open(io.BytesIO(read(picture)))
         check_size(*image.size)  # by its header: nothing is decoded yet
-        gray = np.asarray(image.convert("L"), dtype=float)
-    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        if image.mode.startswith("I"):
+            return np.asarray(image, dtype=float) / 65535.0
+        return np.asarray(image.convert("L"), dtype=float) / 255.0
+    except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ValueError(f"its picture {picture} cannot be read: {reason}") from error
-    return build_map_arena(os.path.basename(path), content, gray)
+        remedy = "give a PNG or PGM, its path relative to this file"
+        raise EntryError(f"{entry.place}: picture {picture} cannot be read: {reason}; {remedy}") from error
 
 
-def _build_arena(root: Entry, file_name: str) -> Arena:
+def _build_arena(root: Entry, path: str, read: Callable[[str], bytes]) -> Arena:
     """Return the arena of a file's content. Raises: EntryError, ValueError."""
     content = root.mapping(_KEYS)
-    name = content["name"].text() if "name" in content else file_name
+    name = content["name"].text() if "name" in content else os.path.basename(path)
     if not name.isprintable():  # it is printed in terminals
         content["name"].refuse("one line of text")
     walls_m = [_read_points(entry, 2) for entry in _list_items(content, "walls_m")]
@@ -84,7 +94,7 @@ def _build_arena(root: Entry, file_name: str) -> Arena:
     segments_m = np.vstack([np.empty((0, 4)), *edges_m])
     bounds_m = _read_bounds(content, segments_m)
     objects = tuple(_read_object(entry) for entry in _list_items(content, "objects"))
-    areas = tuple(_read_area(entry) for entry in _list_items(content, "areas"))
+    areas = tuple(_read_area(entry, path, read) for entry in _list_items(content, "areas"))
     lamps_m = np.reshape([_read_row(entry, "x and y") for entry in _list_items(content, "lamps_m")], (-1, 2))
     circles = np.reshape(circles_m, (-1, 3))
     rims_m = tuple(points_m for points_m in walls_m if _is_rim(points_m, segments_m))
@@ -103,22 +113,28 @@ def _build_arena(root: Entry, file_name: str) -> Arena:
     return arena._replace(starts=starts)
 
 
-def _read_area(entry: Entry) -> Area:
-    """Return a painted part of the floor. Raises: EntryError."""
-    item = entry.mapping(_AREA_KEYS, ("name", "color"))
-    if ("circle_m" in item) == ("rectangle_m" in item):
-        entry.refuse("a mapping with circle_m or rectangle_m, name and color")
+def _read_area(entry: Entry, path: str, read: Callable[[str], bytes]) -> Area:
+    """Return a painted part of the floor, of the arena's file path. Raises: EntryError."""
+    item = entry.mapping(_AREA_KEYS, ("name",))
+    if ("circle_m" in item) == ("rectangle_m" in item) or ("color" in item) == ("picture" in item):
+        entry.refuse("a mapping with circle_m or rectangle_m, name, and color or picture")
+    name = item["name"].text()
     if "circle_m" in item:
         shape_m = _read_circle(item["circle_m"])
     else:
         shape_m = _read_row(item["rectangle_m"], "x min, y min, x max and y max")
         if shape_m[0] >= shape_m[2] or shape_m[1] >= shape_m[3]:
             item["rectangle_m"].refuse("[x min, y min, x max, y max], each minimum less than its maximum")
+    if "picture" in item:
+        if "circle_m" in item:
+            item["picture"].refuse("left out, or have a rectangle_m that it fills")
+        gray = _read_picture(item["picture"], path, read)
+        return Area(name, tuple(shape_m), (float(gray.mean()),) * 3, gray)
     color = item["color"]
     if isinstance(color.value, list):
         red, green, blue = color.numbers(3, 0.0, 1.0, "[red, green, blue]")
-        return Area(item["name"].text(), tuple(shape_m), (red, green, blue))
-    return Area(item["name"].text(), tuple(shape_m), (color.number(0.0, 1.0, "(gray), or [red, green, blue]"),) * 3)
+        return Area(name, tuple(shape_m), (red, green, blue))
+    return Area(name, tuple(shape_m), (color.number(0.0, 1.0, "(gray), or [red, green, blue]"),) * 3)
 
 
 def _read_object(entry: Entry) -> PushedBody:

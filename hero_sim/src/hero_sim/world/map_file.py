@@ -22,7 +22,7 @@ def check_size(width: int, height: int) -> None:
 
 
 def build_map_arena(name: str, content: Dict[str, Entry], gray: np.ndarray) -> Arena:
-    """Return the arena of a map's YAML content, whose values are texts, and its picture (rows, columns), 0..255.
+    """Return the arena of a map's YAML content, whose values are texts, and its picture (rows, columns), 0..1.
 
     Raises: EntryError for invalid values or a turned map, ValueError for one without a free cell.
     """
@@ -35,7 +35,7 @@ def build_map_arena(name: str, content: Dict[str, Entry], gray: np.ndarray) -> A
         x_m, y_m, yaw_rad = origin.numbers(3, -_MAX_ORIGIN_M, _MAX_ORIGIN_M, "a list of x m, y m and yaw")
         if yaw_rad:
             origin.refuse("a list of x m, y m and a yaw of 0")
-    shade = gray[::-1] / 255.0  # the first row of a picture is its upper one
+    shade = gray[::-1]  # the first row of a picture is its upper one
     occupied_share = shade if is_negated else 1.0 - shade
     solid = occupied_share >= free_share
     rows, columns = np.nonzero(~solid)

@@ -211,12 +211,14 @@ def decide(behavior: Behavior, sensed: Sensed, memory: Any, random: Random) -> T
     if not isinstance(command, tuple) or len(command) != 3:
         text = "%s.step() must return linear_m_s, angular_rad_s, memory, not %s"
         raise ValueError(text % (type(behavior).__name__, shorten(command)))
+    speeds = []
     for name, values in zip(("linear_m_s", "angular_rad_s"), command):
-        if np.shape(values) not in ((), (robots,)):
-            text = "%s.step() gives %s of shape %s: it must be a number, or one for each of %d robots (%d,)"
-            raise ValueError(text % (type(behavior).__name__, name, np.shape(values), robots, robots))
-    linear_m_s, angular_rad_s = (np.broadcast_to(np.asarray(values, float), robots) for values in command[:2])
-    return linear_m_s, angular_rad_s, command[2]
+        if np.shape(values) not in ((), (robots,)) or np.asarray(values).dtype.kind not in "bif":
+            given = shorten(values) if np.shape(values) in ((), (robots,)) else f"of shape {np.shape(values)}"
+            text = "%s.step() gives %s %s: it must be a number, or one for each of %d robots (%d,)"
+            raise ValueError(text % (type(behavior).__name__, name, given, robots, robots))
+        speeds.append(np.broadcast_to(np.asarray(values, float), robots))
+    return speeds[0], speeds[1], command[2]
 
 
 def act(behavior: Behavior, memory: Any, robots: int) -> Dict[str, Optional[np.ndarray]]:

@@ -102,6 +102,7 @@ ABOUT = {"version": 1, "rate_hz": 10.0, "bounds_m": [-1, -1, 1, 1], "neighbors":
         ({**ABOUT, "sensors": {"x": ["Nose", {}]}}, "Nose"),
         ({**ABOUT, "sensors": {"x": ["Floor", {"deep": 1}]}}, "deep"),
         ({"version": 1}, "sensors"),
+        ({"rate_hz": 1.0}, "it has version none, this suite reads 1: save it again; save_policy.. writes such files"),
         ([], "cannot be read"),
     ],
 )

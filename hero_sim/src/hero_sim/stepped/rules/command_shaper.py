@@ -81,7 +81,8 @@ class CommandShaper:
         values[0], values[1] = first, second
         if not np.isfinite(values).all():
             wrong = rows.reshape(-1)[~np.isfinite(values).all(axis=0)]
-            raise ValueError(f"the commands for robot rows {wrong.tolist()} must be finite")
+            text = "the commands for robot rows %s must be finite; sensors give nan for what is not known"
+            raise ValueError(text % wrong[:10].tolist())
         self._shape(now_ms, rows.reshape(-1), values)
 
     def _shape_collected(self) -> None:

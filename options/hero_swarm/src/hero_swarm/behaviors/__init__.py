@@ -5,6 +5,7 @@ import inspect
 import os
 from typing import Any, Dict, List, Optional, Type
 
+from hero_node import suggest
 from hero_node.files import EntryError, YamlError, parse_yaml
 from hero_node.parameters import is_number
 
@@ -67,8 +68,8 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
     if name.endswith(ENDING):
         return _load_controller(name, sources)
     if not path.endswith(".py"):
-        text = "behavior %r: must be FILE.py, FILE.py:Class, POLICY.npz, MACHINE.controller, or one of %s"
-        raise ValueError(text % (name, ", ".join(list_names())))
+        text = "behavior %r: must be FILE.py, FILE.py:Class, POLICY.npz, MACHINE.controller, or one of %s%s"
+        raise ValueError(text % (name, ", ".join(list_names()), suggest(name, list_names())))
     classes = list_classes(path, sources)
     if class_name in classes:
         return classes[class_name]
@@ -118,7 +119,9 @@ def make_behavior(name: str, numbers: Any) -> Behavior:
         raise ValueError("parameters is %r, but must be numbers such as {rate_hz: %g}" % (numbers, kind.rate_hz))
     for key, value in numbers.items():
         if key not in defaults:
-            raise ValueError(f"parameters: {name} has no number {key!r}; it has {', '.join(defaults)}")
+            raise ValueError(
+                f"parameters: {name} has no number {key!r}; it has {', '.join(defaults)}{suggest(key, defaults)}"
+            )
         low, high = (MIN_RATE_HZ, MAX_RATE_HZ) if key == "rate_hz" else (-MAX_NUMBER, MAX_NUMBER)
         if not is_number(value, low, high):
             raise ValueError(f"parameters: {key} is {value!r}, but must be a number from {low:g} to {high:g}")

@@ -10,6 +10,7 @@ import math
 import os
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
+from hero_node import suggest
 from hero_node.files import Entry, EntryError, YamlError, read_entries, read_text
 from hero_sim.errors import OptionError
 from hero_sim.link import parse_wifi
@@ -45,11 +46,16 @@ OBJECTS = ("arena", "scattered")
 ROBOT, POINT = BODIES = ("robot", "point")
 """Bodies: those of robots, or points (points.py)."""
 TESTS = ("wilcoxon",)
+NOT_PARAMETERS = ("behavior", "start", "world", *SETTINGS, *ERROR_KEYS)
+"""Names that may vary besides numbers of the behavior and its sensors."""
 _REQUIRED = ("time_s", "seeds", "metrics")
 _KEYS = (
     "behavior", "vary", "world", *SETTINGS, "parameters", "start", "time_s", "until", "seeds", "metrics", "record",
     "compare",
 )  # fmt: skip
+_PARAMETERS_REMEDY = (
+    "numbers of the behavior or its sensors, such as near.range_m, stand below parameters, or as lists below vary"
+)
 
 
 class Bound(NamedTuple):
@@ -241,7 +247,8 @@ def parse_experiment(
 
 def check_experiment(entry: Entry, folder: str, sources: Sources) -> Experiment:
     """Return what the entries of a file describe; arguments and errors as of parse_experiment(), EntryError too."""
-    root = entry.mapping((*_KEYS, *(name for name in entry.mapping() if name in ERROR_KEYS)), _REQUIRED)
+    allowed = (*_KEYS, *(name for name in entry.mapping() if name in ERROR_KEYS))
+    root = entry.mapping(allowed, _REQUIRED, _PARAMETERS_REMEDY)
     given = root["seeds"].mapping(("from", "count"), ("count",))
     first = given["from"].whole(0, MAX_SEED) if "from" in given else 1
     seeds = range(first, first + given["count"].whole(1, MAX_RUNS))
@@ -297,7 +304,7 @@ def _parse_value(name: str, entry: Entry) -> _Value:
     if name in SETTINGS or name in ERROR_KEYS:
         value = _parse_setting(name, entry)
         return _Value(value, {"settings": {name: value}})
-    value = entry.number(-1e6, 1e6, "")
+    value = entry.number(-1e6, 1e6, f"as of a parameter{suggest(name, NOT_PARAMETERS)}")
     return _Value(value, {"parameters": {name: value}})
 
 
@@ -347,8 +354,7 @@ def _check_different(entry: Entry, values: Sequence[Any]) -> None:
 
 def _parse_cells(root: Dict[str, Entry], place: str, seeds: int) -> Tuple[Cell, ...]:
     given = root["parameters"].mapping() if "parameters" in root else {}
-    kinds = (*SETTINGS, *ERROR_KEYS, "behavior", "start", "world")
-    settings = {name: entry for name, entry in root.items() if name in kinds}
+    settings = {name: entry for name, entry in root.items() if name in NOT_PARAMETERS}
     fixed = {name: _parse_value(name, entry) for name, entry in {**settings, **given}.items()}
     varied: List[Tuple[str, List[_Value]]] = []
     for name, entry in (root["vary"].mapping() if "vary" in root else {}).items():

@@ -14,6 +14,7 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from hero_node import suggest
 from hero_node.files import Entry, load_entries, write_file
 from hero_node.parameters import within
 
@@ -165,7 +166,8 @@ def reproduce(name: str, options: argparse.Namespace) -> str:
     """Run what is missing of a published experiment, and return the verdicts as text. Raises: ExperimentError."""
     publications = read_publications()
     if name not in publications:
-        raise ExperimentError(f"{name!r} is no published experiment; there are {', '.join(publications)}")
+        text = "%r is no published experiment; there are %s%s"
+        raise ExperimentError(text % (name, ", ".join(publications), suggest(name, publications)))
     copy_files(options.folder)
     file = os.path.join(options.folder, name + ".yaml")
     try:

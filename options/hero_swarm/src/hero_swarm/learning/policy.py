@@ -61,14 +61,15 @@ def load_policy(path: str, content: bytes) -> Type[Behavior]:
             about: Dict[str, Any] = json.loads(str(file["about"]))
             count = sum(name.startswith("w_") for name in file.files)
             layers = [(file[f"w_{number}"], file[f"b_{number}"]) for number in range(count)]
-        if about["version"] != VERSION:
-            raise ValueError(f"it has version {about['version']}, this suite reads {VERSION}: save it again")
+        if about.get("version") != VERSION:
+            text = "it has version %s, this suite reads %d: save it again"
+            raise ValueError(text % (about.get("version", "none"), VERSION))
         given = {name: getattr(known, kind)(**fields) for name, (kind, fields) in about["sensors"].items()}
         observation = Observation(tuple(about["bounds_m"]), about["neighbors"], about["range_m"], given)
         _check_layers(layers, len(layers[0][0]))
         return make_policy(layers, observation, about["rate_hz"], path)
     except (OSError, ValueError, LookupError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-        raise ValueError(f"policy {path} cannot be read: {one_line(error)}") from error
+        raise ValueError(f"policy {path} cannot be read: {one_line(error)}; save_policy() writes such files") from error
 
 
 def make_policy(layers: Layers, observation: Observation, rate_hz: float, path: str = "") -> Type[Behavior]:

@@ -1,10 +1,10 @@
 """Metrics of users, named FILE.py:FUNCTION: functions of a State that return one number for each world. Pure."""
 
-from typing import Any, NamedTuple, Optional, Tuple
+from typing import Any, Callable, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from hero_node import shorten
+from hero_node import shorten, suggest
 
 from ..sources import Sources, load_file
 from . import METRICS
@@ -54,6 +54,17 @@ def is_own(name: str) -> bool:
     return path.endswith(".py") and function.isidentifier()
 
 
+def find_own(name: str, sources: Sources) -> Callable[[State], Any]:
+    """Return the function of a user's metric. Raises: ValueError if the file, or the function, is missing."""
+    path, _, function = name.rpartition(":")
+    module = load_file("metric", path, sources)
+    metric = getattr(module, function, None)
+    if not callable(metric):
+        raise ValueError(f"metric {name}: the file has no function {function}{suggest(function, vars(module))}")
+    found: Callable[[State], Any] = metric
+    return found
+
+
 def measure_metric(name: str, state: State, sources: Optional[Sources] = None) -> np.ndarray:
     """Return the metric of this name (W,); sources: None reads its file anew.
 
@@ -61,10 +72,7 @@ def measure_metric(name: str, state: State, sources: Optional[Sources] = None) -
     """
     if name in METRICS:
         return METRICS[name](state.poses, state.velocities, state.objects, state.radii_m, state.arena)
-    path, _, function = name.rpartition(":")
-    metric = getattr(load_file("metric", path, sources or Sources()), function, None)
-    if not callable(metric):
-        raise ValueError(f"metric {name}: the file has no function {function}")
+    metric = find_own(name, sources or Sources())
     name += " (line %d)" % metric.__code__.co_firstlineno if hasattr(metric, "__code__") else ""
     given = metric(state)
     try:

@@ -50,7 +50,7 @@ class Floor(NamedTuple):
         area = np.full(len(x_m), -1)
         for number, place in enumerate(_find_arena(around, self).areas):
             inside = place.covers(x_m, y_m)
-            color[inside], area[inside] = place.color, number
+            color[inside], area[inside] = place.find_colors(x_m[inside], y_m[inside]), number
         color[~np.isfinite(x_m)] = np.nan
         return Ground(color.mean(axis=1), color, area)
 

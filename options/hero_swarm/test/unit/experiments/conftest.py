@@ -23,7 +23,10 @@ class InProcess(Executor):
 
     def submit(self, function, *arguments):
         future = Future()
-        future.set_result(function(*pickle.loads(pickle.dumps(arguments))))
+        try:
+            future.set_result(function(*pickle.loads(pickle.dumps(arguments))))
+        except Exception as error:
+            future.set_exception(error)
         return future
 
 

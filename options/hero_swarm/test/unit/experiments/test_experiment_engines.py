@@ -85,6 +85,26 @@ def test_an_error_of_the_users_code_reaches_the_program():
         compute(open_one, 1, fail, [(4,)])
 
 
+class DoneAtOnce(Executor):
+    """Has all results when it is asked; number 0 fails."""
+
+    def submit(self, function, *arguments):
+        future = Future()
+        if arguments == (0,):
+            future.set_exception(ValueError("of number 0"))
+        else:
+            future.set_result(function(*arguments))
+        return future
+
+
+def test_what_is_done_beside_an_error_is_kept():
+    kept = []
+    with engines.Engine(DoneAtOnce, 4) as engine, pytest.raises(ValueError, match="of number 0"):
+        for _, result in engine.compute(square, [(number,) for number in range(8)]):
+            kept.append(result)
+    assert sorted(kept) == [1, 4, 9, 16, 25, 36, 49]
+
+
 def test_without_dask_the_error_names_its_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ProgramError, match="python3-distributed"):

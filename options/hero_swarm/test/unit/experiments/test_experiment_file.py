@@ -81,6 +81,10 @@ def test_a_cell_is_described_by_everything_that_its_runs_depend_on():
     ("old", "new", "line", "words"),
     [
         ("time_s: 300", "time: 300", 4, "unknown 'time'; allowed are: behavior"),
+        ("time_s: 300", "tme_s: 300", 4, "compare; did you mean time_s?; numbers of the behavior or its sensors"),
+        ("time_s: 300", "near.range_m: 1", 4, "such as near.range_m, stand below parameters, or as lists below vary"),
+        ("errors: [perfect, default]", "error: [perfect]", 2, "1e+06 as of a parameter; did you mean errors?"),
+        ("kind: uniform", "kind: unifrom", 3, "file, arena; did you mean uniform?"),
         ("time_s: 300", "time_s: 300 s", 4, "time_s is '300 s', but must be a number from 0.1"),
         ("time_s: 300", "time_s: true", 4, "time_s is True"),
         ("time_s: 300", "time_s: .inf", 4, "time_s is inf"),

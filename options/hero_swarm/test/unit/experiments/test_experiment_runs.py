@@ -158,7 +158,7 @@ def test_the_report_stands_alone_and_names_every_cell_and_remark(finished):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("aggregation", "agregation", "line 1: behavior 'agregation'"),
+        ("aggregation", "agregation", "voter, wall_following, wheel_genome; did you mean aggregation?"),
         ("aggregation", "nowhere.py:A", "nowhere.py"),
         ("errors: [perfect, default]", "sees: [1, 2]", "no parameter 'sees'; there are rate_hz, v0_m_s"),
         ("aggregation", "box_pushing", "line 1: box_pushing pushes objects"),
@@ -196,6 +196,25 @@ def test_an_error_of_the_behavior_names_its_line_and_the_runs(tmp_path):
         match=r"robots 3, errors perfect: IndexError: .*\(own.py, line 5\)",
     ):
         run(write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("'fast'", r"gives linear_m_s 'fast': it must be a number, or one for each of 6 robots \(6,\)"),
+        ("[1.0] * 4", r"gives linear_m_s of shape \(4,\): it must be a number"),
+        ("float('nan')", r"robot rows \[0, 1, 2, 3, 4, 5\] must be finite; sensors give nan for what is not known"),
+    ],
+)
+def test_commands_that_are_no_speeds_are_refused_with_the_behavior(command, words, tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from hero_swarm.behavior import Behavior\n\n"
+        "class Own(Behavior):\n"
+        "    def step(self, sensed, memory, random):\n"
+        f"        return {command}, 0.0, None\n"
+    )
+    with pytest.raises(ExperimentError, match=r"^own.py:Own, robots 3, errors perfect: ValueError: .*" + words):
+        run(write(tmp_path, FILE.replace("behavior: aggregation", "behavior: own.py:Own")))
 
 
 @pytest.mark.slow

@@ -79,7 +79,8 @@ def test_runs_of_a_seed_start_alike_whatever_the_behavior(path):
     ("old", "new", "words"),
     [
         ("near.range_m", "naer.range_m", "line 3: .* has no parameter 'naer.range_m'; there are .*"),
-        ("near.range_m", "near.reach_m", "line 3: .* has no parameter 'near.reach_m'"),
+        ("near.range_m", "near.rang_m", r"line 3: .* has no parameter 'near.rang_m'.*; did you mean near.range_m\?"),
+        ("near.range_m", "errors.slipp", r"line 3: .* has no parameter 'errors.slipp'; .*; did you mean errors.slip\?"),
         ("{gain: 0.05}", "{gian: 0.05}", "line 2: gather.py has no parameter 'gian'; there are gain, .*near.range_m"),
         ("dispersal, {g", "{dispersal: {gain: 1}}, {g", "line 2: dispersal has no parameter 'gain'"),
         ("gather.py: {gain: 0.05}", "other.py: {}", "behavior .*other.py: no such file"),

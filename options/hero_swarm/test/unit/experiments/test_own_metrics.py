@@ -1,6 +1,7 @@
 """Metrics of users: what they see, in which columns they are, what is hashed, and what is refused."""
 
 import csv
+import os
 
 import numpy as np
 import pytest
@@ -107,11 +108,32 @@ def test_a_wrong_metric_is_refused_before_anything_runs(path, line, words):
     assert "\n" not in str(caught.value) and not path.with_suffix("").exists()
 
 
+@pytest.mark.slow
+def test_runs_that_are_done_stay_when_a_metric_fails_later(path):
+    text = "import numpy as np\n\ndef late(state):\n    return 1.0 / (state.time_s < 2 or len(state.sensed.poses) < 8)"
+    path.with_name("late.py").write_text(text + " * np.ones(len(state.poses))\n")
+    path.write_text(
+        "behavior: rendezvous\nvary: {robots: [3, 4]}\ntime_s: 3\nseeds: {count: 2}\nmetrics: [late.py:late]\n"
+    )
+    with pytest.raises(
+        ExperimentError, match=r"rendezvous, robots 4 with seeds 1 to 2: ZeroDivisionError: .*line 4\)$"
+    ):
+        run(path)
+    path.with_name("late.py").write_text(text.replace("1.0 / ", "") + " * np.ones(len(state.poses))\n")
+    with pytest.raises(ExperimentError, match="computed by other code"):
+        run(path)
+    assert len(os.listdir(str(path.with_suffix("") / "batches"))) == 1
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
         ("[own.py:steps,", "[other.py:steps,", "metric .*other.py: no such file"),
-        ("own.py:seen,", "own.py:stops,", "own.py:stops: the file has no function stops"),
+        (
+            "own.py:seen,",
+            "own.py:stops,",
+            r"line 6: metric .*own.py:stops: the file has no function stops; did you mean steps\?",
+        ),
         ("[own.py:steps,", "[own.py,", "line 6: metrics is 'own.py', but must be one of: .*, FILE.py:FUNCTION"),
         ('">= 30"', "30", "line 6: .*own.py:steps is 30, but must be a text such as"),
         ("own.py:seen,", "scale.py:steps,", "line 6: metrics holds 'steps' more than once"),

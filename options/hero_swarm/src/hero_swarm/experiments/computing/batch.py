@@ -17,12 +17,12 @@ from tqdm import tqdm
 
 from hero_node.files import make_new_name, name_file, write_file
 
-from ...metrics.own import State, measure_metric
+from ...metrics.own import State, is_own, measure_metric
 from ...trial import Trial
 from ..errors import report_place
 from ..experiment_file import Experiment, Metric
 from ..results_folder import METRICS_ENDING, POSES_ENDING, Run
-from .cell_setup import check_parameters, set_up
+from .cell_setup import check_setup, set_up
 from .code_version import check_suite
 
 SAMPLE_S = 1.0
@@ -52,7 +52,7 @@ one_at_a_time = threading.RLock()
 
 def load_checked(experiment: Experiment) -> None:
     """Build the first run of all cells that differ in it, to report errors before anything runs: ExperimentError."""
-    check_parameters(experiment)
+    check_setup(experiment, filter(is_own, list_sources(experiment)))
     built = set()
     for cell in tqdm(experiment.cells, "checking", unit=" cells", leave=False, disable=None, file=sys.stderr):
         setup = set_up(experiment, cell)
@@ -61,7 +61,7 @@ def load_checked(experiment: Experiment) -> None:
         if settings not in built:
             # Two worlds, as an own metric may give one number for all.
             trial = setup.build_trial([experiment.seeds[0]] * 2)
-            with report_place(cell.label, experiment.sources):
+            with report_place(f"{cell.behavior}, {cell.label}", experiment.sources):
                 measure(experiment, trial.state)
             built.add(settings)
 
@@ -75,7 +75,7 @@ def compute_batch(experiment: Experiment, suite: str, cell: int, seeds: Sequence
         check_suite(suite)
         setup = set_up(experiment, experiment.cells[0])
         trial = setup.build_trial(seeds)
-        label = "%s with seeds %d to %d" % (setup.cell.label, seeds[0], seeds[-1])
+        label = "%s, %s with seeds %d to %d" % (setup.cell.behavior, setup.cell.label, seeds[0], seeds[-1])
         place = report_place(label, experiment.sources)
         with _record_poses(experiment, trial, stem + POSES_ENDING) as poses, place:
             series, ends = run_trial(experiment, trial, poses)

@@ -2,18 +2,19 @@
 
 import os
 from contextlib import contextmanager
-from typing import Iterator, NamedTuple, Sequence
+from typing import Iterable, Iterator, NamedTuple, Sequence
 
 import numpy as np
 
-from hero_node import HeroError
+from hero_node import HeroError, suggest
 from hero_sim.world import Arena, load_arena, read_known
 
 from ...behavior import Behavior, Objects
 from ...behaviors import find_behavior
+from ...metrics.own import find_own
 from ...trial import OPEN, Trial, scatter_objects
 from ..errors import ExperimentError
-from ..experiment_file import ERROR_KEYS, ERRORS, POINT, Cell, Experiment
+from ..experiment_file import ERROR_KEYS, ERRORS, NOT_PARAMETERS, POINT, Cell, Experiment
 from .starts import place_all
 
 
@@ -77,8 +78,14 @@ def set_up(experiment: Experiment, cell: Cell) -> CellSetup:
     return CellSetup(experiment, cell, behavior, arena)
 
 
-def check_parameters(experiment: Experiment) -> None:
-    """Check that behaviors have their own parameters, and one of them each of the others. Raises: ExperimentError."""
+def check_setup(experiment: Experiment, own_metrics: Iterable[str]) -> None:
+    """Check that behaviors have their own parameters, one of them each of the others, and that there are own metrics.
+
+    Raises: ExperimentError.
+    """
+    with _at(experiment, "metrics"):
+        for name in own_metrics:
+            find_own(experiment.locate(name), experiment.sources)
     with _at(experiment, "behavior"):
         # Where behaviors vary, a baseline need not have what the others have.
         has = {
@@ -90,8 +97,9 @@ def check_parameters(experiment: Experiment) -> None:
         for name in cell.parameters:
             whose, known = (cell.behavior, has[cell.behavior]) if name in cell.own else (experiment.behavior, every)
             if name not in known:
-                text = "%s: %s has no parameter %r; there are %s"
-                raise ExperimentError(text % (experiment.places[name], whose, name, ", ".join(known)))
+                hint = suggest(name, (*known, *NOT_PARAMETERS))
+                text = "%s: %s has no parameter %r; there are %s%s"
+                raise ExperimentError(text % (experiment.places[name], whose, name, ", ".join(known), hint))
 
 
 @contextmanager

@@ -131,7 +131,9 @@ class Engine:
                     while left and len(running) < self.workers * _WAITING:
                         running[self._executor.submit(function, *left[0])] = left[0]
                         left.popleft()
-                    for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    done = wait(running, return_when=FIRST_COMPLETED).done
+                    # Errors last: what is done beside them is kept.
+                    for future in sorted(done, key=lambda one: one.cancelled() or one.exception() is not None):
                         result = future.result()
                         yield running.pop(future), result
             except BrokenExecutor as error:
