@@ -11,9 +11,9 @@ import time
 import traceback
 from typing import Callable, Dict, List, Optional, Tuple
 
-from .command_sender import CommandSender
 from .commands.stop_progress import StopState
 from .config import DriverConfig
+from .corrections.stamps import NS_PER_S
 from .fleet import namespaces
 from .fleet.admission import Admission, RateLimit
 from .fleet.namespaces import Identity
@@ -30,8 +30,6 @@ from .stops.delivery import StopDelivery, can_move, describe_doubt, find_stop_pa
 from .transport.call_queue import Worker
 from .transport.event_loop import THE_DRIVER_ENDS, EventLoop
 from .transport.link import READ_LENGTH, Link, LinkHandler
-
-NS_PER_S = 10**9
 
 STOP_LIMIT_S = 2.0
 """At the end of the driver, and of a connection, robots get this long to come to rest; 0.4 s is usual."""
@@ -60,7 +58,6 @@ class Gateway(LinkHandler):
         self._admission = Admission(config)
         self._stops = StopDelivery(loop.call_later, self)
         self.note_change = on_change
-        self.send_commands = CommandSender(loop.call_later, self).send_commands
         self.stop_robot = self._stops.begin
         self._robot_log = RobotLog(log, self._stops.begin, self.warn_late)
         self._transforms = TransformPublisher(loop.call_later)
@@ -86,7 +83,8 @@ class Gateway(LinkHandler):
             return refusal
         now_s = time.monotonic()
         session = Session(self._config, now_s)
-        peer = Peer(link, session, RateLimit(self._config.max_packets_per_s, self._config.max_bytes_per_s, now_s))
+        rate_limit = RateLimit(self._config.max_packets_per_s, self._config.max_bytes_per_s, now_s)
+        peer = Peer(link, session, rate_limit, self, self._loop.call_later)
         self.peers[link] = peer
         self.poll_link(link, now_s)
         return None

@@ -18,6 +18,7 @@ import rosgraph
 import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
+from hero_msgs.msg import RobotArray
 from hero_node import ProgramError, print_error
 from hero_node.ros import (
     MasterWatch,
@@ -31,15 +32,14 @@ from hero_node.ros import (
 )
 
 from .config import DriverConfig, read_config
-from .gateway import NS_PER_S, STOP_LIMIT_S, Gateway
+from .gateway import STOP_LIMIT_S, Gateway
 from .reports.reporter import FleetStatus, Reporter
+from .reports.robot_status import find_stamp
 from .ros.log_relay import LogRelay, report_dropped_log_lines
 from .ros.rospy_internals import (
-    LATEST_S,
     call_before_shutdown,
     keep_publishers_connected,
     leave_topics_out_of_rosout,
-    limit_clock,
 )
 from .ros.thread_watch import ThreadWatch
 from .stops.interface import StopInterface
@@ -69,8 +69,7 @@ def make_ros_clock() -> Callable[[], int]:
     """Return a function that gives ROS time in nanoseconds: simulated where /use_sim_time is set."""
     if rospy.get_param("/use_sim_time", False):
         return lambda: rospy.Time.now().to_nsec()
-    latest_ns = LATEST_S * NS_PER_S
-    return lambda: min(max(time.time_ns(), NS_PER_S), latest_ns)
+    return time.time_ns
 
 
 class DriverNode:
@@ -196,9 +195,6 @@ class DriverNode:
             return
         if is_periodic:
             reporter.measure_rates(status)
-            if not 1.0 <= time.time() <= LATEST_S:
-                text = "the clock of this PC is before 1970 or beyond 2106, unlike any stamp: set it (timedatectl)"
-                self._log.log_throttled("error", text, text)
         try:
             reporter.publish(status)
         except rospy.ROSException:
@@ -210,20 +206,17 @@ class DriverNode:
 
     def _take_status(self, answer: Callable[[FleetStatus], None]) -> None:
         """Runs on the thread of the sockets."""
-        now_s = time.monotonic()
-        status = FleetStatus(
-            now_s,
-            str(self._loop.listening),
-            self._gateway.stopped,
-            self._stop_interface.stopped_by,
-            self._stop_interface.stopped_s,
-            len(self._gateway.peers),
-            self._gateway.refused_connections,
-            self._gateway.last_refusal,
-            self._gateway.list_robots(now_s),
-            self._gateway.list_gone(now_s),
+        now_s, gateway = time.monotonic(), self._gateway
+        message = RobotArray(
+            listening=str(self._loop.listening),
+            stopped=gateway.stopped,
+            stopped_by=self._stop_interface.stopped_by,
+            gone=[status.message for status in gateway.list_gone(now_s)],
         )
-        answer(status)
+        if self._stop_interface.stopped_s is not None:
+            message.stopped_since = find_stamp(self._stop_interface.stopped_s, now_s)
+        robots, refused = gateway.list_robots(now_s), gateway.refused_connections
+        answer(FleetStatus(now_s, message, robots, len(gateway.peers), refused, gateway.last_refusal))
 
 
 def main(argv: Optional[List[str]] = None) -> int:
@@ -284,7 +277,6 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     keep_publishers_connected()
-    limit_clock()
     init_ros_node(NODE_NAME, arguments=argv)
     leave_topics_out_of_rosout()
     report_dropped_log_lines()

@@ -1,5 +1,6 @@
 """One connection and what is known of it. Thread of the sockets."""
 
+import time
 from dataclasses import dataclass, field
 from typing import List, Optional
 
@@ -11,18 +12,26 @@ from .fleet import log_lines
 from .fleet.admission import RateLimit
 from .fleet.registry import RobotRecord
 from .ros.robot_bridge import RobotBridge
+from .ros.robot_commands import Owner
+from .rosserial.errors import RosserialError
 from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
+from .transport.event_loop import CallLater
 from .transport.link import Link
+
+SILENCE_LIMIT_S = 0.5
+"""A robot silent for this long gets motion only when it sends again; pauses of 0.1 s are common on Wi-Fi."""
 
 
 @dataclass
 class Peer:
-    """One connection and what is known of who is at its other end."""
+    """One connection and what is known of who is at its other end; call_later is the loop's."""
 
     link: Link
     session: Session
     rate_limit: RateLimit
+    owner: Owner
+    call_later: CallLater
     record: Optional[RobotRecord] = None
     bridge: Optional[RobotBridge] = None
     wheels: WheelMotion = field(default_factory=WheelMotion)
@@ -33,7 +42,7 @@ class Peer:
     log_window_s: float = 0.0
     log_count: int = 0
     motion_mark: int = 0  # how much was written when the last motion command was
-    send_due: bool = False
+    send_due: bool = False  # a timer is set for commands that have to wait
     stop: Optional[StopProgress] = None  # while the robot is stopped
 
     def __post_init__(self) -> None:
@@ -62,3 +71,45 @@ class Peer:
     def has_acknowledged_motion(self) -> bool:
         """Return whether the robot's TCP has acknowledged the last motion command."""
         return self.link.handed_length - self.link.read_unacknowledged_length() >= self.motion_mark
+
+    def send_commands(self) -> None:
+        """Send the commands that wait and may go out, later the remainder; a robot that reads none delays no other."""
+        if self.send_due:
+            self._send_ready(time.monotonic())
+        else:
+            self._send_and_come_back()
+
+    def _send_and_come_back(self) -> None:
+        self.send_due = False
+        if self.bridge is None or self.link.closed:
+            return
+        now_s = time.monotonic()
+        delay_s = self.bridge.commands.queue.due_in_s(self._send_ready(now_s), now_s)
+        if delay_s is not None:
+            self.send_due = True
+            self.call_later(delay_s, self._send_and_come_back)
+
+    def _send_ready(self, now_s: float) -> bool:
+        """Send what may go out; return whether the next motion command may, as far as the robot is concerned."""
+        link, bridge = self.link, self.bridge
+        if bridge is None or link.closed:
+            return True
+        if self.owner.stopped:
+            # What a thread of rospy's offered just before the stop.
+            bridge.commands.queue.discard_motion(now_s)
+        stops_only = self.wheels.readings > 0 and now_s - self.session.last_receive_s > SILENCE_LIMIT_S
+        in_flight = link.read_unacknowledged_length()
+        acknowledged = link.handed_length - in_flight >= self.motion_mark
+        for name, payload in bridge.commands.queue.take(in_flight, acknowledged, stops_only, now_s):
+            topic_id = bridge.find_id(name)
+            if topic_id is None:
+                bridge.commands.refused += 1
+                continue
+            try:
+                link.send_packet(self.session.encode_message(topic_id, payload))
+            except RosserialError as error:  # it does not fit
+                self.owner.warn_robot(self, str(error))
+            if bridge.is_motion(name):
+                self.motion_mark = link.handed_length
+                acknowledged = False
+        return acknowledged and not stops_only

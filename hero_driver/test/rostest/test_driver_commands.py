@@ -2,7 +2,7 @@
 """Commands to robots: a stop always arrives, twice, and an old command never does.
 
 That commands are far enough apart for the firmware is a matter of the driver's clock: see
-hero_driver/test/unit/test_command_sender.py.
+hero_driver/test/unit/test_peer_commands.py.
 """
 
 import math

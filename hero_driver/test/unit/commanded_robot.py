@@ -10,12 +10,11 @@ import struct
 from types import SimpleNamespace
 from unittest import mock
 
-from hero_driver import command_sender
+from hero_driver import peer
 from hero_driver.commands.command_settings import CommandSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.fleet.namespaces import identify
-from hero_driver.peer import Peer
 from hero_driver.ros import robot_bridge, robot_commands
 from hero_driver.rosserial import packets
 from hero_driver.rosserial.session import Session, SessionLimits
@@ -56,7 +55,7 @@ class Clock:
     def is_the_drivers(self):
         """Let the driver's parts see this time."""
         with contextlib.ExitStack() as stack:
-            for module in (command_sender, delivery, robot_commands):
+            for module in (peer, delivery, robot_commands):
                 stack.enter_context(mock.patch.object(module, "time", self))
             yield self
 
@@ -99,7 +98,9 @@ class CommandedRobot:
             max_names=100,
         )
         self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), context)
-        self.peer = Peer(self, Session(SessionLimits(), clock.now_s), None, bridge=self.bridge)
+        self.peer = peer.Peer(
+            self, Session(SessionLimits(), clock.now_s), None, self, clock.call_later, bridge=self.bridge
+        )
         self.bridge.corrections.restart(False, self.peer.wheels)
         self.bridge.attach(self.peer)
         self._names = {}
@@ -108,7 +109,6 @@ class CommandedRobot:
         for event in self.peer.session.receive_bytes(subscribed.encode_declarations(), clock.now_s, 0.0):
             self.bridge.declare(event, event.info.name)
             self._names[event.info.topic_id] = event.info.name
-        self.sender = command_sender.CommandSender(clock.call_later, self)
         self.stops = delivery.StopDelivery(clock.call_later, self)
         clock.call_later(phase_s, self._read)
         clock.call_later(0.0, self._watch_commanders)
@@ -116,9 +116,6 @@ class CommandedRobot:
             clock.call_later(phase_s, self._send_reading)
 
     # What commands and stops ask of the gateway.
-
-    def send_commands(self, peer):
-        self.sender.send_commands(peer)
 
     def stop_robot(self, _):
         self.stops.begin(self.peer)
@@ -234,7 +231,7 @@ class CommandedRobot:
         """Offer a motion command, as the subscriber to its topic does."""
         kind = "hero_msgs/Motor" if name == MOTORS else "geometry_msgs/Twist"
         self.bridge.commands.queue.offer_motion(name, payload, STOP_PAYLOADS[kind], self.clock.now_s)
-        self.sender.send_commands(self.peer)
+        self.peer.send_commands()
 
     def drive(self, linear_m_s, name=VELOCITY):
         """Offer a Twist."""

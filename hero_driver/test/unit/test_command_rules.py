@@ -33,7 +33,7 @@ class Bench:
         monkeypatch.setattr(robot_commands, "time", SimpleNamespace(monotonic=lambda: self.now_s))
         monkeypatch.setattr(robot_commands, "RawSubscriber", self.make_subscriber)
         monkeypatch.setattr(robot_commands, "read_caller", lambda sender: sender or "")
-        self.owner = SimpleNamespace(stopped=False, stop_robot=self.stop, send_commands=self.sent.append)
+        self.owner = SimpleNamespace(stopped=False, stop_robot=self.stop)
         given = CommandSettings(**{"clamp": True, "command_max_age_s": 10.0, **settings})
         loop = SimpleNamespace(call_later=lambda delay_s, call: self.later.append((self.now_s + delay_s, call)))
         log = SimpleNamespace(log_throttled=lambda level, key, text: self.lines.append(text))
@@ -48,7 +48,7 @@ class Bench:
             clear=self.clear,
         )
         self.wheels = WheelMotion()
-        self.peer = SimpleNamespace(wheels=self.wheels)
+        self.peer = SimpleNamespace(wheels=self.wheels, send_commands=lambda: self.sent.append(self.peer))
         self.commands.attach(self.peer)
         self.subscribers = {name: self.commands.make_subscriber(name, name, TWIST) for name in (VELOCITY, POSITION)}
 

@@ -1,15 +1,12 @@
 """What the driver changes in rospy: who may connect at once, and what a log line holds."""
 
 import logging
-import time
 
 import pytest
-import rospy
 from rospy.impl import rosout
 
-from hero_driver.node import make_ros_clock
 from hero_driver.ros import rospy_internals
-from hero_driver.ros.rospy_internals import LATEST_S, leave_topics_out_of_rosout, limit_clock
+from hero_driver.ros.rospy_internals import leave_topics_out_of_rosout
 
 
 class Publisher:
@@ -44,15 +41,3 @@ def test_a_log_line_holds_no_names_of_topics_and_is_published_once(rosout_publis
     assert line.header.stamp.secs == 7
     logging.getLogger("rosout").error("another line")
     assert [line.msg for line in rosout_publisher.lines] == ["a line about hero_3", "another line"]
-
-
-@pytest.mark.parametrize(("clock_s", "stamp_s"), [(-5e8, 1), (1.7e9, 1700000000), (4.8e9, LATEST_S)])
-def test_a_clock_that_stamps_cannot_hold_ends_no_driver(monkeypatch, clock_s, stamp_s):
-    monkeypatch.setattr(rospy.rostime, "time", time)
-    monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
-    monkeypatch.setattr(time, "time", lambda: clock_s)
-    monkeypatch.setattr(time, "time_ns", lambda: int(clock_s) * 10**9)
-    monkeypatch.setattr(rospy, "get_param", lambda name, default: default)
-    limit_clock()
-    assert rospy.rostime.get_rostime().secs == stamp_s
-    assert make_ros_clock()() == stamp_s * 10**9

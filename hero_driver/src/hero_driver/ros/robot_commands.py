@@ -39,9 +39,6 @@ class Owner(Protocol):
     stopped: bool
     """True if all robots are stopped until they are released."""
 
-    def send_commands(self, peer: Any) -> None:
-        """Send the commands that wait for the robot of a connection, as soon as it can take them."""
-
     def stop_robot(self, peer: Any) -> None:
         """Stop the robot of a connection."""
 
@@ -157,7 +154,7 @@ class RobotCommands:
                 self._stop_robot()
                 return
             self.queue.offer_motion(name, command, stop_payload, now_s)
-            self._owner.send_commands(self._peer)
+            self._peer.send_commands()
 
     def _change_sender(self, sender: object, now_s: float) -> None:
         """Another connection brings the newest command: warn if two programs take turns, not one follows another."""
@@ -178,7 +175,7 @@ class RobotCommands:
         if name.endswith(LIGHT_SUFFIX) and len(payload) == len(NO_LIGHT):
             self.light = payload
         self.queue.offer(name, payload)
-        self._owner.send_commands(self._peer)
+        self._peer.send_commands()
 
     def offer_request(self, name: str, service_type: str, request: bytes) -> Optional[str]:
         """Take a request of a service; return why it cannot be sent, if so."""
@@ -195,7 +192,7 @@ class RobotCommands:
                 return "it moves the robot, and all robots are stopped (~stop)"
             self.was_told_to_tune = self._may_tune = True
         self.queue.offer(name, request)
-        self._owner.send_commands(self._peer)
+        self._peer.send_commands()
         return None
 
     def _lose_sender(self, name: str, source: str) -> None:

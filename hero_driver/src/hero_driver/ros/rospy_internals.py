@@ -25,19 +25,6 @@ ROSOUT_LOGGER = "rosout"
 """The logger of rospy.loginfo() and the like."""
 
 
-# The clock.
-
-LATEST_S = 2**32 - 86400
-"""A day before the last time that ROS's messages can hold, in 2106: stamps are made a little later than the clock."""
-
-
-def limit_clock() -> None:
-    """Limit rospy's time to what messages can hold: a PC's clock before 1970 or beyond 2106 would end the node."""
-    clock = SimpleNamespace(**vars(time))
-    clock.time = lambda: min(max(time.time(), 1.0), LATEST_S)
-    rospy.rostime.time = clock
-
-
 # Publishers and subscribers.
 
 

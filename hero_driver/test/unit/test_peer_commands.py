@@ -7,8 +7,8 @@ from commanded_robot import LIGHT, MOTORS, POSITION, VELOCITY, Clock, CommandedR
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hero_driver.command_sender import SILENCE_LIMIT_S
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS
+from hero_driver.peer import SILENCE_LIMIT_S
 
 GATE_S = 0.050
 """The firmware drops a velocity that it reads within this time after the last one that it took."""
@@ -142,7 +142,7 @@ def test_a_command_for_what_the_robot_has_not_declared_costs_no_other():
         robot = CommandedRobot(clock)
         for name in ("/hero_1/gone", LIGHT):
             robot.bridge.commands.queue.offer(name, LIGHT_PAYLOAD)
-        robot.send_commands(robot.peer)
+        robot.peer.send_commands()
         clock.run(0.1)
     assert robot.bridge.commands.refused == 1
     assert [payload for _, name, payload in robot.taken if name == LIGHT] == [LIGHT_PAYLOAD]
@@ -153,7 +153,7 @@ def test_a_command_too_long_for_the_robot_is_reported_and_costs_no_other():
         robot = CommandedRobot(clock)
         for payload in (bytes(65536), LIGHT_PAYLOAD):
             robot.bridge.commands.queue.offer(LIGHT, payload)
-        robot.send_commands(robot.peer)
+        robot.peer.send_commands()
         clock.run(0.1)
     assert len(robot.warnings) == 1 and "65536 bytes does not fit the robot's buffer" in robot.warnings[0]
     assert [payload for _, name, payload in robot.taken if name == LIGHT] == [LIGHT_PAYLOAD]
