@@ -44,6 +44,7 @@ def test_programs_wait_report_and_keep_distance_as_their_page_says():
 
 def test_methods_have_the_limits_of_the_api_page():
     assert f"limited to {MAX_LINEAR_M_S:.2f} m/s and {MAX_ANGULAR_RAD_S:g} rad/s" in read("docs/api.md")
+    assert f"..{MAX_LINEAR_M_S:.2f} m/s, angular.z -{MAX_ANGULAR_RAD_S:g}.." in read("docs/robot_interface.md")
     assert f"for about {COMMAND_S:g} s at most" in inspect.getdoc(BaseRobot.drive)
     assert f"if odometry is older than {FRESH_S:g} s" in inspect.getdoc(BaseRobot.pose)
     apart_m = [AvoidanceLaw(body_m=model.body_radius_m).min_spacing_m for model in MODELS.values()]

@@ -9,7 +9,7 @@ Everything here runs on the thread of the sockets, except what says otherwise. I
 import os
 import time
 import traceback
-from typing import Callable, Dict, List, Optional, Tuple
+from typing import Callable, Dict, List, Optional
 
 from .commands.stop_progress import StopState
 from .config import DriverConfig
@@ -23,6 +23,7 @@ from .reports.robot_log import RobotLog
 from .reports.robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
 from .ros.robot_bridge import BridgeContext, RobotBridge
+from .ros.robot_commands import Stops
 from .ros.transform_publisher import TransformPublisher
 from .rosserial.payloads import Log
 from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
@@ -302,7 +303,7 @@ class Gateway(LinkHandler):
             self.bridges[identity.namespace] = bridge
         peer.bridge = bridge
         rebooted = peer.boot is not None
-        bridge.corrections.restart(rebooted and decision.verdict is not Verdict.ARRIVED, peer.wheels)
+        bridge.corrections.odometry.restart(rebooted and decision.verdict is not Verdict.ARRIVED, peer.wheels)
         bridge.attach(peer)
         text = f"{bridge.label} {decision.verdict.value} ({peer.link.address})"
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
@@ -347,7 +348,7 @@ class Gateway(LinkHandler):
         self.note_change()
         answer(names)
 
-    def list_stops(self) -> List[Tuple[str, Optional[StopState]]]:
+    def list_stops(self) -> Stops:
         """Return name and stop of every connection that can move a robot, and None for robots that are away."""
         records = sorted(self.fleet.robots.values(), key=lambda record: record.identity.number)
         connected = [peer for peer in self.peers.values() if peer.bridge is not None or can_move(peer)]

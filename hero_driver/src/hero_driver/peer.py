@@ -101,7 +101,7 @@ class Peer:
         in_flight = link.read_unacknowledged_length()
         acknowledged = link.handed_length - in_flight >= self.motion_mark
         for name, payload in bridge.commands.queue.take(in_flight, acknowledged, stops_only, now_s):
-            topic_id = bridge.find_id(name)
+            topic_id = bridge.ids.get(name)
             if topic_id is None:
                 bridge.commands.refused += 1
                 continue

@@ -30,12 +30,6 @@ MAX_DISTANCE_M = 2.9
 DISTANCE_CONE_RAD = 0.26
 """Its field of view with the 4 x 4 detectors that the firmware uses (15 degrees, ST UM2555)."""
 
-MAX_LINEAR_M_S = 0.20
-"""config.h:60."""
-
-MAX_ANGULAR_RAD_S = 8.0
-"""config.h:61."""
-
 SERVO_CENTER_US = 1500
 """Servo pulse at which a wheel stops, up to the servo's own center."""
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import rospy
 import rostest
-from geometry_msgs.msg import Twist
 from std_msgs.msg import Bool, ColorRGBA
 from tf2_msgs.msg import TFMessage
 
@@ -195,14 +194,6 @@ class TestDriverPolicy(OwnDriverCase):
             lambda: "25 transforms in %s" % transforms.messages,
         )
         driver.wait_line("hero_20: topic '?/tf'? refused")
-
-    def test_velocities_are_clamped_where_a_parameter_says_so(self):
-        driver = self.start(clamp=True)
-        robot = self.dial(driver, 8)
-        publisher = make_publisher("/hero_8/velocity_controller/cmd_vel", Twist)
-        publisher.publish(stock_messages.from_bytes(Twist, stock_messages.make_twist(5.0, -50.0)))
-        wait_for(lambda: robot.velocities, "the command")
-        self.assertEqual((robot.velocities[0].linear_m_s, robot.velocities[0].angular_rad_s), (0.20, -8.0))
 
 
 if __name__ == "__main__":

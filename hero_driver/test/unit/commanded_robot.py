@@ -101,7 +101,7 @@ class CommandedRobot:
         self.peer = peer.Peer(
             self, Session(SessionLimits(), clock.now_s), None, self, clock.call_later, bridge=self.bridge
         )
-        self.bridge.corrections.restart(False, self.peer.wheels)
+        self.bridge.corrections.odometry.restart(False, self.peer.wheels)
         self.bridge.attach(self.peer)
         self._names = {}
         self._senders = {}

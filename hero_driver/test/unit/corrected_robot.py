@@ -70,7 +70,7 @@ class CorrectedRobot:
 
     def reconnect(self, rebooted):
         """Begin a new connection with the stock topics."""
-        self.corrections.restart(rebooted, WheelMotion())
+        self.corrections.odometry.restart(rebooted, WheelMotion())
         self.declare(TYPES)
 
     def receive(self, name, payload, arrival_ns):

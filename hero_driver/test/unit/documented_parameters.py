@@ -15,7 +15,7 @@ GROUPS = {
     "Connections": ("host", "port", "allow"),
     "Limits": ("max_*",),
     "Timeouts": ("*_timeout_s", "grace_s", "command_max_age_s"),
-    "Commands": ("clamp", "orphan_stop_s", "silent_stop_s", "start_stopped", "allow_self_tuning"),
+    "Commands": ("orphan_stop_s", "silent_stop_s", "start_stopped", "allow_self_tuning"),
     "Odometry": ("wheel_*", "ticks_per_turn", "calibration_folder", "*_covariance"),
     "Reports": ("report_period_s",),
     "Others": ("*",),

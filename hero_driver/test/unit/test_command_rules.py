@@ -8,7 +8,7 @@ import pytest
 
 from hero_driver.commands.command_settings import CommandSettings
 from hero_driver.commands.service_requests import find_request_error
-from hero_driver.commands.velocity_shaper import ZERO_TWIST, check_twist
+from hero_driver.commands.velocity_shaper import ZERO_TWIST
 from hero_driver.corrections import message_layouts
 from hero_driver.corrections.tick_odometry import MAX_GAP_S, MIN_GAP_S, TickOdometry, WheelGeometry
 from hero_driver.corrections.wheel_motion import REST_TICKS, SETTLED_TICKS, WheelMotion
@@ -34,7 +34,7 @@ class Bench:
         monkeypatch.setattr(robot_commands, "RawSubscriber", self.make_subscriber)
         monkeypatch.setattr(robot_commands, "read_caller", lambda sender: sender or "")
         self.owner = SimpleNamespace(stopped=False, stop_robot=self.stop)
-        given = CommandSettings(**{"clamp": True, "command_max_age_s": 10.0, **settings})
+        given = CommandSettings(**{"command_max_age_s": 10.0, **settings})
         loop = SimpleNamespace(call_later=lambda delay_s, call: self.later.append((self.now_s + delay_s, call)))
         log = SimpleNamespace(log_throttled=lambda level, key, text: self.lines.append(text))
         self.commands = RobotCommands("/hero_1", self.owner, loop, log, given)
@@ -201,15 +201,7 @@ def test_the_light_is_remembered_by_its_topic_and_length(bench):
     assert bench.commands.light == color and bench.commands.refused == 1
 
 
-def test_speeds_are_clamped_both_ways_and_requests_end_at_their_limits():
-    for linear_m_s, angular_rad_s, expected in (
-        (0.1, -9.0, (0.1, -8.0)),
-        (-0.3, 1.0, (-0.2, 1.0)),
-        (0.2, -8.0, (0.2, -8.0)),
-    ):
-        payload = twist(linear_m_s, angular_rad_s, 1.0, 2.0, 3.0, 4.0)
-        assert struct.unpack("<6d", check_twist(payload, True)) == (expected[0], 1.0, 2.0, 3.0, 4.0, expected[1])
-        assert check_twist(payload, False) == payload
+def test_requests_end_at_their_limits():
     for kind, layout, low, high, beyond in (
         ("hero_msgs/SetOdom", "<3d", -1e6, 1e6, (-1.01e6, 1.01e6)),
         ("hero_msgs/SetPID", "<6f", 0.0, 1e6, (-0.01, 1.01e6)),

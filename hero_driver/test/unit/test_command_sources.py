@@ -181,7 +181,7 @@ def test_an_ordinary_stop_ends_a_tuning_that_the_driver_knows_of(controller, nam
         robot = CommandedRobot(clock, has_readings=True)
         clock.run(1.0)
         calibration = "/hero_1/%s/pid_calibration" % controller
-        robot.bridge._ids[calibration] = 1000
+        robot.bridge.ids[calibration] = 1000
         assert robot.bridge.commands.offer_request(calibration, "std_srvs/Trigger", b"") is None
         robot.motors.start_tuning(controller)
         clock.run(2.0)

@@ -11,8 +11,6 @@ from hero_driver.corrections.tick_odometry import TWIST_WINDOW
 from hero_driver.gateway import STOP_LIMIT_S
 from hero_driver.robot_constants import (
     BODY_RADIUS_M,
-    MAX_ANGULAR_RAD_S,
-    MAX_LINEAR_M_S,
     MAX_RIM_RANGE_M,
     MAX_WATCHDOG_S,
     MIN_RIM_RANGE_M,
@@ -40,7 +38,6 @@ def test_limits_of_commands_are_those_of_the_documents():
         (README, r"wheels still turn ([\d.]+) s after a zero", [command_sources.ZERO_SHOWS_S]),
         (README, r"was suspended for more than (\d+) s", [event_loop.PAUSE_S]),
         (README, r"or (\d+) s have passed, so that no call", [services.LATE_ANSWER_S]),
-        (INTERFACE, r"linear.x -([\d.]+)..0.20 m/s, angular.z -(\d+)..8", [MAX_LINEAR_M_S, MAX_ANGULAR_RAD_S]),
         (INTERFACE, r"the same \| stops after (\d+) s", [MAX_WATCHDOG_S]),
     ):
         assert find_limits(page, pattern) == limits, pattern

@@ -4,6 +4,7 @@ import struct
 from types import SimpleNamespace
 
 import pytest
+import rospy
 from test_gateway import HELLO, HOST, OTHER_HOST, PUBLISHED, STOCK_DECLARATIONS, FakeLink, FakeRobot
 
 from hero_driver import gateway as gateway_module
@@ -53,6 +54,7 @@ class Driver:
         self.keys = []  # of throttled lines
         for module in (gateway_module, delivery):
             monkeypatch.setattr(module.time, "monotonic", lambda: self.now_s)
+        monkeypatch.setattr(rospy.Time, "now", staticmethod(lambda: rospy.Time.from_sec(self.now_s)))
         log = SimpleNamespace(
             log_throttled=self.log_throttled, log=lambda level, text: self.lines.append((level, text))
         )
@@ -228,7 +230,7 @@ def test_a_robot_that_comes_again_keeps_its_topics(driver, monkeypatch):
     driver.join()
     bridge = driver.gateway.bridges["/hero_0"]
     restarts = []
-    monkeypatch.setattr(bridge.corrections, "restart", lambda rebooted, wheels: restarts.append((rebooted, wheels)))
+    monkeypatch.setattr(bridge.corrections.odometry, "restart", lambda rebooted, wheels: restarts.append((rebooted, wheels)))
     for is_booted in (False, True):
         driver.now_s += 10.0
         link = driver.connect()
@@ -410,7 +412,7 @@ def test_a_robot_that_has_said_who_it_is_leaves_the_unidentified_ones(driver):
 def test_a_topic_keeps_its_publisher_until_its_layout_changes(driver):
     bridge, jobs, replaced = join_bridge(driver), [], []
     bridge._registrar = SimpleNamespace(submit=lambda job, **options: jobs.append(job) or True)
-    bridge._endpoints.advertise = lambda name, layout, publishers, old: replaced.append(old)
+    bridge.endpoints.advertise = lambda name, layout, publishers, old: replaced.append(old)
     name, publishers = "/hero_0/note", []
     for md5sum in ("a" * 32, "a" * 32, "b" * 32, "b" * 32):
         bridge.declare(make_topic(name, TopicKind.PUBLISHER, md5sum), name)
@@ -427,17 +429,17 @@ def test_what_a_robot_takes_has_an_id_once_its_layout_is_registered(driver):
     bridge._registrar = SimpleNamespace(submit=lambda job, **options: jobs.append(job) or True)
     bridge._loop = SimpleNamespace(call_soon=lambda call: call())
     usable = [True, True, False]
-    bridge._endpoints.subscribe = lambda name, layout, make_subscriber: usable.pop(0)
+    bridge.endpoints.subscribe = lambda name, layout, make_subscriber: usable.pop(0)
     name = "/hero_0/note"
     for md5sum, before, after in (("a" * 32, 150, 150), ("b" * 32, None, 150), ("c" * 32, None, None)):
         bridge.declare(make_topic(name, TopicKind.SUBSCRIBER, md5sum), name)
-        assert bridge.find_id(name) == before
+        assert bridge.ids.get(name) == before
         jobs.pop()()
-        assert bridge.find_id(name) == after
+        assert bridge.ids.get(name) == after
     bridge.declare(make_topic(name, TopicKind.SUBSCRIBER, "c" * 32), name)
     bridge.detach("closed")
     jobs.pop()()
-    assert bridge.find_id(name) is None, "of a connection that has ended"
+    assert bridge.ids.get(name) is None, "of a connection that has ended"
 
 
 def join_bridge(driver):

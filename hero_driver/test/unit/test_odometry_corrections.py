@@ -258,7 +258,7 @@ def test_ticks_are_those_of_the_model_that_the_robot_is(md5sum, model):
     robot.receive_burst(NOW_NS, (0.0, 0.0))
     (odometry,) = list_odometry(robot.receive_burst(NOW_NS + 34 * MS, (20.0, 20.0)))
     tick_m = {"hero": math.pi * 0.0492 / 288, "hero_plus": math.pi * 0.050 / 96}[model]
-    assert robot.corrections.models.model == model
+    assert robot.corrections.model == model
     assert odometry[2] == pytest.approx(20 * tick_m)
 
 

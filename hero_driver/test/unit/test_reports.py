@@ -167,7 +167,7 @@ def test_a_damaged_calibration_is_reported_beside_all_else(reporter):
 
     def describe(problems, **changes):
         corrections = make_corrections("/hero_7", [], calibration_problems=problems)
-        bridge = SimpleNamespace(last_error="", commands=commands, corrections=corrections)
+        bridge = SimpleNamespace(endpoints=SimpleNamespace(last_error=""), commands=commands, corrections=corrections)
         status = describe_robot(make_record(**changes), bridge, None, StopState.NOT_STOPPED, {}, NOW_S)
         return status.message.last_error, (status.level, status.text)
 

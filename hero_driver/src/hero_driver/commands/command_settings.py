@@ -9,7 +9,6 @@ from hero_node.parameters import declare, flag, number
 class CommandSettings:
     """Permissions and time limits of commands."""
 
-    clamp: bool = declare(flag(False, "limit velocities to those of the firmware (0.20 m/s, 8.0 rad/s)"))
     allow_self_tuning: bool = declare(
         flag(
             False,

@@ -11,7 +11,7 @@ from typing import Optional
 
 from hero_node import TWIST_FORM
 
-from ..robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, SERVO_CENTER_US
+from ..robot_constants import SERVO_CENTER_US
 
 COMMAND_INTERVAL_S = 0.06
 """Time between two commands to one controller: the firmware drops one within 50 ms of the last accepted one."""
@@ -27,10 +27,10 @@ STOP_PAYLOADS = {"geometry_msgs/Twist": ZERO_TWIST, "hero_msgs/Motor": STOPPED_M
 """Message types that move a robot, and the payload of each that stops it."""
 
 
-def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
+def check_twist(payload: bytes) -> Optional[bytes]:
     """Return what to send for a geometry_msgs/Twist: ZERO_TWIST for a stop; None if a component is not finite.
 
-    The robot uses only linear.x and angular.z. clamp brings these two into the firmware's limits.
+    The robot uses only linear.x and angular.z, and clamps both.
     """
     if len(payload) != TWIST_FORM.size:
         return None
@@ -38,14 +38,7 @@ def check_twist(payload: bytes, clamp: bool) -> Optional[bytes]:
     # A sum of finite numbers may overflow; only then are the six looked at one by one.
     if not math.isfinite(sum(components)) and not all(map(math.isfinite, components)):
         return None
-    linear_m_s, angular_rad_s = components[0], components[5]
-    if linear_m_s == 0.0 and angular_rad_s == 0.0:
-        return ZERO_TWIST
-    if not clamp:
-        return payload
-    clamped_m_s = max(-MAX_LINEAR_M_S, min(MAX_LINEAR_M_S, linear_m_s))
-    clamped_rad_s = max(-MAX_ANGULAR_RAD_S, min(MAX_ANGULAR_RAD_S, angular_rad_s))
-    return TWIST_FORM.pack(clamped_m_s, *components[1:5], clamped_rad_s)
+    return ZERO_TWIST if components[0] == 0.0 and components[5] == 0.0 else payload
 
 
 def check_motor_pulses(payload: bytes) -> Optional[bytes]:

@@ -1,17 +1,23 @@
-"""Corrects the messages of one robot, from payloads to payloads; topics that are not in ROUTES pass unchanged."""
+"""Corrects the messages of one robot, from payloads to payloads; topics that are not in ROUTES pass unchanged.
+
+HeRo+ (github.com/varunraveendra/hero_plus) has encoders on the wheels instead of the gears, and an Encoder message with
+one field more, which tells it from stock robots: its firmware logs the version of the stock one.
+"""
 
 import collections
 import functools
 from typing import Callable, Deque, Dict, NamedTuple, Optional, Sequence, Tuple
 
+from hero_node import PLUS_ENCODER_MD5
+from hero_node.files import HERO_PLUS, STOCK
+
 from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
 from .correction_settings import CorrectionSettings
 from .odometry_corrections import OdometryCorrector, Sink
-from .robot_models import ModelWatch
 from .stamps import NS_PER_S, StampFilter
+from .tick_odometry import WheelGeometry
 from .transforms import AddTransform, TransformCorrector
-from .wheel_motion import WheelMotion
 
 TRANSFORMS = "/tf"
 """Name under which single transforms are returned; they are collected over all robots."""
@@ -30,7 +36,12 @@ TypedTopic = Tuple[str, str]
 
 
 class RobotCorrections:
-    """The data of one robot, kept over its reconnects; refused: messages and transforms that could not be used."""
+    """The data of one robot, kept over its reconnects.
+
+    Attributes:
+        refused: messages and transforms that could not be used.
+        model: by its newest Encoder declaration; STOCK before that.
+    """
 
     def __init__(self, namespace: str, settings: CorrectionSettings, add_transform: AddTransform) -> None:
         """Correct the messages of the robot in namespace; add_transform takes the transforms of all robots."""
@@ -39,19 +50,13 @@ class RobotCorrections:
         self._offsets_ns: Deque[int] = collections.deque(maxlen=OFFSET_SAMPLES)
         self.refused = 0
         self._problem = ""
-        self.models = ModelWatch(namespace, settings)
+        self.model = STOCK
+        self._has_encoder = False
         self.stamps = StampFilter()
-        self.odometry = OdometryCorrector(
-            settings, self.models.find_geometry(), self.stamps, add_transform, self._refuse
-        )
+        self.odometry = OdometryCorrector(settings, self._find_wheels(), self.stamps, add_transform, self._refuse)
         self.transforms = TransformCorrector(
             namespace, self.stamps, add_transform, self.odometry.receive_transform, self._refuse
         )
-
-    def restart(self, rebooted: bool, wheels: WheelMotion) -> None:
-        """Begin a new connection, after a reboot or not; wheels are told of all its readings."""
-        self.models.restart()
-        self.odometry.restart(rebooted, wheels)
 
     @property
     def clock_offset_s(self) -> float:
@@ -78,10 +83,23 @@ class RobotCorrections:
         if what:
             self._problem = f"{topic} refused, it cannot be true ({what}): reboot the robot, or flash its firmware"
 
-    def note_encoder(self, md5sum: str) -> None:
-        """The robot declares an Encoder message of this md5, which tells its model."""
-        self.models.note_encoder(md5sum)
-        self.odometry.ticks.change_wheels(self.models.find_geometry())
+    def note_encoder(self, md5sum: str) -> str:
+        """The robot declares an Encoder message of this md5; return what contradicts its model, for users, or ""."""
+        former, self.model = self.model, HERO_PLUS if md5sum == PLUS_ENCODER_MD5 else STOCK
+        had_encoder, self._has_encoder = self._has_encoder, True
+        self.odometry.ticks.change_wheels(self._find_wheels())
+        if had_encoder and former != self.model:
+            text = "it was a %s and is a %s now, by whose wheels its odometry goes on: two robots need two ids"
+            return text % (former, self.model)
+        own = self._settings.own_wheels.get(self._namespace.strip("/"))
+        calibrated = "" if own is None else own.others.get("model", "")
+        if calibrated in ("", self.model):
+            return ""
+        text = "it is a %s, but its calibration file says %s, whose wheels are not used: calibrate it again"
+        return text % (self.model, calibrated)
+
+    def _find_wheels(self) -> WheelGeometry:
+        return self._settings.find_geometry(self._namespace.strip("/"), self.model)
 
     def list_outputs(self, name: str, message_type: str) -> Sequence[TypedTopic]:
         """Return the topics that the messages of the topic called name become; none for TRANSFORMS."""

@@ -84,9 +84,9 @@ def describe_robot(
     tunes, details = False, {}
     if bridge is not None:
         corrections, commands = bridge.corrections, bridge.commands
-        row.model, row.clock_offset = corrections.models.model, corrections.clock_offset_s
+        row.model, row.clock_offset = corrections.model, corrections.clock_offset_s
         row.dropped_messages += commands.refused + commands.queue.dropped + corrections.refused
-        problem, tunes = bridge.last_error, commands.tunes(now_s)
+        problem, tunes = bridge.endpoints.last_error, commands.tunes(now_s)
         calibration_problem = corrections.calibration_problem
         command_fault = commands.fault if peer is not None else ""
         foreign_frames = ", ".join(sorted(corrections.transforms.foreign_frames))

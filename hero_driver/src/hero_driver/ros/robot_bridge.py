@@ -54,9 +54,10 @@ class BridgeContext(NamedTuple):
 
 
 class RobotBridge:
-    """The endpoints of one robot."""
+    """The endpoints of one robot; ids: under which it receives topics and services now, by their names."""
 
     def __init__(self, identity: Identity, context: BridgeContext) -> None:
+        """Begin without a connection: see attach(); identity: of the robot."""
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
         self.commands = RobotCommands(identity.namespace, context.owner, context.loop, context.log, context.commands)
@@ -64,14 +65,14 @@ class RobotBridge:
         self._service_timeout_s = context.commands.service_timeout_s
         self._max_names = context.max_names
         self._registrar = context.registrar
-        self._endpoints = Endpoints(self.label, context.log.log_throttled)
+        self.endpoints = Endpoints(self.label, context.log.log_throttled)
         self._closed = False
         self._connection = 0
         self._publishers: Dict[str, RawPublisher] = {}
         self.corrections = RobotCorrections(identity.namespace, context.corrections, context.transforms.add)
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
-        self._ids: Dict[str, int] = {}
+        self.ids: Dict[str, int] = {}
         self._layouts: Dict[str, Layout] = {}  # as declared last, of what the robot takes
         self._publisher_layouts: Dict[str, Layout] = {}  # and of what it sends
         self._names: Set[str] = set()
@@ -81,14 +82,14 @@ class RobotBridge:
     def attach(self, peer: Any) -> None:
         """A connection is open, a Peer; its topics are declared next."""
         self._connection += 1
-        self._ids.clear()
+        self.ids.clear()
         self._service_halves.clear()
         self.commands.attach(peer)
 
     def detach(self, reason: str) -> None:
         """The connection is closed; endpoints remain, pending calls fail now, pending commands are dropped."""
         self._connection += 1  # what waits for the ROS master is left out
-        self._ids.clear()
+        self.ids.clear()
         self.commands.detach()
         for service in list(self._services.values()):
             service.fail(reason)
@@ -104,13 +105,8 @@ class RobotBridge:
         publishers = list(self._publishers.values())
         self._publishers.clear()
         released = [call for publisher in publishers for call in publisher.release()]
-        self._endpoints.end()
-        self._registrar.submit(lambda: self._endpoints.close(released, publishers), always=True)
-
-    @property
-    def last_error(self) -> str:
-        """The newest problem about a declared topic that still holds, empty if there is none."""
-        return self._endpoints.last_error
+        self.endpoints.end()
+        self._registrar.submit(lambda: self.endpoints.close(released, publishers), always=True)
 
     # From the robot.
 
@@ -120,7 +116,7 @@ class RobotBridge:
         if name not in self._names:
             if len(self._names) >= self._max_names:
                 text = f"topic {name} refused: more than {len(self._names)} names (2 * max_topics)"
-                self._endpoints.report_error("names", text)
+                self.endpoints.report_error("names", text)
                 return
             self._names.add(name)
         ros_type = message_types.apply_aliases(info.message_type)
@@ -128,15 +124,14 @@ class RobotBridge:
         layout = Layout(ros_type, (MD5SUMS[ros_type] if convert else info.md5sum,))
         if kind is TopicKind.PUBLISHER:
             if ros_type == ENCODER_TYPE:
-                self.corrections.note_encoder(info.md5sum)
-            conflict = self.corrections.models.find_conflict(name)
-            if conflict:
-                self._endpoints.report_error("model", conflict)
+                conflict = self.corrections.note_encoder(info.md5sum)
+                if conflict:
+                    self.endpoints.report_error("model", conflict)
             replaced = self._replace_publisher(name, layout)
             publishers = self._choose_publishers(topic, name, layout)
             if convert:
-                topic.receive = _convert_first(convert, topic.receive)
-            self._submit(lambda: self._endpoints.advertise(name, layout, publishers, replaced))
+                topic.receive = functools.partial(_convert_first, convert, topic.receive)
+            self._submit(lambda: self.endpoints.advertise(name, layout, publishers, replaced))
         elif kind is TopicKind.SUBSCRIBER:
             self._take_input(topic, name, layout, lambda: self._subscribe(name, layout))
         elif kind in (TopicKind.SERVICE_ANSWERS, TopicKind.SERVICE_REQUESTS):
@@ -145,15 +140,15 @@ class RobotBridge:
     def _subscribe(self, name: str, layout: Layout) -> bool:
         """Subscribe to what the robot takes, and to its alias (job of the registrar); return whether it can be used."""
         make_subscriber = functools.partial(self.commands.make_subscriber, name, name)
-        is_usable = self._endpoints.subscribe(name, layout, make_subscriber)
+        is_usable = self.endpoints.subscribe(name, layout, make_subscriber)
         alias = self.identity.namespace + VELOCITY_ALIAS
-        if name != self.identity.namespace + VELOCITY_CONTROLLER or alias in self._ids:
+        if name != self.identity.namespace + VELOCITY_CONTROLLER or alias in self.ids:
             return is_usable
         if is_usable and layout.message_type == TWIST_TYPE:
             make_subscriber = functools.partial(self.commands.make_subscriber, name, alias)
-            self._endpoints.subscribe(alias, layout._replace(is_alias=True), make_subscriber)
+            self.endpoints.subscribe(alias, layout._replace(is_alias=True), make_subscriber)
         else:
-            self._endpoints.unsubscribe(alias)
+            self.endpoints.unsubscribe(alias)
         return is_usable
 
     def _take_input(self, topic: Topic, name: str, layout: Layout, register: Callable[[], bool]) -> None:
@@ -163,17 +158,17 @@ class RobotBridge:
         """
         connection, known = self._connection, self._layouts.get(name)
         self._layouts[name] = layout
-        self._ids.pop(name, None)
+        self.ids.pop(name, None)
         if known in (None, layout) and _has_known_layout(layout):
-            self._ids[name] = topic.info.topic_id
+            self.ids[name] = topic.info.topic_id
 
         def settle(is_usable: bool) -> None:
             if connection != self._connection or self._layouts.get(name) != layout:
                 return
             if not is_usable:
-                self._ids.pop(name, None)
-            elif name not in self._ids:
-                self._ids[name] = topic.info.topic_id
+                self.ids.pop(name, None)
+            elif name not in self.ids:
+                self.ids[name] = topic.info.topic_id
 
         def do() -> None:
             is_usable = register()
@@ -195,11 +190,11 @@ class RobotBridge:
                 text += "; odom is the robot's own estimate until then, which loses distance"
             known = [md5 for message_type, md5 in message_layouts.CONVERSIONS if message_type == ros_type]
             md5sums = " or ".join([MD5SUMS[ros_type], *known])
-            self._endpoints.report_error(name, text % (name, topic.info.message_type, layout.md5sums[0], md5sums))
+            self.endpoints.report_error(name, text % (name, topic.info.message_type, layout.md5sums[0], md5sums))
             return []
         if name == TRANSFORMS and ros_type != TRANSFORM_TYPE:
             text = f"topic /tf refused: its type is {ros_type}, not {TRANSFORM_TYPE}"
-            self._endpoints.report_error(name, text)
+            self.endpoints.report_error(name, text)
             return []
         publishers = [
             (output, its_type, self._publishers.setdefault(output, RawPublisher(QUEUE_LENGTH, self._loop.call_later)))
@@ -216,7 +211,7 @@ class RobotBridge:
             return
         if requests.info.message_type != answers.info.message_type:
             halves = f"{requests.info.message_type} and {answers.info.message_type}"
-            self._endpoints.report_error(name, f"service {name} refused: its halves are {halves}")
+            self.endpoints.report_error(name, f"service {name} refused: its halves are {halves}")
             return
         ros_type = message_types.apply_aliases(requests.info.message_type)
         layout = Layout(ros_type, (requests.info.md5sum, answers.info.md5sum))
@@ -226,13 +221,13 @@ class RobotBridge:
             self._services[name] = service
         known_service = service
         answers.receive = lambda payload, _: self._receive_answer(known_service, payload)
-        self._take_input(requests, name, layout, lambda: self._endpoints.serve(name, layout, known_service.call))
+        self._take_input(requests, name, layout, lambda: self.endpoints.serve(name, layout, known_service.call))
 
     def send_request(self, service: RobotService, request: bytes) -> Optional[str]:
         """Send a request of one of the robot's services; return why it cannot be sent, None if it is on its way."""
         if self._services.get(service.name) is not service:
             return "the robot declared it with another type"
-        if service.name not in self._ids:
+        if service.name not in self.ids:
             return "the robot is not connected"
         return self.commands.offer_request(service.name, service.service_type, request)
 
@@ -241,10 +236,6 @@ class RobotBridge:
         if request is not None and service.service_type == SET_ODOM_TYPE and is_success(payload):
             # The answer comes before the first reading of the counters that the robot has just zeroed.
             self.corrections.odometry.set_pose(read_set_odom_pose(request))
-
-    def find_id(self, name: str) -> Optional[int]:
-        """Return the id under which the robot receives the topic or service called name."""
-        return self._ids.get(name)
 
     def is_motion(self, name: str) -> bool:
         """Return whether messages on the topic called name move the robot."""
@@ -261,14 +252,13 @@ class RobotBridge:
                 job()
 
         if not self._registrar.submit(run):
-            self._endpoints.report_error("registrar", "too many topics wait for the ROS master; is it reachable?")
+            self.endpoints.report_error("registrar", "too many topics wait for the ROS master; is it reachable?")
 
 
 def _convert_first(
-    convert: Callable[[bytes], bytes], receive: Callable[[bytes, int], None]
-) -> Callable[[bytes, int], None]:
-    """Return what converts a payload before receive() takes it."""
-    return lambda payload, arrival_ns: receive(convert(payload), arrival_ns)
+    convert: Callable[[bytes], bytes], receive: Callable[[bytes, int], None], payload: bytes, arrival_ns: int
+) -> None:
+    receive(convert(payload), arrival_ns)
 
 
 def _has_known_layout(layout: Layout) -> bool:

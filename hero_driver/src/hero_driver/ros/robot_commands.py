@@ -6,12 +6,13 @@ make_subscriber() -> _receive_motion() or _receive_command() -> CommandQueue
 import functools
 import math
 import time
-from typing import Any, Callable, Dict, Optional, Protocol
+from typing import Any, Callable, Dict, List, Optional, Protocol, Tuple
 
 from ..commands.command_queue import CommandQueue
 from ..commands.command_settings import CommandSettings
 from ..commands.command_sources import CommandSources
 from ..commands.service_requests import find_request_error
+from ..commands.stop_progress import StopState
 from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_twist
 from ..corrections.wheel_motion import WheelMotion
 from ..robot_constants import MAX_WATCHDOG_S
@@ -31,6 +32,9 @@ SUPERSEDED_S = 1.0
 
 TUNING_SILENCE_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
+
+Stops = List[Tuple[str, Optional[StopState]]]
+"""Name and stop of each connection that can move a robot, and None for each robot that is away."""
 
 
 class Owner(Protocol):
@@ -54,6 +58,12 @@ class Owner(Protocol):
     def note_change(self) -> None:
         """A robot's state changed."""
 
+    def set_stopped(self, stopped: bool) -> None:
+        """Stop all robots until they are released, or release them."""
+
+    def list_stops(self) -> Stops:
+        """Return the stops of all robots."""
+
 
 class RobotCommands:
     """The commands of all programs to one robot: the queue of those that wait, and how many were refused.
@@ -65,6 +75,7 @@ class RobotCommands:
     """
 
     def __init__(self, namespace: str, owner: Owner, loop: EventLoop, log: LogRelay, settings: CommandSettings) -> None:
+        """Begin without a connection: see attach(); namespace: of the robot."""
         self.queue = CommandQueue(settings.command_max_age_s)
         self.refused = 0
         self.fault = ""
@@ -113,9 +124,7 @@ class RobotCommands:
         stop_payload = STOP_PAYLOADS.get(ros_type)
         if stop_payload is None:
             return functools.partial(self._receive_command, name)
-        check: Callable[[bytes], Optional[bytes]] = check_motor_pulses
-        if ros_type != MOTOR_TYPE:
-            check = functools.partial(check_twist, clamp=self._settings.clamp)
+        check = check_motor_pulses if ros_type == MOTOR_TYPE else check_twist
         return functools.partial(self._receive_motion, name, source, check, stop_payload)
 
     def _receive_motion(

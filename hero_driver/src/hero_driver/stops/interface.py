@@ -7,7 +7,7 @@ import contextlib
 import queue
 import time
 import weakref
-from typing import Any, Callable, FrozenSet, List, Optional, Protocol, Tuple
+from typing import Any, Callable, FrozenSet, Optional
 
 import rospy
 from std_msgs.msg import Bool
@@ -15,6 +15,7 @@ from std_srvs.srv import SetBool, SetBoolResponse
 
 from ..commands.stop_progress import StopState
 from ..ros.log_relay import LogRelay
+from ..ros.robot_commands import Owner, Stops
 from ..ros.rospy_internals import find_connection, is_latched_before, list_publishers
 from ..transport.call_queue import Worker
 from ..transport.event_loop import EventLoop, NoAnswerError
@@ -26,26 +27,11 @@ ANSWER_WAIT_S = 0.5
 KEEP_WAIT_S = 1.0
 """Likewise the disk: writing took 0.3 to 45 ms; one that hangs (a network's, a failing card) is told of."""
 
-Stops = List[Tuple[str, Optional[StopState]]]
-"""Name and stop of each connection that can move a robot, and None for each robot that is away."""
-
-
-class StoppableFleet(Protocol):
-    """The gateway as this module uses it, on the thread of the sockets."""
-
-    stopped: bool
-
-    def set_stopped(self, stopped: bool) -> None:
-        """Stop all robots until they are released, or release them."""
-
-    def list_stops(self) -> Stops:
-        """Return the stops of all robots."""
-
 
 class StopInterface:
     """The stop of all robots, as ROS sees it."""
 
-    def __init__(self, loop: EventLoop, fleet: StoppableFleet, store: StopStore, log: LogRelay) -> None:
+    def __init__(self, loop: EventLoop, fleet: Owner, store: StopStore, log: LogRelay) -> None:
         self._loop = loop
         self._fleet = fleet
         self._store = store
