@@ -22,9 +22,9 @@ from .peer import Peer
 from .reports.robot_log import RobotLog
 from .reports.robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
+from .ros.raw_publisher import TransformPublisher
 from .ros.robot_bridge import BridgeContext, RobotBridge
 from .ros.robot_commands import Stops
-from .ros.transform_publisher import TransformPublisher
 from .rosserial.payloads import Log
 from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
 from .stops.delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
@@ -77,7 +77,11 @@ class Gateway(LinkHandler):
 
     def open_link(self, link: Link) -> Optional[str]:
         """Begin a conversation, unless the limits are against it."""
-        self._make_room(link.address.host)
+        eviction = self._admission.find_eviction(link.address.host)
+        if eviction is not None:
+            evicted, parameter = eviction
+            self._stops.begin(self.peers[evicted])
+            evicted.close(f"its address has the most of too many connections ({parameter})")
         refusal = self._admission.admit(link, link.address.host)
         if refusal is not None:
             self.refused_connections += 1
@@ -89,15 +93,6 @@ class Gateway(LinkHandler):
         self.peers[link] = peer
         self.poll_link(link, now_s)
         return None
-
-    def _make_room(self, host: str) -> None:
-        """Evict a connection where a cap is reached."""
-        eviction = self._admission.find_eviction(host)
-        if eviction is None:
-            return
-        link, parameter = eviction
-        self._stops.begin(self.peers[link])
-        link.close(f"its address has the most of too many connections ({parameter})")
 
     def receive_data(self, link: Link, data: bytes, now_s: float) -> None:
         """Pass bytes to the session and its events on; the hot path of the driver."""
@@ -136,7 +131,14 @@ class Gateway(LinkHandler):
                 self._watch(bridge, now_s)
             except Exception as error:  # noqa: BLE001 - an error with one robot must not keep the others moving
                 self.report_bug(error)
-        self._collect_expired(now_s)
+        for record in self.fleet.collect_expired(now_s):
+            expired = self.bridges.pop(record.identity.namespace, None)
+            if expired is not None:
+                expired.close()
+                text = f"{expired.label} has left; its topics and services are unregistered"
+                self._log.log_throttled("info", "gone " + expired.label, text, host=record.host)
+            self._admit_duplicates(record, lambda host: True)
+            self.note_change()
 
     def _watch(self, bridge: RobotBridge, now_s: float) -> None:
         bridge.commands.watch_commanders(now_s)
@@ -163,7 +165,7 @@ class Gateway(LinkHandler):
         for bridge in self.bridges.values():
             bridge.commands.queue.discard_motion(now_s)
         for peer in self.peers.values():
-            peer.session.forgive_silence(now_s)
+            peer.session.listening_s = now_s
             if peer.stop is not None:
                 peer.stop.renew(now_s)
 
@@ -422,13 +424,3 @@ class Gateway(LinkHandler):
                 self.receive_data(peer.link, data, time.monotonic())
         except Exception as error:  # noqa: BLE001 - an error with one robot must not keep the others moving
             self.report_bug(error)
-
-    def _collect_expired(self, now_s: float) -> None:
-        for record in self.fleet.collect_expired(now_s):
-            bridge = self.bridges.pop(record.identity.namespace, None)
-            if bridge is not None:
-                bridge.close()
-                text = f"{bridge.label} has left; its topics and services are unregistered"
-                self._log.log_throttled("info", "gone " + bridge.label, text, host=record.host)
-            self._admit_duplicates(record, lambda host: True)
-            self.note_change()

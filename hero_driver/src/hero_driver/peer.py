@@ -4,8 +4,7 @@ import time
 from dataclasses import dataclass, field
 from typing import List, Optional
 
-from .commands.burst_gate import BurstGate
-from .commands.stop_progress import StopProgress
+from .commands.stop_progress import BurstGate, StopProgress
 from .corrections.message_layouts import CONVERSIONS, read_encoder
 from .corrections.wheel_motion import WheelMotion
 from .fleet import log_lines
@@ -13,7 +12,7 @@ from .fleet.admission import RateLimit
 from .fleet.registry import RobotRecord
 from .ros.robot_bridge import RobotBridge
 from .ros.robot_commands import Owner
-from .rosserial.errors import RosserialError
+from .rosserial.packets import RosserialError
 from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
 from .transport.event_loop import CallLater

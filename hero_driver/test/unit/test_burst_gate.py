@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_driver.commands.burst_gate import READINGS_MIN, WAIT_S, BurstGate
+from hero_driver.commands.stop_progress import BURST_READINGS_MIN, BURST_WAIT_S, BurstGate
 from hero_driver.corrections.wheel_motion import WheelMotion
 
 
@@ -23,7 +23,7 @@ def test_the_next_burst_waits_for_readings_after_the_acknowledgement(wheels):
     for _ in range(10):
         wheels.read_ticks(0.0, 0.0)
         assert not gate.is_open(False, 0.1), "it was not acknowledged"
-    for _ in range(READINGS_MIN):
+    for _ in range(BURST_READINGS_MIN):
         assert not gate.is_open(True, 0.2)
         wheels.read_ticks(0.0, 0.0)
     assert gate.is_open(True, 0.2)
@@ -40,7 +40,7 @@ def test_without_a_further_reading_no_further_burst_goes(wheels):
 
 def test_to_a_robot_without_readings_bursts_go_after_times_that_double():
     gate, now_s = BurstGate(WheelMotion()), 0.0
-    for wait_s in (WAIT_S, 2 * WAIT_S, 4 * WAIT_S):
+    for wait_s in (BURST_WAIT_S, 2 * BURST_WAIT_S, 4 * BURST_WAIT_S):
         gate.note_sent(now_s)
         assert not gate.is_open(True, now_s + 0.99 * wait_s)
         now_s += wait_s

@@ -5,8 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from vectors import GOOD, TIME_REQUEST, VECTORS, build_packet
 
-from hero_driver.rosserial.errors import RosserialError
-from hero_driver.rosserial.packets import Packet, PacketReader, encode_packet, sum_bytes
+from hero_driver.rosserial.packets import Packet, PacketReader, RosserialError, encode_packet, sum_bytes
 
 ALL = b"".join(vector.data for vector in VECTORS)
 ALL_PACKETS = [Packet(vector.topic_id, vector.payload) for vector in VECTORS]

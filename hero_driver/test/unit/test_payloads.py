@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from vectors import STOCK_TOPICS, build_declaration
 
-from hero_driver.rosserial.errors import PayloadError, RosserialError
+from hero_driver.rosserial.packets import RosserialError
 from hero_driver.rosserial.payloads import (
     LOG_DEBUG,
     LOG_ERROR,
@@ -15,6 +15,7 @@ from hero_driver.rosserial.payloads import (
     LOG_INFO,
     LOG_WARN,
     Log,
+    PayloadError,
     TopicInfo,
     WireTime,
     decode_log,

@@ -219,7 +219,7 @@ def test_bytes_that_make_no_packet_are_silence():
 
 def test_silence_counts_only_while_there_are_subscribers():
     session = open_declared_session(silence_timeout_s=6.0)
-    session.forgive_silence(T0 + 60.0)
+    session.listening_s = T0 + 60.0
     assert session.poll(T0 + 65.9) == []
     assert session.poll(T0 + 66.1)[0].reason.startswith("silent for 6.1 s")
 
@@ -238,7 +238,7 @@ def test_a_robot_that_only_asks_for_the_time_is_noticed_once():
     assert not session.begins_to_lack_data()
     ask(T0 + 20.0)
     assert noticed_s == pytest.approx([5.1, 5.1])
-    session.forgive_silence(T0 + 100.0)
+    session.listening_s = T0 + 100.0
     receive(session, TIME_REQUEST, T0 + 104.0)
     assert not session.begins_to_lack_data(), "while the driver could not read, robots may have sent data"
 

@@ -14,7 +14,7 @@ from vectors import (
     build_packet,
 )
 
-from hero_driver.rosserial.errors import RosserialError
+from hero_driver.rosserial.packets import RosserialError
 from hero_driver.rosserial.session import MessagesReceived, Problem, Topic, TopicKind
 
 ODOM = next(topic for topic in STOCK_TOPICS if topic[1] == 130)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hero_driver.commands.stop_progress import StopState
-from hero_driver.rosserial.errors import RosserialError
+from hero_driver.rosserial.packets import RosserialError
 from hero_driver.stops import delivery
 from hero_driver.stops.delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, describe_doubt, encode_stop, is_light
 from hero_node import MD5SUMS

@@ -8,13 +8,23 @@ oldest goes. rospy does the rest: registration, handshakes, statistics, shutdown
 import collections
 from typing import Any, Callable, Deque, Dict, List
 
-from hero_node import LENGTH
+from tf2_msgs.msg import TFMessage
+
+from hero_node import LENGTH, encode_list
 
 from ..transport.event_loop import CallLater
+from .message_types import make_raw_class
 from .rospy_internals import NO_CONNECTIONS, open_publisher, send, unregister
 
 RETRY_S = 0.01
 """Delay before a subscriber whose socket was full is tried again."""
+
+TRANSFORMS_PERIOD_S = 0.01
+TRANSFORMS_QUEUE_LENGTH = 200
+"""Two seconds of messages for a listener that is slow."""
+
+TRANSFORMS_MAX = 500
+"""A message holds at most this many transforms: 50 kB, about 3 s of one robot, 30 ms of a hundred."""
 
 
 class RawPublisher:
@@ -92,3 +102,36 @@ class RawPublisher:
                 del self._backlogs[connection]
         if self._backlogs:
             self._call_later(RETRY_S, self._retry)
+
+
+class TransformPublisher:
+    """The transforms of all robots on /tf: those that arrive within TRANSFORMS_PERIOD_S as one message.
+
+    One message for each, as robots send them, would be 150 per robot and second for every listener.
+    """
+
+    def __init__(self, call_later: CallLater) -> None:
+        """Collect what add() takes, a geometry_msgs/TransformStamped as bytes; call_later is the loop's."""
+        self._call_later = call_later
+        self._publisher = RawPublisher(TRANSFORMS_QUEUE_LENGTH, call_later)
+        self._transforms: List[bytes] = []
+        self.add: Callable[[bytes], None] = self._transforms.append
+        self.is_scheduled = False
+
+    def open(self) -> None:
+        """Advertise /tf; asks the ROS master."""
+        self._publisher.open("/tf", make_raw_class(TFMessage))
+
+    def schedule(self) -> None:
+        """Publish what was added within the period; for after each read, unless is_scheduled."""
+        if self._transforms:
+            self.is_scheduled = True
+            self._call_later(TRANSFORMS_PERIOD_S, self._publish)
+
+    def _publish(self) -> None:
+        self.is_scheduled = False
+        if self._publisher.is_wanted:
+            for start in range(0, len(self._transforms), TRANSFORMS_MAX):
+                part = self._transforms[start : start + TRANSFORMS_MAX]
+                self._publisher.publish(encode_list(part))
+        self._transforms.clear()

@@ -44,10 +44,6 @@ RESUMED_S = 0.5
 _INT = struct.Struct("i")
 
 
-def _drop(payload: bytes) -> None:
-    """Take a message for which it is too late."""
-
-
 class RawSubscriber:
     """The messages of one subscribed topic as bytes, read by the loop instead of by a thread of rospy for each."""
 
@@ -81,7 +77,7 @@ class RawSubscriber:
 
     def close(self) -> None:
         """Unsubscribe; asks the ROS master. What the loop still reads is dropped, and ends by itself."""
-        self.receive = _drop
+        self.receive = lambda payload: None
         subscriber, self._subscriber = self._subscriber, None
         if subscriber is not None:
             unregister(subscriber)

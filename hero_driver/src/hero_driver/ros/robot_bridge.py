@@ -24,10 +24,9 @@ from ..transport.event_loop import EventLoop
 from . import message_types
 from .endpoints import QUEUE_LENGTH, Endpoints, Layout
 from .log_relay import LogRelay
-from .raw_publisher import RawPublisher
+from .raw_publisher import RawPublisher, TransformPublisher
 from .robot_commands import Owner, RobotCommands
 from .services import RobotService
-from .transform_publisher import TransformPublisher
 
 VELOCITY_CONTROLLER = "/velocity_controller/cmd_vel"
 VELOCITY_ALIAS = "/cmd_vel"
@@ -127,7 +126,9 @@ class RobotBridge:
                 conflict = self.corrections.note_encoder(info.md5sum)
                 if conflict:
                     self.endpoints.report_error("model", conflict)
-            replaced = self._replace_publisher(name, layout)
+            known, self._publisher_layouts[name] = self._publisher_layouts.get(name, layout), layout
+            # Declared with another layout than before, so that its publisher is used no more.
+            replaced = [self._publishers.pop(name)] if known != layout and name in self._publishers else []
             publishers = self._choose_publishers(topic, name, layout)
             if convert:
                 topic.receive = functools.partial(_convert_first, convert, topic.receive)
@@ -175,11 +176,6 @@ class RobotBridge:
             self._loop.call_soon(lambda: settle(is_usable))
 
         self._submit(do)
-
-    def _replace_publisher(self, name: str, layout: Layout) -> List[RawPublisher]:
-        """Return the publisher of a topic that is declared with another layout than before; it is used no more."""
-        known, self._publisher_layouts[name] = self._publisher_layouts.get(name, layout), layout
-        return [self._publishers.pop(name)] if known != layout and name in self._publishers else []
 
     def _choose_publishers(self, topic: Topic, name: str, layout: Layout) -> List[Tuple[str, str, RawPublisher]]:
         """Set up the way of a topic's messages; return the topics that they become, types and publishers."""

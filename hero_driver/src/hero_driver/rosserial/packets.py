@@ -10,8 +10,6 @@ import struct
 from typing import Callable, List, NamedTuple, Tuple, Union
 from zlib import adler32
 
-from .errors import RosserialError
-
 Bytes = Union[bytes, bytearray, memoryview]
 
 SYNC = b"\xff\xfe"
@@ -55,6 +53,10 @@ _CHECKED_PAYLOAD = slice(HEADER_LENGTH - _CHECKED_OFFSET, -1)
 
 _EXACT_ADLER_LENGTH = 256
 """adler32 & 0xffff is (1 + sum of the bytes) mod 65521: exact up to this length, and much faster than sum()."""
+
+
+class RosserialError(ValueError):
+    """Something cannot be encoded, or must not be sent to this peer: our mistake; what a peer does wrong is counted."""
 
 
 class Packet(NamedTuple):

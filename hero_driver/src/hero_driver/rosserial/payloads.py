@@ -5,8 +5,7 @@ from typing import NamedTuple
 
 from hero_node import LENGTH, encode_text
 
-from .errors import PayloadError
-from .packets import Bytes
+from .packets import Bytes, RosserialError
 
 _UINT16 = struct.Struct("<H")
 _INT32 = struct.Struct("<i")
@@ -17,6 +16,10 @@ LOG_INFO = 1
 LOG_WARN = 2
 LOG_ERROR = 3
 LOG_FATAL = 4
+
+
+class PayloadError(RosserialError):
+    """Bytes are not a payload of the kind that they were read as."""
 
 
 class TopicInfo(NamedTuple):

@@ -14,9 +14,8 @@ from hero_node import shorten
 from hero_node.parameters import declare, number, whole_number
 
 from . import packets, payloads
-from .errors import PayloadError, RosserialError
-from .packets import Bytes, PacketReader, encode_packet
-from .payloads import Log, TopicInfo
+from .packets import Bytes, PacketReader, RosserialError, encode_packet
+from .payloads import Log, PayloadError, TopicInfo
 
 REQUEST_INTERVAL_S = 1.5
 """Time between two requests for topics while none were declared: the robot's boot takes 1.07 s (LEDStatus.ino:93)."""
@@ -62,17 +61,13 @@ class TopicKind(enum.Enum):
 _KIND_BY_PACKET_ID = {kind.value: kind for kind in TopicKind}
 
 
-def _ignore(payload: bytes, arrival_ns: int) -> None:
-    """Take a message without a receiver."""
-
-
 @dataclass
 class Topic:
     """One declared id of this conversation; receive: what takes its payloads and their arrival (ns)."""
 
     info: TopicInfo
     kind: TopicKind
-    receive: Callable[[bytes, int], None] = field(default=_ignore, compare=False, repr=False)
+    receive: Callable[[bytes, int], None] = field(default=lambda *_: None, compare=False, repr=False)
 
 
 class MessagesReceived(NamedTuple):
@@ -121,7 +116,7 @@ class Session:
         self.undeclared_messages = 0
         self.opened_s = now_s
         self.last_receive_s = now_s
-        self._listening_s = now_s  # since when silence counts
+        self.listening_s = now_s  # since when silence counts: before that nothing could be received
         self._limits = limits
         self.outgoing: List[bytes] = []
         self._last_request_s: Optional[float] = None
@@ -173,7 +168,7 @@ class Session:
 
     def poll(self, now_s: float) -> List[Event]:
         """Do what is due by now_s; call it at least a few times per second."""
-        silent_s = now_s - max(self.last_receive_s, self._listening_s)
+        silent_s = now_s - max(self.last_receive_s, self.listening_s)
         if silent_s > self._limits.silence_timeout_s:
             return [SessionEnded(f"silent for {silent_s:.1f} s: no whole packet came")]
         if (self._asks_again or not self.topics) and now_s >= self._request_due_s:
@@ -186,13 +181,9 @@ class Session:
 
     def begins_to_lack_data(self) -> bool:
         """Return whether a robot that answers has now sent none of its topics for DATA_SILENCE_S; True once."""
-        lacked, since_s = self._lacks_data, max(self._last_message_s, self._listening_s)
+        lacked, since_s = self._lacks_data, max(self._last_message_s, self.listening_s)
         self._lacks_data = bool(self._messages) and self.last_receive_s - since_s > DATA_SILENCE_S
         return self._lacks_data and not lacked
-
-    def forgive_silence(self, now_s: float) -> None:
-        """Count silence from now on: until now nothing could be received."""
-        self._listening_s = now_s
 
     def take_packets(self) -> List[bytes]:
         """Return the packets that the session itself wants to send, and forget them."""

@@ -10,7 +10,7 @@ costs the robot 20 ms: only a robot that takes no Twist gets them.
 A robot that tunes itself (pid_calibration) drops every zero within 50 ms of its controller's last run, and that runs
 every 21 ms. Only a read that takes longer lets a zero through: BURST_LIGHTS light commands (1 ms each) and the zeros in
 one write, below the robot's TCP window of 2144 bytes, and no second one before the robot has read the first
-(burst_gate). They hold the robot's last color, so that its light stays as it was.
+(BurstGate). They hold the robot's last color, so that its light stays as it was.
 """
 
 import time
@@ -23,7 +23,7 @@ from ..commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST
 from ..peer import Peer
 from ..ros.message_types import apply_aliases
 from ..ros.robot_commands import LIGHT_SUFFIX, NO_LIGHT, Owner
-from ..rosserial.errors import RosserialError
+from ..rosserial.packets import RosserialError
 from ..rosserial.session import Topic
 from ..transport.event_loop import CallLater
 

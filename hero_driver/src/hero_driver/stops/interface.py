@@ -32,6 +32,7 @@ class StopInterface:
     """The stop of all robots, as ROS sees it."""
 
     def __init__(self, loop: EventLoop, fleet: Owner, store: StopStore, log: LogRelay) -> None:
+        """Serve nothing before open(); the loop's thread owns fleet, and store keeps the stop."""
         self._loop = loop
         self._fleet = fleet
         self._store = store
@@ -44,7 +45,11 @@ class StopInterface:
         self.stopped_by = ""
         """Node that stopped the robots; empty if they are not, or were stopped before the driver's start."""
         self.stopped_s: Optional[float] = None  # monotonic; None: not stopped, or unknown
-        self._keeper = Worker("stop keeper", 100, self._report_bug)
+        self._keeper = Worker(
+            "stop keeper",
+            100,
+            lambda error: log.log("error", f"~stopped was not published: {type(error).__name__}: {error}"),
+        )
 
     def open(self, stopped: bool, since_s: Optional[float]) -> None:
         """Serve; begin as stopped says. The loop does not run yet. since_s: as StopStore.read_since() returns it."""
@@ -131,9 +136,6 @@ class StopInterface:
             self._keeper.submit(self._keep)
             self._keeper.submit(lambda: self._publisher.publish(Bool(stopped)))
             self._log.log("warn", f"{'stopping all robots' if stopped else 'robots may move'}, by {caller or '?'}")
-
-    def _report_bug(self, error: BaseException) -> None:
-        self._log.log("error", f"~stopped was not published: {type(error).__name__}: {error}")
 
 
 def describe_time(since_s: float) -> str:

@@ -85,7 +85,7 @@ class EventLoop(LinkOwner):
         self._handler = LinkHandler()
         # selectors does the same, but what it adds in Python is a twentieth of all that the driver does.
         self._epoll = select.epoll()
-        self._serves: Dict[int, Callable[[int], None]] = {}
+        self._serves: Dict[int, Callable[[int], object]] = {}
         self._listener: Optional[socket.socket] = None
         self._links: Dict[int, Link] = {}
         self._readers: Set[Reader] = set()
@@ -111,7 +111,7 @@ class EventLoop(LinkOwner):
         self._listener = _listen(self._host, self._port)
         self.listening = Address(*self._listener.getsockname()[:2])
         self._listen_on(self._listener)
-        self._register(self._wake_receiver.fileno(), READ, self._take_wake)
+        self._register(self._wake_receiver.fileno(), READ, lambda _: self._wake_receiver.recv(4096))
         self.call_later(POLL_INTERVAL_S, self._poll)
 
     def run(self) -> None:
@@ -252,7 +252,7 @@ class EventLoop(LinkOwner):
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 3)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, self._user_timeout_ms)
 
-    def _register(self, descriptor: int, mask: int, serve: Callable[[int], None]) -> None:
+    def _register(self, descriptor: int, mask: int, serve: Callable[[int], object]) -> None:
         """Call serve(what descriptor is ready for, neither READ nor WRITE where it broke) when mask says so."""
         self._epoll.register(descriptor, mask)
         self._serves[descriptor] = serve
@@ -301,9 +301,6 @@ class EventLoop(LinkOwner):
 
     def _listen_on(self, listener: socket.socket) -> None:
         self._register(listener.fileno(), READ, lambda _: self._call(self._accept))
-
-    def _take_wake(self, _mask: int) -> None:
-        self._wake_receiver.recv(4096)
 
     def _accept(self) -> None:
         listener = self._listener

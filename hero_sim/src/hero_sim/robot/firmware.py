@@ -11,7 +11,6 @@ from typing import Callable, Deque, List, Optional, Tuple
 
 import numpy as np
 
-from hero_driver.rosserial import errors as wire_errors
 from hero_driver.rosserial import packets, payloads
 
 from ..errors import CommandError
@@ -435,7 +434,7 @@ class Firmware:
     def _receive_time(self, payload: bytes, millis: int) -> None:
         try:
             self.clock.receive_answer(payloads.decode_time(payload), self._last_request_ms)
-        except wire_errors.PayloadError as error:
+        except payloads.PayloadError as error:
             self.warn(str(error))
             return
         self._last_answer_ms = millis
