@@ -1,11 +1,10 @@
 """Reports of several drivers become one: each robot once, stopped only if all are; only drivers are believed."""
 
-import math
 import time
 
 import pytest
 
-from hero_client.ros.drivers import clean, find_drivers, merge
+from hero_client.ros.drivers import find_drivers, merge
 from hero_client.values.robot_states import STATES, STOP_STATES, describe_stop_origin
 from hero_msgs.msg import Robot, RobotArray
 
@@ -110,23 +109,6 @@ def test_a_node_with_reports_and_a_stop_service_is_a_driver():
 def test_reports_that_a_robot_declares_are_not_those_of_a_driver():
     state = make_system_state({"/hero_0/robots": ["/hero_driver"]}, {"/hero_0/stop": ["/hero_driver"]})
     assert find_drivers(state, ["/hero_0/robots"]) == set()
-
-
-@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1.1e9, -1.0])
-def test_rates_that_cannot_be_shown_become_zero(number):
-    (robot,) = clean(RobotArray(robots=[Robot(packets_per_s=number, bytes_per_s=number)])).robots
-    assert (robot.packets_per_s, robot.bytes_per_s) == (0.0, 0.0)
-
-
-@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf, 1e306])
-def test_a_clock_offset_that_cannot_be_shown_is_unknown(number):
-    (robot,) = clean(RobotArray(robots=[Robot(clock_offset=number)])).robots
-    assert math.isnan(robot.clock_offset)
-
-
-def test_usual_numbers_stay_what_they_are():
-    (robot,) = clean(RobotArray(robots=[Robot(packets_per_s=1e9, bytes_per_s=4e4, clock_offset=-0.02)])).robots
-    assert (robot.packets_per_s, robot.bytes_per_s, robot.clock_offset) == (1e9, 4e4, -0.02)
 
 
 def test_the_states_of_tables_are_those_of_the_messages():

@@ -226,11 +226,11 @@ def test_a_server_gives_each_goal_its_own_limits_or_those_of_the_server(monkeypa
         message.pose.orientation.z = z
         server._receive_goal(message)
         assert put[-1] == (Goal(0.0, 0.0, yaw_rad), "", 0.02, 30.0, None)
-    for limits in ({"tolerance": -1.0}, {"timeout": math.nan}):
+    for limits in ({"tolerance": -1.0}, {"tolerance": math.inf}, {"timeout": math.nan}, {"timeout": -1e-9}):
         handle = Handle(**limits)
         server._receive_action(handle)
         assert handle.ends[0][0] == "set_rejected" and "tolerance and timeout" in handle.ends[0][1].reason
-    assert len(put) == 5 and logged == ["logerr"] * 2
+    assert len(put) == 5 and logged == ["logerr"] * 4
     logged.clear()
     monkeypatch.setattr(server, "_requests", mock.Mock(spec=server._requests))
     for outcome, end, level in (

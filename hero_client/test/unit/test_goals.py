@@ -13,7 +13,7 @@ from hero_node import STOP, Pose
 from hero_node.parameters import MAX_COORDINATE_M
 
 pytest.importorskip("actionlib", reason="the server of goals is a node's")
-from hero_client.apps.go_to_goal_server import MAX_FRAME_LENGTH, InvalidGoalError, check_limits, read_goal
+from hero_client.apps.go_to_goal_server import MAX_FRAME_LENGTH, InvalidGoalError, read_goal
 
 INF, NAN = math.inf, math.nan
 
@@ -95,15 +95,6 @@ def test_a_quaternion_of_zeros_means_no_heading():
     assert read_goal(make_message(turn=(0.0, 0.0, 0.0, 0.0), frame=""), True) == (Goal(0.1, 0.2, None), "")
     assert read_goal(make_message(turn=(0.0, 0.0, 1.0, 0.0)), True)[0].yaw_rad == pytest.approx(math.pi)
     assert read_goal(make_message(turn=(NAN, NAN, NAN, NAN)), False)[0].yaw_rad is None
-
-
-@given(tolerance_m=numbers, timeout_s=numbers)
-def test_limits_of_a_goal_are_positive_and_finite_or_rejected(tolerance_m, timeout_s):
-    if 0.0 < tolerance_m < INF and 0.0 < timeout_s < INF:
-        check_limits(tolerance_m, timeout_s)
-    else:
-        with pytest.raises(InvalidGoalError, match="tolerance and timeout"):
-            check_limits(tolerance_m, timeout_s)
 
 
 def test_a_robot_whose_odometry_is_not_finite_fails_and_stops():

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from hero_client.controllers import half_planes
 from hero_client.controllers.half_planes import nearest_allowed
 
 NO_LIMIT_M_S = 100.0
@@ -23,13 +24,14 @@ def find_nearest(wanted, normals, bounds):
 
 
 @pytest.mark.parametrize("planes", [1, 2, 4])
-def test_the_nearest_allowed_velocities_are_found(planes):
+def test_the_nearest_allowed_velocities_are_found(planes, monkeypatch):
+    monkeypatch.setattr(half_planes, "_SWEEPS", 2000)
     random = np.random.RandomState(planes)
     wanted = random.normal(size=(40, 2))
     angles_rad = random.uniform(-np.pi, np.pi, (40, planes))
     normals = np.stack((np.cos(angles_rad), np.sin(angles_rad)), axis=-1)
     bounds = random.normal(-0.3, 0.5, (40, planes))
-    found = nearest_allowed(wanted, normals, bounds, NO_LIMIT_M_S, sweeps=2000)
+    found = nearest_allowed(wanted, normals, bounds, NO_LIMIT_M_S)
     nearest = [find_nearest(*one) for one in zip(wanted, normals, bounds)]
     # Borders that meet far away are almost parallel, where the method takes its time.
     solvable = [row for row, velocity in enumerate(nearest) if velocity is not None and np.hypot(*velocity) < 4.0]

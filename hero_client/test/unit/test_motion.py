@@ -9,13 +9,13 @@ from hero_client.controllers.go_to_goal import FREE_S, PROGRESS_S, Goal, GoToGoa
 from hero_client.controllers.motion import (
     BLOCKED_S,
     DEFAULT_TIMEOUT_S,
-    FROZEN_S,
     MAX_STEP_S,
     SETTLE_S,
     STALL_S,
     MotionController,
     State,
 )
+from hero_client.controllers.pose_check import FROZEN_S
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
 from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose, Velocity, transform_pose

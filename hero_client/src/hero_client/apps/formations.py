@@ -68,8 +68,13 @@ def _place(fields: Dict[str, Entry], count: int, min_spacing_m: float) -> List[P
         columns = fields["columns"].whole(1, MAX_COLUMNS) if "columns" in fields else math.ceil(math.sqrt(count))
         places = _grid(count, spacing_m, columns)
     else:
-        places = _read_points(fields, count)
-    _check_spacing(places, min_spacing_m)
+        places = [_read_point(entry) for entry in fields["points"].entries()] if "points" in fields else []
+        if len(places) < count:
+            raise FormationError("formation: points must be a list of at least %d places [x, y] in m" % count)
+    apart_m = min((math.dist(*pair) for pair in combinations(places, 2)), default=math.inf)
+    if apart_m < min_spacing_m:
+        text = "formation: two places are %.3f m apart, but robots need %.2f m: make spacing_m larger"
+        raise FormationError(text % (apart_m, min_spacing_m))
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return [(center[0] + x * cos - y * sin, center[1] + x * sin + y * cos) for x, y in places]
 
@@ -92,20 +97,6 @@ def _grid(count: int, spacing_m: float, columns: int) -> List[Point]:
         )
         for index in range(count)
     ]
-
-
-def _read_points(fields: Dict[str, Entry], count: int) -> List[Point]:
-    points = [_read_point(entry) for entry in fields["points"].entries()] if "points" in fields else []
-    if len(points) < count:
-        raise FormationError("formation: points must be a list of at least %d places [x, y] in m" % count)
-    return points
-
-
-def _check_spacing(places: List[Point], min_spacing_m: float) -> None:
-    apart_m = min((math.dist(*pair) for pair in combinations(places, 2)), default=math.inf)
-    if apart_m < min_spacing_m:
-        text = "formation: two places are %.3f m apart, but robots need %.2f m: make spacing_m larger"
-        raise FormationError(text % (apart_m, min_spacing_m))
 
 
 def _read_number(fields: Dict[str, Entry], key: str, default: float) -> float:

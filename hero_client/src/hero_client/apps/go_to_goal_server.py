@@ -68,14 +68,6 @@ def read_goal(message: Any, use_heading: bool) -> Tuple[Goal, str]:
     return Goal(position.x, position.y, yaw_of(orientation) if known else None), frame
 
 
-def check_limits(tolerance_m: float, timeout_s: float) -> None:
-    """Raises: InvalidGoalError unless both are more than 0 and finite."""
-    if not (0.0 < tolerance_m < math.inf and 0.0 < timeout_s < math.inf):
-        raise InvalidGoalError(
-            f"tolerance and timeout must be finite and not negative, not {tolerance_m:g} m, {timeout_s:g} s"
-        )
-
-
 class GoalRequest(NamedTuple):
     """A goal as received from the action, a topic or parameters; checked."""
 
@@ -141,7 +133,9 @@ class GoToGoalServer:
         timeout_s = wanted.timeout or self._timeout_s
         with self._rejecting(handle):
             goal, frame = read_goal(wanted.target, wanted.use_heading)
-            check_limits(tolerance_m, timeout_s)
+            if not (0.0 < tolerance_m < math.inf and 0.0 < timeout_s < math.inf):
+                text = "tolerance and timeout must be finite and not negative, not %g m, %g s"
+                raise InvalidGoalError(text % (tolerance_m, timeout_s))
             self._put(GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
 
     def _receive_cancel(self, handle: Any) -> None:

@@ -47,7 +47,6 @@ def nearest_allowed(
     bounds: np.ndarray,
     max_speed_m_s: float,
     softness: float = 0.0,
-    sweeps: int = _SWEEPS,
 ) -> np.ndarray:
     """Return the allowed velocities (R, 2) nearest to wanted (R, 2).
 
@@ -61,7 +60,7 @@ def nearest_allowed(
     limits = np.where(present, bounds, -1e9).T.copy()
     across = np.where(present[..., None], normals, 0.0).transpose(1, 2, 0).copy()
     pushes = np.zeros_like(limits)
-    for _ in range(sweeps):
+    for _ in range(_SWEEPS):
         for normal, limit, push in zip(across, limits, pushes):
             lacking = limit - (normal[0] * velocities[0] + normal[1] * velocities[1]) - softness * push
             change = np.maximum(lacking / (1.0 + softness), -push)

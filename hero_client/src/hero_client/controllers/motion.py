@@ -14,7 +14,7 @@ from ..values.readings import Obstacle
 from ..values.robot_constants import BODY_RADIUS_M
 from .avoidance import find_in_path, shorten_for_body
 from .lateness import Lateness
-from .pose_check import FROZEN, FROZEN_S, SAME_M, SAME_RAD, PoseCheck, is_apart
+from .pose_check import SAME_M, SAME_RAD, FrozenCheck, PoseCheck, is_apart
 
 DEFAULT_TIMEOUT_S = 120.0
 
@@ -92,10 +92,9 @@ class MotionController:
         self._blocked_since_s = math.inf
         self._patience_s = BLOCKED_S
         self._obstacle: Optional[Obstacle] = None
-        self._moved_pose: Optional[Pose] = None
-        self._moved_odometry: Optional[Pose] = None
+        self._moved_pose: Optional[Pose] = None  # by the wheels
         self._moved_s = now_s
-        self._pose_check = PoseCheck()
+        self._frozen_check, self._pose_check = FrozenCheck(), PoseCheck()
         self._at_goal = False
 
     def step(
@@ -137,10 +136,11 @@ class MotionController:
         self._stopped_since_s = math.inf
         command = self._slow_for_obstacle(command, ranges, seen_s)
         command = self.lateness.slow(command, pose_age_s)
-        self._check_wheels(pose, odometry, command, seen_s)
-        problem = self._pose_check.add(pose, odometry, seen_s) if odometry is not None else ""
-        if problem:
-            self._fail(problem)
+        self._check_wheels(odometry or pose, command, seen_s)
+        if odometry is not None:
+            problem = self._frozen_check.add(pose, odometry, seen_s) or self._pose_check.add(pose, odometry, seen_s)
+            if problem:
+                self._fail(problem)
         return command if self.state is State.ACTIVE else STOP
 
     def _offset(self, pose: Pose) -> float:
@@ -172,18 +172,15 @@ class MotionController:
             self._fail(self._describe_obstacle() + self._describe_distance())
         return Velocity(0.0, command.angular_rad_s)
 
-    def _check_wheels(self, pose: Pose, odometry: Optional[Pose], command: Velocity, seen_s: float) -> None:
-        """Fail if the pose stays the same although the wheels were told to move."""
+    def _check_wheels(self, odometry: Pose, command: Velocity, seen_s: float) -> None:
+        """Fail if odometry stays the same although the wheels were told to move."""
         is_told_to_move = (
             abs(command.linear_m_s) >= STALL_LINEAR_M_S or abs(command.angular_rad_s) >= STALL_ANGULAR_RAD_S
         )
-        if not is_told_to_move or _has_moved(self._moved_pose, pose):
-            self._moved_pose, self._moved_odometry, self._moved_s = pose, odometry, seen_s
-            return
-        turns = odometry is not None and _has_moved(self._moved_odometry, odometry)
-        if turns and seen_s - self._moved_s >= FROZEN_S:
-            self._fail(FROZEN)
-        elif not turns and seen_s - self._moved_s >= STALL_S:
+        last = self._moved_pose
+        if not is_told_to_move or last is None or is_apart(last, odometry, SAME_M, SAME_RAD):
+            self._moved_pose, self._moved_s = odometry, seen_s
+        elif seen_s - self._moved_s >= STALL_S:
             self._fail(
                 "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
                 " stop the robot?"
@@ -209,8 +206,3 @@ class MotionController:
         from_center_m = range_m + self.body_radius_m - BODY_RADIUS_M
         place = f"{from_center_m:.2f} m from the robot's center" if range_m > 0.0 else "too close to measure"
         return f"an obstacle is in the way, {place}, at {math.degrees(bearing_rad):+.0f} degrees"
-
-
-def _has_moved(last: Optional[Pose], pose: Pose) -> bool:
-    """Return whether a pose differs from the last one by more than noise; True without a last one."""
-    return last is None or is_apart(last, pose, SAME_M, SAME_RAD)

@@ -124,11 +124,6 @@ class BaseRobot(RobotReadings):
         if reason and self.missing() is None:
             self._warn(f"{self.name} drives by its pose alone: {reason}")
 
-    def _warn_unseen(self) -> None:
-        """Log every 5 s that sensors of the robot are not calibrated; not where the program receives no ranges."""
-        if self.age_s("proximity") <= FRESH_S:
-            self._warn(f"{self.name} does not see what is in its way: {NOT_CALIBRATED}")
-
     def _describe_stop(self) -> str:
         return f"{self.name} does not move: {self._link.describe_stop()}"
 
@@ -289,8 +284,8 @@ class BaseRobot(RobotReadings):
             age_s = self.age_s("odom")
             self._send_velocity(*controller.step(pose, self.fresh_proximity(), self.now_s, odometry, age_s))
             self._warn(controller.lateness.take_warning())
-            if controller.is_unseen:
-                self._warn_unseen()
+            if controller.is_unseen and self.age_s("proximity") <= FRESH_S:
+                self._warn(f"{self.name} does not see what is in its way: {NOT_CALIBRATED}")
             on_step()
             if controller.state is State.REACHED:
                 return

@@ -44,9 +44,6 @@ POLL_PERIOD_S = 0.02
 PREFERENCE = (Robot.READY, Robot.JOINING, Robot.AWAY)
 """If a robot has moved from one driver to another, the entry that counts."""
 
-MAX_RATE = 1e9
-"""Messages or bytes per second; a larger number is invalid."""
-
 
 def find_drivers(system_state: Any, topics: Iterable[str]) -> Set[str]:
     """Return those of the topics that are reports of drivers.
@@ -67,15 +64,6 @@ def find_drivers(system_state: Any, topics: Iterable[str]) -> Set[str]:
 def driver_of(topic: str) -> str:
     """Return the name of the driver that has this topic."""
     return topic.rpartition("/")[0]
-
-
-def clean(report: RobotArray) -> RobotArray:
-    """Replace invalid numbers: rates by 0, clock offsets by NaN, which means unknown."""
-    for robot in report.robots:
-        robot.packets_per_s = robot.packets_per_s if 0.0 <= robot.packets_per_s <= MAX_RATE else 0.0
-        robot.bytes_per_s = robot.bytes_per_s if 0.0 <= robot.bytes_per_s <= MAX_RATE else 0.0
-        robot.clock_offset = robot.clock_offset if abs(robot.clock_offset) <= MAX_RATE else math.nan
-    return report
 
 
 def merge(reports: Sequence[RobotArray]) -> RobotArray:
@@ -123,7 +111,6 @@ class _DriverLink:
 
     def _receive(self, report: RobotArray) -> None:
         if report._connection_header.get("callerid") == self.driver:
-            clean(report)
             stopped = [robot.namespace for robot in report.robots if robot.state in (Robot.READY, Robot.JOINING)]
             self.stopped_robots = frozenset(stopped if report.stopped else ())
             self.models = {robot.namespace: robot.model for robot in report.robots if robot.model}
