@@ -11,7 +11,7 @@ import rospy
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
-from hero_node import Pose, measure_distance, wrap_angle
+from hero_node import Pose, Velocity, measure_distance, wrap_angle
 
 from ..values.readings import Obstacle, find_nearest, is_free, read_pose, read_ranges
 from .extra_topics import find_class, load_fleet_file, read_field
@@ -81,6 +81,7 @@ class RobotTrack:
     def __init__(self) -> None:
         self.odometry = RateMeter()
         self.pose: Optional[Pose] = None
+        self.velocity: Optional[Velocity] = None
         self.distance_m = 0.0
         self.turned_rad = 0.0
         self.proximity_seen = False
@@ -124,6 +125,7 @@ class RobotListener:
         odometry = self._odometry.take()
         if odometry is not None:
             self.track.receive_pose(read_pose(odometry.pose.pose))
+            self.track.velocity = Velocity(odometry.twist.twist.linear.x, odometry.twist.twist.angular.z)
         scan = self._proximity.take()
         for topic, newest in self._extras.items():
             message = newest.take()

@@ -38,7 +38,7 @@ from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH, 
 from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.fleet_feed.robot_feed import LIGHT_S, REACHED_M, RobotFeed
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
-from hero_node import NodeError, Pose
+from hero_node import NodeError, Pose, Velocity
 from hero_test.nonempty import nonempty
 
 NOW_S = 100.0
@@ -127,7 +127,7 @@ def make_fleet(monkeypatch):
 
 
 def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
-    row = make_row(3, packets_per_s=211.26, bytes_per_s=4000.6, clock_offset=-0.01234, reconnects=2)
+    row = make_row(3, bytes_per_s=4000.6, clock_offset=-0.01234, reconnects=2)
     row.since, row.uptime = rospy.Time(940), rospy.Duration(61)
     row.dropped_messages, row.bad_packets, row.last_error = 5, 6, "e" * 500
     fleet.receive(row)
@@ -135,6 +135,11 @@ def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
     track = fleet.feed._feeds["/hero_3"].listener.track
     for pose in (Pose(0.0, 0.0, 0.0), Pose(0.3, 0.4, 0.0)):
         track.receive_pose(pose)
+    track.velocity = Velocity(-0.1234, 1.23456)
+    fleet.now_s += ROW_PERIOD_S
+    (before,) = fleet.read()["fleet"]["robots"]
+    assert (before["odom"], before["speed"], before["turn"]) == (0.0, None, None), "not measured yet"
+    track.odometry.total += 30
     fleet.now_s += ROW_PERIOD_S
     state = fleet.read()["fleet"]
     assert (state["driver"], state["listening"], state["stopped"], state["frame"]) == (
@@ -146,7 +151,7 @@ def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
     (shown,) = state["robots"]
     expected = {
         "name": "hero_3", "id": 3, "state": "READY", "known": True, "stop": "at rest", "since": 60, "uptime": 61,
-        "reconnects": 2, "packets": 211.3, "bytes": 4001, "distance": 0.5, "dropped": 5, "bad": 6, "clock": -0.0123,
+        "reconnects": 2, "speed": 0.123, "turn": 1.235, "bytes": 4001, "distance": 0.5, "dropped": 5, "bad": 6, "clock": -0.0123,
         "source": "", "health": [0, ""],
     }  # fmt: skip
     assert {name: shown[name] for name in expected} == expected and len(shown["error"]) == MAX_LINE_LENGTH

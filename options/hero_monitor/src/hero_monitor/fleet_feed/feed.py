@@ -220,6 +220,8 @@ class FleetFeed:
         feed = None if refused else self._feeds.get(row.namespace)
         track = None if feed is None else feed.listener.track
         since_s = row.since.to_sec()
+        odom_hz = None if track is None else round(track.odometry.rate_hz(time.monotonic()), 1)
+        velocity = track.velocity if track is not None and odom_hz else None
         return {
             "name": name,
             "id": row.id,
@@ -235,9 +237,10 @@ class FleetFeed:
             "since": round(self._fleet_stamp_s - since_s) if self._fleet_stamp_s is not None and since_s else None,
             "uptime": round(row.uptime.to_sec()),
             "reconnects": row.reconnects,
-            "packets": round(row.packets_per_s, 1),
             "bytes": round(row.bytes_per_s),
-            "odom": None if track is None else round(track.odometry.rate_hz(time.monotonic()), 1),
+            "odom": odom_hz,
+            "speed": velocity and finite(round(abs(velocity.linear_m_s), 3)),
+            "turn": velocity and finite(round(velocity.angular_rad_s, 3)),
             "distance": None if track is None else finite(round(track.distance_m, 2)),
             "dropped": row.dropped_messages,
             "bad": row.bad_packets,

@@ -1,7 +1,5 @@
 // Exchanges the token for a cookie.
 
-import "./theme.js";
-
 const form = document.getElementById("form");
 const [token, name] = ["token", "name"].map((id) => /** @type {HTMLInputElement} */ (document.getElementById(id)));
 const answer = document.getElementById("answer");

@@ -4,9 +4,8 @@
 
 import { element, make, setPressed, setText } from "./dom.js";
 import { Connection } from "./connection.js";
-import { isDark, onTheme, showTheme } from "./theme.js";
+import { onTheme } from "./theme.js";
 import { FleetTable } from "./panels/fleet.js";
-import { GamepadInput } from "./gamepad.js";
 import { History, addTopics } from "./history.js";
 import { countRobots, showLosses } from "./losses.js";
 import { FleetMap } from "./map/map.js";
@@ -91,7 +90,7 @@ function notice(level, text) {
 
 const history = new History();
 const map = new FleetMap(state, { choose, connection });
-const table = new FleetTable({ choose, history, isAdding: () => map.selecting });
+const table = new FleetTable({ choose, isAdding: () => map.selecting });
 const log = new LogView();
 const chart = new Chart(history);
 new Projector(() => map.draw());
@@ -101,16 +100,6 @@ const lesson = new LessonPanel({ connection });
 const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notice });
 
 const listPresent = () => state.fleet.robots.filter((robot) => robot.state !== "REFUSED");
-new GamepadInput({ panel, stop: () => stop.press(), move: moveChoice });
-
-/** Choose the robot so many places behind the chosen one; 0: all robots. */
-function moveChoice(step) {
-  const names = listPresent().map(({ name }) => name);
-  if (!names.length) return;
-  const place = names.findIndex((name) => state.chosen.has(name));
-  if (step === 0) choose(names, false);
-  else choose([names[(Math.max(place, step < 0 ? 0 : -1) + step + names.length) % names.length]], false);
-}
 
 /** The chosen robot, or several of them, without a choice all, in numbers; and their chart. */
 function showPanel() {
@@ -121,7 +110,7 @@ function showPanel() {
   programs.show(state, [...state.chosen]);
   lesson.show(state, [...state.chosen]);
   element("summary").hidden = chosen.length === 1;
-  showSummary(robots, state, history, chosen.length ? 0 : state.fleet.gone.length);
+  showSummary(robots, state, chosen.length ? 0 : state.fleet.gone.length);
   chart.show(robots);
 }
 
@@ -208,11 +197,6 @@ for (const button of tabs) {
 document.body.dataset.panel = "fleet";
 
 onTheme(() => map.draw());
-element("theme").addEventListener("click", () => {
-  localStorage.setItem("theme", isDark() ? "light" : "dark");
-  showTheme();
-  map.draw();
-});
 
 showHead();
 connection.open();

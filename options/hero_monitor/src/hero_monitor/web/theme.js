@@ -1,19 +1,8 @@
-// Light or dark: as chosen on this page, else as the browser is.
+// Light or dark, as the browser is set; style.css has the colors of the page itself.
 
 const query = matchMedia("(prefers-color-scheme: dark)");
 
-export const isDark = () => document.documentElement.dataset.theme === "dark";
-
-export function showTheme() {
-  document.documentElement.dataset.theme = localStorage.getItem("theme") || (query.matches ? "dark" : "light");
-}
+export const isDark = () => query.matches;
 
 /** Call redraw() when the browser changes between the two. */
-export function onTheme(redraw) {
-  query.addEventListener("change", () => {
-    showTheme();
-    redraw();
-  });
-}
-
-showTheme();
+export const onTheme = (redraw) => query.addEventListener("change", redraw);

@@ -3,6 +3,7 @@
 import { element } from "../dom.js";
 import { KEPT_MS, QUANTITIES } from "../history.js";
 import { colorOf } from "../map/colors.js";
+import { isDark } from "../theme.js";
 
 const LINES_MAX = 12; // more cannot be told apart
 const PERIOD_MS = 500;
@@ -48,9 +49,9 @@ export class Chart {
     element("charts").hidden = names.length === 0;
     if (names.length === 0 || element("chart").clientWidth === 0) return;
     const quantity = QUANTITIES[this.select.value];
-    let [times, ...values] = this.history.listSeries(names, quantity);
+    let [times, ...values] = this.history.listSeries(names, this.select.value);
     if (names.length > LINES_MAX && times.length) values = summarize(values);
-    const key = `${this.select.value} ${document.documentElement.dataset.theme} ${names.slice(0, LINES_MAX + 1)}`;
+    const key = `${this.select.value} ${isDark()} ${names.slice(0, LINES_MAX + 1)}`;
     if (key !== this.key) this.rebuild(key, quantity);
     const width = element("chart").clientWidth;
     if (this.plot.width !== width) this.plot.setSize({ width, height: HEIGHT_PX });

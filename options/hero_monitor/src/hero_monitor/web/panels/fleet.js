@@ -5,7 +5,7 @@ import { colorOf } from "../map/colors.js";
 import { nearestOf, nearestText } from "../history.js";
 import { sourceOf, stateOf, wordOf } from "../losses.js";
 
-export function spanOf(seconds) {
+function spanOf(seconds) {
   if (seconds === null || seconds === undefined) return "-";
   if (seconds < 60) return `${seconds} s`;
   if (seconds < 3600) return `${Math.floor(seconds / 60)} min ${seconds % 60} s`;
@@ -34,7 +34,8 @@ function poseText(robot, state) {
   return source === "odometry" && place ? place : `${place} ${source}`.trim();
 }
 
-const speedOf = (robot, state, history) => history.speedOf(robot.name);
+const versionsOf = ({ firmware, hardware, config }) => [firmware, hardware, config].filter(Boolean).join(", ");
+const lossesOf = ({ dropped, bad }) => `${dropped} messages, ${bad} bad packets`;
 const nearestRange = (robot, state) => nearestOf(state.ranges[robot.name]);
 
 /**
@@ -47,17 +48,42 @@ const COLUMNS = [
   { title: "Stop", value: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", className: "stop", lasting: true },
   { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => LIGHTS[light] || light || "off", byName: true },
   { title: "Nearest", value: nearestRange, text: (mm) => nearestText(mm, 2), className: "number", byName: true },
-  { title: "Speed", value: speedOf, text: (speed) => number(speed, 2, " m/s"), className: "number", byName: true },
+  { title: "Speed", value: (robot) => robot.speed, text: (speed) => number(speed, 2, " m/s"), className: "number", byName: true },
   { title: "Pose", value: poseText, text: String, className: "pose", lasting: true, byName: true },
   { title: "Note", value: (robot) => robot.note ?? "", className: "details", lasting: true },
   { title: "Address", value: (robot) => robot.address, className: "details", lasting: true },
   { title: "Odom", value: (robot) => robot.odom, text: (rate) => number(rate, 1, " Hz"), className: "details number" },
   { title: "From robot", value: (robot) => robot.bytes, text: (bytes) => number(bytes / 1000, 1, " kB/s"), className: "details number" },
   { title: "Clock", value: (robot) => robot.clock, text: (clock) => number(clock === null ? null : clock * 1000, 1, " ms"), className: "details number" },
-  { title: "Firmware", value: (robot) => robot.firmware, className: "details", lasting: true },
+  { title: "Distance", value: (robot) => robot.distance, text: (meters) => number(meters, 2, " m"), className: "details number" },
+  { title: "Model", value: (robot) => robot.model ?? "", className: "details", lasting: true },
+  { title: "Versions", value: versionsOf, className: "details", lasting: true },
+  { title: "Up for", value: (robot) => robot.uptime, text: (seconds) => (seconds ? spanOf(seconds) : "-"), className: "details" },
+  { title: "State since", value: (robot) => robot.since, text: spanOf, className: "details", lasting: true },
   { title: "Reconnects", value: (robot) => robot.reconnects, className: "details number", lasting: true },
+  { title: "Dropped", value: lossesOf, text: String, className: "details", lasting: true },
   { title: "Last error", value: healthOf, text: String, className: "details error", lasting: true },
 ];
+
+/**
+ * Text of a robot in a column; now: its value there.
+ * @param {any} column
+ */
+function textOf(column, robot, state, now = column.value(robot, state)) {
+  const { text, tag, lasting, byName } = column;
+  const shownState = stateOf(robot, state);
+  const isOutdated = shownState !== "READY" && shownState !== "JOINING";
+  if ((isOutdated && !lasting) || (robot.state === "REFUSED" && byName)) return "-";
+  return text ? text(now, robot) : now === "" && !tag ? "-" : String(now);
+}
+
+const SHOWN_ABOVE = ["Robot", "State", "Pose", "Last error"]; // of the facts
+
+/** What the table has of a robot, as [title, text]. */
+export function listFacts(robot, state) {
+  const columns = COLUMNS.filter(({ title }) => !SHOWN_ABOVE.includes(title));
+  return columns.map((column) => [column.title.toLowerCase(), textOf(column, robot, state) || "-"]);
+}
 
 function compare(a, b) {
   if (a === b) return 0;
@@ -66,11 +92,11 @@ function compare(a, b) {
 }
 
 export class FleetTable {
-  choose; history; isAdding;
+  choose; isAdding;
 
   /** isAdding(): whether clicks choose robots in addition, without Shift, too. */
-  constructor({ choose, history, isAdding }) {
-    Object.assign(this, { choose, history, isAdding });
+  constructor({ choose, isAdding }) {
+    Object.assign(this, { choose, isAdding });
     this.column = COLUMNS[0];
     this.down = false;
     this.table = /** @type {HTMLTableElement} */ (document.querySelector("#fleet table"));
@@ -117,7 +143,7 @@ export class FleetTable {
   show(state) {
     this.last = state;
     const sign = this.down ? -1 : 1;
-    const valueOf = (robot) => this.column.value(robot, state, this.history);
+    const valueOf = (robot) => this.column.value(robot, state);
     const robots = [...state.fleet.robots].sort(
       (one, other) => sign * compare(valueOf(one), valueOf(other)) || one.id - other.id,
     );
@@ -153,24 +179,20 @@ export class FleetTable {
 
   fill(row, robot, state) {
     row.robot = robot;
-    const shownState = stateOf(robot, state);
-    const isOutdated = shownState !== "READY" && shownState !== "JOINING";
-    const isRefused = robot.state === "REFUSED";
-    COLUMNS.forEach(({ title, value, text, tag, lasting, byName }, index) => {
-      const now = value(robot, state, this.history);
-      const isHidden = (isOutdated && !lasting) || (isRefused && byName);
-      const shown = isHidden ? "-" : text ? text(now, robot) : now === "" && !tag ? "-" : String(now);
+    COLUMNS.forEach((column, index) => {
+      const now = column.value(robot, state);
+      const shown = textOf(column, robot, state, now);
       if (row.texts[index] === shown) return;
       row.texts[index] = shown;
       const target = row.targets[index];
       target.textContent = shown;
-      if (tag) target.dataset[tag] = shown;
-      if (title === "Light") target.style.setProperty("--light", isHidden || !now ? "transparent" : now);
-      if (title === "Last error") target.title = shown;
+      if (column.tag) target.dataset[column.tag] = shown;
+      if (column.title === "Light") target.style.setProperty("--light", shown === "-" || !now ? "transparent" : now);
+      if (column.title === "Last error") target.title = shown;
     });
     row.chip.style.background = colorOf(robot.id);
-    row.line.classList.toggle("unknown", shownState === "UNKNOWN");
-    const isChosen = state.chosen.has(robot.name) && !isRefused;
+    row.line.classList.toggle("unknown", stateOf(robot, state) === "UNKNOWN");
+    const isChosen = state.chosen.has(robot.name) && robot.state !== "REFUSED";
     row.line.classList.toggle("chosen", isChosen);
     setPressed(row.button, isChosen);
   }

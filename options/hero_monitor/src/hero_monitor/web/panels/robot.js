@@ -9,8 +9,7 @@ import { Lines, element, isPressed, make, setPressed, setText } from "../dom.js"
 import { colorOf } from "../map/colors.js";
 import { isLate } from "../connection.js";
 import { listenToHold } from "../hold.js";
-import { healthOf, spanOf } from "./fleet.js";
-import { nearestOf, nearestText } from "../history.js";
+import { healthOf, listFacts } from "./fleet.js";
 import { mayDrive, roleOf } from "./lesson.js";
 import { stateOf, wordOf } from "../losses.js";
 
@@ -112,13 +111,6 @@ export class RobotPanel {
     if (this.timer === null) this.timer = setInterval(() => this.sendCommand(), HOLD_MS);
   }
 
-  /** A stick is held in a direction, of which each part is -1 to 1; it begins to drive only with a new press. */
-  steer(direction, isNew) {
-    if (element("control").hidden) return;
-    if (isNew) this.hold(direction);
-    else if (this.driving !== null) this.driving.direction = direction;
-  }
-
   sendCommand() {
     const now = Date.now();
     if (document.hidden || !document.hasFocus()) return this.endDrive();
@@ -180,33 +172,16 @@ export class RobotPanel {
 
   listFacts(robot, state) {
     if (stateOf(robot, state) === "UNKNOWN") return [["all data", "unknown"]];
-    const pose = state.poses[robot.name];
+    const [pose, truth] = [state.poses[robot.name], state.ground_truth[robot.name]];
     const meters = (value) => (value / 1000).toFixed(3);
-    const facts = [
-      ["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"],
-      ["stop", robot.stop || "-"],
-      ...(robot.note ? [["note", robot.note]] : []),
-      ["pose source", robot.source || "own odometry: position on the map unknown"],
-      ["frame", robot.source ? state.fleet.frame : "-"],
-      ["distance", robot.distance === null ? "-" : `${robot.distance.toFixed(2)} m since this view opened`],
-      ["nearest", nearestText(nearestOf(state.ranges[robot.name]), 3)],
-      ["odometry", robot.odom === null ? "-" : `${robot.odom.toFixed(1)} Hz`],
-      ["from robot", `${robot.packets.toFixed(0)} packets/s, ${(robot.bytes / 1000).toFixed(1)} kB/s`],
-      ["address", robot.address],
-      ["model", robot.model || "unknown"],
-      ["versions", [robot.firmware, robot.hardware, robot.config].filter(Boolean).join(", ") || "unknown"],
-      ["up for", robot.uptime ? spanOf(robot.uptime) : "-"],
-      ["state since", spanOf(robot.since)],
-      ["reconnects", String(robot.reconnects)],
-      ["clock offset", robot.clock === null ? "-" : `${(robot.clock * 1000).toFixed(1)} ms`],
-      ["dropped", `${robot.dropped} messages, ${robot.bad} bad packets`],
-      ["diagnostics", robot.health[1] || "-"],
-    ];
-    const truth = state.ground_truth[robot.name];
+    const facts = [["pose", pose ? `${meters(pose[0])} ${meters(pose[1])} m, ${((pose[2] / 1000) * (180 / Math.PI)).toFixed(0)}°` : "-"]];
     if (pose && truth) {
-      facts.splice(1, 0, [state.fleet.localized ? "error of the pose" : "odometry error", `${Math.hypot(pose[0] - truth[0], pose[1] - truth[1]).toFixed(0)} mm`]);
+      const error = Math.hypot(pose[0] - truth[0], pose[1] - truth[1]);
+      facts.push([state.fleet.localized ? "error of the pose" : "odometry error", `${error.toFixed(0)} mm`]);
     }
-    return facts;
+    facts.push(["pose source", robot.source || "own odometry: position on the map unknown"]);
+    facts.push(["frame", robot.source ? state.fleet.frame : "-"]);
+    return [...facts, ...listFacts(robot, state), ["diagnostics", robot.health[1] || "-"]];
   }
 
   makeFact(title) {
