@@ -69,8 +69,11 @@ def record_ten(picture):
     with RunningSuite(10, "arena:=obstacles", "wifi:=hotspot") as stage, tempfile.TemporaryDirectory() as folder:
         bag = record(stage, folder).rename(Path(folder) / "ten.bag")
         prefix = picture.with_name("recording")
-        plot(bag, prefix, "--robots", "1 2 3 6", "--figures", "paths,speeds")
-        plot(bag, prefix, "--figures", "connections,errors")
+        plot(bag, prefix)
+        few = Path(folder) / "few"
+        plot(bag, few, "--robots", "1 2 3 6")
+        for name in ("paths", "speeds"):
+            shutil.move(f"{few}_{name}.png", f"{prefix}_{name}.png")
     for path in prefix.parent.glob("recording_*.png"):
         shrink(path)
 

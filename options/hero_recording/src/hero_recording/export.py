@@ -17,7 +17,6 @@ from .bags.bag_set import BagSet
 from .bags.tables import TABLES, Row, declare_tables, is_exported, read_rows
 from .bags.topics import Message
 from .errors import RecordingError, explain_write_errors
-from .options import list_of
 
 BATCH_ROWS = 4096
 """Buffered rows of a table: 8 numbers take some 0.8 MB."""
@@ -70,8 +69,6 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
     parser.add_argument("--out", metavar="PATH", help="output path (the first bag's name); must not exist")
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
-    every, text = ",".join(TABLES), "which, separated by commas (%(default)s)"
-    parser.add_argument("--tables", type=list_of(TABLES), default=every, metavar="LIST", help=text)
     return parser.parse_args(arguments)
 
 
@@ -81,14 +78,14 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
 
     def receive(message: Message) -> None:
         for robot_id, kind, row in read_rows(*message):
-            if kind in options.tables and (options.robots is None or robot_id in options.robots):
+            if options.robots is None or robot_id in options.robots:
                 files.add(robot_id, kind, row)
 
     bags.read(is_exported, receive)
     files.flush()
     if not files.rows:
         raise RecordingError(
-            "%s: nothing of these robots and tables in it; its topics: %s"
+            "%s: nothing of these robots in it; its topics: %s"
             % (", ".join(bags.paths), bags.describe_topics())
         )
     robots = {robot_id for robot_id, _ in files.rows}

@@ -12,7 +12,6 @@ from hero_node.parameters import robot_ids_option
 
 from .bags.bag_set import BagSet
 from .errors import RecordingError, explain_write_errors
-from .options import list_of
 from .plots import analysis
 from .plots.observations import Observations, RobotObservations
 
@@ -33,8 +32,6 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="plot", description="Plot recordings of robots.")
     parser.add_argument("bags", nargs="+", metavar="FILE.bag", help="the bags of one recording, in any order")
     parser.add_argument("--robots", type=robot_ids_option, default="all", help="ids, e.g. '0 1 2' or 0-3 (all)")
-    every, text = ",".join(FIGURES), "which, separated by commas (%(default)s)"
-    parser.add_argument("--figures", type=list_of(FIGURES), default=every, metavar="LIST", help=text)
     parser.add_argument("--format", choices=("png", "pdf"), default="png", help="format of the files (png)")
     parser.add_argument("--out", metavar="PREFIX", help="prefix of the file names (the first bag's name)")
     return parser.parse_args(arguments)
@@ -62,12 +59,12 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
     drawing = Figures(observations, bags.start_s, bags.end_s, names)
     prefix = options.out or os.path.splitext(bags.paths[0])[0]
     paths, missing = [], []
-    for name in options.figures:
+    for name, needed in FIGURES.items():
         path = f"{prefix}_{name}.{options.format}"
         with rc_context(STYLE):
             figure = getattr(drawing, "draw_" + name)()
         if figure is None:
-            missing.append(f"no figure of {name}: nothing of {FIGURES[name]} in the recording")
+            missing.append(f"no figure of {name}: nothing of {needed} in the recording")
             continue
         with explain_write_errors(path), replace_file(path) as file:
             figure.savefig(file, dpi=130, format=options.format)

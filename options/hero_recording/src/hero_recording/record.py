@@ -26,7 +26,7 @@ from hero_node.parameters import robot_ids_option, within
 from hero_node.ros import check_master
 
 from .bags.bag_set import ACTIVE_SUFFIX
-from .bags.repair import repair_bag
+from .bags.repair import ORIGINAL_SUFFIX, repair_bag
 from .bags.topics import declare_topics, make_patterns
 from .disk_guard import MB, find_reason_to_stop, prepare_folder
 from .errors import RecordingError
@@ -69,6 +69,8 @@ class Recording:
         """Return the files of this recording with their sizes, oldest first."""
         found = []
         for path in set(glob.glob(self._pattern)) - self._old_files:
+            if path.endswith(ORIGINAL_SUFFIX):
+                continue
             # Gone since glob saw it: the recorder renames what it has closed, and disks are pulled out.
             with suppress(OSError):
                 status = os.stat(path)

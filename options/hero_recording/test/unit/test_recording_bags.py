@@ -12,7 +12,7 @@ from synthetic_bag import START_S, write_bag
 
 from hero_recording import disk_guard, plot
 from hero_recording.bags.bag_set import BagSet
-from hero_recording.bags.repair import CHUNK_MARK, repair_bag
+from hero_recording.bags.repair import repair_bag
 from hero_recording.errors import RecordingError
 
 
@@ -87,7 +87,7 @@ def test_a_bag_that_was_cut_off_is_refused_and_can_be_repaired(tmp_path):
     with pytest.raises(RecordingError, match="has no index.*record --repair"):
         open_set(path)
     path.rename(str(path) + ".active")
-    assert repair_bag(str(path) + ".active") == "repaired %s" % path
+    assert repair_bag(str(path) + ".active").startswith("repaired %s; " % path)
     left = len(read_all(open_set(path)))
     assert 0.3 * count < left < count
 
@@ -107,6 +107,7 @@ def test_every_whole_chunk_of_a_bag_that_was_cut_off_is_read_again(tmp_path, com
     for position in (chunks[5].pos, (chunks[5].pos + chunks[6].pos) // 2):
         path.write_bytes(content[:position])
         repair_bag(str(path))
+        path.with_name("cut.bag.orig").unlink()
         with rosbag.Bag(str(path)) as bag:
             assert bag.get_message_count() == readable
 
@@ -135,6 +136,10 @@ def test_a_file_that_cannot_be_repaired_is_left_as_it_is(tmp_path):
     assert (tmp_path / "text.bag.active").read_text() == "not a bag\n"
 
 
+CHUNK_MARK = b"\4\0\0\0op=\5"
+"""In the header of each chunk (wiki.ros.org/Bags/Format/2.0)."""
+
+
 def damage(path, share):
     """Change bytes of a bag in a chunk, as a bad disk does."""
     data = bytearray(path.read_bytes())
@@ -145,13 +150,15 @@ def damage(path, share):
 
 
 @pytest.mark.slow
-def test_a_copy_is_kept_where_damage_in_the_middle_is_cut_off(tmp_path):
+def test_the_file_as_it_was_is_kept_and_never_overwritten(tmp_path):
     path = tmp_path / "damaged.bag"
     write_bag(path, seconds=20.0)
     content = damage(path, 0.5)
-    assert repair_bag(str(path)).endswith("only in %s.damaged" % path)
-    assert (tmp_path / "damaged.bag.damaged").read_bytes() == content
+    assert repair_bag(str(path)).endswith("; %s.orig is the file as it was" % path)
+    assert (tmp_path / "damaged.bag.orig").read_bytes() == content
     assert len(read_all(open_set(path))) > 0
+    with pytest.raises(RecordingError, match=r"damaged\.bag\.orig exists already"):
+        repair_bag(str(path))
 
 
 @pytest.mark.slow
@@ -162,6 +169,7 @@ def test_a_bag_without_a_readable_message_is_left_as_it_is(tmp_path):
     with pytest.raises(RecordingError, match="is left as it is"):
         repair_bag(str(path))
     assert path.read_bytes() == content
+    assert [found.name for found in tmp_path.iterdir()] == [path.name]
 
 
 @pytest.fixture(scope="module")
