@@ -6,8 +6,8 @@ from driver_side import SENT, DriverSide
 
 from hero_sim.robot import ranges
 from hero_sim.robot_constants import BODY_RADIUS_M
-from hero_sim.world import range_sensors
-from hero_sim.world.arena import Segments, build_default
+from hero_sim.world import compiled, range_sensors
+from hero_sim.world.arena import Segments, build_default, build_rectangle
 from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.kinematics import find_heading
 from hero_sim.world.robot_errors import draw_errors
@@ -242,3 +242,20 @@ def test_the_distance_sensor_looks_ahead_as_far_as_four_meters():
     assert measure_ahead([(-1.0, 2.0, 1.0, 2.0)], yaw_rad=math.pi / 2.0) == pytest.approx(2.0)
     assert measure_ahead(NO_WALLS, np.array([(3.0, 0.0, 0.1)])) == pytest.approx(2.9)
     assert measure_ahead(NO_WALLS) == measure_ahead([(4.1, -1.0, 4.1, 1.0)]) == 4.0
+
+
+@pytest.mark.option("numba")
+def test_compiled_sensors_see_the_same_bytes(monkeypatch):
+    """Also of robots that touch, beside walls that meet, and beside obstacles."""
+    rng, read = np.random.RandomState(0), []
+    poses = np.column_stack((rng.uniform(-0.45, 0.45, (60, 2)), rng.uniform(-7.0, 7.0, 60)))
+    for rows in (10**9, 0):
+        monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
+        arena = build_rectangle(1.0, 1.2, 0)._replace(circles_m=np.array([[0.1, 0.2, 0.1], [0.3, -0.3, 0.05]]))
+        errors = draw_errors([np.random.RandomState(row) for row in range(60)])
+        world = World(arena, poses, [np.random.RandomState(seed) for seed in range(3)], errors)
+        sights = [sight for _, sight in world._look(np.arange(60), world.observe())]
+        signals = [range_sensors.measure_signals(sight, ALPHA, BETA) for sight in sights]
+        read.append([world.read_infrared(np.arange(60)).tobytes(), *(each.tobytes() for each in signals)])
+        assert len(np.unique(signals)) > 200
+    assert read[0] == read[1]

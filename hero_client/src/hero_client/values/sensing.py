@@ -74,7 +74,7 @@ class Neighborhood(NamedTuple):
     @property
     def range_m(self) -> np.ndarray:
         """Distances between the centers (R, N)."""
-        return np.hypot(self.forward_m, self.left_m)
+        return _measure_length(self.forward_m, self.left_m)
 
     @property
     def bearing_rad(self) -> np.ndarray:
@@ -98,6 +98,12 @@ def list_neighbors(near: Neighborhood, row: int, ids: Sequence[int]) -> List[Nei
     return sorted(found, key=lambda neighbor: neighbor.range_m)
 
 
+def _measure_length(x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+    """Return what np.hypot() returns, several times as fast: places are neither huge nor tiny."""
+    length_m: np.ndarray = np.sqrt(x_m * x_m + y_m * y_m)
+    return length_m
+
+
 def look_at(poses: np.ndarray, others: np.ndarray, forward_m: float) -> Any:
     """Return where others (W, M, 3) are, to the front and to the left (W, N, M), forward_m ahead of each robot."""
     cosine, sine = np.cos(poses[..., 2])[..., None], np.sin(poses[..., 2])[..., None]
@@ -111,7 +117,7 @@ def sense_binary(
     """Return what each robot's sensor tells (W * N,).
 
     random: needed for a sensor with errors; random.random() returns one number from 0 to 1 for each robot (W * N,).
-    find_touched: does for beams, faster, what is done here: that of hero_swarm.sensors.beam_loops.
+    find_touched: does for beams, faster, what is done here: that of hero_swarm.sensors.pair_loops.
     """
     if find_touched is not None and sensor.half_angle_rad == 0.0:
         places_m, sees = np.ascontiguousarray(np.moveaxis(poses[..., :2], 2, 0)), np.zeros(poses.shape[:2], dtype=bool)
@@ -152,15 +158,24 @@ def _find_touched(poses: np.ndarray, sensor: Binary) -> np.ndarray:
     return seen
 
 
-def sense_neighbors(poses: np.ndarray, sensor: Neighbors, random: Optional[Any] = None) -> Neighborhood:
+def sense_neighbors(
+    poses: np.ndarray, sensor: Neighbors, random: Optional[Any] = None, find_near: Optional[Callable[..., None]] = None
+) -> Neighborhood:
     """Return what all W * N robots sense of their neighbors.
 
     random: needed for noise and drop-outs; random.normal(N) and random.random(N) return arrays (W * N, N).
+    find_near: does for a sensor with a range alone, faster, what is done here: that of hero_swarm.sensors.pair_loops.
     """
     worlds, robots, _ = poses.shape
+    rows = np.repeat(np.arange(worlds * robots).reshape(worlds, robots), robots, axis=0)
+    if find_near is not None and sensor == Neighbors(range_m=sensor.range_m):
+        seen, found = np.zeros((worlds, robots, robots), dtype=bool), np.zeros((3, worlds, robots, robots))
+        find_near(poses, np.cos(poses[..., 2]), np.sin(poses[..., 2]), float(sensor.range_m), seen, found)
+        forward_m, left_m, heading_rad = found.reshape(3, -1, robots)
+        return Neighborhood(seen.reshape(-1, robots), forward_m, left_m, heading_rad, rows)
     forward_m, left_m = look_at(poses, poses, 0.0)
     with np.errstate(invalid="ignore"):
-        range_m = np.hypot(forward_m, left_m)
+        range_m = _measure_length(forward_m, left_m)
         seen = range_m <= sensor.range_m
         if sensor.field_rad < 2.0 * math.pi:
             seen &= np.abs(np.arctan2(left_m, forward_m)) <= sensor.field_rad / 2.0
@@ -180,7 +195,6 @@ def sense_neighbors(poses: np.ndarray, sensor: Neighbors, random: Optional[Any] 
             forward_m, left_m = cosine * forward_m - sine * left_m, sine * forward_m + cosine * left_m
             heading_rad = heading_rad + sensor.bearing_noise_rad * random.normal(robots)
     heading_rad = heading_rad - 2.0 * math.pi * np.rint(heading_rad / (2.0 * math.pi))
-    rows = np.repeat(np.arange(worlds * robots).reshape(worlds, robots), robots, axis=0)
     forward_m, left_m, heading_rad = (np.where(seen, values, 0.0) for values in (forward_m, left_m, heading_rad))
     return Neighborhood(seen, forward_m, left_m, heading_rad, rows)
 

@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..robot_constants import BODY_RADIUS_M
+from . import ray_loops
 from .arena import Segments
+from .compiled import compile_loops
 from .kinematics import find_heading
 
 BEAMS = 8
@@ -45,11 +47,13 @@ DISTANCE_NOISE_M = 0.005
 
 # The diode sees a cone, whose rim is modeled by two more rays of less weight. Half angle and weight are assumptions.
 _CONE_RAD = np.array([[0.0], [-0.21], [0.21]])
-_CONE_WEIGHT = np.array([[1.0], [0.7], [0.7]])
-_RAYS_X, _RAYS_Y = find_heading((BEAM_ANGLES_RAD + _CONE_RAD).ravel())
+_CONE_WEIGHT = np.array([1.0, 0.7, 0.7])
+_RAYS = _RAYS_X, _RAYS_Y = np.array(find_heading((BEAM_ANGLES_RAD + _CONE_RAD).ravel()))
 """Directions of all rays in the body frame (A,): those of the cones' middles come first."""
 
 _FAR_M = 1e6
+
+_LIMITS_M = REACH_M, _FAR_M, BODY_RADIUS_M
 
 
 class Rays:
@@ -77,15 +81,14 @@ class Rays:
         start_x, start_y, area_m2 = (array[robots, seen, None] for array in (start_x, start_y, area_m2))
         along_x, along_y = walls.along_m[:, seen, None]
         length_m2 = walls.length_m2[seen, None]
-        cross = ray_x * along_y - ray_y * along_x
-        crossing = cross != 0.0  # else parallel
-        share = np.divide(start_x * ray_y - start_y * ray_x, cross, out=np.zeros(cross.shape), where=crossing)
-        distance_m = np.divide(area_m2, cross, out=np.full(cross.shape, _FAR_M), where=crossing)
-        distance_m[(distance_m < 0.0) | (share < 0.0) | (share > 1.0)] = _FAR_M
+        cross, across_m2 = ray_x * along_y - ray_y * along_x, start_x * ray_y - start_y * ray_x
+        meets = (area_m2 * cross > 0.0) & (across_m2 * cross >= 0.0) & (np.abs(across_m2) <= np.abs(cross))
+        distance_m = np.divide(area_m2, cross, out=np.full(cross.shape, _FAR_M), where=meets)
         # The walls that one robot sees follow each other.
         first = np.concatenate(([True], robots[1:] != robots[:-1])).nonzero()[0]
         self.distance_m[robots[first]] = np.minimum.reduceat(distance_m, first)
-        cosine = np.where(distance_m == self.distance_m[robots], np.abs(cross) / np.sqrt(length_m2), 0.0)
+        nearest = meets & (distance_m == self.distance_m[robots])
+        cosine = np.where(nearest, np.abs(cross) / np.sqrt(length_m2), 0.0)
         self.cosine[robots[first]] = np.maximum.reduceat(cosine, first)
 
     def meet_circles(self, to_x_m: np.ndarray, to_y_m: np.ndarray, radii_m: np.ndarray) -> None:
@@ -144,13 +147,21 @@ def measure_signals(sight: Sight, alpha_counts_m2: np.ndarray, beta_counts: np.n
 
 def _measure_brightness(sight: Sight) -> np.ndarray:
     """Return cosine / distance^2 (1/m^2) of what the eight sensors of each robot see, shape (K, 8)."""
+    loops = compile_loops(ray_loops, len(sight.places_m))
+    if loops is not None:
+        places_m, headings, bodies_m, radii_m, walls, circles_m = sight
+        brightest = np.empty((len(places_m), BEAMS))
+        loops.measure_brightness(
+            places_m, headings, bodies_m, radii_m, *walls, circles_m, _RAYS, _CONE_WEIGHT, _LIMITS_M, brightest
+        )
+        return brightest
     cosine, sine = sight.headings[:, :1], sight.headings[:, 1:]
     rays = Rays(cosine * _RAYS_X - sine * _RAYS_Y, sine * _RAYS_X + cosine * _RAYS_Y)
     _meet_all(rays, sight)
     distance_m = np.maximum(rays.distance_m - BODY_RADIUS_M, 1e-3)
     bright = rays.cosine / (distance_m * distance_m)
-    brightest: np.ndarray = (bright.reshape(-1, len(_CONE_RAD), BEAMS) * _CONE_WEIGHT).max(axis=1)
-    return brightest
+    weighed = bright.reshape(-1, len(_CONE_RAD), BEAMS) * _CONE_WEIGHT[:, None]
+    return np.maximum.reduce(weighed, axis=1)
 
 
 def measure_distances(sight: Sight) -> np.ndarray:

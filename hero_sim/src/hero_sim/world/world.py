@@ -150,6 +150,9 @@ class World:
         self._block_step = self._body_step = _BLOCK_STEPS
         self._ground_m = np.empty((_BLOCK_STEPS, 2, rows))
         self._walls = Segments.from_ends(arena.segments_m)
+        if self._loops is not None:
+            self.read_infrared(np.arange(rows))  # loads what is compiled now: robots in real time would pause
+            self._views = 0
 
     @property
     def poses(self) -> np.ndarray:

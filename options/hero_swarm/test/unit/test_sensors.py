@@ -124,3 +124,17 @@ def test_compiled_beams_see_what_others_see(monkeypatch, sensor):
             around = Surroundings(0.0, poses, Random(range(20), 15))
             seen.append(read_sensor("sees", sensor._replace(error=error), around).tolist())
         assert seen[0] == seen[1] and len(set(seen[0])) == 2
+
+
+@pytest.mark.option("numba")
+@pytest.mark.parametrize("range_m", [0.3, float("inf")])
+def test_compiled_neighbors_are_those_that_others_see(monkeypatch, range_m):
+    """Also of robots at the same place, and of some without a pose."""
+    poses = np.random.RandomState(0).uniform(-0.4, 0.4, (20, 15, 3)) * (1.0, 1.0, 10.0)
+    poses[0, 3], poses[1, 4] = np.nan, poses[1, 5]
+    found = []
+    for rows in (10**9, 0):
+        monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
+        near = read_sensor("near", Neighbors(range_m=range_m), Surroundings(0.0, poses, Random(range(20), 15)))
+        found.append([values.tolist() for values in near])
+    assert found[0] == found[1] and 0 < near.counts[:15].sum() <= 14 * 13 and not near.seen[3].any()

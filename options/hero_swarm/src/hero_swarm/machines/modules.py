@@ -4,7 +4,7 @@ Source: AutoMoDe-Chocolate (G. Francesca et al., Swarm Intelligence 2015), of wh
 ANTS 2018) makes trees.
 """
 
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -14,7 +14,9 @@ Kinds = Dict[str, Tuple[str, ...]]
 _PLAIN: Kinds = dict.fromkeys(("stop", "phototaxis", "anti-phototaxis"), ())
 DO: Kinds = {"exploration": ("turn_steps",), **_PLAIN, **dict.fromkeys(("attraction", "repulsion"), ("gain",))}
 
-_SHARES = "black floor", "gray floor", "white floor", "fixed probability"
+FLOORS = "black floor", "gray floor", "white floor", "unknown"
+MAX_COUNT = 100  # of neighbors; more are as many
+_SHARES = (*FLOORS[:3], "fixed probability")
 _COUNTS = "neighbor count", "inverted neighbor count"
 WHEN: Kinds = {**dict.fromkeys(_SHARES, ("probability",)), **dict.fromkeys(_COUNTS, ("neighbors", "steepness"))}
 
@@ -26,29 +28,50 @@ MAX_NEXT = 4  # transitions of a state, and children of a tree
 State = Dict[str, Any]  # {name, do, numbers, next: [{to, when, numbers}]}
 
 
-def stack(machines: Sequence[List[State]]) -> Dict[str, np.ndarray]:
-    """Return M machines of up to S states as arrays, by the names of what they hold.
+class Tables(NamedTuple):
+    """M machines of S states each, missing ones among them, as arrays (M * S, ...), machine after machine.
 
-    do and its numbers (M, S); to, when and its numbers (M, S, MAX_NEXT); when is -1 where there is no transition.
+    Attributes:
+        states: of each machine, S.
+        do: which of DO a state is; turn_steps, gain: its numbers, 0 where it has none.
+        to: number of the state that each transition leads to (M * S, MAX_NEXT).
+        chances: probability of each transition in a step, where there is one (M * S, ..., MAX_NEXT): on floors of each
+            kind, see FLOORS, and after these for each number of neighbors. A transition has those of one kind alone.
     """
-    shape = len(machines), max(map(len, machines))
-    tables = {name: np.zeros(shape, int if name == "do" else float) for name in ("do", "turn_steps", "gain")}
-    tables.update({name: np.zeros((*shape, MAX_NEXT)) for name in ("probability", "neighbors", "steepness")})
-    tables.update(to=np.zeros((*shape, MAX_NEXT), int), when=np.full((*shape, MAX_NEXT), -1))
+
+    states: int
+    do: np.ndarray
+    turn_steps: np.ndarray
+    gain: np.ndarray
+    to: np.ndarray
+    chances: np.ndarray
+
+
+def stack(machines: Sequence[List[State]]) -> Tables:
+    """Return machines as arrays."""
+    count = max(map(len, machines))
+    rows = len(machines) * count
+    do, to, numbers = np.zeros(rows, dtype=int), np.zeros((rows, MAX_NEXT), dtype=int), np.zeros((2, rows))
+    chances = np.zeros((rows, len(FLOORS) + MAX_COUNT + 1, MAX_NEXT))
     for machine, states in enumerate(machines):
         names = [state["name"] for state in states]
-        for row, state in enumerate(states):
-            _fill(tables, (machine, row), "do", DO, state)
+        for row, state in enumerate(states, machine * count):
+            do[row] = list(DO).index(state["do"])
+            numbers[:, row] = state.get("turn_steps", 0.0), state.get("gain", 0.0)
             for column, follows in enumerate(state.get("next", ())):
-                _fill(tables, (machine, row, column), "when", WHEN, follows)
-                tables["to"][machine, row, column] = names.index(follows["to"])
-    return tables
+                to[row, column] = names.index(follows["to"])
+                chances[row, :, column] = _find_chances(follows)
+    return Tables(count, do, numbers[0], numbers[1], to, chances)
 
 
-def _fill(tables: Dict[str, np.ndarray], place: Tuple[int, ...], kind: str, kinds: Kinds, given: State) -> None:
-    tables[kind][place] = list(kinds).index(given[kind])
-    for name in kinds[given[kind]]:
-        tables[name][place] = given[name]
+def _find_chances(follows: State) -> np.ndarray:
+    when, counts = follows["when"], np.arange(MAX_COUNT + 1.0)
+    if when in _SHARES:
+        on_floors = [follows["probability"] * (when in (floor, "fixed probability")) for floor in FLOORS]
+        return np.array(on_floors + [0.0] * len(counts))
+    lacking = follows["steepness"] * (follows["neighbors"] - counts)
+    enough = 1.0 / (1.0 + np.exp(np.clip(lacking, -50.0, 50.0)))
+    return np.concatenate((np.zeros(len(FLOORS)), enough if when == "neighbor count" else 1.0 - enough))
 
 
 def follow(children: Sequence[State]) -> List[State]:

@@ -21,7 +21,7 @@ from hero_client.values import (
 )
 from hero_sim.world import Arena, compile_loops
 
-from . import beam_loops
+from . import pair_loops
 
 
 class Surroundings(NamedTuple):
@@ -52,14 +52,17 @@ class Surroundings(NamedTuple):
     kept: Dict[str, Any] = {}
 
 
-def _sense_binary(sensor: Binary, around: Surroundings) -> np.ndarray:
-    loops = compile_loops(beam_loops, around.poses.shape[0] * around.poses.shape[1])
-    return sense_binary(around.poses, sensor, around.random, loops and loops.find_touched)
+def _compile(name: str, around: Surroundings) -> Any:
+    """Return a loop over pairs of robots, or None where it is not compiled."""
+    loops = compile_loops(pair_loops, around.poses.shape[0] * around.poses.shape[1])
+    return loops and getattr(loops, name)
 
 
 _READERS: Dict[type, Callable[[Any, Surroundings], Any]] = {
-    Binary: _sense_binary,
-    Neighbors: lambda sensor, around: sense_neighbors(around.poses, sensor, around.random),
+    Binary: lambda sensor, around: sense_binary(around.poses, sensor, around.random, _compile("find_touched", around)),
+    Neighbors: lambda sensor, around: sense_neighbors(
+        around.poses, sensor, around.random, _compile("find_near", around)
+    ),
     Objects: lambda sensor, around: sense_objects(around.poses, around.things, sensor),
     Sight: lambda sensor, around: sense_sight(around.poses, around.things, sensor),
 }

@@ -1,7 +1,12 @@
-"""Loop over the beams of all robots, used where numba compiles it, which gives what sense_binary() gives. Pure."""
+"""Loops over pairs of robots, used where numba compiles them: they give what sense_binary() and sense_neighbors() give.
+
+Pure.
+"""
 
 import math
 from typing import Any
+
+import numpy as np
 
 
 def find_touched(places_m: Any, cosines: Any, sines: Any, radius_m: float, range_m: float, touched: Any) -> None:
@@ -26,3 +31,23 @@ def find_touched(places_m: Any, cosines: Any, sines: Any, radius_m: float, range
                 ):
                     touched[world, i] = True
                     break
+
+
+def find_near(poses: Any, cosines: Any, sines: Any, range_m: float, seen: Any, found: Any) -> None:
+    """Set seen (W, N, N), and in found (3, W, N, N) what is forward and left, and the heading, of those in range.
+
+    poses (W, N, 3), NaN where one is not known; cosines, sines (W, N): of the headings.
+    """
+    worlds, robots, _ = poses.shape
+    for world in range(worlds):
+        for i in range(robots):
+            own_x_m, own_y_m, own_rad = poses[world, i]
+            cosine, sine = cosines[world, i], sines[world, i]
+            for j in range(robots):
+                to_x_m, to_y_m = poses[world, j, 0] - own_x_m, poses[world, j, 1] - own_y_m
+                forward_m, left_m = cosine * to_x_m + sine * to_y_m, cosine * to_y_m - sine * to_x_m
+                if i != j and math.sqrt(forward_m * forward_m + left_m * left_m) <= range_m:
+                    heading_rad = poses[world, j, 2] - own_rad
+                    seen[world, i, j] = True
+                    found[0, world, i, j], found[1, world, i, j] = forward_m, left_m
+                    found[2, world, i, j] = heading_rad - 2.0 * math.pi * np.rint(heading_rad / (2.0 * math.pi))
