@@ -67,8 +67,9 @@ PACKAGES: Dict[str, Path] = {path.parent.name: path.parent for path in find("pac
 
 
 def list_programs(package: str) -> List[str]:
-    """Programs of a package that rosrun finds: those that CMake makes, and scripts in nodes/."""
+    """Programs of a package that rosrun finds: those that CMake makes, and scripts in nodes/ and on pages."""
     scripts = [path.name for path in sorted((PACKAGES[package] / "nodes").glob("*"))]
+    scripts += re.findall(r"hero_add_page_script\(\S+ (\w+\.py)", read_cmake(package))
     return re.findall(r"hero_add_(?:program|node)\((\w+)", read_cmake(package)) + scripts
 
 

@@ -34,7 +34,7 @@ PROGRAMS = [
     (path.parent.name, program)
     for path in sources.find("CMakeLists.txt")
     for program in re.findall(
-        r"hero_add_(?:program|node|script)\((?:nodes/)?([\w.]+)",
+        r"hero_add_(?:program|node|script|page_script)\((?:nodes/|\S+ )?([\w.]+)",
         path.read_text().replace("${PROJECT_NAME}", path.parent.name),
     )
 ]
@@ -74,6 +74,8 @@ def copy_sources(destination):
     ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
     for folder in PACKAGES.values():
         shutil.copytree(str(folder), str(destination / folder.relative_to(ROOT)), ignore=ignored)
+    # Pages hold scripts of hero_tutorial.
+    shutil.copytree(str(ROOT / "docs" / "tutorial"), str(destination / "docs" / "tutorial"))
 
 
 class Workspace:

@@ -17,8 +17,7 @@ import rostest
 from hero_test.processes import find_free_port
 from hero_test.tutorial_runner import Course
 
-PACKAGE = Path(__file__).resolve().parents[2]
-ROOT = PACKAGE.parent
+ROOT = Path(__file__).resolve().parents[3]
 HERO = sorted((ROOT / "docs" / "tutorial" / "hero").glob("[0-9]*.md"))
 PAGES = {
     "in_process": [ROOT / "docs" / "in_process.md"],
@@ -64,7 +63,7 @@ class TutorialsTest(unittest.TestCase):
     def setUpClass(cls):
         home = tempfile.TemporaryDirectory(prefix="tutorials_")
         cls.addClassCleanup(home.cleanup)
-        cls.course = Course(Path(home.name), PACKAGE, make_changes(sys.argv[1]))
+        cls.course = Course(Path(home.name), make_changes(sys.argv[1]))
         cls.addClassCleanup(cls.course.close)
         cls.failed = None
         cls.master = rosgraph.Master("tutorials")

@@ -1,11 +1,12 @@
 """The pages of the courses, without running them; the rostests run them."""
 
+import ast
 import re
 from pathlib import Path
 
 import pytest
 
-from hero_test.tutorial_runner import check_same_as, read_blocks
+from hero_test.tutorial_runner import read_blocks
 
 PACKAGE = Path(__file__).resolve().parents[2]
 TUTORIAL = PACKAGE.parent / "docs" / "tutorial"
@@ -31,11 +32,12 @@ def test_every_page_has_the_same_sections_and_lists_common_mistakes(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_block_can_be_parsed_and_equals_the_file_it_shows(page):
+def test_every_block_can_be_parsed(page):
     for block in read_blocks(page):
-        check_same_as(block, page, PACKAGE)
         if block.language == "console":
             block.read_steps(page)
+        elif block.file and block.file.endswith(".py"):
+            ast.parse(block.text, feature_version=(3, 8))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
@@ -43,7 +45,15 @@ def test_the_overview_lists_every_page(page):
     assert f"({name_of(page)})" in (TUTORIAL / "README.md").read_text(encoding="utf-8")
 
 
-def test_every_script_of_the_package_is_shown_or_linked_in_a_page():
-    shown = {block.same_as for page in PAGES for block in read_blocks(page)}
+def test_every_script_of_the_package_is_linked_in_a_page():
     linked = {name for page in PAGES for name in re.findall(r"hero_tutorial/(nodes/\w+\.py)\)", page.read_text())}
-    assert {f"nodes/{path.name}" for path in (PACKAGE / "nodes").glob("*.py")} <= shown | linked
+    assert {f"nodes/{path.name}" for path in (PACKAGE / "nodes").glob("*.py")} == linked
+
+
+def test_the_package_takes_scripts_from_pages_that_have_them_written():
+    written = {(page, block.file) for page in PAGES for block in read_blocks(page) if block.language == "python"}
+    shown = {(name_of(page), Path(file).name) for page, file in written if file and "/scripts/" in file}
+    made = re.findall(
+        r"hero_add_page_script\(\.\./docs/tutorial/(\S+) (\S+)\)", (PACKAGE / "CMakeLists.txt").read_text()
+    )
+    assert set(made) <= shown and len(made) == 9

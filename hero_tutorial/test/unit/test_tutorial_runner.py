@@ -17,14 +17,11 @@ def try_page(tmp_path):
     """Writes a page with this text and runs it; returns the home directory."""
     home = tmp_path / "home"
     home.mkdir()
-    package = tmp_path / "package"
-    package.mkdir()
-    (package / "one.py").write_text("print(1)\n", encoding="utf-8")
 
     def run(text, changes=None):
         page = tmp_path / "05_page.md"
         page.write_text(text, encoding="utf-8")
-        course = Course(home, package, changes or {})
+        course = Course(home, changes or {})
         try:
             course.run_page(page)
         finally:
@@ -126,12 +123,6 @@ def test_blocks_are_written_to_files_and_commands_may_span_lines(try_page):
         + console("$ cat ~/some/where.txt <<'END'", "> nothing", "> END", "hello")
     )
     assert (home / "some" / "where.txt").read_text(encoding="utf-8") == "hello\n"
-
-
-def test_a_block_that_shows_a_file_must_equal_it(try_page):
-    try_page("<!-- tutorial: same as one.py -->\n```python\nprint(1)\n```\n")
-    with pytest.raises(TutorialError, match="differs from"):
-        try_page("<!-- tutorial: same as one.py -->\n```python\nprint(2)\n```\n")
 
 
 def test_blocks_can_be_skipped_and_commands_replaced(try_page):

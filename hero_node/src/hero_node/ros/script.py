@@ -44,7 +44,10 @@ def start_node(name: str = "hero_program") -> None:
 
 
 def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
-    """Run a file of a package, a script of plain rospy, and end the process; without arguments it needs a master."""
+    """Run a script of plain rospy, and end the process; file: in the package's folder, or an absolute path.
+
+    arguments: names of those that it takes; a script without any is a node, and needs a master.
+    """
     path = os.path.join(rospkg.RosPack().get_path(package), file)
 
     def main() -> None:

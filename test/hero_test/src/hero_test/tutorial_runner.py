@@ -21,7 +21,6 @@ A comment right before a block holds instructions for the test, separated by ";"
     <!-- tutorial: instead COMMAND -->     type this in place of the block's only command
     <!-- tutorial: not run, REASON -->     skip the block
     <!-- tutorial: file PATH -->           write the block, in any language, to this file
-    <!-- tutorial: same as FILE -->        the block must equal this file of the package
 
 Independent of ROS. The terminals are pseudo terminals running an interactive bash.
 """
@@ -92,7 +91,6 @@ class Block(NamedTuple):
     when: Optional[str]
     not_run: Optional[str]
     file: Optional[str]
-    same_as: Optional[str]
 
     def read_steps(self, page: Path) -> List[Step]:
         """Return the actions in the terminal. Raises: PageError."""
@@ -121,7 +119,7 @@ def read_instructions(text: str, where: str) -> Dict[str, object]:
     for instruction in filter(None, (part.strip() for part in text.split(";"))):
         number = re.match(r"terminal (\d+)$", instruction)
         seconds = re.match(r"within (\d+) s$", instruction)
-        argument = re.match(r"(presses|instead|when|not run,|file|same as) +(.+)$", instruction, re.DOTALL)
+        argument = re.match(r"(presses|instead|when|not run,|file) +(.+)$", instruction, re.DOTALL)
         if number:
             instructions["terminal"] = int(number.group(1))
         elif seconds:
@@ -172,7 +170,6 @@ def make_block(line: int, language: str, text: str, instructions: Dict[str, obje
         "when": None,
         "not_run": None,
         "file": None,
-        "same_as": None,
     }
     values.update(instructions)
     return Block(line=line, language=language, text=text, **values)  # type: ignore[arg-type]
@@ -299,21 +296,18 @@ class Terminal:
 class Course:
     """The terminals in which the pages of a course run one after the other, sharing one home directory."""
 
-    def __init__(self, home: Path, package: Path, changes: Dict[str, str]) -> None:
+    def __init__(self, home: Path, changes: Dict[str, str]) -> None:
         """Start without terminals.
 
-        home: an empty directory. package: where "same as" looks for files. changes: replacements for text in
-        console blocks, e.g. the path of an interpreter.
+        home: an empty directory. changes: replacements for text in console blocks, e.g. the path of an interpreter.
         """
         self._environment = dict(os.environ, HOME=str(home))
-        self._package = package
         self._changes = changes
         self._terminals: Dict[int, Terminal] = {}
 
     def run_page(self, page: Path) -> None:
         """Run a page. Raises: PageError, TutorialError."""
         for block in self._read_blocks(page):
-            check_same_as(block, page, self._package)
             if block.file is not None:
                 self._write_file(block)
             elif block.language == "console":
@@ -425,11 +419,3 @@ class Course:
         for terminal in reversed(list(self._terminals.values())):
             terminal.close()
         self._terminals.clear()
-
-
-def check_same_as(block: Block, page: Path, package: Path) -> None:
-    """Raises: TutorialError if the block differs from the file that it is marked as."""
-    if block.same_as is None:
-        return
-    if block.text != (package / block.same_as).read_text(encoding="utf-8"):
-        raise TutorialError("%s:%d: the block differs from %s" % (page, block.line, package / block.same_as))
