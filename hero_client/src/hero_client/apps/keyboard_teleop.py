@@ -236,22 +236,17 @@ class KeyboardTeleop:
         missing = robot.missing()
         if missing is not None:
             return "info", f"{robots} | waiting: {missing}"
+        near = "free"
         try:
-            pose, near = robot.pose, _describe_nearest(robot)
+            pose, nearest = robot.pose, robot.nearest()
+            if nearest is not None:
+                near = f"{nearest.range_m:.2f} m at {math.degrees(nearest.bearing_rad):+.0f} deg"
+        except NotCalibratedError:
+            near = "not calibrated"
         except StaleDataError as error:
             return "info", f"{robots} | waiting: {error}"
         where = f"x {pose.x_m:.2f} y {pose.y_m:.2f} m {math.degrees(pose.yaw_rad):.0f} deg"
         return "info", f"{robots} | {speeds} | {where} | near: {near}"
-
-
-def _describe_nearest(robot: Robot) -> str:
-    try:
-        nearest = robot.nearest()
-    except NotCalibratedError:
-        return "not calibrated"
-    if nearest is None:
-        return "free"
-    return f"{nearest.range_m:.2f} m at {math.degrees(nearest.bearing_rad):+.0f} deg"
 
 
 def read_stops(keyboard: Keyboard) -> Optional[List[str]]:

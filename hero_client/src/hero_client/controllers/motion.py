@@ -117,7 +117,8 @@ class MotionController:
             self._moved_pose = None
         step_s, self._stepped_s = min(now_s - self._stepped_s, MAX_STEP_S), now_s
         if now_s - self._start_s > self._timeout_s:
-            return self._fail(self._describe_timeout())
+            text = f"not there after {self._timeout_s:g} s" + self._describe_distance()
+            return self._fail("; ".join(filter(None, (text, self._describe_obstacle()))))
         if pose is None or not all(math.isfinite(value) for value in pose):
             self._silent_steps += 1
             return STOP if self._silent_steps < SILENT_STEPS else self._fail("no pose for 2 s")
@@ -193,10 +194,6 @@ class MotionController:
 
     def _describe_distance(self) -> str:
         return "" if math.isnan(self.distance_m) else f", {self.distance_m:.3f} m are left"
-
-    def _describe_timeout(self) -> str:
-        text = f"not there after {self._timeout_s:g} s" + self._describe_distance()
-        return text + ("; " + self._describe_obstacle() if self._obstacle else "")
 
     def _describe_obstacle(self) -> str:
         """Return the last obstacle in the way, for users; empty if there was none."""

@@ -2,6 +2,7 @@
 
 import math
 import time
+from contextlib import suppress
 from functools import lru_cache
 from typing import Dict, NamedTuple, Optional, Set
 
@@ -69,9 +70,13 @@ class PoseListener:
     """Subscription to the poses of all robots."""
 
     def __init__(self) -> None:
+        """Subscribe; asks the ROS master, which may take seconds."""
         self._report: Optional[PoseReport] = None  # replaced, never changed: read on all threads
         self._subscriber = rospy.Subscriber(TOPIC, RobotPoses, self._receive, queue_size=1, tcp_nodelay=True)
-        self._is_expected = _is_published(self._subscriber.resolved_name)
+        self._is_expected = False  # whether there is a publisher, so that a message is worth waiting for
+        with suppress(NodeError):
+            published = ask_master("getPublishedTopics", "")
+            self._is_expected = any(name == self._subscriber.resolved_name for name, _ in published)
 
     def _receive(self, message: RobotPoses) -> None:
         robots = {robot.id: robot for robot in message.robots}
@@ -108,14 +113,6 @@ class PoseListener:
         """Return how old the pose of a robot is; inf if it has none."""
         report = self._report
         return math.inf if report is None else report.age_s(robot_id, time.monotonic())
-
-
-def _is_published(topic: str) -> bool:
-    """Return whether the ROS master knows a publisher, so that a message is worth waiting for."""
-    try:
-        return any(name == topic for name, _ in ask_master("getPublishedTopics", ""))
-    except NodeError:
-        return False
 
 
 @lru_cache(maxsize=None)

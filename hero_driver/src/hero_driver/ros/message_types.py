@@ -6,7 +6,7 @@ The firmware's hero_common is this suite's hero_msgs on the PC, its tf package t
 import functools
 import importlib.util
 import os
-from typing import Any, Tuple
+from typing import Any
 
 import genpy
 import roslib.message
@@ -82,14 +82,10 @@ def find_message_class(type_name: str, md5sum: str) -> Any:
 def find_service_class(type_name: str, request_md5sum: str, response_md5sum: str) -> Any:
     """Return the class of a service type, declared by one md5 per half; may read files. Raises: MessageTypeError."""
     ros_type = apply_aliases(type_name)
-    service_class = _load(roslib.message.get_service_class, "srv", ros_type)
-    halves: Tuple[Tuple[str, str, Any], ...] = (
-        ("request of service type", request_md5sum, service_class._request_class),
-        ("answer of service type", response_md5sum, service_class._response_class),
-    )
-    for what, md5sum, half in halves:
-        _check_md5sum(what, type_name, ros_type, md5sum, half._md5sum)
-    return service_class
+    found = _load(roslib.message.get_service_class, "srv", ros_type)
+    _check_md5sum("request of service type", type_name, ros_type, request_md5sum, found._request_class._md5sum)
+    _check_md5sum("answer of service type", type_name, ros_type, response_md5sum, found._response_class._md5sum)
+    return found
 
 
 def _load(loader: Any, kind: str, ros_type: str) -> Any:

@@ -148,9 +148,7 @@ def unregister(topic: Any) -> None:
     if impl is not None:
         # From here on rospy lets no connection in: it looks at impl.closed under the same lock.
         with impl.c_lock:
-            close = getattr(impl.connection_poll.poller, "close", None)  # not every system's poller is a file
-            if close is not None:
-                close()
+            impl.connection_poll.poller.close()
 
 
 # Log lines.

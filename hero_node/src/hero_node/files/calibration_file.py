@@ -118,18 +118,14 @@ def read_calibration(path: str) -> KeptCalibration:
     robot = ""
     try:
         content = load_entries(path, "robot: hero_3").mapping(None, ("robot",))
-        robot_id = _read_robot_id(content["robot"])
+        match = re.fullmatch(r"hero_([0-9]{1,9})", str(content["robot"].value))
+        robot_id = int(match.group(1)) if match else content["robot"].refuse("hero_N")
         robot = "hero_%d" % robot_id
         values, others = _read_values(content)
     except EntryError as error:
         raise CalibrationFileError(f"{error}; {REMEDY}", robot) from error
     date = str(content["date"].value) if "date" in content else ""
     return KeptCalibration(robot_id, make_printable(date), values, others)
-
-
-def _read_robot_id(entry: Entry) -> int:
-    match = re.fullmatch(r"hero_([0-9]{1,9})", str(entry.value))
-    return int(match.group(1)) if match else entry.refuse("hero_N")
 
 
 def _read_values(content: Dict[str, Entry]) -> Tuple[Dict[str, List[float]], Dict[str, Any]]:

@@ -58,7 +58,10 @@ def read_fleet_file(path: str = "") -> FleetFile:
         return FleetFile()
     content = load_entries(path, "robots: [{id: 3, name: Ada}]", may_be_empty=True).mapping(FleetFile._fields)
     robots = [_read_robot(entry) for entry in content["robots"].entries()] if "robots" in content else []
-    topics = [_read_topic(entry) for entry in content["topics"].entries()] if "topics" in content else []
+    topics = [
+        ExtraTopic(**_read_texts(entry.mapping(ExtraTopic._fields, ("name", "topic", "type", "field"))))
+        for entry in (content["topics"].entries() if "topics" in content else ())
+    ]
     run_time_h = content["run_time_h"].number(0.0, 1000.0, "h") if "run_time_h" in content else 0.0
     return FleetFile(dict(robots), tuple(topics), run_time_h)
 
@@ -69,10 +72,8 @@ def _read_robot(entry: Entry) -> Tuple[int, RobotNotes]:
     broken = fields.pop("broken", None)
     if broken is not None and not isinstance(broken.value, bool):
         broken.refuse("true or false")
-    texts = {name: str(field.value) for name, field in fields.items()}
-    return robot_id, RobotNotes(broken=broken is not None and broken.value, **texts)
+    return robot_id, RobotNotes(broken=broken is not None and broken.value, **_read_texts(fields))
 
 
-def _read_topic(entry: Entry) -> ExtraTopic:
-    fields = entry.mapping(ExtraTopic._fields, ("name", "topic", "type", "field"))
-    return ExtraTopic(**{name: str(field.value) for name, field in fields.items()})
+def _read_texts(fields: Dict[str, Entry]) -> Dict[str, str]:
+    return {name: str(field.value) for name, field in fields.items()}

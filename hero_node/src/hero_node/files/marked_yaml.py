@@ -128,9 +128,7 @@ def load_entries(path: str, example: str, read: Callable[[str], bytes] = read_fi
 def mark_values(value: Any, place: str, name: str = "") -> Entry:
     """Return values that come from no file as entries; place: where they come from."""
     if isinstance(value, dict):
-        value = {
-            str(key): mark_values(item, place, f"{name}.{key}" if name else str(key)) for key, item in value.items()
-        }
+        value = {str(key): mark_values(item, place, _join(name, str(key))) for key, item in value.items()}
     elif isinstance(value, (list, tuple)):
         value = [mark_values(item, place, name) for item in value]
     return Entry(value, name, place)

@@ -55,16 +55,12 @@ def lock_file(path: str) -> Iterator[None]:
         deadline_s = time.monotonic() + LOCK_TIMEOUT_S
         while True:
             try:
-                fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                _lock(folder, fcntl.LOCK_EX)
                 break
             except BlockingIOError:
                 if time.monotonic() > deadline_s:
                     raise OSError(errno.EBUSY, "another program has it locked", path) from None
                 time.sleep(RETRY_S)
-            except OSError as error:
-                if error.errno not in NO_LOCKS:
-                    raise
-                break
         yield
     finally:
         os.close(folder)
@@ -77,14 +73,18 @@ def hold_file(path: str, is_shared: bool = False) -> Iterator[bool]:
     True: no other program holds it; False: the file system has no locks. Raises: OSError, BlockingIOError if held.
     """
     with open(path, "ab") as file:  # NFS locks only files that are open for writing
-        is_held = True
-        try:
-            fcntl.flock(file, (fcntl.LOCK_SH if is_shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-        except OSError as error:
-            if error.errno not in NO_LOCKS:
-                raise
-            is_held = False
-        yield is_held
+        yield _lock(file.fileno(), fcntl.LOCK_SH if is_shared else fcntl.LOCK_EX)
+
+
+def _lock(descriptor: int, kind: int) -> bool:
+    """Lock an open file or folder; return False without locks. Raises: OSError, BlockingIOError if it is locked."""
+    try:
+        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno not in NO_LOCKS:
+            raise
+        return False
+    return True
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """YAML from files and parameters as values, or one line that says what is wrong with it. Knows no ROS."""
 
-from typing import Any, Type
+from typing import Any
 
 import yaml
 
@@ -31,12 +31,12 @@ def decode_text(content: bytes) -> str:
     return text
 
 
-def parse_yaml(text: str, loader: Type[Any] = yaml.SafeLoader) -> Any:
+def parse_yaml(text: str) -> Any:
     """Return what a text of at most MAX_CHARACTERS says. Raises: YamlError."""
     if len(text) > MAX_CHARACTERS:
         raise YamlError("it has more than %d characters" % MAX_CHARACTERS)
     try:
-        return yaml.load(text, loader)  # noqa: S506 - callers give SafeLoader, or one that is stricter
+        return yaml.safe_load(text)
     except RecursionError:
         raise YamlError("lists or tables within each other, deeper than can be read") from None
     except Exception as error:  # noqa: BLE001 - PyYAML raises many kinds at invalid dates and numbers

@@ -40,14 +40,11 @@ class ConnectionLimit:
         """Hold a connection; if there are too many, shut down the oldest one of the address with the most."""
         with self._lock:
             if len(self._held) >= self._most:
-                self._evict()
+                victim = self._held.list_connections(self._held.find_largest())[0]
+                self._held.remove(victim)
+                with contextlib.suppress(OSError):
+                    victim.shutdown(socket.SHUT_RDWR)  # its own thread closes it
             self._held.add(sock, address[0])
-
-    def _evict(self) -> None:
-        victim = self._held.list_connections(self._held.find_largest())[0]
-        self._held.remove(victim)
-        with contextlib.suppress(OSError):
-            victim.shutdown(socket.SHUT_RDWR)  # its own thread closes it
 
     def remove(self, sock: socket.socket) -> bool:
         """Return whether sock was still held."""
