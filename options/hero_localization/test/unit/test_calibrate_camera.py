@@ -9,7 +9,7 @@ import pytest
 
 from hero_client import ProgramError
 from hero_localization.calibration.lens_calibration import BoardView, LensCalibration
-from hero_localization.calibration.print_fit import estimate_height
+from hero_localization.calibration.print_fit import estimate_height, find_print_scale
 from hero_localization.calibration.robot_calibration import RobotCalibration
 from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.camera.frame_source import Frame
@@ -26,8 +26,9 @@ from hero_sim.world.arena import build_rectangle
 FOUND = {
     0: RobotCalibration(Pose(0.001, -0.002, math.radians(3.0)), 0.060, 0.001, 0.001, [], 0.073),
     1: RobotCalibration(Pose(0.002, 0.0, 0.0), 0.070, 0.001, 0.001, [], 0.079),
-    2: RobotCalibration(Pose(0.0, 0.001, math.pi), 0.200, 0.001, 0.001, ["the tag is on upside down"], 0.0),
+    2: RobotCalibration(Pose(0.0, 0.001, math.pi), 0.200, 0.001, 0.001, ["the tag is on upside down"], 0.076),
     3: RobotCalibration(Pose(0.0, 0.0, 0.0), 0.070, 0.001, 0.001, [], 0.0807),
+    4: RobotCalibration(Pose(0.0, 0.0, 0.0), 0.070, 0.001, 0.001, []),
 }
 
 
@@ -35,7 +36,7 @@ FOUND = {
 def calibrate(tmp_path, monkeypatch):
     """Return a function that calibrates robots, each of which drives as FOUND says, and returns status and settings."""
     path = str(tmp_path / "camera.yaml")
-    settings.update(path, {"mounts": {8: [0.003, 0.0, 5.0]}, "tag_robots": {12: 2}})
+    settings.update(path, {"mounts": {8: [0.003, 0.0, 5.0]}, "tag_robots": {12: 2}, "references": {100: [0, 0, 0]}})
 
     def watch(pictures, program, robot_id, tag_id):
         if robot_id not in FOUND:
@@ -73,6 +74,13 @@ def test_tags_that_are_higher_than_the_file_says_are_named_in_one_line(calibrate
     assert calibrate("1 3")[0] == 1
     text = "  tags are 80 mm above the floor by their size, not 76: is tag_height_m right, are all printed alike?\n"
     assert capsys.readouterr().out.count(text) == 1
+    calibrate("4 0")
+    assert "tag_height_m" not in capsys.readouterr().out, "by those of which it is known"
+
+
+def test_a_height_that_no_reference_tag_shows_is_named(calibrate, capsys):
+    assert calibrate("4")[0] == 1
+    assert "  tag_height_m is not checked: no reference tag lies well within the image\n" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -86,12 +94,15 @@ def test_the_height_of_a_tag_follows_from_its_size_beside_references():
     image, layout = renderer.render(poses), TagLayout(references={100 + index: Pose(0, 0, 0) for index in range(3)})
     found, camera = create_detector(decimate=1.0).detect(image), renderer.camera
     assert len(found) == 9
-    for used in (layout, layout._replace(height_m=0.091)):
-        heights_m = [estimate_height(camera, image, row, found, used, "36h11") for row in range(6)]
-        assert np.median(heights_m) == pytest.approx(0.081, abs=0.002), heights_m
     robots = [tag for tag in found if tag.tag_id < 6]
-    assert estimate_height(camera, image, 1, robots, layout, "36h11") == layout.height_m, "no reference tag is seen"
-    assert estimate_height(camera, image, 7, found, layout, "36h11") == layout.height_m
+    for used in (layout, layout._replace(height_m=0.091)):
+        scale = find_print_scale(camera, image, found, used, "36h11")
+        assert scale.share == pytest.approx(1.025, abs=0.001)
+        heights_m = [estimate_height(camera, image, tag, scale, used, "36h11") for tag in robots]
+        assert np.mean(heights_m) == pytest.approx(0.081, abs=0.001), heights_m
+    assert find_print_scale(camera, image, robots, layout, "36h11") is None, "no reference tag is seen"
+    at_rim = robots[0]._replace(corners=robots[0].corners - robots[0].corners.min(axis=0))
+    assert math.isnan(estimate_height(camera, image, at_rim, scale, layout, "36h11"))
 
 
 def test_a_robot_that_is_not_seen_does_not_keep_others_from_the_file(calibrate, capsys):

@@ -1,6 +1,7 @@
 """A robot that is stepped below simulated cameras, from their rendered images to calibrations and poses."""
 
 import math
+import re
 from contextlib import nullcontext
 from types import SimpleNamespace
 
@@ -153,7 +154,7 @@ class SteppedPictures:
 
     take = poll
 
-    def find_tags(self, decimate, frame):
+    def find_tags(self, frame):
         return self.detector.detect(frame.gray)
 
 
@@ -165,13 +166,18 @@ def make_odometry(stamp_s, pose):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("yaw_rad", [0.05, math.pi - 0.05])
-def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeypatch, capsys, yaw_rad):
+@pytest.mark.parametrize(("yaw_rad", "height_m"), [(0.05, 0.076), (math.pi - 0.05, 0.076), (0.05, 0.081), (0.05, 0.071)])
+def test_calibrating_robots_names_tags_upside_down_or_at_a_wrong_height(
+    tmp_path, monkeypatch, capsys, yaw_rad, height_m
+):
     scene, path = Scene(tmp_path), str(tmp_path / "camera.yaml")
     place_m = (scene.true.x_m, scene.true.y_m, HEIGHT_M)
     options = OPTIONS._replace(width_px=240, center_px=(121.0, 118.0), position_m=place_m)
-    renderer = CameraRenderer(options, load_arena(scene.path), [PrintedTag(0, yaw_rad=yaw_rad)])
-    settings.update(path, settings.describe_camera(renderer.camera, {}))
+    floor = [PrintedTag(100 + side, 0.08, 0.0, place_m[0], place_m[1] + 0.15 * side) for side in (-1, 1)]
+    robot = PrintedTag(0, height_m=height_m, yaw_rad=yaw_rad)
+    renderer = CameraRenderer(options, load_arena(scene.path), [robot], floor)
+    references = {"references": {tag.tag_id: [tag.x_m, tag.y_m, 0.0] for tag in floor}, "reference_size_m": 0.08}
+    settings.update(path, {**references, **settings.describe_camera(renderer.camera, {})})
 
     def subscribe(topic, kind, receive, **others):
         scene.on_odometry.append(lambda *reading: receive(make_odometry(*reading)))
@@ -183,7 +189,9 @@ def test_calibrating_robots_names_a_tag_that_is_on_upside_down(tmp_path, monkeyp
     program = SimpleNamespace(sleep=None)
     parsed = calibrate_camera.parse_options(["robots", "--robots", "0", "--file", path])
     status = calibrate_robots.calibrate_robot_tags(parsed, SteppedPictures(scene, renderer, path), program)
-    text, is_wrong = capsys.readouterr().out, yaw_rad > 1.0
-    assert status == int(is_wrong), text
-    assert ("hero_0: the tag is on upside down" in text) == is_wrong, text
+    text, is_turned, is_off = capsys.readouterr().out, yaw_rad > 1.0, height_m != 0.076
+    assert status == int(is_turned or is_off), text
+    assert ("hero_0: the tag is on upside down" in text) == is_turned, text
+    told = re.findall("tags are ([0-9]+) mm above the floor by their size, not 76", text)
+    assert [float(found) for found in told] == pytest.approx([1e3 * height_m] * is_off, abs=1.0), text
     assert settings.load(path).layout.mounts[0].yaw_rad == pytest.approx(yaw_rad, abs=0.03)

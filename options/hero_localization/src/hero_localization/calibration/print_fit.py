@@ -6,7 +6,7 @@ image best.
 """
 
 import math
-from typing import List, Sequence
+from typing import List, NamedTuple, Optional, Sequence
 
 import cv2
 import numpy as np
@@ -22,9 +22,6 @@ MARGIN_CELLS = 2
 """Margin of white around the print, of which SEEN_CELLS are compared."""
 SEEN_CELLS = 0.7
 
-MAX_SIZE_ERROR_PX = 0.04
-"""Twice the standard deviation of a size. A tag of 25 px whose height is wrong by 5 mm differs by 0.06 px."""
-
 ROUNDS, MIN_GAIN = 20, 1e-4
 FIRST_BLUR_PX = 0.8
 STEPS = np.array((0.002, 0.02, 0.5, 0.5, 0.02))
@@ -34,28 +31,49 @@ LOW, HIGH = np.array((0.9, 0.3, 1.0, 30.0, 0.4)), np.array((1.1, 4.0, 200.0, 255
 
 def refine_corners(gray: np.ndarray, tags: Sequence[TagCorners], family: str) -> List[TagCorners]:
     """Return tags of an image (H, W), 8 bit, with corners in true distance from their centers."""
-    return [_refine(gray, tag, draw_tag(family, tag.tag_id)) for tag in tags]
+    fits = [_fit_print(gray, tag, draw_tag(family, tag.tag_id)) for tag in tags]
+    return [tag if fit is None else _scale(tag, fit[0]) for tag, fit in zip(tags, fits)]
+
+
+class PrintScale(NamedTuple):
+    """Findings from the reference tags in an image: about its camera and their printer.
+
+    share: measured size of the reference tags by that of their print; blur_px, gamma: of the image.
+    """
+
+    share: float
+    blur_px: float
+    gamma: float
+
+
+def find_print_scale(
+    camera: Camera, gray: np.ndarray, tags: Sequence[TagCorners], layout: TagLayout, family: str
+) -> Optional[PrintScale]:
+    """Return the scale of the prints in an image (H, W); None if no reference tag lies well within it."""
+    chosen = [tag for tag in tags if tag.tag_id in layout.references]
+    fits = [(tag, _fit_print(gray, tag, draw_tag(family, tag.tag_id))) for tag in chosen]
+    known = [(_scale(tag, fit[0]), fit) for tag, fit in fits if fit is not None]
+    if not known:
+        return None
+    sizes_m = [fit.size_m for fit in fit_squares(camera, [tag for tag, _ in known], 0.0)]
+    _, blur_px, _, _, gamma = np.median([fit for _, fit in known], axis=0)
+    return PrintScale(float(np.median(sizes_m)) / layout.reference_size_m, blur_px, gamma)
 
 
 def estimate_height(
-    camera: Camera, gray: np.ndarray, tag_id: int, tags: Sequence[TagCorners], layout: TagLayout, family: str
+    camera: Camera, gray: np.ndarray, tag: TagCorners, scale: PrintScale, layout: TagLayout, family: str
 ) -> float:
-    """Return a robot's tag's height above the floor (m), by its size beside that of reference tags in an image (H, W).
+    """Return the height above the floor (m) of a robot's tag in an image (H, W), by its size; nan at the image's rim.
 
-    All are printed alike: the errors of printer and tape measure are the same in both. The layout's height where they
-    differ by less than the image can tell, or are not both seen well within it.
+    It is printed as the reference tags are: the errors of printer and tape measure are the same in both. Blur and gamma
+    of the image are those of the reference tags, of which larger tags tell more.
     """
-    chosen = [tag for tag in tags if tag.tag_id == tag_id] + [tag for tag in tags if tag.tag_id in layout.references]
-    refined = [new for new, tag in zip(refine_corners(gray, chosen, family), chosen) if new is not tag]
-    if [tag.tag_id == tag_id for tag in refined[:2]] != [True, False]:
-        return layout.height_m
-    heights_m = np.array([layout.height_m] + [0.0] * (len(refined) - 1))
-    own_m, *others_m = (fit.size_m for fit in fit_squares(camera, refined, heights_m))
-    share = own_m / layout.size_m * layout.reference_size_m / float(np.median(others_m))
-    if abs(share - 1.0) * refined[0].side_px < MAX_SIZE_ERROR_PX:
-        return layout.height_m
+    fit = _fit_print(gray, tag, draw_tag(family, tag.tag_id), scale)
+    if fit is None:
+        return math.nan
+    own_m = fit_squares(camera, [_scale(tag, fit[0])], layout.height_m)[0].size_m
     from_camera_m = float(camera.position_m[2]) - layout.height_m
-    return layout.height_m + from_camera_m - from_camera_m / share
+    return layout.height_m + from_camera_m - from_camera_m * layout.size_m * scale.share / own_m
 
 
 class _Print:
@@ -90,24 +108,43 @@ class _Print:
         return shades
 
 
-def _refine(gray: np.ndarray, tag: TagCorners, cells: np.ndarray) -> TagCorners:
+def _fit_print(
+    gray: np.ndarray, tag: TagCorners, cells: np.ndarray, known: Optional[PrintScale] = None
+) -> Optional[np.ndarray]:
+    """Return scale, blur, black, white and gamma that explain a print best; None at the rim of the image (H, W).
+
+    known: blur and gamma are not fitted, but these.
+    """
     from scipy.optimize import least_squares  # takes 0.1 s, which --help does not need
 
     half_px = math.ceil(0.85 * tag.side_px)
     corner_px, size_px = np.rint(tag.center).astype(int) - half_px, 2 * half_px + 1
     if corner_px.min() < 0 or (corner_px + size_px > gray.shape[::-1]).any():
-        return tag
+        return None
     image = gray[corner_px[1] : corner_px[1] + size_px, corner_px[0] : corner_px[0] + size_px].astype(float)
     model = _Print(cells, tag, corner_px, size_px)
     seen = image[model.seen]
-    start = np.clip((1.0, FIRST_BLUR_PX, *np.percentile(seen, (5, 95)), 1.0), LOW, HIGH)
-    fit = least_squares(
-        lambda values: model.render(values) - seen,
-        start,
-        bounds=(LOW, HIGH),
-        diff_step=STEPS / start,
-        x_scale=STEPS,
+    fit = np.clip((1.0, FIRST_BLUR_PX, *np.percentile(seen, (5, 95)), 1.0), LOW, HIGH)
+    fitted = np.arange(len(fit))
+    if known is not None:
+        fit[[1, 4]], fitted = (known.blur_px, known.gamma), np.array((0, 2, 3))
+
+    def compare(values: np.ndarray) -> np.ndarray:
+        fit[fitted] = values
+        return model.render(fit) - seen
+
+    fit[fitted] = least_squares(
+        compare,
+        fit[fitted],
+        bounds=(LOW[fitted], HIGH[fitted]),
+        diff_step=STEPS[fitted] / fit[fitted],
+        x_scale=STEPS[fitted],
         ftol=MIN_GAIN,
         max_nfev=ROUNDS,
     ).x
-    return tag._replace(corners=tag.center + fit[0] * (tag.corners - tag.center))
+    return fit
+
+
+def _scale(tag: TagCorners, share: float) -> TagCorners:
+    """Return a tag with corners in this many times their distance from the center."""
+    return tag._replace(corners=tag.center + share * (tag.corners - tag.center))

@@ -20,7 +20,7 @@ def calibrate_extrinsics(options: argparse.Namespace, images: Images) -> int:
     settings, layout, found = images.settings, images.settings.layout, []
     for _ in range(ARENA_FRAMES):
         frame = images.take()
-        found.append(images.find_tags(1.0, frame))
+        found.append(images.find_tags(frame))
     lens = settings.lens or images.source.lens
     if lens is None:
         reason = f" ({images.source.lens_problem})" if images.source.lens_problem else ""

@@ -14,7 +14,7 @@ from hero_client.values import is_plausible, read_pose
 from hero_node import HeroError, Pose, say
 from hero_node.ros import read_duration_clock_s
 
-from ..calibration.print_fit import estimate_height
+from ..calibration.print_fit import estimate_height, find_print_scale, PrintScale
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
 from ..camera.frame_source import Frame
 from ..errors import CalibrationError, DetectorError
@@ -56,7 +56,10 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
         problems += ["hero_%d: %s" % (robot_id, problem) for problem in result.problems]
     if not results:
         raise CalibrationError("; ".join(problems))
-    height_m = float(np.median([result.height_m for result in results.values()]))
+    heights_m = [result.height_m for result in results.values() if math.isfinite(result.height_m)]
+    height_m = float(np.median(heights_m)) if heights_m else layout.height_m
+    if layout.references and not heights_m:
+        problems.append("tag_height_m is not checked: no reference tag lies well within the image")
     if abs(height_m - layout.height_m) > MAX_HEIGHT_ERROR_M:
         text = "tags are %.0f mm above the floor by their size, not %.0f: is tag_height_m right, are all printed alike?"
         problems.append(text % (1e3 * height_m, 1e3 * layout.height_m))
@@ -68,19 +71,24 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
 
 def _watch_robot(images: Images, program: Program, robot_id: int, tag_id: int) -> RobotCalibration:
     """Drive one robot, and return how its tag sits. Raises: CalibrationError if it cannot be seen; HeroError."""
-    settings, camera = images.settings, images.settings.camera
+    camera, layout, family = images.settings.camera, images.settings.layout, images.settings.family
     assert camera is not None
     odometry: List[Tuple[float, Pose]] = []
     seen: List[Tuple[float, Pose]] = []
     heights_m: List[float] = []
+    scale: Optional[PrintScale] = None
 
-    def watch(frame: Optional[Frame]) -> int:
-        found = images.find_tags(settings.decimate, frame) if frame is not None else []
+    def watch(frame: Optional[Frame], is_measuring: bool = False) -> int:
+        nonlocal scale
+        found = images.find_tags(frame) if frame is not None else []
         tags = [tag for tag in found if tag.tag_id == tag_id]
         if frame is not None and len(tags) == 1:
-            pose = fit_squares(camera, tags, settings.layout.height_m)[0].pose
+            pose = fit_squares(camera, tags, layout.height_m)[0].pose
             if is_plausible(pose):
                 seen.append((frame.stamp_s, pose))
+            scale = scale or find_print_scale(camera, frame.gray, found, layout, family)
+            if scale is not None and is_measuring:
+                heights_m.append(estimate_height(camera, frame.gray, tags[0], scale, layout, family))
         return len(tags)
 
     with Robot(robot_id) as robot:
@@ -101,16 +109,11 @@ def _watch_robot(images: Images, program: Program, robot_id: int, tag_id: int) -
                 end_s = read_duration_clock_s() + duration_s
                 while read_duration_clock_s() < end_s:
                     robot.drive(linear_m_s, angular_rad_s)
-                    watch(images.poll())
-                if linear_m_s == angular_rad_s == 0.0:  # at rest
-                    frame = images.take()
-                    found = images.find_tags(settings.decimate, frame)
-                    heights_m.append(
-                        estimate_height(camera, frame.gray, tag_id, found, settings.layout, settings.family)
-                    )
+                    watch(images.poll(), is_measuring=angular_rad_s == 0.0)  # a turn blurs the tag
         finally:
             subscriber.unregister()
-    return calibrate_robot(seen, odometry)._replace(height_m=float(np.median(heights_m)))
+    heights_m = [height_m for height_m in heights_m if math.isfinite(height_m)]
+    return calibrate_robot(seen, odometry)._replace(height_m=float(np.median(heights_m)) if heights_m else math.nan)
 
 
 def _keep_odometry(kept: List[Tuple[float, Pose]], message: Odometry) -> None:

@@ -49,8 +49,8 @@ class Images:
         reason = self.source.problem or "is the camera's driver running?"
         raise CalibrationError(f"no image from {self._name} for {FRAME_S:g} s: {reason}")
 
-    def find_tags(self, decimate: float, frame: Frame) -> List[TagCorners]:
-        """Return the tags in an image; decimate of the first call counts.
+    def find_tags(self, frame: Frame) -> List[TagCorners]:
+        """Return the tags in an image, which is searched at its full size.
 
         Raises: CalibrationError for another size than the lens has, DetectorError; ProgramError as poll().
         """
@@ -59,7 +59,7 @@ class Images:
             settings.lens.check_size(height_px, width_px)
         if self._finder is None:
             # Not in this process: Ctrl-C during a detection would end it, and leave a robot driving.
-            self._finder = DetectorProcess(settings.detector, settings.family, decimate, width_px, height_px)
+            self._finder = DetectorProcess(settings.detector, settings.family, 1.0, width_px, height_px)
         try:
             return self._finder.search(frame.gray, frame.stamp_s, {})
         except DetectorError:
