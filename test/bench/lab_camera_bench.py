@@ -25,7 +25,7 @@ from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors
 from hero_localization.tracking.settings import Settings
-from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagCorners, TagLayout, find_smallest_side
+from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagCorners, TagLayout, find_smallest_side, list_corners
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
 from hero_node import Pose
@@ -86,10 +86,11 @@ def create_search(lab: LabCamera) -> TagSearch:
     )
 
 
-def project_tags(lab: LabCamera, tags: Sequence[LabTag]) -> Dict[int, Tuple[float, float]]:
-    """Return the pixels of the tags' centers, by id."""
-    pixels = lab.project(np.array([(tag.x_m, tag.y_m, tag.height_m) for tag in tags]))
-    return {tag.tag_id: (float(u), float(v)) for tag, (u, v) in zip(tags, pixels)}
+def project_tags(lab: LabCamera, tags: Sequence[LabTag]) -> Dict[int, Tuple[float, float, float]]:
+    """Return the pixels of the tags' centers, and their side, by id."""
+    corners = [list_corners(Pose(*tag[1:4]), tag.size_m, tag.height_m) for tag in tags]
+    seen = [TagCorners(tag.tag_id, lab.project(points_m)) for tag, points_m in zip(tags, corners)]
+    return {tag.tag_id: (*tag.center.tolist(), tag.side_px) for tag in seen}
 
 
 def run_search(
@@ -101,7 +102,7 @@ def run_search(
     for index in range(WARM_FRAMES + frames):
         image = images[index % len(images)]
         if is_losing and index >= WARM_FRAMES and index % 30 < 15:
-            u, v = map(int, expected[(index // 30 * 7) % len(tags)])
+            u, v = map(int, expected[(index // 30 * 7) % len(tags)][:2])
             image = image.copy()
             image[max(0, v - 35) : v + 35, max(0, u - 35) : u + 35] = 110
         start_s = time.process_time()

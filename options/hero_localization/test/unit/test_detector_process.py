@@ -47,7 +47,7 @@ def test_process_finds_what_a_search_in_this_process_does(process):
         assert all((tag.corners == same.corners).all() for tag, same in nonempty(zip(found, expected)))
     assert [tag.tag_id for tag in found] == [5]
     # Far from there, it is found where it is expected.
-    (found,) = process.search(picture(400, 300), 10 / 30.0, {5: (419.5, 319.5)})
+    (found,) = process.search(picture(400, 300), 10 / 30.0, {5: (419.5, 319.5, 40.0)})
     assert found.center == pytest.approx((419.5, 319.5), abs=0.5)
     with pytest.raises(ValueError, match="480"):
         process.search(picture(60, 60)[:100], 11 / 30.0, {})
@@ -151,7 +151,7 @@ def make_memory(gray):
 def test_the_process_answers_with_what_it_finds():
     memory = make_memory(picture(100, 200))
     options = ("aruco", "36h11", 2.0, WIDTH_PX, HEIGHT_PX, 20.0)
-    connection = FakeConnection(options, (0.0, {}), (0.1, {5: (119.5, 219.5)}))
+    connection = FakeConnection(options, (0.0, {}), (0.1, {5: (119.5, 219.5, 40.0)}))
     with pytest.raises(EOFError):
         detector_process.serve(connection, memory)
     os.close(memory)

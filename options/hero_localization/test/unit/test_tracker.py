@@ -8,6 +8,7 @@ from hero_localization.tracking.settings import Settings
 from hero_localization.tracking.tag_pose import TagCorners, TagLayout
 from hero_localization.tracking.tracker import Problem, Tracker
 from hero_node import Pose
+from hero_test.nonempty import nonempty
 
 MATRIX = (1390.0, 0.0, 960.0, 0.0, 1390.0, 540.0, 0.0, 0.0, 1.0)
 CAMERA = Camera(
@@ -37,8 +38,8 @@ def see_references(moved_m, ids=REFERENCES):
 def test_tags_are_expected_where_their_robots_are():
     places = make_tracker().project({0: Pose(0.2, 0.1, 1.0), 1: Pose(0.3, 0.0, 0.0), 9: Pose(0.0, 0.0, 0.0)})
     assert set(places) == {0, 5}, "tag 9 is an object's"
-    assert places[0] == pytest.approx(see(0, 0.2, 0.1).center)
-    assert places[5] == pytest.approx(see(5, 0.31, 0.0).center)
+    for tag in nonempty([see(0, 0.2, 0.1), see(5, 0.31, 0.0)]):
+        assert places[tag.tag_id] == pytest.approx((*tag.center, tag.side_px), rel=1e-3)
     assert make_tracker().project({}) == {}
 
 
@@ -180,7 +181,7 @@ def test_a_tag_expected_near_the_border_need_not_be_seen():
                          ((900.0, 39.0), 0)):  # fmt: skip
         tracker = make_tracker()
         for frame in range(60):
-            tracker.take(see_references(0.0), frame / 30.0, frame, {7: place})
+            tracker.take(see_references(0.0), frame / 30.0, frame, {7: (*place, 26.0)})
         assert len(tracker.list_problems()) == count, place
 
 
@@ -189,7 +190,7 @@ def test_a_tag_that_left_the_image_is_expected_anew_when_it_is_back():
     tracker = make_tracker()
     for frame in range(120):
         place = (10.0, 10.0) if frame == 40 else (900.0, 500.0)
-        tracker.take(see_references(0.0), frame / 30.0, frame, {7: place})
+        tracker.take(see_references(0.0), frame / 30.0, frame, {7: (*place, 26.0)})
         assert len(tracker.list_problems()) == (frame >= 100), frame
 
 

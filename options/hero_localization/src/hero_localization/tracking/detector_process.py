@@ -44,6 +44,7 @@ class DetectorProcess:
         near, far = Pipe()
         command = [sys.executable, "-m", __name__, str(far.fileno()), str(memory)]
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        environment["OPENBLAS_NUM_THREADS"] = "1"  # others would spin beside it, and cost more than the search
         self._connection: Optional[Connection] = near
         with far:
             self._process = subprocess.Popen(
@@ -59,7 +60,7 @@ class DetectorProcess:
             self.close()
             raise DetectorError(problem)
 
-    def search(self, gray: np.ndarray, stamp_s: float, expected: Mapping[int, Tuple[float, float]]) -> List[TagCorners]:
+    def search(self, gray: np.ndarray, stamp_s: float, expected: Mapping[int, Tuple[float, float, float]]) -> List[TagCorners]:
         """Return the tags found in the next frame, as TagSearch.search() does.
 
         Raises: DetectorError if the process ended or does not answer; ValueError for a frame of another size.

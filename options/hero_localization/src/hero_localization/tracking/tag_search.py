@@ -3,12 +3,13 @@
 A detector takes 15 to 90 ms for a whole image of 1920 by 1080, by its noise and texture, and 0.1 ms for a window around
 one tag. So known tags are looked for where they are expected, in every frame, and the rest of the image is searched in
 turn, in two seconds. Finer detectors look where the first one found nothing: all of them for a tag that was seen a
-moment ago, then one after another at longer and longer intervals. Where tags are small, one of them takes every other
-turn of the sweep. A tag that was seen steadily and is lost is also searched around its place, at most one image's
-pixels per second.
+moment ago, then one after another at longer and longer intervals; many tags that are missed take turns, so that this
+does not hold up the others. Where tags are small, one of them takes every other turn of the sweep. A tag that was seen
+steadily and is lost is also searched around its place, at most one image's pixels per second.
 """
 
 import math
+from collections import defaultdict
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type, Union
 
 import numpy as np
@@ -24,6 +25,14 @@ PATIENCE_S = 0.15
 BACKOFF, MAX_BACKOFF_S = 0.2, 0.6
 """A tag that is missed for longer than the first is looked for by one finer detector at a time, at intervals of this
 share of the time for which it is missed: most are covered or gone."""
+
+FINE_COSTS_MS = (0.3, 1.5, 0.6)
+"""CPU of a window by each of the finer detectors, ms; of the last one where the heading is known."""
+BLIND_COST = 5.0
+"""Cost of the last one for any heading, by that."""
+
+FINE_SHARE, MAX_FINE_MS = 0.4, 20.0
+"""Share of a core, and most of an image, ms, that finer detectors may take: then other tags' turn is in the next one."""
 
 FINE_S = 2.0
 """Time for which coarser detectors skip a tag that only a finer one found."""
@@ -140,7 +149,9 @@ class TagSearch:
         self._due = 0.0
         self._nearby_px = 0.0
         self._previous_s: Optional[float] = None
-        self._smallest_px = smallest_px
+        self._fine_ms = MAX_FINE_MS
+        self._looked_s: Dict[int, float] = defaultdict(lambda: -math.inf)
+        """When finer detectors looked for a tag last."""
         self._seen: Dict[int, TagCorners] = {}
         """The tags when they were found last."""
         self._hard: Dict[int, Tuple[int, float]] = {}
@@ -149,34 +160,38 @@ class TagSearch:
         """The finer detector whose turn it is to look for a tag that is missed, and when; by tag."""
 
     def search(
-        self, gray: np.ndarray, stamp_s: float, expected: Optional[Mapping[int, Tuple[float, float]]] = None
+        self, gray: np.ndarray, stamp_s: float, expected: Optional[Mapping[int, Tuple[float, float, float]]] = None
     ) -> List[TagCorners]:
         """Return the tags found in the next frame; an id that appears twice is returned twice.
 
         gray: (H, W), 8 bit.
         stamp_s: when it was taken.
-        expected: pixels where the centers of tags should be, by id, from what is known of their robots' motion;
+        expected: u, v of the centers of tags and their side (px), by id, from what is known of their robots' motion;
             others are looked for where they were.
         """
         if self._previous_s is not None and stamp_s < self._previous_s - KEPT_S:
             # Time went back, as when a recording is replayed: stamps tell no more for how long a tag is lost.
             self._tracks, self._lost, self._hard = [], {}, {}
-        places = {tag_id: np.array(place, dtype=float) for tag_id, place in (expected or {}).items()}
+            self._looked_s.clear()
+        step_s = 0.0 if self._previous_s is None else min(max(stamp_s - self._previous_s, 0.0), MAX_STEP_S)
+        self._fine_ms = min(self._fine_ms + 1e3 * FINE_SHARE * step_s, MAX_FINE_MS)
+        places = {tag_id: np.array(place[:2], dtype=float) for tag_id, place in (expected or {}).items()}
+        sides_px = {tag_id: side_px for tag_id, (_, _, side_px) in (expected or {}).items()}
         frame = _Frame(gray, stamp_s)
-        for track in self._tracks:
+        for track in sorted(self._tracks, key=lambda track: self._looked_s[track.tag_id]):
             elapsed_s = stamp_s - track.stamp_s
             # First where it was: what is known from elsewhere is newer than the frame.
             centers = [track.center, *([places[track.tag_id]] if track.tag_id in places else [])]
             windows_s = (NARROW_S, elapsed_s) if elapsed_s > NARROW_S else (elapsed_s,)
             windows = [(center, window_s) for window_s in windows_s for center in centers]
-            self._look_for(frame, track.tag_id, track.side_px, windows, elapsed_s)
+            # A tag that had to wait for its turn is not missed meanwhile.
+            missed_s = min(stamp_s, self._looked_s[track.tag_id]) - track.stamp_s
+            self._look_for(frame, track.tag_id, track.side_px, windows, missed_s)
         tracked = {track.tag_id for track in self._tracks}
-        for tag_id, place in places.items():
+        for tag_id in sorted(places.keys() - tracked, key=self._looked_s.__getitem__):
             # Lost for long, or too small for the tiles: where it is expected, it costs no more than a window.
-            side_px = self._seen[tag_id].side_px if tag_id in self._seen else self._smallest_px
-            if tag_id not in tracked and math.isfinite(side_px):
-                self._look_for(frame, tag_id, side_px, [(place, MAX_STEP_S)], math.inf)
-        for detector, tile in self._take_tiles(stamp_s):
+            self._look_for(frame, tag_id, sides_px[tag_id], [(places[tag_id], MAX_STEP_S)], math.inf)
+        for detector, tile in self._take_tiles(step_s):
             frame.search(detector, *tile)
         self._search_nearby(frame, places)
         self._follow(frame)
@@ -194,6 +209,10 @@ class TagSearch:
                 half_px = (WINDOW_SIDES + slack_sides) * side_px + SLACK_PX
                 corners = self._seen[tag_id].corners if missed_s <= PATIENCE_S else None
                 detector = made(tag_id, center, side_px, corners) if isinstance(made, type) else made
+                if index > 0:
+                    is_blind = isinstance(made, type) and corners is None
+                    self._fine_ms -= FINE_COSTS_MS[index - 1] * (BLIND_COST if is_blind else 1.0)
+                    self._looked_s[tag_id] = frame.stamp_s
                 if frame.search_around(detector, tag_id, center, side_px, half_px):
                     first, found_s = self._hard.get(tag_id, (0, -math.inf))
                     if index != first or frame.stamp_s >= found_s + FINE_S:
@@ -203,25 +222,25 @@ class TagSearch:
 
     def _choose_detectors(self, tag_id: int, stamp_s: float, missed_s: float) -> List[int]:
         """Return the detectors that look for a tag in this frame, in their order."""
-        first, found_s = self._hard.get(tag_id, (0, -math.inf))
-        count = len(self._detectors)
+        last, found_s = self._hard.get(tag_id, (0, -math.inf))
+        first, count = last if stamp_s < found_s + FINE_S else 0, len(self._detectors)
+        if self._fine_ms < 0.0:
+            return [] if first else [0]
         if missed_s <= PATIENCE_S:
-            first = first if stamp_s < found_s + FINE_S else 0
-            return [first, *(index for index in range(count) if index != first)]
-        turn, due_s = self._turns.get(tag_id, (max(first, 1), -math.inf))
+            return list(dict.fromkeys((first, last, *range(count))))
+        turn, due_s = self._turns.get(tag_id, (max(last, 1), -math.inf))
         if count == 1 or due_s - MAX_BACKOFF_S <= stamp_s < due_s:
             return [0]
         self._turns[tag_id] = turn % (count - 1) + 1, stamp_s + min(BACKOFF * missed_s, MAX_BACKOFF_S)
         return [0, turn]
 
-    def _take_tiles(self, stamp_s: float) -> List[Tuple[TagDetector, Tuple[int, int, int, int]]]:
+    def _take_tiles(self, step_s: float) -> List[Tuple[TagDetector, Tuple[int, int, int, int]]]:
         """Return the tiles to be searched in this frame, and the detector for each."""
         if self._previous_s is None:
             return [(self._sweeps[0], self._whole)]
-        elapsed_s = min(max(stamp_s - self._previous_s, 0.0), MAX_STEP_S)
         image_px = float(self._size_px.prod())
-        self._nearby_px = min(self._nearby_px + NEARBY_IMAGES_S * elapsed_s * image_px, image_px)
-        self._due += len(self._tiles) * elapsed_s / SWEEP_S
+        self._nearby_px = min(self._nearby_px + NEARBY_IMAGES_S * step_s * image_px, image_px)
+        self._due += len(self._tiles) * step_s / SWEEP_S
         count = min(int(self._due), len(self._tiles))
         self._due -= int(self._due)
         first, total = self._next_tile, len(self._tiles) * len(self._sweeps)

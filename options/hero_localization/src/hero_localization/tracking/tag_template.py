@@ -6,10 +6,12 @@ with the print. The pose is refined by inverse compositional alignment (Baker an
 
 import math
 from functools import lru_cache
-from typing import Iterator, List, NamedTuple, Optional, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 import cv2
 import numpy as np
+
+from hero_node import clamp
 
 from ..prints.tag_images import FAMILIES, draw_tag
 from .tag_pose import TagCorners
@@ -37,6 +39,8 @@ MAX_STARTS = 6
 ROUGH_ROUNDS, ROUNDS = 4, 6
 MAX_STEP, MAX_STRETCH = 1.0, 0.2
 """Most cells, and share of the size, that a round of the refinement changes."""
+SETTLED_STEP, SETTLED_STRETCH = 0.01, 0.002
+"""The last round changes less; the next one would change a hundredth of that."""
 
 MIN_ROUGH_MATCH, MIN_CODE_MATCH, MIN_BORDER_MATCH = 0.6, 0.85, 0.8
 """Least correlation with the print: to go on, of the cells that hold the code (other tags: 0.78), and around them."""
@@ -48,6 +52,20 @@ MIN_CONTRAST = 0.15
 _EDGES = [(turn * math.pi / 12.0, float(place)) for turn in range(12) for place in range(-4, 5)]
 """Directions of shadows, rad, and places of their edges along these, cells."""
 EDGE_CELLS = 0.5
+
+
+SIDE = CELLS + 2
+"""Cells along a side of the print with its white margin."""
+
+
+def _list_places(samples: int) -> np.ndarray:
+    axis = (np.arange(SIDE * samples) + 0.5) / samples - SIDE / 2.0
+    return np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
+
+
+POINTS, CELL_CENTERS = _list_places(SAMPLES), _list_places(1)
+"""Places of the samples (M, 2) and of the cells' centers (C * C, 2), in cells from the center of the print."""
+_IS_CODE, _IS_CODE_CELL = (np.abs(places).max(axis=1) < SIDE / 2.0 - 2.0 for places in (POINTS, CELL_CENTERS))
 
 
 class _Fit(NamedTuple):
@@ -62,6 +80,7 @@ class _Fit(NamedTuple):
     border: float
     misread: int
     contrast: float
+    is_settled: bool
 
     @property
     def is_sure(self) -> bool:
@@ -75,34 +94,23 @@ class TagTemplate:
 
     def __init__(self, family: str, tag_id: int, blur_cells: float) -> None:
         """Raises: ValueError for an unknown id."""
-        cells = np.pad(draw_tag(family, tag_id) > 0, 1, constant_values=True)
-        self._side = len(cells)
-        pad = 2
+        cells, pad = np.pad(draw_tag(family, tag_id) > 0, 1, constant_values=True), 2
         drawn = np.kron(np.pad(cells, pad, mode="edge"), np.ones((STEPS, STEPS)))
-        drawn = np.log(cv2.GaussianBlur(np.where(drawn > 0, 1.0, BLACK), (0, 0), STEPS * blur_cells))
+        drawn = np.log(cv2.GaussianBlur(np.where(drawn > 0, 1.0, BLACK), (0, 0), STEPS * blur_cells)).astype(np.float32)
         down, right = (STEPS * slope for slope in np.gradient(drawn))
-        self._points, coarse = self._list_places(SAMPLES), self._list_places(1)
-        pixels = STEPS * (self._points + self._side / 2.0 + pad) - 0.5
+        coarse = CELL_CENTERS
+        pixels = STEPS * (POINTS + SIDE / 2.0 + pad) - 0.5
         self._print, across, along = (_sample(part, pixels[None])[0] for part in (drawn, right, down))
         spread, self._print = self._print.std(), (self._print - self._print.mean()) / self._print.std()
-        x, y = self._points.T
+        x, y = POINTS.T
         self._slopes = np.column_stack((across, along, across * x, across * y, along * x, along * y)) / spread
-        self._is_code = np.abs(self._points).max(axis=1) < self._side / 2.0 - 2.0
-        print_ = self._coarsen(self._print[None])[0]
+        print_ = _coarsen(self._print[None])[0]
         self._even = np.linalg.qr(np.column_stack((np.ones(len(coarse)), coarse, print_)))[0]
         self._even[:, 3] *= np.sign(self._even[:, 3] @ print_)
         shadows = _shade(coarse)
         self._shadows, self._faded = self._make_basis(shadows, shadows * print_)
-
-    def _list_places(self, samples: int) -> np.ndarray:
-        axis = (np.arange(self._side * samples) + 0.5) / samples - self._side / 2.0
-        return np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-
-    def _coarsen(self, samples: np.ndarray) -> np.ndarray:
-        """Return the mean of each cell (N, C * C)."""
-        shape = (len(samples), self._side, SAMPLES, self._side, SAMPLES)
-        means: np.ndarray = samples.reshape(shape).mean(axis=(2, 4)).reshape(len(samples), -1)
-        return means
+        self._lights: Dict[int, Tuple[np.ndarray, np.ndarray]] = {}
+        """For each of _EDGES met so far: columns that explain samples, (M, 6), and what solves for their factors."""
 
     def _make_basis(self, shadows: np.ndarray, faded: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return for each edge what a shadow and its loss of contrast add to an evenly lit print, (E, C * C) each."""
@@ -124,9 +132,10 @@ class TagTemplate:
             fit = self._refine(shades, *start, ROUGH_ROUNDS)
             if min(fit.code, fit.border) < MIN_ROUGH_MATCH:
                 continue
-            fit = self._refine(shades, fit.shape, fit.center, ROUNDS)
+            if not (fit.is_sure and fit.is_settled):
+                fit = self._refine(shades, fit.shape, fit.center, ROUNDS)
             if fit.is_sure:
-                half = self._side / 2.0 - 1.0
+                half = SIDE / 2.0 - 1.0
                 return half * np.array(((-1, -1), (1, -1), (1, 1), (-1, 1))) @ fit.shape.T + fit.center
         return None
 
@@ -136,8 +145,8 @@ class TagTemplate:
         """Yield shapes and centers to begin with, those that explain the image best first, one for each shift."""
         yield shapes[0], center
         shifts = cell_px * np.stack(np.meshgrid((-1, 0, 1), (-1, 0, 1)), axis=-1).reshape(-1, 2)
-        places = self._list_places(1) @ shapes.transpose(0, 2, 1)
-        places = (places[:, None] + (shifts + center)[:, None]).reshape(-1, self._side**2, 2)
+        places = CELL_CENTERS @ shapes.transpose(0, 2, 1)
+        places = (places[:, None] + (shifts + center)[:, None]).reshape(-1, SIDE**2, 2)
         contrast, rest, _ = self._explain(_sample(cv2.GaussianBlur(shades, (0, 0), 0.25 * cell_px), places))
         scores = np.where(contrast > 0.0, contrast**2 / (contrast**2 + rest + 1e-9), 0.0).reshape(len(shapes), -1)
         best = scores.argmax(axis=0)
@@ -153,30 +162,41 @@ class TagTemplate:
 
     def _refine(self, shades: np.ndarray, shape: np.ndarray, center: np.ndarray, rounds: int) -> _Fit:
         """Return a fit, some rounds after this shape and center; shades: logarithms (H, W)."""
-        samples = _sample(shades, (self._points @ shape.T + center)[None])[0]
+        samples = _sample(shades, (POINTS @ shape.T + center)[None])[0]
         light, _, contrast = self._fit_light(samples)
-        solve = _invert(np.column_stack((light, self._slopes * contrast[:, None])))
+        solve = _invert(np.column_stack((light, self._slopes * contrast[:, None])))[light.shape[1] :]
+        is_settled = False
         for _ in range(rounds):
-            change = (solve @ samples)[light.shape[1] :]
-            stretch = np.linalg.inv(np.eye(2) + np.clip(change[2:].reshape(2, 2), -MAX_STRETCH, MAX_STRETCH))
-            center = center - shape @ stretch @ np.clip(change[:2], -MAX_STEP, MAX_STEP)
+            *steps, a, b, c, d = (solve @ samples).tolist()
+            across, down = (clamp(step, MAX_STEP) for step in steps)
+            a, b, c, d = (clamp(part, MAX_STRETCH) for part in (a, b, c, d))
+            stretch = np.array(((1.0 + d, -b), (-c, 1.0 + a))) / ((1.0 + a) * (1.0 + d) - b * c)
+            center = center - shape @ stretch @ (across, down)
             shape = shape @ stretch
-            samples = _sample(shades, (self._points @ shape.T + center)[None])[0]
-        _, evenness, contrast = self._fit_light(samples)
+            samples = _sample(shades, (POINTS @ shape.T + center)[None])[0]
+            changes = max(abs(across), abs(down)), max(map(abs, (a, b, c, d)))
+            is_settled = changes[0] < SETTLED_STEP and changes[1] < SETTLED_STRETCH
+            if is_settled:
+                break
+        final_light, evenness, contrast = self._fit_light(samples)
+        is_settled &= final_light is light  # or the edge of a shadow turned out to be another one
         seen = (samples - evenness) / np.maximum(contrast, MIN_CONTRAST)
-        code, border = (_correlate(seen[part], self._print[part]) for part in (self._is_code, ~self._is_code))
-        off = np.abs(self._coarsen((seen - self._print)[None])[0])
-        misread = int((off[self._coarsen(self._is_code[None])[0] > 0] > MISREAD).sum())
-        return _Fit(shape, center, code, border, misread, float(contrast.min()))
+        code, border = (_correlate(seen[part], self._print[part]) for part in (_IS_CODE, ~_IS_CODE))
+        off = np.abs(_coarsen((seen - self._print)[None])[0])
+        misread = int((off[_IS_CODE_CELL] > MISREAD).sum())
+        return _Fit(shape, center, code, border, misread, float(contrast.min()), is_settled)
 
     def _fit_light(self, samples: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return what explains samples (M,): columns (M, 6), logarithms without the print (M,), and contrast (M,)."""
-        edge = int(self._explain(self._coarsen(samples[None]))[2][0])
-        shadow = _shade(self._points, edge)[0]
-        plain = np.column_stack((np.ones(len(samples)), self._points, shadow))
-        light = np.column_stack((plain, self._print, shadow * self._print))
-        factors = _invert(light) @ samples
-        return light, plain @ factors[:4], factors[4] + factors[5] * shadow
+        edge = int(self._explain(_coarsen(samples[None]))[2][0])
+        if edge not in self._lights:
+            shadow = _shade(POINTS, edge)[0]
+            columns = (np.ones(len(samples)), POINTS, shadow, self._print, shadow * self._print)
+            light = np.column_stack(columns)
+            self._lights[edge] = light, _invert(light)
+        light, solve = self._lights[edge]
+        factors = solve @ samples
+        return light, light[:, :4] @ factors[:4], factors[4] + factors[5] * light[:, 3]
 
 
 @lru_cache(maxsize=64)
@@ -225,10 +245,15 @@ def _invert(columns: np.ndarray) -> np.ndarray:
     return solve
 
 
+def _coarsen(samples: np.ndarray) -> np.ndarray:
+    """Return the means of each cell (N, C * C) of samples (N, M)."""
+    means: np.ndarray = samples.reshape(-1, SIDE, SAMPLES, SIDE, SAMPLES).mean(axis=(2, 4)).reshape(len(samples), -1)
+    return means
+
+
 def _sample(image: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return the values (M, N) of an image (H, W) at places (M, N, 2), px."""
-    u, v = np.moveaxis(places.astype(np.float32), 2, 0)
-    return cv2.remap(image.astype(np.float32), u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    """Return the values (M, N) of an image (H, W), single precision, at places (M, N, 2), px."""
+    return cv2.remap(image, places.astype(np.float32), None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _correlate(one: np.ndarray, other: np.ndarray) -> float:

@@ -101,7 +101,7 @@ class Tracker:
         tags: Sequence[TagCorners],
         stamp_s: float,
         number: int,
-        expected: Optional[Mapping[int, Tuple[float, float]]] = None,
+        expected: Optional[Mapping[int, Tuple[float, float, float]]] = None,
     ) -> Sightings:
         """Return what the tags of the next image stand for.
 
@@ -123,19 +123,29 @@ class Tracker:
         """Return when an image was taken: its stamp, less the delay that the robots' calibration found; at least 0."""
         return max(0.0, stamp_s - self._settings.delay_s)
 
-    def project(self, robots: Mapping[int, Pose]) -> Dict[int, Tuple[float, float]]:
-        """Return where the centers of the tags of robots at these poses in map are in an image, px, by tag."""
+    def project(self, robots: Mapping[int, Pose]) -> Dict[int, Tuple[float, float, float]]:
+        """Return u and v of the centers of the tags of robots at these poses in map, and their side, px, by tag."""
         layout = self._settings.layout
-        places: Dict[int, np.ndarray] = {}
-        for robot, tag_id in layout.find_tags(robots).items():
-            place = transform_pose(robots[robot], layout.find_mount(tag_id))
-            places[tag_id] = np.array((place.x_m, place.y_m, layout.height_m))
-        if not places:
+        tags = layout.find_tags(robots)
+        if not tags:
             return {}
-        pixels = self.camera.project(np.array(list(places.values())))
-        return {tag_id: (float(u), float(v)) for tag_id, (u, v) in zip(places, pixels) if np.isfinite((u, v)).all()}
+        places = [transform_pose(robots[robot], layout.find_mount(tag_id)) for robot, tag_id in tags.items()]
+        half_m = layout.size_m / 2.0
+        crosses = [
+            (place.x_m + x_m, place.y_m + y_m, layout.height_m)
+            for place in places
+            for x_m, y_m in ((-half_m, 0.0), (0.0, half_m), (half_m, 0.0), (0.0, -half_m))
+        ]
+        pixels = self.camera.project(np.array(crosses)).reshape(-1, 4, 2)
+        found = {}
+        for tag_id, ends in zip(tags.values(), pixels):
+            cross = TagCorners(tag_id, ends)  # of half the tag's area, as its diagonals are as long as a side
+            if np.isfinite(ends).all():
+                u, v = cross.center.tolist()
+                found[tag_id] = (u, v, math.sqrt(2.0) * cross.side_px)
+        return found
 
-    def _note_expected(self, seen: Set[int], expected: Mapping[int, Tuple[float, float]]) -> None:
+    def _note_expected(self, seen: Set[int], expected: Mapping[int, Tuple[float, float, float]]) -> None:
         size_px = (self.camera.lens.width_px, self.camera.lens.height_px)
         for tag_id, place in expected.items():
             if all(MARGIN_PX < at < limit - MARGIN_PX for at, limit in zip(place, size_px)):
