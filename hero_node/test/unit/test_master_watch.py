@@ -140,7 +140,7 @@ def test_the_watch_tells_of_a_loss_once_and_of_the_return(monkeypatch, failure):
     end = LooksThenEnd(monkeypatch, [None, lost, lost, failure, None, None, lost])
     news, losses = [], []
     monkeypatch.setattr(master_watch.rospy, "resolve_name", lambda name: name)
-    MasterWatch()._run(end, news.append, losses.append)
+    MasterWatch()._run(end, news.append, losses.append, 1.5)
     assert news == ["the ROS master answers again; 2 topics and 1 services are registered again"]
     assert losses == ["no ROS master: existing connections keep working"] * 2
-    assert end.waited_s == 8 * master_watch.WATCH_PERIOD_S
+    assert end.waited_s == 8 * 1.5

@@ -28,17 +28,27 @@ class MasterWatch:
         self.is_lost = False
 
     def start(
-        self, has_ended: threading.Event, tell: Callable[[str], None], tell_loss: Callable[[str], None] = lambda _: None
+        self,
+        has_ended: threading.Event,
+        tell: Callable[[str], None],
+        tell_loss: Callable[[str], None] = lambda _: None,
+        period_s: float = WATCH_PERIOD_S,
     ) -> None:
-        """Look on a thread of its own every WATCH_PERIOD_S, until has_ended is set.
+        """Look on a thread of its own every period_s, until has_ended is set.
 
         tell: takes what was registered; tell_loss: that the master was lost, once until it is back; both for users.
         """
-        arguments = has_ended, tell, tell_loss
+        arguments = has_ended, tell, tell_loss, period_s
         threading.Thread(target=self._run, args=arguments, name="master watch", daemon=True).start()
 
-    def _run(self, has_ended: threading.Event, tell: Callable[[str], None], tell_loss: Callable[[str], None]) -> None:
-        while not has_ended.wait(WATCH_PERIOD_S):
+    def _run(
+        self,
+        has_ended: threading.Event,
+        tell: Callable[[str], None],
+        tell_loss: Callable[[str], None],
+        period_s: float,
+    ) -> None:
+        while not has_ended.wait(period_s):
             was_lost = self.is_lost
             try:
                 news = self.look()

@@ -37,9 +37,6 @@ END_CHECK_PERIOD_S = 0.2
 LESSON = "lesson"
 """Part of the page state."""
 
-UNWATCHED_S = 2.0
-"""Time between two looks at the ROS master while no page is open."""
-
 
 class Monitor:
     """Pages, the fleet that they show, and what they may do with it."""
@@ -134,7 +131,6 @@ class Monitor:
 
     def _check_end(self) -> None:
         self._programs.beat()
-        self._feed.master.check(UNWATCHED_S)
         if not self._program.running:
             self._loop.stop()
 

@@ -241,7 +241,8 @@ class ViewTest(unittest.TestCase):
             self.page.wait_for_text("#empty", shown)
 
     def test_no_wall_is_drawn_behind_the_class_code_of_the_projector(self):
-        walls = [[0, 0, 0, 1800, 20], [0, 1800, 0, 1800, 20], [-900, 900, 1571, 1800, 20], [900, 900, 1571, 1800, 20]]
+        sides = ((0, 0, 0), (0, 1800, 0), (-900, 900, 1571), (900, 900, 1571))
+        walls = [[*side, 1800, 20, None] for side in sides]
         lesson = {"code": "123456", "link": "http://lab:8088/", "qr": ["10" * 12] * 25, "drivers": [], "users": []}
         self.addCleanup(self.page.resize, 1440, 900)
         self.addCleanup(self.monitor.show, lesson=None, arena={"boxes": [], "circles": []})

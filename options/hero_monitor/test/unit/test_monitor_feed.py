@@ -33,12 +33,13 @@ from hero_monitor.fleet_feed.feed import (
     describe_stop_of_others,
     find_true_poses,
 )
-from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S, LocalizationWatch, list_losses
+from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S
 from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH, encode_range, shorten
 from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.fleet_feed.robot_feed import LIGHT_S, REACHED_M, RobotFeed
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
 from hero_node import NodeError, Pose, Velocity
+from hero_node.ros import MasterWatch
 from hero_test.nonempty import nonempty
 
 NOW_S = 100.0
@@ -75,7 +76,8 @@ class Fleet:
         monkeypatch.setattr(feed_module, "Drivers", lambda: drivers)
         monkeypatch.setattr(feed_module, "NewestMessage", Newest)
         monkeypatch.setattr(feed_module, "RobotFeed", self.make_robot_feed)
-        monkeypatch.setattr(feed_module, "MasterLink", lambda background: SimpleNamespace(check=lambda: ""))
+        self.master = create_autospec(MasterWatch, instance=True, is_lost=False)
+        monkeypatch.setattr(feed_module, "MasterWatch", lambda: self.master)
         monkeypatch.setattr(feed_module.rospy, "Subscriber", lambda *arguments, **options: None)
         monkeypatch.setattr(feed_module, "time", SimpleNamespace(monotonic=lambda: self.now_s, time=lambda: 1.7e9))
         monkeypatch.setattr(feed_module.rospy, "get_name", lambda: "/hero_monitor")
@@ -379,7 +381,7 @@ def test_walls_objects_and_places_go_when_the_simulator_has_ended(fleet):
     fleet.subscribe()
     robot = [make_marker(Marker.ARROW, 1, 1, 1, ns=name, text="hero_0") for name in ("headings", "names")]
     message = MarkerArray([make_marker(Marker.CUBE, 0.5, 0.02, 0.1), *robot])
-    nothing = {"boxes": [], "circles": [], "areas": []}
+    nothing = {"boxes": [], "circles": []}
     for part, topic, empty in (
         ("arena", "/hero_sim/arena", nothing),
         ("objects", "/hero_sim/object_markers", nothing),
@@ -414,18 +416,27 @@ def test_commands_that_no_robot_hears_and_goals_outside_the_walls_are_told(fleet
     assert find.call_count == 2, "once in LOOK_PERIOD_S"
 
 
+def test_a_lost_master_is_told_until_it_answers(fleet):
+    assert fleet.master.start.called
+    fleet.receive(make_row(0))
+    fleet.master.is_lost = True
+    assert [loss["source"] for loss in fleet.read()["losses"]] == ["master"]
+    fleet.master.is_lost = False
+    assert fleet.read()["losses"] == []
+
+
 def test_arena_and_ground_truth_are_drawn_in_millimeters():
     box, disc = make_marker(Marker.CUBE, 0.5, 0.02, 0.1), make_marker(Marker.CYLINDER, 0.1, 0.1, 0.1)
     gone, other = make_marker(Marker.CUBE, 1.0, 1.0, 1.0), make_marker(Marker.SPHERE, 1.0, 1.0, 1.0)
     gone.action = Marker.DELETE
     odd = make_marker(Marker.CUBE, math.nan, 1.0, 1.0)
     shown = describe_arena(MarkerArray([box, disc, gone, other, odd]))
-    assert shown == {"boxes": [[1000, 0, 0, 500, 20]], "circles": [[1000, 0, 50]], "areas": []}
+    assert shown == {"boxes": [[1000, 0, 0, 500, 20, None]], "circles": [[1000, 0, 50, None]]}
     painted = [make_marker(kind, 0.5, 0.2, 0.1, ns="areas") for kind in (Marker.CUBE, Marker.CYLINDER)]
     for marker in painted:
         marker.color.r, marker.color.g, marker.color.b = 1.0, 0.5, 0.0
-    areas = describe_arena(MarkerArray(painted))["areas"]
-    assert areas == [[1000, 0, 0, 500, 200, 255, 128, 0], [1000, 0, 250, 255, 128, 0]]
+    areas = describe_arena(MarkerArray(painted))
+    assert areas == {"boxes": [[1000, 0, 0, 500, 200, "#ff8000"]], "circles": [[1000, 0, 250, "#ff8000"]]}
     assert len(describe_arena(MarkerArray([box] * (MARKERS_MAX + 1)))["boxes"]) == MARKERS_MAX
     heading, name = (
         make_marker(Marker.ARROW, 1, 1, 1, ns="headings", id=3),
@@ -468,26 +479,6 @@ def test_a_light_goes_out_and_a_goal_is_drawn_until_reached(monkeypatch):
     for x_m, is_shown in ((0.5 - REACHED_M - 0.001, True), (0.5 - REACHED_M + 0.001, False), (0.3, False)):
         listener.track.receive_pose(Pose(x_m, 0.0, 0.0))
         assert (feed.find_goal(placement) is not None) == is_shown, "once reached, it is no longer drawn"
-
-
-def test_losses_begin_and_end_at_their_times():
-    watch, drivers = LocalizationWatch(), {"/a": True}
-
-    def list_sources(now_s):
-        return [loss.source for loss in list_losses(drivers, "", watch, now_s)]
-
-    watch.receive(1, NOW_S)
-    watch.receive(0, NOW_S)
-    for silent_s, lost in (
-        (SILENT_S - 0.01, ["camera"]),
-        (SILENT_S + 0.01, ["localization"]),
-        (FORGOTTEN_S - 0.01, ["localization"]),
-        (FORGOTTEN_S + 0.01, []),
-    ):
-        assert list_sources(NOW_S + silent_s) == lost
-    several = list_losses({"/a": False, "/lab/b": False}, "http://pc does not answer", LocalizationWatch(), 0.0)
-    assert several[0].cause == "No answer from a, lab/b: their robots are unknown"
-    assert "http://pc does not answer" in several[1].cause and len(several) == 2
 
 
 def test_texts_and_ranges_are_cut_at_their_limits():

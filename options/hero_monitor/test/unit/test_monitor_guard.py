@@ -14,9 +14,7 @@ from hero_monitor.control import programs as programs_module
 from hero_monitor.control.offers import OFFERS
 from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import MAX_GOAL_M, MAX_TEXT_LENGTH, RequestError, read_request
-from hero_monitor.fleet_feed import master_link as master_link_module
 from hero_monitor.fleet_feed.camera_picture import MAX_DISTANCE_M, CameraPicture
-from hero_monitor.fleet_feed.master_link import MasterLink
 from hero_monitor.fleet_feed.page_state import LogRing, PageState
 from hero_monitor.fleet_feed.placement import Placement
 from hero_node import Pose
@@ -130,27 +128,6 @@ def test_all_programs_are_waited_for_together_at_the_end(monkeypatch):
     assert joined == [3.0, 0.0] and ended == children[:2] and all(child.is_ending for child in children)
     programs._forget(1)
     assert 1 not in programs._running and ended[-1] is children[0]
-
-
-def test_the_master_is_asked_in_turn_and_missed_after_a_while(monkeypatch):
-    clock, jobs = SimpleNamespace(now_s=100.0), []
-    monkeypatch.setattr(master_link_module, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
-    monkeypatch.setattr(master_link_module, "MasterWatch", lambda: SimpleNamespace(is_lost=False, look=lambda: ""))
-
-    def submit(function):
-        jobs.append(function)
-        return SimpleNamespace(done=lambda: function not in jobs)
-
-    link = MasterLink(SimpleNamespace(submit=submit))
-    for after_s, asked, is_lost in ((0.0, 1, False), (0.7, 1, False), (0.55, 1, False), (0.1, 1, True)):
-        clock.now_s += after_s
-        assert bool(link.check()) == is_lost and len(jobs) == asked
-    jobs.pop()()
-    assert link.check() == "" and len(jobs) == 1
-    jobs.pop()()
-    for after_s, asked in ((0.5, 0), (0.11, 1)):
-        clock.now_s += after_s
-        assert link.check() == "" and len(jobs) == asked
 
 
 def test_robots_without_a_place_stand_a_meter_apart_around_the_middle():

@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import pytest
 
 from hero_monitor.control.requests import AGE_MAX_S, is_fresh
-from hero_monitor.fleet_feed.losses import FORGOTTEN_S, NO_DRIVER, LocalizationWatch, list_losses
+from hero_monitor.fleet_feed.losses import FORGOTTEN_S, NO_DRIVER, SILENT_S, LocalizationWatch, list_losses
 from hero_monitor.serving.server import PAGES_MAX, choose_served
 
 
 def list_sources(drivers, localization=None, now_s=0.0):
-    return [loss.source for loss in list_losses(drivers, "", localization or LocalizationWatch(), now_s)]
+    return [loss.source for loss in list_losses(drivers, False, localization or LocalizationWatch(), now_s)]
 
 
 def test_nothing_is_lost_while_all_that_was_ever_heard_answers():
@@ -18,14 +18,14 @@ def test_nothing_is_lost_while_all_that_was_ever_heard_answers():
 
 
 def test_a_driver_that_does_not_answer_is_named_and_a_missing_one_too():
-    losses = list_losses({"/hero_driver": True, "/hero_driver_b": False}, "", LocalizationWatch(), 0.0)
+    losses = list_losses({"/hero_driver": True, "/hero_driver_b": False}, False, LocalizationWatch(), 0.0)
     assert [loss.cause for loss in losses] == ["No answer from hero_driver_b: its robots are unknown"]
     assert "roslaunch" in losses[0].remedy
     assert list_sources({}) == ["driver"]
 
 
 def test_what_is_worst_comes_first():
-    losses = list_losses({"/hero_driver": False}, "http://pc:11311 does not answer", LocalizationWatch(), 0.0)
+    losses = list_losses({"/hero_driver": False}, True, LocalizationWatch(), 0.0)
     assert [loss.source for loss in losses] == ["driver", "master"]
     assert all(loss.remedy.endswith("again: " + NO_DRIVER) for loss in losses)
 
@@ -74,3 +74,23 @@ def test_pages_that_no_one_can_see_give_way_to_others():
     served = [page.number for page in choose_served(pages)]
     assert len(served) == PAGES_MAX
     assert served == [*range(5, PAGES_MAX + 3), 0, 1]
+
+
+def test_losses_begin_and_end_at_their_times():
+    watch, drivers = LocalizationWatch(), {"/a": True}
+
+    def list_sources(now_s):
+        return [loss.source for loss in list_losses(drivers, False, watch, now_s)]
+
+    watch.receive(1, 100.0)
+    watch.receive(0, 100.0)
+    for silent_s, lost in (
+        (SILENT_S - 0.01, ["camera"]),
+        (SILENT_S + 0.01, ["localization"]),
+        (FORGOTTEN_S - 0.01, ["localization"]),
+        (FORGOTTEN_S + 0.01, []),
+    ):
+        assert list_sources(100.0 + silent_s) == lost
+    several = list_losses({"/a": False, "/lab/b": False}, True, LocalizationWatch(), 0.0)
+    assert several[0].cause == "No answer from a, lab/b: their robots are unknown"
+    assert "No ROS master" in several[1].cause and len(several) == 2

@@ -85,8 +85,7 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
     files.flush()
     if not files.rows:
         raise RecordingError(
-            "%s: nothing of these robots in it; its topics: %s"
-            % (", ".join(bags.paths), bags.describe_topics())
+            "%s: nothing of these robots in it; its topics: %s" % (", ".join(bags.paths), bags.describe_topics())
         )
     robots = {robot_id for robot_id, _ in files.rows}
     return "%d robots, %d tables, %d rows" % (len(robots), len(files.rows), sum(files.rows.values()))

@@ -47,21 +47,22 @@ def _encode_marker(marker: Marker) -> List[Dict[str, Any]]:
     if marker.type == Marker.TEXT_VIEW_FACING:
         place = marker.pose.position
         found = encode_pose(Pose(place.x, place.y, marker.scale.z))
-        text = {"text": shorten(marker.text), "at": found, "color": _encode_rgb(marker.color)}
+        text = {"text": shorten(marker.text), "at": found, "color": encode_rgb(marker.color)}
         return [] if found is None else [text]
     if marker.type not in (Marker.LINE_LIST, Marker.LINE_STRIP):
         return []
     points = [encode_pose(Pose(point.x, point.y, 0.0)) for point in marker.points]
     if marker.type == Marker.LINE_STRIP:
-        color = _encode_rgb(marker.color)
+        color = encode_rgb(marker.color)
         return [{"lines": [[place[:2] for place in points if place is not None]], "color": color, "isBeam": False}]
     by_color: Dict[str, List[List[List[int]]]] = {}
     colors = marker.colors if len(marker.colors) == len(points) else [marker.color] * len(points)
     for start, end, color in zip(points[::2], points[1::2], colors[::2]):
         if start is not None and end is not None:
-            by_color.setdefault(_encode_rgb(color), []).append([start[:2], end[:2]])
+            by_color.setdefault(encode_rgb(color), []).append([start[:2], end[:2]])
     return [{"lines": lines, "color": color, "isBeam": True} for color, lines in by_color.items()]
 
 
-def _encode_rgb(color: Any) -> str:
+def encode_rgb(color: Any) -> str:
+    """Return a std_msgs/ColorRGBA as #rrggbb."""
     return encode_color(color.r, color.g, color.b) or "#000000"

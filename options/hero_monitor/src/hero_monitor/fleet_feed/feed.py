@@ -7,6 +7,7 @@ are subscribed to in the background, because the ROS master may block.
 import contextlib
 import math
 import re
+import threading
 import time
 from collections import deque
 from concurrent.futures import Future
@@ -34,12 +35,12 @@ from hero_client.values import (
 )
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
 from hero_node import NodeError, Pose, make_printable, pose_of
+from hero_node.ros import MasterWatch
 
 from ..background import Background
 from .camera_picture import CameraPicture
-from .drawings import Drawings
-from .losses import SILENT_S, LocalizationWatch, Loss, list_losses
-from .master_link import MasterLink
+from .drawings import Drawings, encode_rgb
+from .losses import MASTER_PERIOD_S, SILENT_S, LocalizationWatch, Loss, list_losses
 from .occupancy import encode_grid
 from .page_state import LOG_LINES_KEPT, PageState, encode_pose, encode_range, shorten
 from .placement import Placement
@@ -111,7 +112,8 @@ class FleetFeed:
         self._shown_grid: Tuple[Optional[OccupancyGrid], str] = (None, "")
         self._replay_s = 0.0
         self._tracked: Set[str] = set()
-        self.master = MasterLink(background)
+        self._master = MasterWatch()
+        self._master.start(threading.Event(), background.warn, period_s=MASTER_PERIOD_S)
         self._pending_reads = 0
         self.lab_file = load_fleet_file()
         self._report = RobotArray()
@@ -200,7 +202,7 @@ class FleetFeed:
         self.page_state.put("fleet", fleet)
 
     def _list_losses(self) -> None:
-        losses = list_losses(self._answering, self.master.check(), self._localization, time.monotonic())
+        losses = list_losses(self._answering, self._master.is_lost, self._localization, time.monotonic())
         gone = describe_gone(self._report, time.time()) if any(self._answering.values()) else ""
         if gone:
             losses.append(Loss("robots", shorten(gone), "Switch them on, or dismiss this"))
@@ -333,7 +335,7 @@ class FleetFeed:
         self.page_state.put("arena", arena)
         ends = [
             (x + side * length * math.cos(yaw / 1e3), y + side * length * math.sin(yaw / 1e3))
-            for x, y, yaw, length, _ in arena["boxes"]
+            for x, y, yaw, length, *_ in arena["boxes"]
             for side in (-0.5, 0.5)
         ]
         self._walls = [edge(values) for values in zip(*ends) for edge in (min, max)]
@@ -415,26 +417,24 @@ def describe_stop_of_others(origin: Optional[str], moving: Sequence[str]) -> Opt
     return None if origin is None else StopStatus("info", f"stopped {origin}".strip(), is_final=True)
 
 
-def describe_arena(message: MarkerArray) -> Dict[str, List[List[int]]]:
+def describe_arena(message: MarkerArray) -> Dict[str, List[List[Any]]]:
     """Return boxes (x, y, yaw, length, width) and circles (x, y, radius) of the arena or of objects, in mm and mrad.
 
-    areas: either of these, and red, green and blue from 0 to 255.
+    The last value of each is the color of a painted area of the floor; None for what stands there.
     """
-    boxes: List[List[int]] = []
-    circles: List[List[int]] = []
-    areas: List[List[int]] = []
+    boxes: List[List[Any]] = []
+    circles: List[List[Any]] = []
     for marker in message.markers[:MARKERS_MAX]:
         pose = encode_pose(read_pose(marker.pose))
         size = encode_pose(Pose(marker.scale.x, marker.scale.y, 0.0))
         if pose is None or size is None or marker.action != Marker.ADD:
             continue
-        rgb = (marker.color.r, marker.color.g, marker.color.b) if marker.ns == "areas" else ()
-        ink = [round(255.0 * min(max(part, 0.0), 1.0)) for part in rgb]
+        color = encode_rgb(marker.color) if marker.ns == "areas" else None
         if marker.type == Marker.CUBE:
-            (areas if ink else boxes).append([*pose, size[0], size[1], *ink])
+            boxes.append([*pose, size[0], size[1], color])
         elif marker.type == Marker.CYLINDER:
-            (areas if ink else circles).append([pose[0], pose[1], size[0] // 2, *ink])
-    return {"boxes": boxes, "circles": circles, "areas": areas}
+            circles.append([pose[0], pose[1], size[0] // 2, color])
+    return {"boxes": boxes, "circles": circles}
 
 
 def find_true_poses(message: MarkerArray) -> Dict[str, Optional[List[int]]]:

@@ -12,10 +12,8 @@ SILENT_S = 1.8
 FORGOTTEN_S = 10.0
 """Silence of localization: then robots are placed by odometry, as without it, and the page says so."""
 
-MASTER_SILENT_S = 1.3
-"""A question to the ROS master that is open for longer; it is asked every MASTER_PERIOD_S."""
-
-MASTER_PERIOD_S = 0.6
+MASTER_PERIOD_S = 1.0
+"""Time between two questions to the ROS master."""
 
 NO_DRIVER = "roslaunch hero_bringup hero_bringup.launch"
 
@@ -58,10 +56,13 @@ class LocalizationWatch:
         return self._had_tracked and not self._has_tracked and now_s - self._heard_s <= SILENT_S
 
 
-def list_losses(drivers: Dict[str, bool], master: str, localization: LocalizationWatch, now_s: float) -> List[Loss]:
+def list_losses(
+    drivers: Dict[str, bool], is_master_lost: bool, localization: LocalizationWatch, now_s: float
+) -> List[Loss]:
     """Return what is lost, worst first.
 
-    drivers: by name, whether they answer; empty if none was ever heard. master: why the ROS master is lost, or empty.
+    drivers: by name, whether they answer; empty if none was ever heard. is_master_lost: whether the ROS
+    master is.
     """
     losses = []
     silent = sorted(name.strip("/") for name, answers in drivers.items() if not answers)
@@ -72,8 +73,8 @@ def list_losses(drivers: Dict[str, bool], master: str, localization: Localizatio
         losses.append(Loss("driver", cause, remedy))
     elif not drivers:
         losses.append(Loss("driver", "No driver", "Start it: " + NO_DRIVER))
-    if master:
-        cause = f"No ROS master ({master}): robots and programs that start now do not appear"
+    if is_master_lost:
+        cause = "No ROS master answers: robots and programs that start now do not appear"
         remedy = "Existing connections keep working, and STOP ALL works; start it again: " + NO_DRIVER
         losses.append(Loss("master", cause, remedy))
     if localization.is_lost(now_s):

@@ -44,7 +44,6 @@ export class MapPainter {
     if (state.grid) this.paintOccupancy(state.grid);
     if (map.picture.box) this.paintPicture(map.picture);
     this.paintGrid();
-    this.paintAreas(state.arena.areas ?? []);
     this.paintShapes(state.arena, "--wall");
     this.paintShapes(state.objects, "--object");
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
@@ -134,24 +133,16 @@ export class MapPainter {
     }
   }
 
+  /** Paint what stands on the floor in an ink, and its painted areas in their colors. */
   paintShapes({ boxes, circles }, ink) {
     const { context, view } = this;
-    context.fillStyle = this.ink(ink);
-    for (const [x, y, yaw, length, width] of boxes) {
+    const isArea = (shape) => shape.at(-1) !== null;
+    for (const shape of [...boxes, ...circles].sort((one, other) => Number(isArea(other)) - Number(isArea(one)))) {
+      const [x, y, yaw, length, width] = shape;
+      context.fillStyle = isArea(shape) ? shape.at(-1) : this.ink(ink);
       const thick = Math.max(width, 3 / view.scale);
-      this.at([x, y, yaw], () => context.fillRect(-length / 2, -thick / 2, length, thick));
-    }
-    for (const [x, y, radius] of circles) this.circle(x, y, radius).fill();
-  }
-
-  /** Paint parts of the floor: rectangles or circles, and their colors. */
-  paintAreas(areas) {
-    const { context } = this;
-    for (const area of areas) {
-      const [x, y] = area;
-      context.fillStyle = `rgb(${area.slice(-3).join(",")})`;
-      if (area.length === 6) this.circle(x, y, area[2]).fill();
-      else this.at([x, y, area[2]], () => context.fillRect(-area[3] / 2, -area[4] / 2, area[3], area[4]));
+      if (shape.length === 4) this.circle(x, y, shape[2]).fill();
+      else this.at([x, y, yaw], () => context.fillRect(-length / 2, -thick / 2, length, thick));
     }
   }
 
