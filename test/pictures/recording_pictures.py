@@ -1,7 +1,7 @@
-"""Makes the pictures of recordings and calibrations as their pages say, by the programs themselves: script/pictures.
+"""Makes the pictures of recordings as their page says, by the programs themselves: script/pictures.
 
 recording_paths (with speeds, connections, errors): ten robots in a hotspot's network, of which one loses its
-power and one its connection. calibration_motors (with infrared): robots whose servos and sensors are off.
+power and one its connection.
 """
 
 import shutil
@@ -23,7 +23,6 @@ sys.path.append(str(ROOT / "test" / "bench"))
 from running_suite import RunningSuite  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"
-CALIBRATION_ARENA = ROOT / "options" / "hero_calibration" / "test" / "rostest" / "calibration_arena.yaml"
 RECORDED_S = 60
 
 
@@ -78,24 +77,6 @@ def record_ten(picture):
         shrink(path)
 
 
-def calibrate(picture):
-    """Servos and wheels of hero_1, which has room, and infrared sensors of hero_0, which faces a wall."""
-    arena = ["--arena", str(CALIBRATION_ARENA), "--motors", "factory", "--ir", "factory"]
-    errors = ["--error", "robot=0,alpha_counts_m2=0.36,alpha6_counts_m2=0.46"]
-    errors += ["--error", "robot=1,left_center_us=1533,right_center_us=1478"]
-    with RunningSuite(0) as stage, tempfile.TemporaryDirectory() as folder:
-        stage.start(
-            ["rosrun", "hero_sim", "hero_sim", "--count", "2", "--port", str(stage.port), "--quiet", *arena, *errors]
-        )
-        program = ["rosrun", "hero_calibration", "calibrate", "--folder", folder, "--yes"]
-        subprocess.run([*program, "infrared", "--robots", "0"], check=True)
-        shutil.move(folder + "/hero_0.png", str(picture.with_name("calibration_infrared.png")))
-        subprocess.run([*program, "motors", "velocity", "--robots", "1"], check=True)
-        shutil.move(folder + "/hero_1.png", str(picture))
-    for path in picture.parent.glob("calibration_*.png"):
-        shrink(path)
-
-
 if __name__ == "__main__":
-    pictures = {"recording_paths": record_ten, "calibration_motors": calibrate}
+    pictures = {"recording_paths": record_ten}
     make_pictures(pictures, PICTURES_FOLDER, __doc__)

@@ -34,7 +34,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--missing", action="store_true", help="only robots whose files lack one of the parts")
     text = "this many robots at a time, such as fit the wall; each batch is saved before the next"
     parser.add_argument("--batch", type=within(1, 500, int), metavar="N", help=text)
-    parser.add_argument("--folder", default="~/hero_calibration", help="folder of files and pictures (%(default)s)")
+    parser.add_argument("--folder", default="~/hero_calibration", help="folder of files (%(default)s)")
     options = parser.parse_args(arguments)
     options.restore = options.parts[:1] == [RESTORE]
     options.files = options.parts[1:] if options.restore else []

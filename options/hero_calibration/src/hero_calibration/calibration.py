@@ -1,12 +1,10 @@
 """Calibrates all robots of a session part by part, keeps what was measured, and prints a table. Knows no ROS."""
 
-import importlib.util
-import os
 import time
 from typing import Any, Dict, List, Optional, Sequence
 
 from hero_node import say
-from hero_node.files import KeptCalibration, replace_file
+from hero_node.files import KeptCalibration
 
 from . import store
 from .errors import CalibrationError, EndedError
@@ -46,11 +44,11 @@ def calibrate_parts(
         # Robots hold what was measured before the end, whatever caused it: the files must, too.
         for probe in session.probes:
             found = {part: by_robot[probe.robot_id] for part, by_robot in results.items() if probe.robot_id in by_robot}
-            paths = _save(probe, folder, found) if found else []
+            path = _save(probe, folder, found) if found else ""
             outcome = "ok" if found else "not measured"
             lines.append(f"{probe.name}: {'FAILED: ' + probe.failure if probe.failure else outcome}")
             lines += [f"  {part:9} {result.describe()}" for part, result in found.items()]
-            lines += ["  " + path for path in paths]
+            lines += ["  " + path] if path else []
     say("\n" + "\n".join(lines))
     if ended:
         say("ended early: robots hold what the table shows, and keep the rest")
@@ -76,25 +74,14 @@ def _calibrate(
         calibrate_infrared(session, results[INFRARED])
 
 
-def _save(probe: Probe, folder: str, results: Dict[str, Any]) -> List[str]:
-    """Write a robot's file and its plots; return their paths."""
+def _save(probe: Probe, folder: str, results: Dict[str, Any]) -> str:
+    """Write a robot's file; return its path, empty if that failed."""
     path = store.name_file(folder, probe.robot_id)
-    picture = os.path.splitext(path)[0] + ".png"
     values = {key: numbers for result in results.values() for key, numbers in result.to_file().items()}
     date = time.strftime("%Y-%m-%d %H:%M:%S")
-    written = []
     try:
         store.save(path, KeptCalibration(probe.robot_id, date, values, {"model": probe.model}))
-        written.append(path)
-        drawn = [result for part, result in results.items() if part != WHEELS]
-        if drawn and importlib.util.find_spec("matplotlib") is not None:
-            from .figures import draw_robot
-
-            with replace_file(picture) as file:
-                draw_robot(probe.name, drawn).savefig(file, dpi=120, format="png")
-            written.append(picture)
     except CalibrationError as error:
         probe.failure = probe.failure or str(error)
-    except OSError as error:
-        probe.failure = probe.failure or f"{picture} cannot be written: {error.strerror}"
-    return written
+        return ""
+    return path

@@ -260,7 +260,7 @@ class TestSpeedResponse:
     def test_the_search_finds_the_best_gains_within_range(self):
         def respond(gains):
             error = abs(gains[0] - 1300.0) / 5000.0 + abs(gains[1] - 12000.0) / 50000.0
-            return step_response.Response(error, 0.0, ())
+            return step_response.Response(error, 0.0)
 
         tried = []
         for _ in range(step_response.ROUNDS):

@@ -9,7 +9,6 @@ import pytest
 from hero_calibration import calibration, store
 from hero_calibration.calibration import INFRARED, MOTORS, VELOCITY, WHEELS, calibrate_parts
 from hero_calibration.errors import CalibrationError, EndedError
-from hero_calibration.figures import draw_robot
 from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models import infrared_model as model
 from hero_calibration.models.encoder_readings import TICK_M, make_readings
@@ -256,10 +255,10 @@ def test_dead_zones_have_their_widths_and_sweeps_their_pulses():
 
 def test_files_hold_rounded_numbers_in_the_order_that_they_say():
     zones = [dead_zone.DeadZone(1470.4, 1530.3, 1e-3), dead_zone.DeadZone(1480.0, 1541.2, 1e-3)]
-    motors = MotorResult(np.full((2, 1), 1500), np.zeros((2, 1)), zones)
+    motors = MotorResult(zones)
     assert motors.to_file() == {"motor_centers_us": [1500, 1511], "dead_zones_us": [1470, 1530, 1480, 1541]}
     assert motors.describe() == "centers 1500 and 1511 us"
-    slow, quick = Response(0.3, 0.2, ()), Response(0.1, 0.0, ())
+    slow, quick = Response(0.3, 0.2), Response(0.1, 0.0)
     velocity = VelocityResult([slow, quick], [quick, quick], [(1.0, 2.0, 0.1), (3.0, 4.0, 0.1)])
     assert velocity.to_file() == {"velocity_gains": [1.0, 2.0, 0.1, 3.0, 4.0, 0.1], "velocity_errors": [0.2, 0.1]}
     assert velocity.describe() == "mean error 20 % before, 10 % after"
@@ -319,7 +318,7 @@ def test_gains_are_searched_first_for_the_integral_and_scaled_to_the_servo():
     for servo_gain, scale in ((NOMINAL_GAIN_M_S_US, 1.0), (2.0 * NOMINAL_GAIN_M_S_US, 0.5), (9.0, 0.5), (1e-9, 2.0)):
         found = []
         for number in range(step_response.ROUNDS):
-            response = Response(0.5 - 0.1 * (number == 2) - 0.2 * (number == 5), 0.0, ())
+            response = Response(0.5 - 0.1 * (number == 2) - 0.2 * (number == 5), 0.0)
             found.append((choose_gains(found, servo_gain), response))
         tried = [gains for gains, _ in found]
         assert tried[0] == DEFAULT_GAINS
@@ -367,56 +366,6 @@ def test_wheels_drive_a_square_to_each_side_and_are_looked_at_at_rest(monkeypatc
     assert looked == pytest.approx([100.0 + (count + 0.5) * wheels.MEASURE_S for count in range(17)])
 
 
-def list_lines(axes):
-    return [(line.get_label(), line.get_linestyle(), line.get_xydata().tolist()) for line in axes.lines]
-
-
-def test_a_figure_shows_each_result_before_and_after():
-    zones = [dead_zone.DeadZone(1470.0, 1530.0, 1e-3), dead_zone.DeadZone(1480.0, 1542.0, 1e-3)]
-    motors = MotorResult(np.tile([1400, 1500, 1600], (2, 1)), np.array([(0.1, 0.0, -0.1), (-0.1, 0.0, 0.2)]), zones)
-    curve = (np.array([0.0, 1.0]), np.array([0.0, 0.08]))
-    slow, quick = Response(0.3, 0.2, (curve, curve)), Response(0.124, 0.0, (curve,))
-    velocity = VelocityResult([slow, slow], [quick, quick], [(1.0, 2.0, 0.1)] * 2)
-    after_m = np.array([0.001, -0.002, math.nan, 0.0, 0.0, 0.0, 0.0, 0.003])
-    infrared = InfraredResult([0.42] * 8, np.full(8, math.nan), after_m)
-    figure = draw_robot("hero_3", [motors, velocity, infrared])
-    assert figure.get_size_inches() == pytest.approx((13.2, 3.8)) and figure._suptitle.get_text() == "hero_3"
-    servos, wheels_axes, ranges = figure.axes
-
-    assert list_lines(servos) == [
-        ("left", "-", [[1400.0, 0.1], [1500.0, 0.0], [1600.0, -0.1]]),
-        ("center 1500 us", "-", [[1500.0, 0], [1500.0, 1]]),
-        ("right", "-", [[1400.0, -0.1], [1500.0, 0.0], [1600.0, 0.2]]),
-        ("center 1511 us", "-", [[1511.0, 0], [1511.0, 1]]),
-        ("nominal 1500 us", ":", [[1500, 0], [1500, 1]]),
-    ]
-    to_data = servos.transData.inverted()
-    spans = [patch.get_extents().transformed(to_data).intervalx.tolist() for patch in servos.patches]
-    assert spans == [pytest.approx((1470.0, 1530.0)), pytest.approx((1480.0, 1542.0))]
-    assert servos.lines[0].get_color() == servos.lines[1].get_color() != servos.lines[2].get_color()
-
-    rows = list_lines(wheels_axes)
-    assert [label for label, _, _ in rows if not label.startswith("_") and label] == [
-        "left, before: mean error 30 %", "right, before: mean error 30 %",
-        "left, after: mean error 12 %", "right, after: mean error 12 %",
-    ]  # fmt: skip
-    assert [style for _, style, _ in rows] == [":"] * 4 + ["-"] * 3
-    assert rows[0][2] == [[0.0, 0.0], [1.0, 0.08]] and [point[1] for point in rows[-1][2]] == [0.08, 0.08]
-
-    before, after, zero = list_lines(ranges)
-    assert before[0] == "before: no calibration" and before[2] == []
-    assert after[0] == "after" and np.allclose(after[2], [(0, 1), (1, -2), (3, 0), (4, 0), (5, 0), (6, 0), (7, 3)])
-    assert [point[1] for point in zero[2]] == [0.0, 0.0]
-    assert [tick.get_text() for tick in ranges.get_xticklabels()][:3] == ["rear", "rear\nright", "right"]
-    assert [axes.get_legend() is not None for axes in figure.axes] == [True] * 3
-    labels = [(axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
-    assert labels == [
-        ("Servos: dead zones", "pulse (us)", "speed of the wheel (m/s)"),
-        ("Wheels: step response", "time since the command (s)", "speed, both directions (m/s)"),
-        ("Infrared: range error at 10 cm", "", "range too far (mm)"),
-    ]
-
-
 class Kept:
     """A result that a file and a table can hold."""
 
@@ -444,7 +393,6 @@ def catch_parts(monkeypatch):
     for name in ("motors", "velocity", "infrared", "wheels"):
         monkeypatch.setattr(calibration, "calibrate_" + name, lambda *arguments, name=name: measure(name, *arguments))
     monkeypatch.setattr(calibration, "place_robots", place)
-    monkeypatch.setattr(calibration.importlib.util, "find_spec", lambda name: None)
     return calls
 
 

@@ -235,7 +235,7 @@ def test_a_robot_that_fails_while_gains_are_tried_is_left_with_the_best(monkeypa
         if len(rounds) == 4:
             session.probes[1].failure = "velocity: too few readings"
         error = 0.1 if len(rounds) == 2 else 0.3  # the first gains that are tried are the best
-        response = step_response.Response(error, 0.0, ())
+        response = step_response.Response(error, 0.0)
         return {probe.robot_id: [response] * 2 for probe in session.active}
 
     monkeypatch.setattr(velocity, "_test", test)

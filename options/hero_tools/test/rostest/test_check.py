@@ -54,7 +54,7 @@ class CheckTest(unittest.TestCase):
         self.assert_point(points, "port", "OK", "the driver listens on 127.0.0.1:21290")
         self.assert_point(points, "addresses", "WARN", "open on 127.0.0.1 only")
         self.assert_point(points, "packages", "OK", "all of version")
-        self.assert_point(points, "diagnostics", "OK", "hero_driver: 2 of 2 robots without a problem")
+        self.assert_point(points, "diagnostics", "OK", "without a problem")
 
     def test_commands_that_no_robot_hears_are_named(self):
         mine = [rospy.Publisher(topic, Twist, queue_size=1) for topic in ("/hero_0/led", "/hero_1/velocity")]

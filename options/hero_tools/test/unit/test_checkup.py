@@ -261,25 +261,24 @@ def test_a_camera_that_this_user_may_not_open_is_named(tmp_path, monkeypatch):
     assert finding.text.endswith("may not open %s" % (tmp_path / "video1"))
 
 
-def test_what_tracker_and_filter_report_is_told():
+def test_what_nodes_report_is_counted_and_problems_are_named():
     rate = DiagnosticStatus(name="track: camera", message="29.9 images per second, 2 tags")
     robots = [DiagnosticStatus(name="localization: hero_%d" % number, message="tracked") for number in (0, 1)]
-    other = DiagnosticStatus(name="hero_driver: hero_0", level=DiagnosticStatus.ERROR, message="no bytes")
-    finding = localization.describe_nodes(["track", "localization"], [rate, *robots, other])
-    text = "track: 29.9 images per second, 2 tags; localization: 2 of 2 robots without a problem"
-    assert finding == (OK, text, ())
+    reports = {"track": [rate], "localization": robots}
+    text = "track: 1 of 1 without a problem; localization: 2 of 2 without a problem"
+    assert localization.describe_nodes(reports) == (OK, text, ())
     robots[1].level, robots[1].message = DiagnosticStatus.WARN, "not measured for 3 s"
     rate.level, rate.message = DiagnosticStatus.ERROR, "images are too dark"
-    finding = localization.describe_nodes(["track", "localization"], [rate, *robots])
+    finding = localization.describe_nodes(reports)
     assert (finding.state, finding.text) == (
         WARN,
-        "track: no usable images; localization: 1 of 2 robots without a problem",
+        "track: 0 of 1 without a problem; localization: 1 of 2 without a problem",
     )
     assert finding.remedy == ("track: camera: images are too dark", "localization: hero_1: not measured for 3 s")
 
 
 def test_a_tracker_that_reports_nothing_is_named():
-    finding = localization.describe_nodes(["track"], [])
+    finding = localization.describe_nodes({"track": []})
     assert finding.state == WARN
     assert "rosnode ping track" in finding.remedy[0]
 

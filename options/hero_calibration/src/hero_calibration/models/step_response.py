@@ -51,14 +51,10 @@ Curve = Tuple[np.ndarray, np.ndarray]
 
 
 class Response(NamedTuple):
-    """Response of a wheel to a step: mean deviation from the target speed, highest speed beyond it, as shares of it.
-
-    curves: for each direction, times s and speeds m/s, positive in the direction of the test.
-    """
+    """Response of a wheel to a step: mean deviation from the target speed, highest speed beyond it, as shares of it."""
 
     mean_error: float
     overshoot: float
-    curves: Tuple[Curve, ...]
 
     @property
     def score(self) -> float:
@@ -123,7 +119,7 @@ def evaluate_response(curves: Sequence[Curve]) -> Response:
         share = speeds_m_s / STEP_M_S
         errors.append(np.abs(share[times_s >= 0.0] - 1.0).mean())
         overshoots.append(max(0.0, float(share.max()) - 1.0))
-    return Response(float(np.mean(errors)), float(np.mean(overshoots)), tuple(curves))
+    return Response(float(np.mean(errors)), float(np.mean(overshoots)))
 
 
 def choose_gains(tried: Sequence[Tried], servo_gain_m_s_us: float) -> Gains:

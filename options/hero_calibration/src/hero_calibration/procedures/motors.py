@@ -22,10 +22,8 @@ move up to 0.13 m."""
 
 
 class MotorResult(NamedTuple):
-    """Sweep of one robot: pulses us and speeds m/s of both wheels (2, steps; NaN: unknown), dead zones."""
+    """Dead zones of both servos of one robot."""
 
-    pulses_us: np.ndarray
-    speeds_m_s: np.ndarray
     zones: List[dead_zone.DeadZone]
 
     def to_file(self) -> Dict[str, List[float]]:
@@ -41,14 +39,17 @@ class MotorResult(NamedTuple):
 
 
 def evaluate_sweep(pulses_us: np.ndarray, speeds_m_s: np.ndarray) -> MotorResult:
-    """Return the result of a sweep. Raises: CalibrationError with the wheel if a dead zone cannot be found."""
+    """Return the result of a sweep: pulses us, speeds m/s (2, steps; NaN: unknown).
+
+    Raises: CalibrationError with the wheel if a dead zone cannot be found.
+    """
     zones = []
     for wheel, pulses, speeds in zip(("left", "right"), pulses_us, speeds_m_s):
         try:
             zones.append(dead_zone.find_dead_zone(pulses, speeds))
         except CalibrationError as error:
             raise CalibrationError(f"the {wheel} wheel {error}") from error
-    return MotorResult(pulses_us, speeds_m_s, zones)
+    return MotorResult(zones)
 
 
 def calibrate_motors(session: Session, results: Dict[int, MotorResult]) -> None:

@@ -2,7 +2,7 @@
 
 import glob
 import os
-from typing import Dict, List, Sequence
+from typing import Dict, Mapping, Sequence
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -12,9 +12,6 @@ from hero_node.ros import ask_master
 from .points import Finding, ok, wait_until, warn
 
 DIAGNOSTICS_TOPIC = "/diagnostics"
-TRACKER, LOCALIZER = "track", "localization"
-"""Nodes of hero_localization; track_2 is that of a second camera. Their statuses are called NODE: SUBJECT."""
-
 REPORT_TIMEOUT_S = 3.0
 """They report once a second; a busy PC takes its time to connect."""
 
@@ -34,45 +31,29 @@ def check_camera(pattern: str = "/dev/video*") -> Finding:
 
 
 def check_nodes() -> Finding:
-    """Print what drivers, tracker and filter report, such as the rate of images and robots with a problem."""
-    published = dict(ask_master("getSystemState")[0])
-    names = sorted(name.lstrip("/") for name in published.get(DIAGNOSTICS_TOPIC, []))
-    running = [name for name in names if f"/{name}" in published.get(f"/{name}/robots", ())]
-    running += [name for name in names if name.partition("_")[0] == TRACKER]
-    running += [name for name in names if name == LOCALIZER]
-    if not running:
-        return ok("no driver, tracker or localization runs")
-    statuses: Dict[str, DiagnosticStatus] = {}
+    """Print how many of the robots and other subjects that nodes report on have no problem, and name those that do."""
+    nodes = dict(ask_master("getSystemState")[0]).get(DIAGNOSTICS_TOPIC, [])
+    if not nodes:
+        return ok("no node reports diagnostics")
+    heard: Dict[str, Dict[str, DiagnosticStatus]] = {node: {} for node in nodes}
 
     def keep(report: DiagnosticArray) -> None:
-        statuses.update({status.name: status for status in report.status})
+        own = heard.setdefault(report._connection_header["callerid"], {})
+        own.update({status.name: status for status in report.status})
 
     subscriber = rospy.Subscriber(DIAGNOSTICS_TOPIC, DiagnosticArray, keep)
-    wait_until(lambda: all(list_statuses(name, list(statuses.values())) for name in running), REPORT_TIMEOUT_S)
+    wait_until(lambda: all(heard.values()), REPORT_TIMEOUT_S)
     subscriber.unregister()
-    return describe_nodes(running, list(statuses.values()))
+    return describe_nodes({node.lstrip("/"): list(statuses.values()) for node, statuses in sorted(heard.items())})
 
 
-def list_statuses(name: str, statuses: Sequence[DiagnosticStatus]) -> List[DiagnosticStatus]:
-    """Return the statuses of a node."""
-    return [status for status in statuses if status.name.startswith(name + ": ")]
-
-
-def describe_nodes(running: Sequence[str], statuses: Sequence[DiagnosticStatus]) -> Finding:
-    """Return one line on all of them, and a line for each problem that they report."""
+def describe_nodes(reports: Mapping[str, Sequence[DiagnosticStatus]]) -> Finding:
+    """Return one line on all nodes, by name, and a line for each problem that they report."""
     texts, remedies = [], []
-    for name in running:
-        own = list_statuses(name, statuses)
-        good = [status for status in own if status.level == DiagnosticStatus.OK]
-        if name.partition("_")[0] == TRACKER:
-            camera = [status for status in own if status.name == name + ": camera"]
-            is_usable = camera and camera[0].level < DiagnosticStatus.ERROR
-            texts.append(f"{name}: {camera[0].message if is_usable else 'no usable images'}")
-        else:
-            robots = [status for status in own if status.name.startswith(f"{name}: hero_")]
-            well = [robot for robot in robots if robot in good]
-            texts.append(f"{name}: {len(well)} of {len(robots)} robots without a problem")
-        if not own:
+    for name, statuses in reports.items():
+        bad = [status for status in statuses if status.level != DiagnosticStatus.OK]
+        texts.append(f"{name}: {len(statuses) - len(bad)} of {len(statuses)} without a problem")
+        if not statuses:
             remedies.append(f"{name} sends no diagnostics: rosnode ping {name} tells whether it hangs")
-        remedies += [f"{status.name}: {status.message}" for status in own if status not in good]
+        remedies += [f"{status.name}: {status.message}" for status in bad]
     return warn("; ".join(texts), *remedies[:LINES_MAX]) if remedies else ok("; ".join(texts))
