@@ -29,7 +29,7 @@ from .sensors.virtual import Floor, Light, Pheromone, RangeAndBearing
 __all__ = [
     "DRIVES", "PULSES", "VELOCITY", "Behavior", "Binary", "Command", "Distance", "Floor", "Light", "NeighborColors",
     "Neighborhood", "Neighbors", "Objects", "ObjectsInSight", "Odometry", "Pheromone", "Proximity", "Random",
-    "RangeAndBearing", "Sensed", "Sight", "act", "decide", "derive_seed", "lock", "sense",
+    "RangeAndBearing", "Sensed", "Sight", "act", "decide", "derive_seed", "lock", "sense", "turn",
 ]  # fmt: skip
 
 MIN_RATE_HZ, MAX_RATE_HZ = 0.1, 100.0
@@ -64,6 +64,12 @@ class Random:
     def normal(self, columns: Optional[int] = None) -> np.ndarray:
         """Return standard normal numbers: one for each robot (R,), or several (R, columns)."""
         return self._draw("standard_normal", columns)
+
+
+def turn(vectors: Any, angle_rad: Any) -> np.ndarray:
+    """Return vectors, x and y (2, ...), turned counter-clockwise: by -yaw from the common frame to a robot's own."""
+    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array((cosine * vectors[0] - sine * vectors[1], sine * vectors[0] + cosine * vectors[1]))
 
 
 def lock(values: np.ndarray) -> np.ndarray:

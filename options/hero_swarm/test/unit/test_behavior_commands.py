@@ -71,7 +71,14 @@ def test_wheels_of_one_bit_behaviors_turn_as_published():
 def test_behaviors_step_as_often_as_they_were_tuned_for():
     rates_hz = {name: find_behavior(name)().rate_hz for name in list_names()}
     evolved = dict.fromkeys(("evolved_aggregation", "dispersal", "wheel_genome"), 1e3 / 60.0)
-    slow = {"coverage": 5.0, "voter": 2.0, "majority": 2.0, "wall_following": 10.0, "random_fields": 10.0}
+    slow = {
+        "coverage": 5.0,
+        "voter": 2.0,
+        "majority": 2.0,
+        "wall_following": 10.0,
+        "random_fields": 10.0,
+        "molecules": 10.0,
+    }
     assert rates_hz == {**dict.fromkeys(list_names(), 20.0), **evolved, **slow}
     pulses = {name for name in list_names() if find_behavior(name)().drive == PULSES}
     assert pulses == {"aggregation", *evolved}

@@ -105,6 +105,15 @@ def measure_mixing(poses, velocities, trial):
     return (distances_m.argmin(axis=2) % 2 != np.arange(poses.shape[1]) % 2).mean(axis=1)
 
 
+def measure_lacking(poses, velocities, trial):
+    """The number of centers of molecules that do not bind two robots which bind them, too; all without a memory."""
+    if not isinstance(trial.memory, np.ndarray) or trial.memory.shape[1:] != (5,):
+        return np.full(len(poses), 4.0)
+    bound, kind = trial.memory[:, 2:4].astype(int), trial.memory[:, 4]
+    is_back = (bound[bound] == np.arange(len(bound))[:, None, None]).any(axis=2) & (bound >= 0)
+    return ((is_back.sum(axis=1) < 2) & (kind == 1)).reshape(poses.shape[:2]).sum(axis=1)
+
+
 def measure_way_to_center(poses, velocities, trial):
     """The mean distance of robots from the middles of their cells, as Lloyd's algorithm has it."""
     grid_m = np.linspace(-0.975, 0.975, 40)
@@ -145,6 +154,7 @@ CASES = {
     "segregation": (measure_mixing, 0.1, False, 12, 40, OPEN, (1.2, 1.2)),
     "potential_segregation": (measure_mixing, 0.1, False, 12, 40, OPEN, (1.2, 1.2)),
     "random_fields": (measure_mixing, 0.1, False, 12, 60, SQUARE, None),
+    "molecules": (measure_lacking, 3, False, 12, 60, SQUARE, None),
     "rendezvous": (by_name("consensus_error"), 0.2, False, 10, 30, OPEN, (2.0, 2.0)),
     "leader_followers": (measure_gap_error, 0.06, False, 5, 60, OPEN, (1.0, 1.0)),
     "formation": (measure_side_error, 0.1, False, 6, 90, OPEN, (1.2, 1.2)),

@@ -1,13 +1,15 @@
 """Rules of segregation by potentials and by random fields against closed forms, and points in place of robots."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hero_client.values import Neighbors, sense_neighbors
 from hero_swarm.behavior import Behavior
-from hero_swarm.behaviors.random_fields import BURNED, LOST, SAMPLES, RandomFields, find_potential
+from hero_swarm.behaviors import find_behavior
+from hero_swarm.behaviors.random_fields import BURNED, LOST, SAMPLES, Molecules, RandomFields, find_potential
 from hero_swarm.behaviors.spacing import PotentialSegregation
 from hero_swarm.metrics.own import State, measure_metric
 from hero_swarm.trial import OPEN, Trial
@@ -73,7 +75,11 @@ def find_energies(groups, apart_m, velocities):
     behavior = RandomFields()
     near = sense_neighbors(poses, Neighbors(range_m=behavior.near.range_m))
     given = np.repeat(np.array(velocities, dtype=float)[:, None], 2, axis=1)
-    return behavior.find_energies(near, poses[0, :, 2], np.zeros((2, 2)), np.array(groups), given)[:, 0]
+    signs = {}
+    behavior.choose = lambda sensed, memory, found, *rest: signs.update(found=found) or np.zeros((3, 2))
+    sensed = SimpleNamespace(near=near, numbers=np.array(groups))
+    behavior.step(sensed, None, None)
+    return behavior.find_energies(near, poses[0, :, 2], np.zeros((2, 2)), signs["found"], behavior.mass, given)[:, 0]
 
 
 def test_a_velocity_is_the_likelier_the_nearer_it_leads_to_the_own_group():
@@ -108,3 +114,69 @@ def test_clusters_are_chains_of_nearest_robots_of_a_group():
     poses[1, 4, 0] = 3.0
     state = State(0.0, poses, np.zeros_like(poses), np.empty((2, 0, 3)), 0.037, memory=np.tile((0, 1), 8))
     assert measure_metric(f"{MEASURES}:chained_clusters", state).tolist() == [4.0, 3.0]
+
+
+def bind(places, kind, bound, bonds=2):
+    """Return which rows each robot binds now, as lists, and the neighborhood."""
+    poses = np.array([[(x, y, 0.3) for x, y in places]])
+    near = sense_neighbors(poses, Neighbors(range_m=1.0))
+    found = Molecules(bonds=bonds).bind(near, np.array(kind), np.array(bound))
+    return [[row for row in rows if row >= 0] for rows in found.tolist()]
+
+
+def test_a_hydrogen_binds_the_nearest_center_before_other_hydrogens():
+    places, kind = [(0, 0), (0.1, 0), (0.3, 0), (0.5, 0)], [0, 0, 1, 1]
+    nothing = np.full((4, 2), -1)
+    assert bind(places, kind, nothing) == [[2], [2], [1, 0], [1, 0]]
+    assert bind(places[:2], kind[:2], nothing[:2]) == [[1], [0]]
+    # Bound to each other, hydrogens have room for a center, which takes one; one of a center has none for another one.
+    assert bind(places, kind, [[1, -1], [0, -1], [-1, -1], [-1, -1]])[2:] == [[1], [1]]
+    assert bind(places, kind, [[2, -1], [2, -1], [1, 0], [-1, -1]]) == [[2], [2], [1, 0], []]
+
+
+def test_a_full_center_keeps_its_own_and_molecules_have_no_rings():
+    places, kind = [(0, 0), (0.2, 0), (0, 0.2), (0.1, 0.1)], [1, 0, 0, 0]
+    full = [[1, 2], [0, -1], [0, -1], [-1, -1]]
+    assert bind(places, kind, full) == [[3, 1], [0], [0], []], "the center would take the nearest, which finds no room"
+    # Two centers that share a hydrogen: it does not bind the second, as both bind the same one.
+    shared = bind([(0, 0), (0.1, 0), (0.2, 0)], [1, 0, 1], [[1, -1], [0, 2], [1, -1]], 2)
+    assert shared[1] == [0]
+
+
+def test_molecules_and_their_missing_bonds_are_counted_as_published():
+    # Water; a pair of hydrogens; a center that binds one which binds another one.
+    bound = [[1, 2], [0, -1], [0, -1], [4, -1], [3, -1], [1, -1]]
+    kind = [1, 0, 0, 0, 0, 1]
+    memory = np.column_stack((np.zeros((6, 2)), bound, kind))
+    poses = np.zeros((1, 6, 3))
+    state = State(0.0, poses, poses, np.empty((1, 0, 3)), 0.037, memory=memory)
+    assert measure_metric(f"{MEASURES}:molecules", state).tolist() == [2.0]
+    assert measure_metric(f"{MEASURES}:missing_bonds", state).tolist() == [2.0]
+
+
+def test_accelerated_points_feel_the_forces_and_damping_of_the_program():
+    kind = find_behavior(str(MEASURES.with_name("accelerated.py")))
+    starts = np.array([[(0.0, 0.0, 1.0), (3.0, 0.0, 2.0)]])
+    trial = Trial(kind(groups=2), OPEN, 2, [1], starts=starts, is_point=True)
+    trial.step()
+    force = (3.0 - 5.0) + (1.0 / 3.0 - 5.0 / 9.0)  # towards the other one, of another group
+    assert trial.memory[0, 2:4] == pytest.approx((force, 0.0), abs=1e-12)
+    assert trial.poses[0, :, 0] == pytest.approx((0.5 * force * 1e-4, 3.0 - 0.5 * force * 1e-4), abs=1e-9)
+    trial.step()
+    apart = trial.poses[0, 1, 0] - trial.poses[0, 0, 0]
+    assert trial.memory[0, 2] == pytest.approx(0.98 * force, abs=1e-3) and apart > 3.0
+    noisy = Trial(kind(groups=2, noise=0.3), OPEN, 2, [1], starts=starts, is_point=True)
+    noisy.step()
+    assert 0.01 < abs(noisy.memory[0, 2] - force) < 0.3 * 3.0
+    state = State(0.0, *[noisy.poses] * 2, np.empty((1, 0, 3)), 0.037, memory=noisy.memory)
+    assert measure_metric(f"{MEASURES}:effort", state)[0] == pytest.approx(np.abs(noisy.memory[:, 2:4]).sum())
+
+
+def test_items_and_robots_on_the_spot_are_counted_by_their_floor():
+    kept, counts = {}, []
+    for areas in ((1, 0), (-1, 2), (0, 0), (0, 1)):
+        sensed = SimpleNamespace(floor=SimpleNamespace(area=np.array(areas)))
+        poses = np.zeros((1, 2, 3))
+        state = State(0.0, poses, poses, np.empty((1, 0, 3)), 0.037, sensed=sensed, kept=kept)
+        counts.append([measure_metric(f"{MEASURES}:{name}", state)[0] for name in ("items", "on_spot")])
+    assert counts == [[0, 1], [0, 0], [2, 2], [2, 1]]

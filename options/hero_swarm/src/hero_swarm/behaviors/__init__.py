@@ -35,6 +35,7 @@ _MODULES: Dict[str, str] = {
     "segregation": "spacing.Segregation",
     "potential_segregation": "spacing.PotentialSegregation",
     "random_fields": "random_fields.RandomFields",
+    "molecules": "random_fields.Molecules",
     "rendezvous": "consensus.Rendezvous",
     "leader_followers": "consensus.LeaderFollowers",
     "formation": "consensus.Formation",

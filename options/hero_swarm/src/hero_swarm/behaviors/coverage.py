@@ -7,7 +7,7 @@ import numpy as np
 from hero_client.controllers import steer
 from hero_node.parameters import number
 
-from ..behavior import SPEED, Behavior, Command, Random, Sensed
+from ..behavior import SPEED, Behavior, Command, Random, Sensed, turn
 
 
 class VoronoiCoverage(Behavior):
@@ -39,6 +39,5 @@ class VoronoiCoverage(Behavior):
                 sums_m = np.bincount(owner, points_m[axis], sensed.count)
                 world_m[:, axis] = np.where(counts > 0, sums_m / np.maximum(counts, 1), places_m[:, axis])
         to_m = np.nan_to_num((targets_m - poses[..., :2]).reshape(-1, 2)) * self.gain_1_s
-        cosine, sine = np.cos(np.nan_to_num(sensed.poses[:, 2])), np.sin(np.nan_to_num(sensed.poses[:, 2]))
-        forward_m_s, left_m_s = cosine * to_m[:, 0] + sine * to_m[:, 1], cosine * to_m[:, 1] - sine * to_m[:, 0]
+        forward_m_s, left_m_s = turn(to_m.T, -np.nan_to_num(sensed.poses[:, 2]))
         return (*steer(forward_m_s, left_m_s, self.max_linear_m_s), memory)

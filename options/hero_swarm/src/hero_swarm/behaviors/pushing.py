@@ -9,7 +9,7 @@ from hero_client.values import BODY_RADIUS_M, OBJECT, ROBOT
 from hero_node.parameters import number
 from hero_sim.world import join_wheels
 
-from ..behavior import SPEED, Behavior, Command, Neighbors, Objects, Random, Sensed, Sight
+from ..behavior import SPEED, Behavior, Command, Neighbors, Objects, Random, Sensed, Sight, turn
 from .clearance import keep_apart
 
 _COORDINATE = number(0.0, -1000.0, 1000.0, "m")
@@ -73,9 +73,8 @@ class PushToGoal(Behavior):
 
     def _find_way(self, sensed: Sensed) -> _Way:
         object_m = np.array((sensed.objects.forward_m[:, 0], sensed.objects.left_m[:, 0]))
-        to_x_m, to_y_m = self.goal_x_m - sensed.poses[:, 0], self.goal_y_m - sensed.poses[:, 1]
-        cosine, sine = np.cos(sensed.poses[:, 2]), np.sin(sensed.poses[:, 2])
-        way_m = np.array((cosine * to_x_m + sine * to_y_m, cosine * to_y_m - sine * to_x_m)) - object_m
+        to_goal_m = self.goal_x_m - sensed.poses[:, 0], self.goal_y_m - sensed.poses[:, 1]
+        way_m = turn(to_goal_m, -sensed.poses[:, 2]) - object_m
         length_m = np.maximum(np.hypot(*way_m), 1e-6)
         along = way_m / length_m
         behind_m = object_m[0] * along[0] + object_m[1] * along[1]

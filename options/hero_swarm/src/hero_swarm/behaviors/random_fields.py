@@ -1,12 +1,13 @@
 """Segregation by velocities that are sampled from a Gibbs random field."""
 
-from typing import Any
+from typing import Any, Tuple
 
 import numpy as np
 
 from hero_client.controllers import steer
+from hero_node.parameters import whole_number
 
-from ..behavior import Command, Neighborhood, Neighbors, Proximity, Random, Sensed
+from ..behavior import Command, Neighborhood, Neighbors, Proximity, Random, Sensed, turn
 from .clearance import keep_clear
 from .spacing import Segregation
 
@@ -15,6 +16,12 @@ SAMPLES, BURNED = 100, 60
 
 LOST = 1e4
 """Energy of losing sight of a robot of the own group."""
+
+UNIT_CHARGE, UNBOUND = 16.0, -3e-5
+"""Product of charges that attracts as a robot of the own group does, and how robots repel that do not bind."""
+
+CANDIDATES = 12
+"""Nearest neighbors that a robot may bind."""
 
 
 def find_potential(apart: np.ndarray, sign: np.ndarray) -> np.ndarray:
@@ -37,7 +44,9 @@ class RandomFields(Segregation):
 
     Attributes:
         unit_m: of the potential's lengths.
+        nearness: share of a distance that the potential is taken at.
         safe_m: within it robots of other groups repel.
+        mass: of a robot, in the kinetic energy.
         spread: of drawn velocities, as a share of max_linear_m_s.
     """
 
@@ -45,45 +54,68 @@ class RandomFields(Segregation):
     infrared = Proximity()
     rate_hz = 10.0
     unit_m = 0.45
+    nearness = 0.8
     safe_m = 0.135
     clear_m = 0.1
+    mass = 0.3
     spread = 0.2
     max_linear_m_s = 0.08
     settings = {name: Segregation.settings[name] for name in ("groups", "max_linear_m_s")}
 
     def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
-        group = sensed.numbers % int(self.groups)
-        own = np.zeros((len(group), 2)) if memory is None else memory[:, :2]
+        near, group = sensed.near, sensed.numbers % int(self.groups)
+        is_own = near.seen & (group[near.rows] == group[:, None])
+        signs = np.where(is_own, 1.0, np.where(near.seen & (near.range_m < self.safe_m), -1.0, 0.0))
+        wanted, *speeds = self.choose(sensed, memory, signs, self.mass, random)
+        return speeds[0], speeds[1], np.column_stack((wanted, group))
+
+    def choose(
+        self, sensed: Sensed, memory: Any, signs: np.ndarray, mass: Any, random: Random
+    ) -> Tuple[np.ndarray, Any, Any]:
+        """Return velocities that are drawn from the field (R, 2), and the speeds that steer robots so.
+
+        signs: how strongly each neighbor attracts, as in find_potential(); 0: it does not count. mass: (R,) or one.
+        """
+        own = np.zeros((len(signs), 2)) if memory is None else memory[:, :2]
         drawn = random.normal(2 * SAMPLES).reshape(-1, SAMPLES, 2).transpose(1, 0, 2)
         velocities = np.concatenate((own[None], own + self.spread * drawn))
         velocities /= np.maximum(np.hypot(*velocities.T).T, 1.0)[..., None]
-        energies = self.find_energies(sensed.near, sensed.poses[:, 2], own, group, velocities)
+        energies = self.find_energies(sensed.near, sensed.poses[:, 2], own, signs, mass, velocities)
         wanted = self._draw(velocities, energies, random.random(SAMPLES))
-        cosine, sine = np.cos(sensed.poses[:, 2]), np.sin(sensed.poses[:, 2])
-        ahead = np.array((cosine * wanted[:, 0] + sine * wanted[:, 1], cosine * wanted[:, 1] - sine * wanted[:, 0]))
-        command = self.max_linear_m_s * ahead + keep_clear(sensed.infrared.ranges_m, self.clear_m, 2.0)
-        speeds = steer(command[0], command[1], self.max_linear_m_s, max_angular_rad_s=self.max_angular_rad_s)
-        return (*speeds, np.column_stack((wanted, group)))
+        command = self.max_linear_m_s * turn(wanted.T, -sensed.poses[:, 2]) + keep_clear(
+            sensed.infrared.ranges_m, self.clear_m, 2.0
+        )
+        return (
+            wanted,
+            *steer(command[0], command[1], self.max_linear_m_s, max_angular_rad_s=self.max_angular_rad_s),
+        )
 
     def find_energies(
-        self, near: Neighborhood, yaw_rad: np.ndarray, own: np.ndarray, group: np.ndarray, velocities: np.ndarray
+        self,
+        near: Neighborhood,
+        yaw_rad: np.ndarray,
+        own: np.ndarray,
+        signs: np.ndarray,
+        mass: Any,
+        velocities: np.ndarray,
     ) -> np.ndarray:
-        """Return the energies (S, R) of velocities (S, R, 2); own: velocities of now (R, 2)."""
-        is_own = near.seen & (group[near.rows] == group[:, None])
-        counts = is_own | (near.seen & (near.range_m < self.safe_m))
+        """Return the energies (S, R) of velocities (S, R, 2); own: those of now (R, 2); signs, mass: see choose()."""
+        counts = signs != 0.0
         nearest = np.argsort(~counts, axis=1, kind="stable")[:, : max(1, int(counts.sum(axis=1).max()))]
-        rows = np.arange(len(group))[:, None]
-        counts, is_own, others = counts[rows, nearest], is_own[rows, nearest], own[near.rows[rows, nearest]]
+        rows = np.arange(len(own))[:, None]
+        counts, signs, others = counts[rows, nearest], signs[rows, nearest], own[near.rows[rows, nearest]]
         length_m, angle_rad = near.range_m[rows, nearest], near.bearing_rad[rows, nearest] + yaw_rad[:, None]
         reach = self.max_linear_m_s / self.rate_hz  # m in a step at full speed
         to_m = np.stack((length_m * np.cos(angle_rad), length_m * np.sin(angle_rad)), axis=2) + reach * others
         apart_m = np.hypot(*np.moveaxis(to_m - reach * velocities[:, :, None], -1, 0)) + 1e-6
-        pairs = find_potential(0.8 * apart_m / self.unit_m, np.where(is_own, 1.0, -1.0))
+        pairs = find_potential(self.nearness * apart_m / self.unit_m, signs)
+        is_own = signs > 0.0
         pairs = np.where(is_own & (apart_m > self.near.range_m), LOST, pairs) * counts
         flock = is_own[None] & (apart_m > self.safe_m)
         relative = ((others - velocities[:, :, None]) * flock[..., None]).sum(axis=2)
         speeds = np.minimum((relative**2).sum(axis=2), 1.0), (velocities**2).sum(axis=2)
-        energies: np.ndarray = pairs.sum(axis=2) + 0.15 * (1.0 + flock.sum(axis=2)) * (speeds[0] + 1.0 - speeds[1])
+        moving = 0.5 * mass * (1.0 + flock.sum(axis=2)) * (speeds[0] + 1.0 - speeds[1])
+        energies: np.ndarray = pairs.sum(axis=2) + moving
         return energies
 
     @staticmethod
@@ -98,3 +130,63 @@ class RandomFields(Segregation):
                 total += velocities[chosen, robots]
         mean: np.ndarray = total / (SAMPLES - BURNED)
         return mean
+
+
+class Molecules(RandomFields):
+    """Robots form the pattern of a molecule: each center binds some of the others, such as two in water.
+
+    After P. Rezeck and L. Chaimowicz, Chemistry-inspired pattern formation with robotic swarms, RA-L 2022. Every
+    (bonds + 1)-th robot is a center, which binds hydrogens only; a hydrogen binds one robot, a center rather than
+    another hydrogen. Bound robots attract each other by the product of their charges. The memory holds of each robot its
+    velocity, the rows of those that it binds, -1 for none, and its kind; neighbors tell each other theirs.
+
+    Attributes:
+        bonds: of a center.
+        charge, center_charge: of hydrogens and of centers.
+        mass, center_mass: of the same, in the kinetic energy.
+    """
+
+    near = Neighbors(range_m=0.36)
+    nearness = 0.7
+    safe_m = 0.36
+    bonds = 2
+    charge, center_charge = 5.0, 15.0
+    mass, center_mass = 1.0, 16.0
+    settings = {"bonds": whole_number(2, 1, 6), "max_linear_m_s": RandomFields.settings["max_linear_m_s"]}
+
+    def step(self, sensed: Sensed, memory: Any, random: Random) -> Command:
+        near, robots = sensed.near, len(sensed.numbers)
+        kind = (sensed.numbers % (int(self.bonds) + 1) == 0).astype(int)
+        bound = np.full((robots, int(self.bonds)), -1) if memory is None else memory[:, 2:-1].astype(int)
+        bound = self.bind(near, kind, bound)
+        is_bound = (near.rows[:, :, None] == bound[:, None]).any(axis=2) & near.seen
+        charges = np.where(kind, self.center_charge, self.charge)
+        product = charges[:, None] * charges[near.rows] / UNIT_CHARGE
+        signs, mass = np.where(is_bound, product, UNBOUND * near.seen), np.where(kind, self.center_mass, self.mass)
+        wanted, *speeds = self.choose(sensed, memory, signs, mass, random)
+        return speeds[0], speeds[1], np.column_stack((wanted, bound, kind))
+
+    def bind(self, near: Neighborhood, kind: np.ndarray, bound: np.ndarray) -> np.ndarray:
+        """Return which rows robots bind now (R, K), -1 for none, the nearest first; kind: 1 of centers (R,).
+
+        bound: which they bound before. A robot is bound if it bound this one, or has room for it, unless a robot that is
+        bound already binds the same one: molecules have no rings.
+        """
+        rows, room_of = np.arange(len(kind)), np.where(kind, int(self.bonds), 1)
+        order = np.argsort(np.where(near.seen, near.range_m, np.inf), axis=1, kind="stable")[:, :CANDIDATES]
+        others, seen = near.rows[rows[:, None], order], near.seen[rows[:, None], order]
+        centers = ((bound >= 0) & (kind[bound] == 1)).sum(axis=1)
+        # A hydrogen that binds a hydrogen has room for a center.
+        has_room = np.where(kind[:, None] == 1, centers[others] < 1, ((bound >= 0).sum(axis=1) < room_of)[others])
+        has_room |= (bound[others] == rows[:, None, None]).any(axis=2)
+        has_room &= seen & ~((kind[:, None] == 1) & (kind[others] == 1))
+        taken = np.full(others.shape, -2)
+        for column in range(others.shape[1]):
+            beyond = bound[others[:, column]]
+            is_ring = (beyond[:, :, None] == taken[:, None]).any(axis=(1, 2))
+            taken[:, column] = np.where(has_room[:, column] & ~is_ring, others[:, column], -2)
+        rank = np.where(taken < 0, 2, 1 - kind[taken]) * taken.shape[1] + np.arange(taken.shape[1])
+        chosen = np.take_along_axis(taken, np.argsort(rank, axis=1)[:, : bound.shape[1]], axis=1)
+        kept = np.full(bound.shape, -1)
+        kept[:, : chosen.shape[1]] = chosen
+        return np.where((kept >= 0) & (np.arange(bound.shape[1]) < room_of[:, None]), kept, -1)

@@ -26,6 +26,7 @@ const ABOUT = {
   behavior_segregation: ["gather, spread", "Groups come together and keep apart from each other.", [...ring(3, 3, [10, 12]), ...ring(3, 3, [30, 12])], "M20 2v20"],
   behavior_potential_segregation: ["gather, spread", "Groups take distances inside and between them.", [...ring(3, 3, [10, 12]), ...ring(3, 3, [30, 12])], "M20 2v20"],
   behavior_random_fields: ["gather, spread", "Groups move together, by velocities drawn at random.", [...ring(3, 3, [10, 12]), ...ring(3, 3, [30, 12])], "M20 2v20M34 12h4"],
+  behavior_molecules: ["gather, spread", "Robots bind each other to patterns, such as water.", [[10, 8], [16, 14], [22, 8], [28, 18], [34, 12]], "M10 8l6 6 6-6M28 18l6-6"],
   behavior_flocking: ["move together", "Robots drive together in one direction.", [[8, 8], [8, 16], [15, 12], [16, 5], [16, 19]], "M22 12h12M31 9l4 3-4 3"],
   behavior_cyclic_pursuit: ["move together", "Robots follow each other on one ring.", ring(6, 9), "M20 3a9 9 0 0 1 8 5M20 21a9 9 0 0 1-8-5"],
   behavior_milling: ["move together", "Robots circle a common center, like fish.", [...ring(6, 9), ...ring(3, 4)]],
