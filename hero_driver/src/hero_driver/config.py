@@ -23,15 +23,13 @@ from .corrections.correction_settings import CorrectionSettings
 from .fleet.admission import AdmissionLimits
 from .rosserial.session import SessionLimits
 
-DEFAULT_PORT = 11411
-
 
 @dataclass(frozen=True)
 class DriverConfig(CommandSettings, CorrectionSettings, SessionLimits, AdmissionLimits):
     """All parameters of the driver."""
 
     host: str = declare(string("0.0.0.0", "address to listen on"))
-    port: int = declare(whole_number(DEFAULT_PORT, 0, 65535, "", "TCP port to listen on; 0: any free port"))
+    port: int = declare(whole_number(11411, 0, 65535, "", "TCP port to listen on; 0: any free port"))
     declare_timeout_s: float = declare(
         number(20.0, 2.0, 600.0, "s", "time for a robot to declare a topic that identifies it; then it is disconnected")
     )

@@ -23,7 +23,7 @@ from .reports.robot_log import RobotLog
 from .reports.robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
 from .ros.raw_publisher import TransformPublisher
-from .ros.robot_bridge import BridgeContext, RobotBridge
+from .ros.robot_bridge import RobotBridge
 from .ros.robot_commands import Stops
 from .rosserial.payloads import Log
 from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
@@ -63,9 +63,6 @@ class Gateway(LinkHandler):
         self._robot_log = RobotLog(log, self._stops.begin, self.warn_late)
         self._transforms = TransformPublisher(loop.call_later)
         self.open = self._transforms.open
-        self._context = BridgeContext(
-            self, loop, log, self._transforms, registrar, config, config, 2 * config.max_topics
-        )
         self.peers: Dict[Link, Peer] = {}
         self.fleet = FleetRegistry(config.grace_s)
         self.bridges: Dict[str, RobotBridge] = {}
@@ -301,8 +298,8 @@ class Gateway(LinkHandler):
             decision.old_link.close(f"the robot connected again from {peer.link.address}")
         bridge = self.bridges.get(identity.namespace)
         if bridge is None:
-            bridge = RobotBridge(identity, self._context)
-            self.bridges[identity.namespace] = bridge
+            shared = self, self._loop, self._log, self._transforms, self._registrar, self._config, self._config
+            bridge = self.bridges[identity.namespace] = RobotBridge(identity, *shared, 2 * self._config.max_topics)
         peer.bridge = bridge
         rebooted = peer.boot is not None
         bridge.corrections.odometry.restart(rebooted and decision.verdict is not Verdict.ARRIVED, peer.wheels)

@@ -45,8 +45,7 @@ from .ros.thread_watch import ThreadWatch
 from .stops.interface import StopInterface
 from .stops.store import StopStore
 from .transport.call_queue import Worker
-from .transport.event_loop import EventLoop, NoAnswerError
-from .transport.link import HostNotFoundError
+from .transport.event_loop import EventLoop, HostNotFoundError, NoAnswerError
 
 NODE_NAME = "hero_driver"
 

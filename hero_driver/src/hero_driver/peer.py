@@ -4,6 +4,8 @@ import time
 from dataclasses import dataclass, field
 from typing import List, Optional
 
+from hero_node import TokenBucket
+
 from .commands.stop_progress import BurstGate, StopProgress
 from .corrections.message_layouts import CONVERSIONS, read_encoder
 from .corrections.wheel_motion import WheelMotion
@@ -17,6 +19,9 @@ from .rosserial.payloads import Log
 from .rosserial.session import Session, Topic
 from .transport.event_loop import CallLater
 from .transport.link import Link
+
+LOG_LINES_PER_S = 100
+"""Log lines of one robot that reach /rosout; a robot that tunes its motors sends 47 per second."""
 
 SILENCE_LIMIT_S = 0.5
 """A robot silent for this long gets motion only when it sends again; pauses of 0.1 s are common on Wi-Fi."""
@@ -38,8 +43,7 @@ class Peer:
     boot: Optional[log_lines.BootLine] = None
     early_logs: List[Log] = field(default_factory=list)
     early_topics: List[Topic] = field(default_factory=list)  # /tf, declared before a name that tells who it is
-    log_window_s: float = 0.0
-    log_count: int = 0
+    log_lines: TokenBucket = field(default_factory=lambda: TokenBucket(LOG_LINES_PER_S, LOG_LINES_PER_S, 0.0))
     motion_mark: int = 0  # how much was written when the last motion command was
     send_due: bool = False  # a timer is set for commands that have to wait
     stop: Optional[StopProgress] = None  # while the robot is stopped

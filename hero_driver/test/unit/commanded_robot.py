@@ -87,7 +87,8 @@ class CommandedRobot:
         self._longest_read_s = 0.0
         self._buffer = b""
         self._reader = packets.PacketReader()
-        context = robot_bridge.BridgeContext(
+        self.bridge = robot_bridge.RobotBridge(
+            identify("/hero_1/odom"),
             owner=self,
             loop=None,
             log=SimpleNamespace(log_throttled=lambda level, key, text: self.lines.append(text)),
@@ -97,7 +98,6 @@ class CommandedRobot:
             commands=CommandSettings(allow_self_tuning=True, command_max_age_s=10.0),
             max_names=100,
         )
-        self.bridge = robot_bridge.RobotBridge(identify("/hero_1/odom"), context)
         self.peer = peer.Peer(
             self, Session(SessionLimits(), clock.now_s), None, self, clock.call_later, bridge=self.bridge
         )

@@ -4,9 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_driver.reports.robot_log import LINES_PER_S, RobotLog
+from hero_driver.peer import LOG_LINES_PER_S
+from hero_driver.reports.robot_log import RobotLog
 from hero_driver.ros.log_relay import LogRelay
 from hero_driver.rosserial.payloads import LOG_INFO, Log
+from hero_node import TokenBucket
 
 NOW_S = 1000.0
 
@@ -29,8 +31,7 @@ def make_peer():
         wheels=SimpleNamespace(is_late=False),
         refused=False,
         boot=None,
-        log_window_s=0.0,
-        log_count=0,
+        log_lines=TokenBucket(LOG_LINES_PER_S, LOG_LINES_PER_S, 0.0),
     )
 
 
@@ -133,9 +134,9 @@ def test_odometry_begins_anew_only_where_a_robot_boots_in_another_world(lines):
 def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):
     robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
     for second in range(3):
-        for number in range(LINES_PER_S + 7):
-            robot_log.receive(peer, Log(LOG_INFO, "line %d" % number), NOW_S + second + 0.005 * number)
-        assert len(lines) == LINES_PER_S * (second + 1)
+        for number in range(LOG_LINES_PER_S + 7):
+            robot_log.receive(peer, Log(LOG_INFO, "line %d" % number), NOW_S + second)
+        assert len(lines) == LOG_LINES_PER_S * (second + 1)
         assert peer.record.dropped_messages == 7 * (second + 1)
 
 

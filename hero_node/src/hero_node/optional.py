@@ -14,14 +14,12 @@ def import_optional(module: str, package: str) -> ModuleType:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        command = "apt install " + package if package.startswith("python3-") else _describe_pip(package)
+        # Debian's own Python refuses pip from version 12 on.
+        is_managed = os.path.exists(os.path.join(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED"))
+        command = f"{sys.executable} -m pip install '{package}'"
+        if package.startswith("python3-"):
+            command = "apt install " + package
+        elif sys.prefix == sys.base_prefix and is_managed:
+            command = f"{sys.executable} -m venv --system-site-packages ~/hero_venv && ~/hero_venv/bin/pip install"
+            command += f" '{package}', and start it with ~/hero_venv/bin/python3"
         raise ProgramError(f"{module} is missing ({error}); install it: {command}") from None
-
-
-def _describe_pip(package: str) -> str:
-    """Return how to install a package of PyPI: Debian's own Python refuses pip from version 12 on."""
-    is_managed = os.path.exists(os.path.join(sysconfig.get_path("stdlib"), "EXTERNALLY-MANAGED"))
-    if sys.prefix != sys.base_prefix or not is_managed:
-        return f"{sys.executable} -m pip install '{package}'"
-    environment = f"{sys.executable} -m venv --system-site-packages ~/hero_venv"
-    return f"{environment} && ~/hero_venv/bin/pip install '{package}', and start it with ~/hero_venv/bin/python3"

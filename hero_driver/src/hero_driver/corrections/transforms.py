@@ -55,7 +55,6 @@ class TransformCorrector:
         self._passed_ns = self._passed_arrival_ns = 0
         self._own_frames: Set[bytes] = set()
         self._possible: Dict[bytes, bytes] = {}  # the newest tail that can be true, by frames
-        self._known_foreign: Set[bytes] = set()
 
     def correct(self, payload: bytes, arrival_ns: int) -> None:
         """Take a tf2_msgs/TFMessage that came at arrival_ns; pass on its transforms, stamps corrected, or refuse it."""
@@ -115,18 +114,14 @@ class TransformCorrector:
 
     def _admit_frames(self, frames: bytes) -> bool:
         """Return whether the robot may send a pair of frames that is not known as its own."""
-        if frames in self._known_foreign:
-            self._refuse("tf", "")
-            return False
         parent, child = message_layouts.split_frames(frames)
-        if not self._is_own(parent) or not self._is_own(child) or len(self._own_frames) >= FRAMES_MAX:
-            self._refuse("tf", "")
-            if len(self._known_foreign) < FRAMES_MAX:
-                self._known_foreign.add(frames)
-                self.foreign_frames.add(f"{_show_name(parent)} -> {_show_name(child)}")
-            return False
-        self._own_frames.add(frames)
-        return True
+        if self._is_own(parent) and self._is_own(child) and len(self._own_frames) < FRAMES_MAX:
+            self._own_frames.add(frames)
+            return True
+        self._refuse("tf", "")
+        if len(self.foreign_frames) < FRAMES_MAX:
+            self.foreign_frames.add(f"{_show_name(parent)} -> {_show_name(child)}")
+        return False
 
     def _is_own(self, name: bytes) -> bool:
         """Return whether a frame is the robot's own, with a name that every listener of /tf can read."""

@@ -11,9 +11,6 @@ from ..rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_
 
 LEVELS = {LOG_DEBUG: "debug", LOG_INFO: "info", LOG_WARN: "warn", LOG_ERROR: "error", LOG_FATAL: "fatal"}
 
-LINES_PER_S = 100
-"""Log lines of one robot that reach /rosout; a robot that tunes its motors sends 47 per second."""
-
 EARLY_LINES_MAX = 10
 """Lines that are kept until a robot has said who it is."""
 
@@ -50,10 +47,7 @@ class RobotLog:
                 self._receive_unrequested_tuning(peer)
         if line.uptime_s is not None:
             self._receive_uptime(peer, record, line.uptime_s, now_s)
-        if now_s - peer.log_window_s >= 1.0:
-            peer.log_window_s, peer.log_count = now_s, 0
-        peer.log_count += 1
-        if peer.log_count > LINES_PER_S:
+        if not peer.log_lines.take(1.0, now_s):
             record.dropped_messages += 1
             return
         level = "debug" if line.is_routine else LEVELS.get(log.level, "error")

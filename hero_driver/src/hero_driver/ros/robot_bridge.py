@@ -7,7 +7,7 @@ registrar. Endpoints stay up when the connection goes and are there again when t
 """
 
 import functools
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 
 from hero_node import MD5SUMS
 
@@ -38,37 +38,34 @@ TWIST_TYPE = "geometry_msgs/Twist"
 SET_ODOM_TYPE = "hero_msgs/SetOdom"
 
 
-class BridgeContext(NamedTuple):
-    """Objects that all bridges share."""
-
-    owner: Owner
-    loop: EventLoop
-    log: LogRelay
-    transforms: TransformPublisher
-    registrar: Worker
-    corrections: CorrectionSettings
-    commands: CommandSettings
-    max_names: int
-    """Topics and services of one robot over all its connections."""
-
-
 class RobotBridge:
     """The endpoints of one robot; ids: under which it receives topics and services now, by their names."""
 
-    def __init__(self, identity: Identity, context: BridgeContext) -> None:
-        """Begin without a connection: see attach(); identity: of the robot."""
+    def __init__(
+        self,
+        identity: Identity,
+        owner: Owner,
+        loop: EventLoop,
+        log: LogRelay,
+        transforms: TransformPublisher,
+        registrar: Worker,
+        corrections: CorrectionSettings,
+        commands: CommandSettings,
+        max_names: int,
+    ) -> None:
+        """Begin without a connection: see attach(); max_names: topics and services of the robot over all of them."""
         self.identity = identity
         self.label = identity.namespace.lstrip("/")
-        self.commands = RobotCommands(identity.namespace, context.owner, context.loop, context.log, context.commands)
-        self._loop = context.loop
-        self._service_timeout_s = context.commands.service_timeout_s
-        self._max_names = context.max_names
-        self._registrar = context.registrar
-        self.endpoints = Endpoints(self.label, context.log.log_throttled)
+        self.commands = RobotCommands(identity.namespace, owner, loop, log, commands)
+        self._loop = loop
+        self._service_timeout_s = commands.service_timeout_s
+        self._max_names = max_names
+        self._registrar = registrar
+        self.endpoints = Endpoints(self.label, log.log_throttled)
         self._closed = False
         self._connection = 0
         self._publishers: Dict[str, RawPublisher] = {}
-        self.corrections = RobotCorrections(identity.namespace, context.corrections, context.transforms.add)
+        self.corrections = RobotCorrections(identity.namespace, corrections, transforms.add)
         self._services: Dict[str, RobotService] = {}
         self._service_halves: Dict[Tuple[str, TopicKind], Topic] = {}
         self.ids: Dict[str, int] = {}

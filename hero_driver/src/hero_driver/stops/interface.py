@@ -3,7 +3,6 @@
 Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow.
 """
 
-import contextlib
 import queue
 import time
 import weakref
@@ -140,10 +139,9 @@ class StopInterface:
 
 def describe_time(since_s: float) -> str:
     """Return a time (s since 1970) for users."""
-    with contextlib.suppress(OverflowError, ValueError, OSError):
-        if since_s != UNKNOWN_TIME_S:
-            return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(since_s))
-    return "an unknown time"
+    if since_s == UNKNOWN_TIME_S:
+        return "an unknown time"
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(since_s))
 
 
 def describe_stop(stops: Stops) -> str:

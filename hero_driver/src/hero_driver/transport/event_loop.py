@@ -17,7 +17,7 @@ from typing import Callable, Dict, List, Optional, Protocol, Set, Tuple, TypeVar
 from hero_node import raise_file_limit
 
 from .call_queue import CallQueue
-from .link import Address, Link, LinkHandler, LinkOwner, describe_error, find_socket_address
+from .link import Address, Link, LinkHandler, LinkOwner, describe_error
 
 T = TypeVar("T")
 
@@ -57,6 +57,10 @@ THE_DRIVER_ENDS = "the driver ends"
 
 class NoAnswerError(Exception):
     """The loop did not answer in time: it hangs or has ended."""
+
+
+class HostNotFoundError(OSError):
+    """A host is neither an address nor a name that leads to one; the text says so of it."""
 
 
 class Reader(Protocol):
@@ -362,7 +366,13 @@ class EventLoop(LinkOwner):
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    family, kind, protocol, _, target = find_socket_address(Address(host, port), socket.AI_PASSIVE)
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+    except (OSError, ValueError) as error:
+        # What is no name at all ("10.42.0..1") is a UnicodeError of the codec for names.
+        reason = describe_error(error) if isinstance(error, OSError) else "not a host's name"
+        raise HostNotFoundError(f"{host!a} cannot be found ({reason})") from error
+    family, kind, protocol, _, target = found[0]
     sock = socket.socket(family, kind, protocol)
     try:
         # A driver that starts again must not wait for the old one's connections to time out.

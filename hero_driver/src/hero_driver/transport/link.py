@@ -6,7 +6,7 @@ import functools
 import socket
 import struct
 import termios
-from typing import Any, Callable, Deque, NamedTuple, Optional, Protocol
+from typing import Callable, Deque, NamedTuple, Optional, Protocol
 
 READ_LENGTH = 4096
 """Read at once from one robot: two bursts, or garbage that takes 1 ms, which delays the others by no more."""
@@ -25,20 +25,6 @@ class Address(NamedTuple):
 
     def __str__(self) -> str:
         return "[%s]:%d" % self if ":" in self.host else "%s:%d" % self
-
-
-class HostNotFoundError(OSError):
-    """A host is neither an address nor a name that leads to one; the text says so of it."""
-
-
-def find_socket_address(address: Address, flags: int = 0) -> Any:
-    """Return what socket.getaddrinfo() finds first for a TCP address; may block. Raises: HostNotFoundError."""
-    try:
-        return socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM, flags=flags)[0]
-    except (OSError, ValueError) as error:
-        # What is no name at all ("10.42.0..1") is a UnicodeError of the codec for names.
-        reason = describe_error(error) if isinstance(error, OSError) else "not a host's name"
-        raise HostNotFoundError(f"{address.host!a} cannot be found ({reason})") from error
 
 
 class LinkHandler:
