@@ -15,7 +15,6 @@ from hero_client.apps.joystick_teleop import (
     SILENCE_S,
     JoystickMapping,
     JoystickTeleop,
-    RobotChoice,
 )
 from hero_client.apps.keyboard_teleop import PERIOD_S, KeyboardTeleop
 from hero_client.apps.teleop_output import HOLD_ENDED, PAUSE_S, TeleopOutput
@@ -325,30 +324,21 @@ def test_buttons_choose_robots_and_those_that_are_left_stop(shown):
     assert [link.colors[-1][1] for link in swarm.links] == [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
 
 
-def test_a_choice_goes_round_keeps_and_returns_to_all():
-    swarm = make_swarm(0, 1, 2)
-    next_one, keep, everyone = (0, 0, 0, 0, 0, 1), (0, 0, 1), (0, 0, 0, 1)
-    choice = RobotChoice(swarm.robots, MAPPING)
-    for buttons, chosen, left in (
-        (keep, [0, 1, 2], []),  # nothing is chosen yet
-        (next_one, [0], [1, 2]),
-        (next_one, [0], []),  # still held
-        ((), [0], []),
-        (next_one, [1], [0]),
-        (keep, [1], []),
-        (next_one, [1, 2], []),
-        ((), [1, 2], []),
-        (next_one, [0, 1], [2]),
-        (everyone, [0, 1, 2], []),
-        (next_one, [0], [1, 2]),
-        (keep, [0], []),
-        (next_one, [0, 1], []),
-    ):
-        assert [robot.robot_id for robot in choice.read(buttons)] == left
-        assert [robot.robot_id for robot in choice.robots] == chosen
-        lit = [link.colors[-1][1] == (1.0, 1.0, 1.0) if link.colors else False for link in swarm.links]
-        assert lit == [len(chosen) < 3 and number in chosen for number in range(3)]
-    assert MAPPING[6:] == (5, 2, 3), "as the documents say"
+@pytest.mark.parametrize("numbers", [(0, 1, 2), (4,)])
+def test_a_button_chooses_one_robot_after_the_other_and_all_again(shown, numbers):
+    swarm = make_swarm(*numbers)
+    teleop = JoystickTeleop(swarm, MAPPING)
+    rounds = [[number] for number in numbers] if len(numbers) > 1 else []
+    for chosen in [*rounds, list(numbers), *rounds]:
+        for is_held in (1, 1, 0):  # a press counts once, however long it is held
+            swarm.sleep(0.1)
+            teleop.receive(Joy(axes=[0.0, 1.0], buttons=[0, 0, 0, 0, 1, is_held]))
+            teleop.step(swarm.now_s)
+        driven = [number for number, link in zip(numbers, swarm.links) if velocities(link)[-1:] == [(0.1, 0.0)]]
+        assert driven == chosen
+        lit = [number for number, link in zip(numbers, swarm.links) if link.colors[-1][1] == (1.0, 1.0, 1.0)]
+        assert lit == (chosen if len(numbers) > 1 and len(chosen) == 1 else [])
+    assert MAPPING[6:] == (5,), "as the documents say"
 
 
 def test_a_program_with_a_keyboard_ends_and_reads_as_it_should(shown, monkeypatch):

@@ -198,20 +198,20 @@ def test_a_short_press_of_the_stop_button_stops_all_robots_once(swarm):
     assert swarm.drivers.requests == [True]
 
 
-NEXT, KEEP, ALL = 5, 2, 3
+NEXT = 5
 
 
-def press(swarm, teleop, button):
-    use_stick(swarm, teleop, make_joy(1.0, pressed=[button]), 0.2)
+def press_next(swarm, teleop):
+    use_stick(swarm, teleop, make_joy(1.0, pressed=[NEXT]), 0.2)
     use_stick(swarm, teleop, make_joy(1.0), 0.8)
     return [robot.robot_id for robot in swarm if robot.velocity.linear_m_s > 0.05]
 
 
-def test_buttons_choose_one_robot_some_or_all_and_lights_show_it():
+def test_a_button_chooses_one_robot_or_all_and_lights_show_it():
     with StepSwarm(3, perfect=True) as swarm:
         swarm.drivers = Drivers()
         teleop = JoystickTeleop(swarm, MAPPING)
-        assert [press(swarm, teleop, button) for button in (NEXT, NEXT, KEEP, NEXT)] == [[0], [1], [1], [1, 2]]
-        assert [robot.light[:3] == (1.0, 1.0, 1.0) for robot in swarm] == [False, True, True]
-        assert press(swarm, teleop, ALL) == [0, 1, 2]
+        assert [press_next(swarm, teleop) for _ in range(3)] == [[0], [1], [2]]
+        assert [robot.light[:3] == (1.0, 1.0, 1.0) for robot in swarm] == [False, False, True]
+        assert press_next(swarm, teleop) == [0, 1, 2]
         assert not any(any(robot.light[:3]) for robot in swarm)

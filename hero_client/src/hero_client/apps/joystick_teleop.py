@@ -1,11 +1,11 @@
 """Drives robots with a joystick (sensor_msgs/Joy): only while the enable button is held and /joy is alive.
 
-Other buttons choose which ones, and stop all robots of all drivers.
+Other buttons choose one of several, and stop all robots of all drivers.
 """
 
 import math
 from collections import deque
-from typing import Any, Deque, List, NamedTuple, Optional, Sequence, Set
+from typing import Deque, NamedTuple, Optional, Sequence
 
 import rospy
 from sensor_msgs.msg import Joy
@@ -45,15 +45,7 @@ class JoystickMapping(NamedTuple):
     enable_button: int
     stop_button: int
     next_button: int = 5
-    """Chooses the next robot; after the last one the first. Buttons that a joystick lacks are never pressed."""
-    keep_button: int = 2
-    """Keeps the chosen robot, beside those that are chosen next."""
-    all_button: int = 3
-    """Chooses all robots again."""
-
-    def is_enabled(self, buttons: Sequence[int]) -> bool:
-        """Return whether the enable button is held."""
-        return self.enable_button < len(buttons) and bool(buttons[self.enable_button])
+    """Chooses the first robot, then the next one, after the last one all again."""
 
     def read(self, joy: Joy) -> Velocity:
         """Return the command of a message; STOP while the enable button is released or an axis is not finite.
@@ -70,56 +62,23 @@ class JoystickMapping(NamedTuple):
         if not math.isfinite(linear) or not math.isfinite(angular):
             rospy.logwarn_once("the joystick sends numbers that are not finite: the robot is stopped meanwhile")
             return STOP
-        if not self.is_enabled(joy.buttons):
+        if not is_held(joy.buttons, self.enable_button):
             return STOP
         return Velocity(linear * self.linear_m_s, angular * self.angular_rad_s)
 
 
-class RobotChoice:
-    """The robots of a swarm that a joystick drives: at first all. Their lights show a choice."""
-
-    def __init__(self, robots: Sequence[Any], buttons: JoystickMapping) -> None:
-        """robots: those of the swarm, in its order; buttons say which of the joystick's choose."""
-        self._robots = list(robots)
-        self._buttons = buttons
-        self._held: Set[int] = set()
-        self._current = -1  # of no robot: all are chosen
-        self._kept: Set[int] = set()
-
-    @property
-    def robots(self) -> List[Any]:
-        """Those that are chosen, in the order of the swarm."""
-        if self._current < 0:
-            return self._robots
-        return [robot for index, robot in enumerate(self._robots) if index == self._current or index in self._kept]
-
-    def read(self, buttons: Sequence[int]) -> List[Any]:
-        """Take the buttons of a message; return the robots that are no longer chosen."""
-        choosing = self._buttons.next_button, self._buttons.keep_button, self._buttons.all_button
-        held = {index for index in choosing if index < len(buttons) and buttons[index]}
-        pressed, self._held = held - self._held, held
-        before = self.robots
-        if self._buttons.all_button in pressed:
-            self._current = -1
-            self._kept.clear()
-        elif self._buttons.keep_button in pressed and self._current >= 0:
-            self._kept.add(self._current)
-        elif self._buttons.next_button in pressed:
-            self._current = (self._current + 1) % len(self._robots)
-        else:
-            return []
-        chosen = self.robots
-        for robot in self._robots:
-            robot.led(CHOSEN_COLOR if robot in chosen and self._current >= 0 else "off")
-        return [robot for robot in before if robot not in chosen]
+def is_held(buttons: Sequence[int], button: int) -> bool:
+    """Return whether a button is held; one that the joystick lacks never is."""
+    return button < len(buttons) and bool(buttons[button])
 
 
 class JoystickTeleop:
-    """Sends the joystick's commands to all robots of a swarm, or those that its buttons choose."""
+    """Sends the joystick's commands to all robots of a swarm, or to one that a button chooses, whose light is white."""
 
     def __init__(self, swarm: Swarm, mapping: JoystickMapping) -> None:
         """Drive swarm by the axes and buttons of mapping; start stopped."""
-        self._choice = RobotChoice(list(swarm), mapping)
+        self._chosen = list(swarm)
+        self._is_next_held = False
         self._presses: Deque[Sequence[int]] = deque(maxlen=PRESSES_MAX)
         self._swarm = swarm
         self._mapping = mapping
@@ -135,8 +94,7 @@ class JoystickTeleop:
     def receive(self, joy: Joy) -> None:
         """Take a message of the joystick; a press of the stop button stops all robots of the drivers."""
         # Here, because a short press may be over at the program's next step.
-        button = self._mapping.stop_button
-        is_pressed = button < len(joy.buttons) and bool(joy.buttons[button])
+        is_pressed = is_held(joy.buttons, self._mapping.stop_button)
         if is_pressed and not self._is_stop_pressed:
             self._swarm.drivers.request_stop(True)
         self._is_stop_pressed = is_pressed
@@ -178,15 +136,26 @@ class JoystickTeleop:
             )
         while self._presses:
             buttons = self._presses.popleft()
-            self._output.note_hold(self._mapping.is_enabled(buttons))
-            for robot in self._choice.read(buttons):
-                robot.drive(*STOP)
+            self._output.note_hold(is_held(buttons, self._mapping.enable_button))
+            was_next_held, self._is_next_held = self._is_next_held, is_held(buttons, self._mapping.next_button)
+            if self._is_next_held and not was_next_held:
+                self._choose_next()
         command = self._output.limit(command, self._swarm)
         if self._output.passes(command):
-            for robot in self._choice.robots:
+            for robot in self._chosen:
                 robot.drive(*command)
         self._report_stop()
         self._swarm.report_missing()
+
+    def _choose_next(self) -> None:
+        """Drive the next robot from now on; those that were driven stop."""
+        robots, before = self._swarm.robots, self._chosen
+        start = robots.index(before[0]) + 1 if len(before) == 1 else 0
+        self._chosen = robots[start : start + 1] or list(robots)
+        for robot in robots:
+            robot.led(CHOSEN_COLOR if len(self._chosen) < len(robots) and robot in self._chosen else "off")
+            if robot in before and robot not in self._chosen:
+                robot.drive(*STOP)
 
     def _report_stop(self) -> None:
         """Log once what came of a stop of all robots."""

@@ -1,4 +1,4 @@
-"""Drives robots with a joystick on /joy while the enable button is held; other buttons choose some, or stop all."""
+"""Drives robots with a joystick on /joy while the enable button is held; other buttons choose one, or stop all."""
 
 from hero_client import Program, ProgramError, open_swarm, read_parameters
 from hero_client.apps.joystick_teleop import JoystickMapping, JoystickTeleop
@@ -18,12 +18,10 @@ def main():
                 "enable_button": whole_number(4, 0, 63),
                 "stop_button": whole_number(1, 0, 63),
                 "next_button": whole_number(5, 0, 63),
-                "keep_button": whole_number(2, 0, 63),
-                "all_button": whole_number(3, 0, 63),
             }
         )
         ids = parameters.pop("robots")
-        for name in ("enable_button", "next_button", "keep_button", "all_button"):
+        for name in ("enable_button", "next_button"):
             if parameters["stop_button"] == parameters[name]:
                 raise ProgramError("~stop_button is %d, the same as ~%s" % (parameters[name], name))
         with open_swarm(program, ids, odom=False, proximity=False) as swarm:
