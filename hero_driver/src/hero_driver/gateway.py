@@ -367,28 +367,12 @@ class Gateway(LinkHandler):
             self._stops.release()
         self.note_change()
 
-    def stop_and_wait(self, answer: Callable[[None], None]) -> None:
-        """Stop every robot; say which may still move and call answer(None) when all rest, or after STOP_LIMIT_S."""
-
-        def finish(doubtful: List[Peer]) -> None:
-            self._report_doubtful(doubtful)
-            answer(None)
-
-        self.set_stopped(True)
-        self._stops.await_rest(self._list_stoppable(), time.monotonic() + STOP_LIMIT_S, finish)
-
-    def stop_without_loop(self) -> None:
-        """Stop every robot although the loop that serves them has broken; blocks."""
+    def stop_at_end(self) -> None:
+        """Stop every robot after the loop that served them, and say which may still move; blocks."""
         self.stopped = True
-        doubtful = self._stops.stop_without_loop(
-            self._list_stoppable(), time.monotonic() + STOP_LIMIT_S, self._read_without_loop
-        )
-        self._report_doubtful(doubtful)
-
-    def _report_doubtful(self, peers: List[Peer]) -> None:
-        """Say which robots may still move when the driver ends."""
-        if peers:
-            names = ", ".join(f"{peer.label} ({describe_doubt(peer)})" for peer in peers)
+        doubtful = self._stops.stop_and_wait(self._list_stoppable(), time.monotonic() + STOP_LIMIT_S, self._serve)
+        if doubtful:
+            names = ", ".join(f"{peer.label} ({describe_doubt(peer)})" for peer in doubtful)
             self._log.log("error", f"the driver ends, and these robots are not known to be at rest: {names}")
 
     def _list_stoppable(self) -> List[Peer]:
@@ -414,8 +398,10 @@ class Gateway(LinkHandler):
             text += " whether robots that were stopped are at rest; end other programs"
             self._log.log_throttled("warn", "overload", text)
 
-    def _read_without_loop(self, peer: Peer) -> None:
+    def _serve(self, peer: Peer) -> None:
+        """Write what waits for a robot, and take what it has sent, as the loop does."""
         try:
+            peer.link.flush()
             data = peer.link.read()
             if data:
                 self.receive_data(peer.link, data, time.monotonic())

@@ -60,6 +60,9 @@ REPORT_CHECK_S = 0.1
 MASTER_CHECK_S = 0.5
 """Time between two looks for the ROS master at the start."""
 
+HANG_WAIT_S = 1.0
+"""The loop ends within milliseconds of the stop of the robots, unless it hangs."""
+
 LEAVE_WAIT_S = 3.0
 """Time limit for unregistering at the ROS master; 50 robots take 0.5 s."""
 
@@ -152,12 +155,10 @@ class DriverNode:
     def close(self) -> None:
         """Stop all robots, then close their connections; safe to call twice."""
         if self._thread.is_alive():
-            try:
-                self._loop.ask(self._gateway.stop_and_wait, STOP_LIMIT_S + 0.3)
-            except NoAnswerError:
-                self._log.log("error", "the driver ends, and could not stop the robots: its loop hangs")
             self._loop.stop()
-            self._thread.join(1.0)
+            self._thread.join(STOP_LIMIT_S + HANG_WAIT_S)
+            if self._thread.is_alive():
+                self._log.log("error", "the driver ends, and could not stop the robots: its loop hangs")
         self._stop_interface.close()
         self._is_closed.set()
         self._registrar.close()

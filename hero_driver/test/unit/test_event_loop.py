@@ -426,19 +426,21 @@ def test_the_handler_and_every_other_link_are_polled_though_each_fails(still_loo
     assert first == [1000.0, 1, 3] and polled[3:] == [1000.0, 0] and len(handler.bugs) == 5
 
 
-@pytest.mark.parametrize("error", [RuntimeError, MemoryError, SystemExit, KeyboardInterrupt])
-def test_whatever_breaks_the_loop_robots_stop_before_connections_close(monkeypatch, error):
+@pytest.mark.parametrize("error", [None, RuntimeError, MemoryError, SystemExit, KeyboardInterrupt])
+def test_whatever_ends_the_loop_robots_stop_before_connections_close(monkeypatch, error):
     handler, steps = Handler(), []
     loop = EventLoop("127.0.0.1", 0, 1.0)
     loop.open(handler)
-    handler.stop_without_loop = lambda: steps.append("stop")
+    handler.stop_at_end = lambda: steps.append("stop")
     close_all = loop._close_all
 
     def break_down():
-        raise error
+        loop._end()
+        if error is not None:
+            raise error
 
     monkeypatch.setattr(loop, "_run_once", break_down)
     monkeypatch.setattr(loop, "_close_all", lambda: (steps.append("close"), close_all()))
-    with pytest.raises(error):
+    with pytest.raises(error) if error else contextlib.nullcontext():
         loop.run()
     assert steps == ["stop", "close"]

@@ -224,30 +224,12 @@ def test_wheels_that_turn_although_stopped_are_reported_and_stopped():
 
 @given(phase_s=phases, network_s=networks)
 def test_the_end_waits_for_rest_and_no_longer(phase_s, network_s):
-    ended = []
     with Clock().is_the_drivers() as clock:
+        clock.sleep = clock.run
         robot = make_moving(clock, "both controllers", phase_s=phase_s, network_s=network_s)
-        stop(robot)
-        robot.stops.await_rest([robot.peer], clock.now_s + 2.0, lambda doubtful: ended.append((clock.now_s, doubtful)))
-        began_s = clock.now_s
-        clock.run(5.0)
-    ((ended_s, doubtful),) = ended
-    assert doubtful == []
-    assert ended_s - began_s < CONFIRMED_S + 4 * network_s
-
-
-def test_the_end_waits_until_its_deadline_for_a_robot_that_does_not_rest():
-    ended = []
-    with Clock().is_the_drivers() as clock:
-        robot = CommandedRobot(clock, has_readings=True)
-        robot.motors.is_pushed = True
-        clock.run(1.0)
-        stop(robot)
-        robot.stops.await_rest([robot.peer], clock.now_s + 2.0, lambda doubtful: ended.append((clock.now_s, doubtful)))
-        clock.run(1.9)
-        assert ended == []
-        clock.run(0.2)
-    assert [doubtful for _, doubtful in ended] == [[robot.peer]]
+        robot.stopped, began_s = True, clock.now_s
+        assert robot.stops.stop_and_wait([robot.peer], clock.now_s + 2.0, lambda peer: None) == []
+    assert clock.now_s - began_s < CONFIRMED_S + 4 * network_s
 
 
 def test_a_tuning_that_begins_right_after_a_release_goes_on():
@@ -365,10 +347,8 @@ def test_a_robot_that_was_released_is_stopped_again_as_the_first_time():
 
 def test_a_deadline_that_has_come_is_not_waited_for():
     with Clock().is_the_drivers() as clock:
-        robot, ended = make_moving(clock, "pulses"), []
-        stop(robot)
-        robot.stops.await_rest([robot.peer], clock.now_s, ended.append)
-    assert ended == [[robot.peer]]
+        robot = make_moving(clock, "pulses")
+        assert robot.stops.stop_and_wait([robot.peer], clock.now_s, None) == [robot.peer]
 
 
 def test_why_a_robot_may_still_move_is_said_in_words():
@@ -386,20 +366,20 @@ def test_why_a_robot_may_still_move_is_said_in_words():
         assert describe_doubt(peer) == text
 
 
-def test_a_stop_without_a_loop_reads_and_advances_until_all_rest():
+def test_the_end_reads_and_advances_until_all_rest_or_its_deadline():
     with Clock().is_the_drivers() as clock:
         clock.sleep = clock.run
         robot = CommandedRobot(clock, has_readings=True)
         robot.publish_velocity(0.1)
         clock.run(1.0)
         robot.stopped, began_s, reads = True, clock.now_s, []
-        assert robot.stops.stop_without_loop([robot.peer], began_s + 2.0, reads.append) == []
+        assert robot.stops.stop_and_wait([robot.peer], began_s + 2.0, reads.append) == []
         assert clock.now_s - began_s < CONFIRMED_S and not robot.motors.is_turning
         assert set(map(id, reads)) == {id(robot.peer)}
         robot.motors.is_pushed = True
         began_s = clock.now_s
         robot.peer.stop = None
-        assert robot.stops.stop_without_loop([robot.peer], began_s + 2.0, reads.append) == [robot.peer]
+        assert robot.stops.stop_and_wait([robot.peer], began_s + 2.0, reads.append) == [robot.peer]
         assert 2.0 <= clock.now_s - began_s < 2.03
 
 

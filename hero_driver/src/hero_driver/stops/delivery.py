@@ -14,7 +14,7 @@ one write, below the robot's TCP window of 2144 bytes, and no second one before 
 """
 
 import time
-from typing import Callable, Iterable, List, Optional
+from typing import Callable, List, Optional
 
 from hero_node import MD5SUMS
 
@@ -118,32 +118,19 @@ class StopDelivery:
             return peer.stop.state
         return StopState.STOPPING if self._owner.stopped else StopState.NOT_STOPPED
 
-    def await_rest(self, peers: Iterable[Peer], deadline_s: float, then: Callable[[List[Peer]], None]) -> None:
-        """Call then(peers that are not known to be at rest) when all peers are at rest, or at deadline_s."""
-        waiting = list(peers)
+    def stop_and_wait(self, peers: List[Peer], deadline_s: float, serve: Callable[[Peer], None]) -> List[Peer]:
+        """Stop all peers without a loop; return those that are not known to be at rest by deadline_s. Blocks.
 
-        def check() -> None:
-            if time.monotonic() < deadline_s and any(map(_is_pending, waiting)):
-                self._call_later(POLL_S, check)
-            else:
-                then([peer for peer in waiting if _is_doubtful(peer)])
-
-        check()
-
-    def stop_without_loop(self, peers: Iterable[Peer], deadline_s: float, read: Callable[[Peer], None]) -> List[Peer]:
-        """Stop all peers although the loop has broken; return those that are not known to be at rest. Blocks.
-
-        read(peer) takes what a robot has sent.
+        serve(peer) writes what waits for a robot, and takes what it has sent.
         """
-        waiting = list(peers)
-        for peer in waiting:
+        for peer in peers:
             self.begin(peer)
-        while time.monotonic() < deadline_s and any(map(_is_pending, waiting)):
+        while time.monotonic() < deadline_s and any(map(_is_pending, peers)):
             time.sleep(POLL_S)
-            for peer in waiting:
-                read(peer)
+            for peer in peers:
+                serve(peer)
                 self._advance(peer, time.monotonic())
-        return [peer for peer in waiting if _is_doubtful(peer)]
+        return [peer for peer in peers if peer.stop is not None and peer.stop.state is not StopState.AT_REST]
 
     def _poll(self) -> None:
         now_s = time.monotonic()
@@ -207,10 +194,6 @@ def _is_pending(peer: Peer) -> bool:
     if peer.stop is None or peer.link.closed:
         return False
     return peer.stop.state not in (StopState.AT_REST, StopState.UNCONFIRMED)
-
-
-def _is_doubtful(peer: Peer) -> bool:
-    return peer.stop is not None and peer.stop.state is not StopState.AT_REST
 
 
 def describe_doubt(peer: Peer) -> str:

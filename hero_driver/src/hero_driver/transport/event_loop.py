@@ -119,17 +119,17 @@ class EventLoop(LinkOwner):
         self.call_later(POLL_INTERVAL_S, self._poll)
 
     def run(self) -> None:
-        """Serve until stop(); then close everything."""
+        """Serve until stop(), or until something breaks; then stop the robots, and close everything."""
         self._thread_id = threading.get_ident()
         self._turned_s = time.monotonic()
         try:
             while self._is_running:
                 self._run_once()
-        except BaseException:
-            self._handler.stop_without_loop()
-            raise
         finally:
-            self._close_all()
+            try:
+                self._handler.stop_at_end()
+            finally:
+                self._close_all()
 
     def _run_once(self) -> None:
         timeout_s = None

@@ -51,8 +51,8 @@ class LinkHandler:
     def report_bug(self, error: Exception) -> None:
         """One of the calls above, or one made for the loop, raised error; the loop continues."""
 
-    def stop_without_loop(self) -> None:
-        """The loop itself has broken and ends after this: stop what moves at the other ends; this may block."""
+    def stop_at_end(self) -> None:
+        """The loop has ended, or has broken: stop what moves at the other ends before they are closed; may block."""
 
     def warn_network(self, text: str) -> None:
         """Something about the network that the user should know."""
