@@ -18,7 +18,7 @@ from hero_node.parameters import (
     whole_number,
 )
 
-from .commands.command_settings import CommandSettings
+from .commands.command_queue import CommandSettings
 from .corrections.correction_settings import CorrectionSettings
 from .fleet.admission import AdmissionLimits
 from .rosserial.session import SessionLimits

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 from unittest import mock
 
 from hero_driver import peer
-from hero_driver.commands.command_settings import CommandSettings
+from hero_driver.commands.command_queue import CommandSettings
 from hero_driver.commands.velocity_shaper import STOP_PAYLOADS
 from hero_driver.corrections.correction_settings import CorrectionSettings
 from hero_driver.fleet.namespaces import identify

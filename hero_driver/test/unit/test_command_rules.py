@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from hero_driver.commands.command_settings import CommandSettings
+from hero_driver.commands.command_queue import CommandSettings
 from hero_driver.commands.service_requests import find_request_error
 from hero_driver.commands.velocity_shaper import ZERO_TWIST
 from hero_driver.corrections import message_layouts

@@ -30,6 +30,7 @@ from .ros_messages import (
     POSE_FORM,
     SCAN_FORM,
     TWIST_FORM,
+    TooLongError,
     encode_header,
     encode_list,
     encode_odometry,
@@ -39,7 +40,7 @@ from .ros_messages import (
     encode_transforms,
     encode_turn_scan,
     encode_twist,
+    find_messages,
 )
-from .tcpros import TooLongError, find_messages
 from .texts import list_names, make_printable, one_line, shorten, suggest
 from .token_bucket import TokenBucket, TokenBuckets

@@ -1,8 +1,8 @@
-"""ROS messages as bytes: md5 sums, layouts in the order of their definitions, and encoders. Pure."""
+"""ROS messages as bytes: md5 sums, layouts, encoders, and messages in a TCPROS stream, each behind its length. Pure."""
 
 import math
 import struct
-from typing import Iterable, Sequence, Tuple
+from typing import Iterable, Iterator, Sequence, Tuple, Union
 
 Numbers = Sequence[float]
 
@@ -108,3 +108,21 @@ def encode_turn_scan(
     step_rad = 2.0 * math.pi / len(ranges_m)
     settings = (-math.pi, math.pi - step_rad, step_rad, 0.0, scan_time_s, *limits_m)
     return encode_scan(header, settings, ranges_m, intensities)
+
+
+class TooLongError(ValueError):
+    """A length that no message has: the other end does not speak TCPROS."""
+
+
+def find_messages(data: Union[bytes, bytearray], length_max: int) -> Iterator[Tuple[int, int]]:
+    """Yield the start and end of each complete message. Raises: TooLongError behind the messages before it."""
+    end, data_length, prefix_length = 0, len(data), LENGTH.size
+    while data_length - end >= prefix_length:
+        length: int = LENGTH.unpack_from(data, end)[0]
+        if length > length_max:
+            raise TooLongError("a message of %d bytes; at most %d are accepted" % (length, length_max))
+        start = end + prefix_length
+        end = start + length
+        if end > data_length:
+            return
+        yield start, end

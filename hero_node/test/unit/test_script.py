@@ -65,8 +65,11 @@ def test_nodes_of_scripts_have_names_of_their_own_and_end_by_their_signals(monke
 
 
 def test_an_error_that_ends_a_thread_is_one_line(monkeypatch, capsys):
-    monkeypatch.setattr(threading, "excepthook", script._print_thread_exception)
-
+    monkeypatch.setattr(sys, "excepthook", sys.__excepthook__)
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+    monkeypatch.setattr(script.rospy.core, "is_initialized", lambda: True)
+    monkeypatch.setattr(script, "check_master", lambda: None)
+    script.start_node()
     monkeypatch.setattr(sys.modules["__main__"], "__file__", __file__, raising=False)
     monkeypatch.setattr(sys.modules["__main__"], "__spec__", None)
 

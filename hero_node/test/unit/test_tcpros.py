@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_node.tcpros import LENGTH, TooLongError, find_messages
+from hero_node.ros_messages import LENGTH, TooLongError, find_messages
 
 MESSAGES = [b"first", b"", b"third one"]
 STREAM = b"".join(LENGTH.pack(len(message)) + message for message in MESSAGES)

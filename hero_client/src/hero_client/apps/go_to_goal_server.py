@@ -27,9 +27,6 @@ FEEDBACK_PERIOD_S = 0.5
 CLOSE_TIMEOUT_S = 1.0
 """Giving up a goal takes 0.2 s."""
 
-MAX_QUEUED_GOALS = 100
-"""More goals at once are rejected."""
-
 MAX_QUATERNION_ENTRY = 1e3
 """A unit quaternion has no entry beyond 1."""
 
@@ -103,7 +100,7 @@ class GoToGoalServer:
         self.robot = robot
         self.reached = False
         self._tolerance_m, self._timeout_s, self._avoid = tolerance_m, timeout_s, avoid
-        self._requests: queue.Queue[GoalRequest] = queue.Queue(MAX_QUEUED_GOALS)
+        self._requests: queue.Queue[GoalRequest] = queue.Queue()
         self._cancelled: Any = None
         self._is_closed = False
         self._news = threading.Event()
@@ -136,7 +133,7 @@ class GoToGoalServer:
             if not (0.0 < tolerance_m < math.inf and 0.0 < timeout_s < math.inf):
                 text = "tolerance and timeout must be finite and not negative, not %g m, %g s"
                 raise InvalidGoalError(text % (tolerance_m, timeout_s))
-            self._put(GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
+            self._requests.put(GoalRequest(goal, frame, tolerance_m, timeout_s, handle))
 
     def _receive_cancel(self, handle: Any) -> None:
         self._cancelled = handle
@@ -144,14 +141,8 @@ class GoToGoalServer:
 
     def put_goal(self, goal: Goal, frame: str = "") -> None:
         """Accept a goal with the server's own tolerance and time limit; an empty frame means hero_N/odom."""
-        with self._rejecting():
-            self._put(GoalRequest(goal, frame, self._tolerance_m, self._timeout_s))
-
-    def _put(self, request: GoalRequest) -> None:
-        try:
-            self._requests.put_nowait(request)
-        except queue.Full:
-            raise InvalidGoalError("more than %d goals at once" % MAX_QUEUED_GOALS) from None
+        self._requests.put(GoalRequest(goal, frame, self._tolerance_m, self._timeout_s))
+        self._news.set()
 
     @contextmanager
     def _rejecting(self, handle: Any = None) -> Iterator[None]:

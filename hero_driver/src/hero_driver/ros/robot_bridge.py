@@ -11,7 +11,7 @@ from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 
 from hero_node import MD5SUMS
 
-from ..commands.command_settings import CommandSettings
+from ..commands.command_queue import CommandSettings
 from ..commands.service_requests import is_success, read_set_odom_pose
 from ..commands.velocity_shaper import STOP_PAYLOADS
 from ..corrections import message_layouts

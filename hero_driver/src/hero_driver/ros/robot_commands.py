@@ -8,8 +8,7 @@ import math
 import time
 from typing import Any, Callable, Dict, List, Optional, Protocol, Tuple
 
-from ..commands.command_queue import CommandQueue
-from ..commands.command_settings import CommandSettings
+from ..commands.command_queue import CommandQueue, CommandSettings
 from ..commands.command_sources import CommandSources
 from ..commands.service_requests import find_request_error
 from ..commands.stop_progress import StopState

@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from types import FrameType
-from typing import Any, Callable, NoReturn, Optional, Sequence, Type
+from typing import Any, NoReturn, Optional, Sequence, Type
 
 import rospkg
 import rospy
@@ -32,7 +32,7 @@ def start_node(name: str = "hero_program") -> None:
     """
     if sys.excepthook is sys.__excepthook__ and not hasattr(sys, "ps1"):  # no shell or notebook
         sys.excepthook = _print_exception
-        threading.excepthook = _print_thread_exception
+        threading.excepthook = lambda ended: _print_exception(*ended[:3])
     with _START:
         if rospy.core.is_initialized():
             check_master()  # rospy itself would wait for a master for ever
@@ -64,22 +64,12 @@ def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
     run(main)
 
 
-def _print_exception(kind: Type[BaseException], error: BaseException, traceback: Any) -> None:
+def _print_exception(kind: Type[BaseException], error: Any, traceback: Any) -> None:
     """Print a HeroError as one line and Ctrl-C not at all; a mistake in the script keeps its traceback."""
     if issubclass(kind, HeroError):
         print_error(str(error) + find_line(error))
-    elif not issubclass(kind, KeyboardInterrupt):
+    elif not issubclass(kind, (KeyboardInterrupt, SystemExit)):
         sys.__excepthook__(kind, error, traceback)
-
-
-def _print_thread_exception(
-    ended: threading.ExceptHookArgs, others: Callable[[threading.ExceptHookArgs], Any] = threading.excepthook
-) -> None:
-    """Print a HeroError that ends a thread as one line; others: prints other errors."""
-    if isinstance(ended.exc_value, HeroError):
-        print_error(str(ended.exc_value) + find_line(ended.exc_value))
-    else:
-        others(ended)
 
 
 def _raise_exit(number: int, frame: Optional[FrameType]) -> None:
