@@ -154,7 +154,8 @@ class LabCamera(NamedTuple):
         """Return the image that the camera makes of the light (H, W) that is reflected."""
         width, height = self.lens.size_px
         u, v = np.meshgrid(np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height))
-        light = light * (1.0 - self.vignette * (0.7 * (u**2 + v**2) / 2.0 + 0.15 * (1.0 + u)))
+        darker: np.ndarray = self.vignette * (0.35 * (u**2 + v**2) + 0.15 * (1.0 + u))
+        light = light * (1.0 - darker)
         light = cv2.GaussianBlur(light, (0, 0), self.blur_px)
         image = 255.0 * light ** (1.0 / self.gamma) + random.normal(0.0, self.noise, light.shape)
         gray = np.clip(np.rint(image), 0, 255).astype(np.uint8)
@@ -176,7 +177,7 @@ class LabCamera(NamedTuple):
         moments = MOMENTS if tag.speed_m_s or tag.turn_rad_s else 1
         patch = np.zeros(len(points_m))
         under = np.kron(light[low[1] : high[1], low[0] : high[0]], np.ones((SAMPLES, SAMPLES))).ravel()
-        for share in (np.arange(moments) + 0.5) / moments - 0.5:
+        for share in np.linspace(-0.5, 0.5, 2 * moments + 1)[1::2]:
             time_s = share * self.exposure_s
             yaw_rad = tag.yaw_rad + tag.turn_rad_s * time_s
             moved_m = tag.speed_m_s * time_s

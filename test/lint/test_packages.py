@@ -113,6 +113,18 @@ def test_every_package_xml_is_complete_and_like_the_others():
     assert len(versions) == 1, "all packages carry one version"
 
 
+def test_every_package_finds_alone_the_functions_that_build_it():
+    """In one workspace of catkin_make, functions that another package has found are there for all."""
+    for package in ORDER[1:-2]:  # but hero_msgs and the metapackages
+        build = (PACKAGES[package] / "CMakeLists.txt").read_text(encoding="utf-8")
+        (components,) = re.findall(r"^find_package\(catkin REQUIRED COMPONENTS (.*)\)$", build, re.MULTILINE)
+        has_messages = "generate_messages(" in build
+        assert components.split() == ["hero_msgs", *["message_generation"] * has_messages], package
+        root = ElementTree.parse(PACKAGES[package] / "package.xml").getroot()
+        needed = {found.text for kind in ("build_depend", "depend") for found in root.iter(kind)}
+        assert set(components.split()) <= needed, package
+
+
 def test_every_package_has_a_changelog_of_its_version():
     for package in PACKAGES:
         changelog = get_changelog_from_path(str(PACKAGES[package]), package)

@@ -88,6 +88,7 @@ def test_a_camera_that_tilted_a_little_blames_no_tag_before_all_agree():
         assert any("the camera has moved" in text for text in shifted.texts)
 
 
+@pytest.mark.slow
 def test_a_camera_that_did_not_move_stays_as_it_is():
     for count in (4, 6):
         shifted = Shifted(count, corner_px=0.15)

@@ -234,6 +234,7 @@ def test_a_tag_is_looked_for_by_its_print_with_the_heading_that_it_had():
     assert made[0].corners is corners and made[-1].corners is None and made[-1].side_px == SIDE_PX
 
 
+@pytest.mark.slow
 def test_a_tag_that_is_gone_is_looked_for_by_one_finer_detector_at_times():
     watch, tags = Watch(with_fine=True), everywhere()[:100:4]
     expected = dict(tags)

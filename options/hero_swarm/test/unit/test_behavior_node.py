@@ -346,6 +346,7 @@ def test_robots_of_others_are_avoided_by_their_own_radii(stage, tmp_path, speed_
     assert 0.0 < min(gaps_m) < 0.3, min(gaps_m)
 
 
+@pytest.mark.slow
 def test_robots_of_others_without_a_pose_are_named_and_new_ones_added(stage):
     stage.joined, stage.silent = range(5), {4}
     stage.start("wheel_genome", 3, safety="fence and robots")
@@ -385,6 +386,7 @@ def test_a_fence_that_limits_nothing_is_refused(stage, given, words):
         stage.start("wheel_genome", **given)
 
 
+@pytest.mark.slow
 def test_missing_poses_are_told_after_3_s_and_then_every_5_s(stage):
     stage.start("wheel_genome")
     stage.run(1.02)

@@ -286,6 +286,7 @@ def test_a_robot_at_walls_gives_a_good_model_or_none():
         ((1.0, 1.2, 1.0), "right wheel 1.2 times the nominal one is implausible"),
     ],
 )
+@pytest.mark.slow
 def test_an_implausible_body_is_refused_with_its_value(body, words, monkeypatch):
     monkeypatch.setattr(robot_fit, "fit_body", lambda recordings: np.array(body))
     monkeypatch.setattr(robot_fit, "predict_ends", lambda *arguments: np.array([[0.02], [0.01]]))
@@ -326,6 +327,7 @@ def test_a_nominal_robot_has_nothing_to_correct(tmp_path, monkeypatch):
         assert line.endswith(",left_wheel=1.0162,right_wheel=1.0162,slip=0.02,wheel_separation_m=0.063")
 
 
+@pytest.mark.slow
 def test_noise_does_not_decide_whether_a_nominal_robot_is_refused():
     fit = fit_robot([record(VELOCITY, 40.0, hidden=None)])
     assert max(fit.before_m, fit.after_m) < 0.004

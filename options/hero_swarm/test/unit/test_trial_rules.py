@@ -182,6 +182,7 @@ def test_robots_are_never_scattered_into_what_an_arena_holds(name):
     assert (uniform[..., :2] > low_m).all() and (uniform[..., :2] < high_m).all()
 
 
+@pytest.mark.slow
 def test_an_arena_without_room_for_the_robots_is_refused():
     full = build_rectangle(1.0, 1.0, 1)._replace(circles_m=np.array([(0.0, 0.0, 0.7)]), name="full")
     with pytest.raises(ValueError, match="3 robots find no place in 1 m x 1 m of arena full"):

@@ -173,7 +173,7 @@ class SourceClocks:
         told = effects @ self._covariance
         # More for what is not linear: delays that are hardly known are found in several steps.
         expected = told @ effects.T
-        weight = np.linalg.inv(expected + np.diag(noise + BENT * np.diagonal(expected)))
+        weight = np.linalg.inv(expected * (1.0 + BENT * np.eye(3)) + np.diag(noise))
         off = np.array(_subtract(seen, counted))
         if float(off @ weight @ off) > GATE:
             self._covariance[sources, sources] = np.minimum(DOUBT * self._covariance[sources, sources], START_SD_S**2)

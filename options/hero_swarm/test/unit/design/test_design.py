@@ -3,7 +3,7 @@
 import os
 import pickle
 import shutil
-import subprocess
+import signal
 import sys
 import zlib
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -22,7 +22,6 @@ from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.computing.cell_setup import set_up
 from hero_swarm.experiments.computing.engines import Engine
 from hero_swarm.experiments.errors import ExperimentError
-from hero_test.waiting import wait_for
 
 MISSIONS = Path(__file__).resolve().parents[3] / "examples" / "missions"
 MISSION = """\
@@ -50,10 +49,14 @@ class InProcess(Executor):
 
     left = 10**6
 
+    @staticmethod
+    def end():
+        raise KeyboardInterrupt
+
     def submit(self, function, *arguments):
         future = Future()
         if InProcess.left == 0:
-            raise KeyboardInterrupt
+            InProcess.end()
         InProcess.left -= 1
         future.set_result(function(*pickle.loads(pickle.dumps(arguments))))
         return future
@@ -159,23 +162,21 @@ def test_a_killed_design_goes_on_to_the_same_bytes(path, light, capsys):
 
 
 @pytest.mark.slow
-def test_a_design_that_was_killed_by_sigkill_ends_with_the_same_bytes(path):
-    command = [sys.executable, "-m", "hero_swarm", "design", "m.yaml", "--budget", "200", "--tests", "2", "--jobs", "1"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    history, wholes = Path("m_chocolate/design_1.csv"), []
-    for kills in ((), (3, 100)):
-        for lines in kills:
-            with subprocess.Popen(command, **quiet) as process:
-                wait_for(
-                    lambda n=lines: history.exists() and history.read_text().count("\n") >= n, "runs in the history"
-                )
-                process.kill()
-        subprocess.run(command, check=True, **quiet)
-        wholes.append({**read_all("m_chocolate"), **read_all("m_chocolate_simulated")})
-        assert history.read_text().count("\n") > 150 and "runs.csv" in wholes[-1]
-        for folder in (history.parent, Path("m_chocolate_simulated"), Path("m_chocolate_pseudo_reality")):
-            shutil.rmtree(str(folder))
-    assert wholes[0] == wholes[1]
+def test_a_design_that_was_killed_by_sigkill_ends_with_the_same_bytes(path, light, monkeypatch):
+    options, history = ["m.yaml", "--budget", "500"], Path("m_chocolate/design_1.csv")
+    program.main(options)
+    whole = read_all("m_chocolate")
+    shutil.rmtree("m_chocolate")
+    child = os.fork()
+    if child == 0:
+        InProcess.left = 3
+        monkeypatch.setattr(InProcess, "end", lambda: os.kill(os.getpid(), signal.SIGKILL))
+        program.main(options)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == signal.SIGKILL
+    assert 20 < history.read_text().count("\n") < whole["design_1.csv"].count(b"\n")
+    program.main(options)
+    assert read_all("m_chocolate") == whole
 
 
 @pytest.mark.slow
@@ -210,6 +211,7 @@ def test_parts_share_out_the_designs(path, light, capsys):
     assert len(capsys.readouterr().out.splitlines()) == 9
 
 
+@pytest.mark.slow
 def test_a_damaged_history_is_named_and_what_is_above_is_kept(path, light):
     options = ["m.yaml", "--budget", "200"]
     program.main(options)
@@ -311,6 +313,7 @@ def test_a_wrong_mission_is_named_with_its_line(path, old, new, words):
         program.main(["m.yaml", "--budget", "200"])
 
 
+@pytest.mark.slow
 def test_a_score_that_is_nan_or_tells_nothing_is_refused(path):
     (path.parent / "score.py").write_text(
         SCORE.replace("mean(axis=1)", "mean(axis=1) * (1.0 if state.time_s < 0.5 else float('nan'))")

@@ -47,6 +47,7 @@ def run_and_measure(trial, score, seconds):
     return value
 
 
+@pytest.mark.slow
 def test_robots_carry_items_from_sources_to_the_nest():
     forage = find_behavior(str(EXAMPLES / "missions" / "foraging.controller"))
     starts = np.array([[(0.75, 0.0, 0.0), (0.0, -0.9, 0.0), (0.0, 0.5, 0.0)]])

@@ -46,6 +46,7 @@ def test_columns_are_a_last_sample_a_mean_or_the_first_time_below_a_bound():
     assert take("nearest_neighbor: 1", series)[2] == 0.0, "it holds from the start on"
 
 
+@pytest.mark.slow
 def test_a_run_that_has_ended_has_no_more_samples_and_others_go_on(tmp_path):
     whole = compute(FILE, [11, 12, 13], str(tmp_path / "a"))
     series, poses = (np.load(str(tmp_path / ("a" + ending))) for ending in (METRICS_ENDING, POSES_ENDING))

@@ -79,6 +79,7 @@ def test_own_metrics_see_memory_sensors_and_colors_and_are_columns(path, capsys)
     assert "speed_m_s 0.1 against speed_m_s 0.05, 2 pairs: difference 0" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_an_edited_metric_or_module_of_it_is_other_code(path):
     run(path)
     path.with_name("scale.py").write_text("SCALE = 2.0\n")

@@ -44,6 +44,7 @@ def drive(text=FILE, lost_s=math.inf, found_s=math.inf):
         rows.advance(rows.now_ms + round(1000.0 / trial.rate_hz))
 
 
+@pytest.mark.slow
 def test_a_trial_ends_at_its_time_with_values_and_without_contact():
     trial, end_s, poses = drive()
     assert end_s == pytest.approx(12.0) and trial.remark == ""
@@ -162,6 +163,7 @@ def test_speeds_of_a_trial_are_those_between_its_samples(monkeypatch):
     assert [values[0] for values in late._samples] == [0.0, 0.0], "also where no time has passed"
 
 
+@pytest.mark.slow
 def test_a_trial_is_filtered_between_decisions_and_counts_limits(tmp_path):
     file = tmp_path / "meet.py"
     file.write_text(
