@@ -136,7 +136,7 @@ class Camera:
         device_controls._CONTROL.pack_into(data, 0, control, self.values[control])
 
 
-UVC = {"AUTO_EXPOSURE": 3, "EXPOSURE": 250, "AUTO_EXPOSURE_RATE": 1, "GAIN": 7, "POWER_LINE": 2, "FOCUS": 5}
+UVC = {"AUTO_EXPOSURE": 3, "EXPOSURE": 250, "AUTO_EXPOSURE_RATE": 1, "GAIN": 7, "FOCUS": 5}
 UVC["AUTO_FOCUS"] = 1
 
 
@@ -154,8 +154,8 @@ def warn(play, monkeypatch):
 
 def test_a_camera_takes_the_controls_of_its_file(warn):
     camera = Camera(**UVC)
-    assert warn(camera, 0.008, 30, 10, 50) == ""
-    taken = {"AUTO_EXPOSURE": 1, "EXPOSURE": 80, "AUTO_EXPOSURE_RATE": 0, "GAIN": 30, "POWER_LINE": 1, "FOCUS": 10}
+    assert warn(camera, 0.008, 30, 10) == ""
+    taken = {"AUTO_EXPOSURE": 1, "EXPOSURE": 80, "AUTO_EXPOSURE_RATE": 0, "GAIN": 30, "FOCUS": 10}
     assert camera.values == Camera(**taken, AUTO_FOCUS=0).values
 
 
@@ -170,11 +170,10 @@ def test_automatic_exposure_and_focus_are_named_with_a_remedy(warn):
 def test_what_a_camera_makes_of_its_controls_is_read_back(warn):
     camera = Camera(**{name: value for name, value in UVC.items() if name != "GAIN"})
     camera.steps[device_controls.EXPOSURE] = 50
-    camera.fixed = {device_controls.POWER_LINE, device_controls.AUTO_FOCUS}
-    assert warn(camera, 0.008, 30, 10, 50).split("; ") == [
+    camera.fixed = {device_controls.AUTO_FOCUS}
+    assert warn(camera, 0.008, 30, 10).split("; ") == [
         "exposure_s: the camera has 0.005, not 0.008",
         "the camera has no gain to set: take it out of the camera file",
-        "power_line_hz: the camera has 60, not 50",
         "the camera changes its focus by itself: set focus in the camera file, then calibrate the lens",
     ]
 

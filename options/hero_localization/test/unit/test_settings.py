@@ -146,7 +146,6 @@ def test_yaml_of_any_form_keeps_its_values(path, text):
         ("lens: {width_px: 10, height_px: 10, matrix: [0], distortion: []}", "not calibrated"),
         ("exposure_s: 8", "exposure_s is 8, but must be a number from 0.0001 to 1"),
         ("focus: auto", "focus is 'auto', but must be a whole number from 0 to"),
-        ("power_line_hz: 55", "power_line_hz is 55, but must be 0, 50 or 60"),
     ],
 )
 def test_a_wrong_file_is_refused_with_file_and_remedy(path, text, reason):
@@ -157,8 +156,8 @@ def test_a_wrong_file_is_refused_with_file_and_remedy(path, text, reason):
 
 
 def test_controls_of_a_camera_are_read(path):
-    write(path, "exposure_s: 0.008\nfocus: 0\npower_line_hz: 50\n")
-    assert settings.load(path).controls == (0.008, None, 0, 50)
+    write(path, "exposure_s: 0.008\nfocus: 0\n")
+    assert settings.load(path).controls == (0.008, None, 0)
 
 
 def test_a_file_that_cannot_be_written_is_an_error(tmp_path):
@@ -231,8 +230,8 @@ def test_numbers_are_taken_up_to_their_limits(path, key, low, high):
 def test_what_a_file_leaves_out_has_its_default(path):
     write(path, "references: {100: [1, 2, 90]}\nmounts: {3: [0.01, 0.02, -90]}\n")
     found = settings.load(path)
-    assert (found.decimate, found.delay_s, found.controls) == (2.0, 0.0, (None, None, None, None))
-    assert settings.Settings()[2:] == (2.0, TagLayout(), None, None, 0.0, {}, (None, None, None, None), 0.0)
+    assert (found.decimate, found.delay_s, found.controls) == (2.0, 0.0, (None, None, None))
+    assert settings.Settings()[2:] == (2.0, TagLayout(), None, None, 0.0, {}, (None, None, None), 0.0)
     assert found.layout[-3:] == (0.04, 0.076, 0.1)
     assert found.layout.references[100] == Pose(1.0, 2.0, math.pi / 2.0)
     assert found.layout.mounts[3] == pytest.approx((0.01, 0.02, -math.pi / 2.0))

@@ -1,7 +1,7 @@
-"""Controls of a USB camera that must not change by themselves: exposure, gain, focus; and its power-line filter.
+"""Controls of a USB camera that must not change by themselves: exposure, gain, focus.
 
-A lens is calibrated for one focus; a long exposure blurs moving tags. OpenCV knows no power-line filter, and not what a
-camera made of a value: they are written and read back through the kernel. Source: linux/videodev2.h, v4l2-controls.h.
+A lens is calibrated for one focus; a long exposure blurs moving tags. OpenCV does not tell what a camera made of a
+value: they are written and read back through the kernel. Source: linux/videodev2.h, v4l2-controls.h.
 """
 
 import fcntl
@@ -13,7 +13,7 @@ GET_CONTROL, SET_CONTROL = 0xC008561B, 0xC008561C
 """VIDIOC_G_CTRL, VIDIOC_S_CTRL: of a struct v4l2_control, id and value."""
 _CONTROL = struct.Struct("=Ii")
 
-AUTO_GAIN, GAIN, POWER_LINE = 0x00980912, 0x00980913, 0x00980918
+AUTO_GAIN, GAIN = 0x00980912, 0x00980913
 AUTO_EXPOSURE, EXPOSURE, AUTO_EXPOSURE_RATE = 0x009A0901, 0x009A0902, 0x009A0903
 FOCUS, AUTO_FOCUS = 0x009A090A, 0x009A090C
 
@@ -22,8 +22,6 @@ MANUAL_EXPOSURE = 1
 """Values of AUTO_EXPOSURE; both that are on leave the time to the camera."""
 
 EXPOSURE_STEP_S = 1e-4
-POWER_LINES_HZ = (0, 50, 60)
-"""By the value of POWER_LINE; 0: no filter."""
 
 
 class DeviceControls(NamedTuple):
@@ -32,7 +30,6 @@ class DeviceControls(NamedTuple):
     exposure_s: Optional[float] = None
     gain: Optional[int] = None
     focus: Optional[int] = None
-    power_line_hz: Optional[int] = None
 
 
 def call_control(path: str, request: int, control: int, value: int = 0) -> Optional[int]:
@@ -63,8 +60,6 @@ def apply_controls(controls: DeviceControls, path: str) -> List[str]:
         wanted["gain"] = {AUTO_GAIN: 0, GAIN: controls.gain}
     if controls.focus is not None:
         wanted["focus"] = {AUTO_FOCUS: 0, FOCUS: controls.focus}
-    if controls.power_line_hz is not None:
-        wanted["power_line_hz"] = {POWER_LINE: POWER_LINES_HZ.index(controls.power_line_hz)}
     for key, values in wanted.items():
         for control, value in values.items():
             call_control(path, SET_CONTROL, control, value)
@@ -83,8 +78,4 @@ def apply_controls(controls: DeviceControls, path: str) -> List[str]:
 
 def _scale(key: str, value: int) -> str:
     """Return a value of the device in units of the camera file."""
-    if key == "exposure_s":
-        return f"{value * EXPOSURE_STEP_S:g}"
-    if key == "power_line_hz" and 0 <= value < len(POWER_LINES_HZ):
-        return str(POWER_LINES_HZ[value])
-    return str(value)
+    return f"{value * EXPOSURE_STEP_S:g}" if key == "exposure_s" else str(value)

@@ -1,4 +1,4 @@
-"""Images of one camera, gray, with the time at which they were taken: from topics, a V4L2 device or a video file."""
+"""Images of one camera, gray, with the time at which they were taken: from topics, a V4L2 device or a URL."""
 
 import ctypes
 import itertools
@@ -12,9 +12,6 @@ import cv2
 import numpy as np
 import rospy
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
-
-from hero_node import clamp
-from hero_node.ros import read_duration_clock_s
 
 from ..errors import FrameSourceError
 from .camera_model import Intrinsics
@@ -177,8 +174,7 @@ class DeviceSource(FrameSource):
         self._thread.start()
 
     def _open(self) -> Any:
-        backend = cv2.CAP_V4L2 if self._path.startswith(_DEVICES) else cv2.CAP_ANY
-        capture = _open_capture(self._path, backend, "no camera, or another program uses it")
+        capture = _open_capture(self._path)
         capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter_fourcc(*"MJPG"))
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, self._size_px[0])
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, self._size_px[1])
@@ -217,7 +213,7 @@ class DeviceSource(FrameSource):
 
     def _decode(self, received: Tuple[float, np.ndarray, int]) -> Frame:
         stamp_s, image, number = received
-        return Frame(stamp_s, _make_gray(image), number)
+        return Frame(stamp_s, cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image, number)
 
     def close(self) -> None:
         self._ending.set()
@@ -225,79 +221,32 @@ class DeviceSource(FrameSource):
         self._capture.release()
 
 
-class VideoSource(FrameSource):
-    """A video file, played in real time; it waits for a program that is slower, so that no image is lost."""
-
-    def __init__(self, path: str) -> None:
-        """Raises: FrameSourceError if it cannot be opened."""
-        super().__init__()
-        self._path = path
-        self._capture = _open_capture(path, cv2.CAP_ANY, "no video that OpenCV can read")
-        self._start_s = read_duration_clock_s()
-        self._numbers = itertools.count()
-        self._next: Optional[Frame] = None
-
-    def poll(self, timeout_s: float) -> Optional[Frame]:
-        """Return the next image as soon as it is due; None if that is later than timeout_s, or there is none."""
-        if self._next is None:
-            self._next = self._read()
-        wait_s = timeout_s if self._next is None else self._next.stamp_s - read_duration_clock_s()
-        time.sleep(clamp(max(0.0, wait_s), timeout_s))
-        if self._next is None or wait_s > timeout_s:
-            return None
-        frame, self._next = self._next, None
-        self.arrived_s = rospy.get_time()
-        self._start_s += read_duration_clock_s() - frame.stamp_s
-        return frame._replace(stamp_s=self.arrived_s)
-
-    def _read(self) -> Optional[Frame]:
-        is_read, image = self._capture.read()
-        if not is_read:
-            self.problem = f"{self._path} gives no more images: the video has ended"
-            return None
-        stamp_s = self._start_s + self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
-        return Frame(stamp_s, _make_gray(image), next(self._numbers))
-
-    def close(self) -> None:
-        self._capture.release()
-
-
-def _make_gray(image: np.ndarray) -> np.ndarray:
-    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 else image
-
-
-def _open_capture(path: str, backend: int, reason: str) -> Any:
-    """Open a device or a video. Raises: FrameSourceError with what OpenCV does not tell, or else with this reason."""
-    if _URL not in path:
-        is_device = path.startswith(_DEVICES)
+def _open_capture(path: str) -> Any:
+    """Open a device or an address. Raises: FrameSourceError with what OpenCV does not tell."""
+    is_device = path.startswith(_DEVICES)
+    if is_device:
         if not os.path.exists(path):
-            raise FrameSourceError(f"{path} does not exist{'; ls /dev/video* lists cameras' if is_device else ''}")
-        mode = os.stat(path).st_mode
-        if stat.S_ISDIR(mode):
-            raise FrameSourceError(f"{path} is a folder, but must be a camera or a video")
-        if not (stat.S_ISCHR(mode) if is_device else stat.S_ISREG(mode)):  # a pipe would be waited for
-            kind = "a camera" if is_device else "a video file"
-            raise FrameSourceError(f"{path} is a pipe, socket or file of another kind, but must be {kind}")
+            raise FrameSourceError(f"{path} does not exist; ls /dev/video* lists cameras")
+        if not stat.S_ISCHR(os.stat(path).st_mode):  # a pipe would be waited for
+            raise FrameSourceError(f"{path} is no camera, but a folder, pipe, socket or file of another kind")
         if not os.access(path, os.R_OK):
-            remedy = ": sudo usermod -aG video $USER, and log in again" if is_device else ""
-            raise FrameSourceError(f"{path} may not be read by this user{remedy}")
-    capture = cv2.VideoCapture(path, backend)
+            raise FrameSourceError(f"{path} may not be read by this user: sudo usermod -aG video $USER, and log in again")
+    capture = cv2.VideoCapture(path, cv2.CAP_V4L2 if is_device else cv2.CAP_ANY)
     if not capture.isOpened():
-        raise FrameSourceError(f"{path} cannot be opened: {reason}")
+        raise FrameSourceError(f"{path} cannot be opened: no camera, or another program uses it")
     return capture
 
 
 def open_source(image: str, device: str, size_px: str, rate_hz: float, controls: DeviceControls) -> FrameSource:
-    """Return the source of images: the device or video if one is named, else the topic image.
+    """Return the source of images: the device, such as /dev/video0, or URL if one is named, else the topic image.
 
-    Raises: FrameSourceError for a device or video that cannot be opened, or an invalid size.
+    Raises: FrameSourceError for a device that cannot be opened, or an invalid size.
     """
     if not device:
         return TopicSource(rospy.resolve_name(image))
-    path = os.path.expanduser(device)
-    if not path.startswith(_DEVICES) and _URL not in path:
-        return VideoSource(path)
+    if not device.startswith(_DEVICES) and _URL not in device:
+        raise FrameSourceError(f"the device is {device!r}, but must be such as /dev/video0, or a URL")
     words = size_px.split("x")
     if len(words) != 2 or not all(word.strip().isdecimal() for word in words):
         raise FrameSourceError(f"the size of images is {size_px!r}, but must be such as 1920x1080")
-    return DeviceSource(path, (int(words[0]), int(words[1])), rate_hz, controls)
+    return DeviceSource(device, (int(words[0]), int(words[1])), rate_hz, controls)

@@ -8,6 +8,7 @@ import math
 from collections import deque
 from typing import Deque, Dict, Sequence, Tuple
 
+import cv2
 import numpy as np
 from scipy import ndimage
 
@@ -184,13 +185,7 @@ class OccupancyGrid:
 
 def _widen(cells: np.ndarray) -> np.ndarray:
     """Return cells and their eight neighbors (rows, columns); scipy's binary_dilation takes 20 times as long."""
-    rows = cells.copy()
-    rows[1:] |= cells[:-1]
-    rows[:-1] |= cells[1:]
-    wide = rows.copy()
-    wide[:, 1:] |= rows[:, :-1]
-    wide[:, :-1] |= rows[:, 1:]
-    return wide
+    return cv2.dilate(cells.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 
 
 class _Robot:

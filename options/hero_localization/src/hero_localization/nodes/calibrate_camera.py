@@ -28,7 +28,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("part", choices=("lens", "arena", "robots"), help="what to calibrate, in this order")
     parser.add_argument("--file", default=camera_file.DEFAULT_PATH, help="camera file (%(default)s)")
     parser.add_argument("--image", default="camera/image_raw", help="topic of the images (%(default)s)")
-    parser.add_argument("--device", default="", help="instead of a topic: /dev/video0, a URL, or a video file")
+    parser.add_argument("--device", default="", help="instead of a topic: /dev/video0, or a URL")
     parser.add_argument("--size", default="1920x1080", help="size of a device's images (%(default)s)")
     parser.add_argument("--rate", type=float, default=30.0, help="rate of a device, Hz (%(default)s)")
     parser.add_argument("--yaml", metavar="FILE", help="lens: take the result of camera_calibration")

@@ -215,7 +215,7 @@ PARAMETERS = {
     "image": string(
         "camera/image_raw", "sensor_msgs/Image or CompressedImage (`.../compressed`), with its camera_info beside it"
     ),
-    "device": string("", "instead: a V4L2 device such as `/dev/video0`, the URL of a network camera, or a video file"),
+    "device": string("", "instead: a V4L2 device such as `/dev/video0`, or the URL of a network camera"),
     "size_px": string("1920x1080", "of the images of a device"),
     "rate_hz": number(30.0, 1.0, 240.0, "Hz", "of a device"),
     "file": string(camera_file.DEFAULT_PATH, "[camera file](#camera-file)"),

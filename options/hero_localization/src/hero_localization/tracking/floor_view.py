@@ -1,19 +1,15 @@
 """Images as seen from straight above, to scale, so that they lie under a map. Knows images, not ROS."""
 
-import math
 from typing import Collection, Sequence, Tuple
 
 import cv2
 import numpy as np
 
-from ..camera.camera_model import Camera
+from ..camera.camera_model import EQUIDISTANT, Camera
 from ..errors import SettingsError
 from .tag_pose import TagCorners
 
 MAX_SIDE_PX = 1280
-
-STEP_PX = 8
-"""Pixels are found in such steps, with those between on a line: all of them would hold up the tracker."""
 
 MAX_REACH = 3.0
 """Reach of the view to each side of the camera, in heights of the camera: a tilted camera sees to the horizon."""
@@ -38,13 +34,13 @@ class FloorView:
         self._px_per_m = MAX_SIDE_PX / max(right_m - left_m, high_m - low_m)
         width_px = round((right_m - left_m) * self._px_per_m)
         height_px = round((high_m - low_m) * self._px_per_m)
-        across, down = ((np.arange(math.ceil(side / STEP_PX) + 2) - 0.5) * STEP_PX for side in (width_px, height_px))
-        grid = np.meshgrid(left_m + across / self._px_per_m, high_m - down / self._px_per_m)
-        points_m = np.column_stack([axis.ravel() for axis in grid] + [np.full(grid[0].size, height_m)])
-        coarse = np.nan_to_num(camera.project(points_m), nan=-1e4).reshape(*grid[0].shape, 2).astype(np.float32)
-        sources = cv2.resize(coarse, None, fx=STEP_PX, fy=STEP_PX, interpolation=cv2.INTER_LINEAR)
-        shown = slice(STEP_PX, STEP_PX + height_px), slice(STEP_PX, STEP_PX + width_px)
-        self._maps = cv2.convertMaps(np.ascontiguousarray(sources[shown]), None, cv2.CV_16SC2)
+        lens, (x_m, y_m, z_m), scale_m = camera.lens, camera.position_m, 1.0 / self._px_per_m
+        corner_m = (left_m + scale_m / 2.0 - x_m, high_m - scale_m / 2.0 - y_m, height_m - z_m)
+        to_ray = camera.rotation @ np.column_stack(((scale_m, 0.0, 0.0), (0.0, -scale_m, 0.0), corner_m))
+        module = cv2.fisheye if lens.model == EQUIDISTANT else cv2
+        self._maps = module.initUndistortRectifyMap(
+            lens.matrix, lens.distortion, np.eye(3), np.linalg.inv(to_ray), (width_px, height_px), cv2.CV_16SC2
+        )
 
     def _find_box(self) -> Tuple[float, float, float, float]:
         lens = self.camera.lens
@@ -64,7 +60,7 @@ class FloorView:
 
     def rectify(self, gray: np.ndarray) -> np.ndarray:
         """Return a camera's image (H, W) as seen from above: x right, y up, black where it saw nothing."""
-        return cv2.remap(gray, self._maps[0], self._maps[1], cv2.INTER_LINEAR)
+        return cv2.remap(gray, *self._maps, cv2.INTER_LINEAR)
 
     def find_pixels(self, pixels: np.ndarray) -> np.ndarray:
         """Return where pixels (N, 2) of the camera's image are in the view."""

@@ -26,7 +26,7 @@ from hero_node.files import (
 from hero_node.parameters import MAX_COORDINATE_M
 
 from ..camera.camera_model import MODELS, PLUMB_BOB, Camera, Intrinsics
-from ..camera.device_controls import POWER_LINES_HZ, DeviceControls
+from ..camera.device_controls import DeviceControls
 from ..errors import SettingsError
 from ..prints.tag_images import DEFAULT_SIZE_M, FAMILIES, REFERENCE_SIZE_M
 from .detectors import BACKENDS, DEFAULT_BACKEND
@@ -137,9 +137,7 @@ _NUMBERS = {
 }
 """Default and limits."""
 
-_OTHERS = (
-    "detector family lens camera references seen_references objects tag_robots mounts gain focus power_line_hz".split()
-)
+_OTHERS = "detector family lens camera references seen_references objects tag_robots mounts gain focus".split()
 
 
 def _build(root: Entry) -> Settings:
@@ -165,9 +163,6 @@ def _build(root: Entry) -> Settings:
     _check_meanings(layout, content)
     lens = _build_lens(content["lens"]) if "lens" in content else None
     gain, focus = (content[key].whole(0, MAX_ID) if key in content else None for key in ("gain", "focus"))
-    line_hz = content["power_line_hz"].whole(0, 60) if "power_line_hz" in content else None
-    if line_hz not in (None, *POWER_LINES_HZ):
-        content["power_line_hz"].refuse("0, 50 or 60")
     return Settings(
         content["detector"].choice(sorted(BACKENDS)) if "detector" in content else DEFAULT_BACKEND,
         content["family"].choice(sorted(FAMILIES)) if "family" in content else "36h11",
@@ -177,7 +172,7 @@ def _build(root: Entry) -> Settings:
         _build_camera(content["camera"], lens) if "camera" in content else None,
         numbers["delay_s"],
         _by_tag(content, "seen_references", _read_pose),
-        DeviceControls(numbers["exposure_s"], gain, focus, line_hz),
+        DeviceControls(numbers["exposure_s"], gain, focus),
         numbers["arena_sd_m"],
     )
 
