@@ -16,7 +16,7 @@ from hero_localization.prints.tag_images import draw_tag
 
 SAMPLES = 4
 MOMENTS = 5
-MAX_RADIUS, RADIUS_STEP = 1.6, 1e-4
+MAX_RADIUS, RADIUS_STEP = 3.0, 1e-4
 """Of rays, per unit of depth."""
 BOARD_CELLS_PX, BOARD_MARGIN = 60, 1
 """Of a square of the board; white squares around it."""
@@ -33,10 +33,20 @@ class LabLens(NamedTuple):
     k1: float
     k2: float
     size_px: Tuple[int, int] = (1920, 1080)
+    k4: float = 0.0
+    """Of the denominator: a rational lens."""
+    is_fisheye: bool = False
+
+    def bend(self, radius: np.ndarray) -> np.ndarray:
+        """Return the distance from the principal point at which rays of this slope are seen, by the focal length."""
+        bent = np.arctan(radius) if self.is_fisheye else radius
+        return bent * (1.0 + self.k1 * bent**2 + self.k2 * bent**4) / (1.0 + self.k4 * bent**2)
 
 
 LENS_A = LabLens(1391.0, -0.32, 0.11)
 LENS_B = LabLens(900.0, -0.38, 0.16)
+FISHEYE = LabLens(700.0, -0.02, 0.004, is_fisheye=True)
+RATIONAL = LabLens(800.0, -0.1, 0.02, k4=0.2)
 
 
 class LabTag(NamedTuple):
@@ -86,15 +96,15 @@ class LabCamera(NamedTuple):
 
     def _bend(self, rays: np.ndarray) -> np.ndarray:
         """Return the pixels (N, 2) that show rays (N, 2), per unit of depth."""
-        r2 = (rays**2).sum(axis=1, keepdims=True)
-        return rays * (1.0 + self.lens.k1 * r2 + self.lens.k2 * r2**2) * self.lens.focal_px + self.center_px
+        radius = np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-12)
+        return rays * self.lens.bend(radius) / radius * self.lens.focal_px + self.center_px
 
     def _find_rays(self, pixels: np.ndarray) -> np.ndarray:
         """Return the rays (N, 2), per unit of depth, that pixels (N, 2) show; those beyond the lens's rim are its."""
         bent = (pixels - self.center_px) / self.lens.focal_px
         bent_r = np.hypot(*bent.T)
         radius = np.arange(0.0, MAX_RADIUS, RADIUS_STEP)
-        image_r = radius * (1.0 + self.lens.k1 * radius**2 + self.lens.k2 * radius**4)
+        image_r = self.lens.bend(radius)
         rising = int(np.argmax(np.append(np.diff(image_r) <= 0.0, True))) + 1
         found_r = np.interp(bent_r, image_r[:rising], radius[:rising])
         rays: np.ndarray = bent * (found_r / np.maximum(bent_r, 1e-12))[:, None]

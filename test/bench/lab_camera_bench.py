@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from lab_camera import LENS_A, LENS_B, LabCamera, LabLens, LabTag
 from lab_filter import measure_ages, measure_uncertainty
+from lab_lenses import measure_models
 from measuring import print_machine
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
@@ -25,7 +26,13 @@ from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors
 from hero_localization.tracking.settings import Settings
-from hero_localization.tracking.tag_pose import DEFAULT_HEIGHT_M, TagCorners, TagLayout, find_smallest_side, list_corners
+from hero_localization.tracking.tag_pose import (
+    DEFAULT_HEIGHT_M,
+    TagCorners,
+    TagLayout,
+    find_smallest_side,
+    list_corners,
+)
 from hero_localization.tracking.tag_search import TagSearch
 from hero_localization.tracking.tracker import Tracker
 from hero_node import Pose
@@ -400,6 +407,7 @@ PARTS: Dict[str, Callable[[int], None]] = {
     "ages": lambda seeds: measure_ages(),
     "uncertainty": measure_uncertainty,
     "lenses": measure_lenses,
+    "models": measure_models,
 }
 
 

@@ -36,6 +36,8 @@ FOUND = {
 def calibrate(tmp_path, monkeypatch):
     """Return a function that calibrates robots, each of which drives as FOUND says, and returns status and settings."""
     path = str(tmp_path / "camera.yaml")
+    camera = CameraOptions(position_m=(0.0, 0.0, 2.5)).geometry  # 3.5 mm of height are 0.033 px
+    settings.update(path, settings.describe_camera(camera, {}))
     settings.update(path, {"mounts": {8: [0.003, 0.0, 5.0]}, "tag_robots": {12: 2}, "references": {100: [0, 0, 0]}})
 
     def watch(pictures, program, robot_id, tag_id):

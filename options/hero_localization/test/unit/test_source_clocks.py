@@ -27,6 +27,7 @@ class Drive:
         self.delays_s, self.lines, self.next_s = delays_s, [], 0.0
         self.speed = self.goal = np.zeros(2)
         self.true, self.counted = [np.zeros(3)], np.zeros(3)
+        self.odometry_ahead_s = 0.0
 
     def _move(self, pose, speed):
         heading = pose[2] + speed[1] * STEP_S / 2.0
@@ -56,14 +57,15 @@ class Drive:
             self.true.append(self._move(self.true[-1], self.speed))
             self.counted = self._move(self.counted, WHEELS * self.speed)
             if step % 3 == 0:
-                self.lines += self.localizer.add_odometry(4, self.now_s, Pose(*self.counted), self.now_s)
+                stamp_s = self.now_s + self.odometry_ahead_s
+                self.lines += self.localizer.add_odometry(4, stamp_s, Pose(*self.counted), self.now_s)
                 self.lines += self.localizer.find_lost(self.now_s)
             for index, delay_s in enumerate(self.delays_s):
                 if step % 3 == 1 + index:
                     self._take((TRACK, TRACK_2)[index], delay_s)
             (robot,) = self.localizer.list_robots(self.now_s)
             if robot.estimate is not None and step > duration_s / STEP_S - 200:
-                true = self.true[round(robot.estimate.stamp_s / STEP_S)]
+                true = self.true[min(round(robot.estimate.stamp_s / STEP_S), len(self.true) - 1)]
                 errors_m.append(math.dist(robot.estimate.pose[:2], true[:2]))
         return max(errors_m)
 
@@ -96,6 +98,22 @@ def test_a_clock_that_is_off_is_named_only_where_it_is_not_corrected():
     assert text.endswith("ms late")
     drive.motion = lambda now_s: (0.2, 1.0)
     assert drive.run(4.0) > 0.015
+
+
+@pytest.mark.slow
+def test_a_camera_is_not_blamed_for_a_robots_clock_that_was_set_ahead():
+    drive = Drive([0.0], motion=lambda now_s: (0.1, 2.0 if now_s % 1.0 < 0.5 else -2.0))
+    drive.run(2.5)
+    for ahead_s in (0.018, 0.0):
+        drive.odometry_ahead_s = ahead_s
+        for _ in range(5):
+            drive.run(0.5)
+            assert list_clocks(drive) == [], ahead_s
+    assert [line for line in drive.lines if "chrony" in line] == []
+    drive.odometry_ahead_s = 0.03
+    drive.run(9.0)
+    ((_, text),) = list_clocks(drive)
+    assert "early" in text
 
 
 @pytest.mark.slow

@@ -22,6 +22,9 @@ MARGIN_CELLS = 2
 """Margin of white around the print, of which SEEN_CELLS are compared."""
 SEEN_CELLS = 0.7
 
+MAX_SIZE_ERROR_PX = 0.033
+"""Error of the size of a robot's tag, by many images of some robots: half of what 5 mm of height change of 25 px."""
+
 ROUNDS, MIN_GAIN = 20, 1e-4
 FIRST_BLUR_PX = 0.8
 STEPS = np.array((0.002, 0.02, 0.5, 0.5, 0.02))
@@ -74,6 +77,13 @@ def estimate_height(
     own_m = fit_squares(camera, [_scale(tag, fit[0])], layout.height_m)[0].size_m
     from_camera_m = float(camera.position_m[2]) - layout.height_m
     return layout.height_m + from_camera_m - from_camera_m * layout.size_m * scale.share / own_m
+
+
+def find_height_error(camera: Camera, layout: TagLayout) -> float:
+    """Return the error, m, that heights of robots' tags by their size may have below a camera."""
+    from_camera_m = float(camera.position_m[2]) - layout.height_m
+    side_px = float(camera.lens.matrix[0, 0]) * layout.size_m / from_camera_m
+    return MAX_SIZE_ERROR_PX / side_px * from_camera_m
 
 
 class _Print:

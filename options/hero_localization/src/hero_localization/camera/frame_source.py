@@ -230,7 +230,9 @@ def _open_capture(path: str) -> Any:
         if not stat.S_ISCHR(os.stat(path).st_mode):  # a pipe would be waited for
             raise FrameSourceError(f"{path} is no camera, but a folder, pipe, socket or file of another kind")
         if not os.access(path, os.R_OK):
-            raise FrameSourceError(f"{path} may not be read by this user: sudo usermod -aG video $USER, and log in again")
+            raise FrameSourceError(
+                f"{path} may not be read by this user: sudo usermod -aG video $USER, and log in again"
+            )
     capture = cv2.VideoCapture(path, cv2.CAP_V4L2 if is_device else cv2.CAP_ANY)
     if not capture.isOpened():
         raise FrameSourceError(f"{path} cannot be opened: no camera, or another program uses it")

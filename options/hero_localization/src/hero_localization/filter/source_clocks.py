@@ -33,6 +33,10 @@ STEP_S = (0.02, 0.1)
 NAMED_S, SETTLED_S = 0.01, 0.005
 """A delay is named and corrected from the first on, until it is below the second: network and exposure take as much."""
 
+CONFIRMED_S = 5.0
+"""A delay is named after this long. Robots set their clocks every 2.5 s, ahead by the time in which a busy driver comes
+to answer: for some time, a camera may seem early by as much."""
+
 SLEW = 0.05
 """Most that a correction changes in a second, s: faster, poses would seem to be of robots moved by hand."""
 
@@ -56,11 +60,11 @@ MIN_EFFECT = 0.1
 
 
 class _Source:
-    """One source, what is corrected of its delay, and when that was found."""
+    """One source, what is corrected of its delay, when that was found, and since when it is off."""
 
     def __init__(self, name: str) -> None:
         self.name, self.is_off = name, False
-        self.corrected_s, self.now_s = 0.0, math.inf
+        self.corrected_s, self.now_s, self.off_s = 0.0, math.inf, math.inf
 
 
 class SourceClocks:
@@ -79,7 +83,7 @@ class SourceClocks:
         """Return by how much clocks are off, and the remedy, by the nodes that poses come from."""
         off, corrected = {}, ", which is corrected" if self._slew else ""
         for source, delay_s in zip(self._sources, self._delays_s.tolist()):
-            if source.is_off:
+            if source.is_off and source.now_s >= source.off_s + CONFIRMED_S:
                 side = "late" if delay_s > 0.0 else "early"
                 text = f"poses from {source.name} come with stamps {1e3 * abs(delay_s):.0f} ms {side}{corrected}"
                 off[source.name] = text + ": run chrony on all machines, or set its delay_s"
@@ -90,7 +94,8 @@ class SourceClocks:
         index = self._find_source(measurement.source)
         source, delay_s = self._sources[index], self._delays_s.item(index)
         if SURE_SDS * math.sqrt(self._covariance.item(index, index)) < max(abs(delay_s), NAMED_S):
-            source.is_off = abs(delay_s) > (SETTLED_S if source.is_off else NAMED_S)
+            was_off, source.is_off = source.is_off, abs(delay_s) > (SETTLED_S if source.is_off else NAMED_S)
+            source.off_s = source.off_s if was_off else now_s
             missing_s = (delay_s if source.is_off else 0.0) - source.corrected_s
             source.corrected_s += clamp(missing_s, self._slew * max(0.0, now_s - source.now_s))
         source.now_s = now_s

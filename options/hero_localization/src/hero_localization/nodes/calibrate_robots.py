@@ -14,16 +14,14 @@ from hero_client.values import is_plausible, read_pose
 from hero_node import HeroError, Pose, say
 from hero_node.ros import read_duration_clock_s
 
-from ..calibration.print_fit import estimate_height, find_print_scale, PrintScale
+from ..calibration.print_fit import PrintScale, estimate_height, find_height_error, find_print_scale
 from ..calibration.robot_calibration import CALIBRATION_DRIVE, RobotCalibration, calibrate_robot
+from ..camera.camera_model import Camera
 from ..camera.frame_source import Frame
 from ..errors import CalibrationError, DetectorError
 from ..tracking.settings import describe_pose
 from ..tracking.tag_pose import fit_squares
 from .calibration_images import Images, finish
-
-MAX_HEIGHT_ERROR_M = 0.0035
-"""It shifts robots at the field's edge by 2.5 mm."""
 
 READY_S = 10.0
 LOOK_S = 3.0
@@ -57,10 +55,10 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
     if not results:
         raise CalibrationError("; ".join(problems))
     heights_m = [result.height_m for result in results.values() if math.isfinite(result.height_m)]
-    height_m = float(np.median(heights_m)) if heights_m else layout.height_m
+    height_m = float(np.median(heights_m)) if heights_m else math.nan
     if layout.references and not heights_m:
         problems.append("tag_height_m is not checked: no reference tag lies well within the image")
-    if abs(height_m - layout.height_m) > MAX_HEIGHT_ERROR_M:
+    if heights_m and abs(height_m - layout.height_m) > find_height_error(_get_camera(images), layout):
         text = "tags are %.0f mm above the floor by their size, not %.0f: is tag_height_m right, are all printed alike?"
         problems.append(text % (1e3 * height_m, 1e3 * layout.height_m))
     mounts = {**layout.mounts, **{tag_id: result.mount for tag_id, result in results.items()}}
@@ -69,10 +67,14 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
     return finish(options.file, {"mounts": described, "delay_s": round(delay_s, 4)}, problems)
 
 
+def _get_camera(images: Images) -> Camera:
+    assert images.settings.camera is not None, "calibrate_camera refuses a file without"
+    return images.settings.camera
+
+
 def _watch_robot(images: Images, program: Program, robot_id: int, tag_id: int) -> RobotCalibration:
     """Drive one robot, and return how its tag sits. Raises: CalibrationError if it cannot be seen; HeroError."""
-    camera, layout, family = images.settings.camera, images.settings.layout, images.settings.family
-    assert camera is not None
+    camera, layout, family = _get_camera(images), images.settings.layout, images.settings.family
     odometry: List[Tuple[float, Pose]] = []
     seen: List[Tuple[float, Pose]] = []
     heights_m: List[float] = []
