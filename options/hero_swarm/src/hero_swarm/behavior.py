@@ -45,25 +45,31 @@ Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
 
 
+_AHEAD = 16
+"""Calls for which uniform numbers are drawn at once: streams are called by world, which takes longer than drawing."""
+
+
 class Random:
     """Random numbers for all robots: those of a world depend on its seed alone, not on the worlds beside it."""
 
     def __init__(self, seeds: Sequence[int], robots: int) -> None:
         """Begin one stream for each world with robots."""
         self._streams = [np.random.RandomState(seed) for seed in seeds]
-        self._robots = robots
-
-    def _draw(self, name: str, columns: Optional[int]) -> np.ndarray:
-        shape = (self._robots,) if columns is None else (self._robots, columns)
-        return np.concatenate([getattr(stream, name)(shape) for stream in self._streams])
+        self._robots, self._drawn = robots, np.empty((len(seeds), 0))
 
     def random(self, columns: Optional[int] = None) -> np.ndarray:
         """Return numbers from 0 to 1: one for each robot (R,), or several (R, columns)."""
-        return self._draw("random_sample", columns)
+        count = self._robots * (1 if columns is None else columns)
+        if self._drawn.shape[1] < count:
+            more = [stream.random_sample(_AHEAD * count) for stream in self._streams]
+            self._drawn = np.hstack((self._drawn, more))
+        drawn, self._drawn = self._drawn[:, :count], self._drawn[:, count:]
+        return drawn.reshape(-1) if columns is None else drawn.reshape(-1, columns)
 
     def normal(self, columns: Optional[int] = None) -> np.ndarray:
         """Return standard normal numbers: one for each robot (R,), or several (R, columns)."""
-        return self._draw("standard_normal", columns)
+        shape = (self._robots,) if columns is None else (self._robots, columns)
+        return np.concatenate([stream.standard_normal(shape) for stream in self._streams])
 
 
 def turn(vectors: Any, angle_rad: Any) -> np.ndarray:

@@ -368,7 +368,15 @@ def test_a_box_is_pushed_when_all_are_in_place_and_until_one_is_far_off():
 def test_streams_of_random_numbers_depend_on_the_seed_of_their_world_alone():
     both, alone = Random([3, 4], 5), Random([4], 5)
     assert both.normal(2)[5:].tolist() == alone.normal(2).tolist()
-    assert both.random()[5:].tolist() == alone.random().tolist() and both.random().shape == (10,)
+    first = both.random()
+    assert first[5:].tolist() == alone.random().tolist() and first.shape == (10,)
+    drawn = []
+    for columns in (1, 7, None, 2) * 10:  # beyond what is drawn at once
+        values = [stream.random(columns) for stream in (both, alone)]
+        assert values[0][5:].tolist() == values[1].tolist()
+        drawn += both.normal(columns).ravel().tolist() + values[0].ravel().tolist()
+        assert alone.normal(columns).size == 5 * (columns or 1)
+    assert len(set(drawn)) == len(drawn)
     assert derive_seed(3, "places") != derive_seed(3, "objects") != derive_seed(4, "objects")
 
 

@@ -23,8 +23,8 @@ from .results_folder import FOLDER, REAL, SIMULATED, ResultsFolder, Run, RunKey
 
 MAX_BATCH = 1000
 
-BATCH_ROBOT_S = 240_000.0
-"""Robot-seconds in a batch: about 10 s of work. Beyond some thousand robots at once, more of them save nothing."""
+BATCH_ROBOT_S = 480_000.0
+"""Robot-seconds in a batch: with numba 10 to 20 s of work. Beyond some thousand robots at once, more save nothing."""
 
 _BATCHES_PER_WORKER = 2
 """At least, where there are enough runs: no worker idles long while another computes the last batch."""
@@ -64,7 +64,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     add = parser.add_argument
     add("file", metavar="EXPERIMENT.yaml", help="experiment file")
     add("--out", metavar="FOLDER", help="folder of the results (the file's name without .yaml)")
-    add("--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (about 10 s of work)")
+    add("--batch", type=within(1, MAX_BATCH, int), help="runs that are computed together (10 to 20 s of work)")
     add("--seeds", type=within(1, MAX_RUNS, int), metavar="N", help="only the first N seeds of the file")
     add_engine_options(parser)
     add("--robots", type=explicit_ids_option, metavar="IDS", help="run trials on these robots instead, such as 0-9")

@@ -91,7 +91,7 @@ def test_what_a_behavior_raises_names_the_cell_and_the_seeds(tmp_path, monkeypat
     assert not (tmp_path / ("a" + POSES_ENDING)).exists(), "a file has its name once it is whole"
 
 
-def make_experiment(robots=20, time_s=300, count=100):
+def make_experiment(robots=20, time_s=600, count=100):
     text = FILE.replace("[3]", "[%d, 1000]" % robots).replace("time_s: 4", "time_s: %g" % time_s)
     return parse_experiment(text.replace("count: 3", "count: %d" % count), "e.yaml")
 
@@ -102,7 +102,7 @@ class Folder:
 
 
 def test_a_batch_is_some_seconds_of_work_and_something_for_each_worker():
-    for robots, time_s, expected in ((20, 300, 40), (20, 301, 40), (20, 299, 41), (3, 1, 1000), (20, 80000, 1)):
+    for robots, time_s, expected in ((20, 600, 40), (20, 601, 40), (20, 599, 41), (3, 1, 1000), (20, 80000, 1)):
         assert runner.choose_batch(make_experiment(robots, time_s), 0) == expected
     experiment = make_experiment()
     missing = [(0, seed) for seed in range(11, 111)] + [(1, seed) for seed in (12, 14)]

@@ -34,7 +34,8 @@ def place_all(
         assert start.file is not None
         return np.array([_read_poses(start.file, robots, arena, read)] * len(seeds))
     try:
-        return np.array([_place(start, arena, robots, seed) for seed in seeds])
+        placed = {seed: _place(start, arena, robots, seed) for seed in sorted(set(seeds))}  # designs repeat seeds
+        return np.array([placed[seed] for seed in seeds])
     except (OptionError, ValueError) as error:
         raise ExperimentError(f"start: {error}") from error
 
