@@ -1,7 +1,7 @@
 """The arena and the bodies in it: wheels, poses, collisions and infrared light, in steps of simulated time."""
 
 from .arena import BARE_GRAY, Area, Arena, Segments, build_default, is_free, measure_clearance, place_robots
-from .arena_file import SHIPPED, load_arena
+from .arena_file import SHIPPED, load_arena, locate_arena
 from .compiled import compile_loops
 from .kinematics import join_wheels, split_to_wheels
 from .pushing.shapes import PushedBody, list_outlines

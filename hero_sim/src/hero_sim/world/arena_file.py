@@ -30,6 +30,11 @@ _AREA_KEYS = ("name", "circle_m", "rectangle_m", "color", "picture")
 _OBJECT_KEYS = ("circle_m", "polygon_m", "mass_kg", "friction")
 
 
+def locate_arena(path: str, arena: str) -> str:
+    """Return the arena that a file at path names: one that is shipped, or a path from there."""
+    return arena if not arena or arena in SHIPPED else os.path.join(os.path.dirname(path), arena)
+
+
 def load_arena(name: str, read: Callable[[str], bytes] = read_file) -> Arena:
     """Return the arena of a shipped name or of the file at that path; read: how all its files are read.
 

@@ -212,6 +212,15 @@ def test_why_a_program_failed_is_shown_until_another_one_starts(started):
     assert started.programs.describe() == []
 
 
+def test_the_node_of_a_behavior_of_a_file_has_the_name_of_the_file(started, monkeypatch):
+    name = "behavior_/home/a/own-1/design-1_1.controller"
+    monkeypatch.setitem(OFFERS, name, OFFERS["random_walk"])
+    started.programs.paths[name] = sys.executable
+    started.start("import sys; sys.exit(sys.argv[-1])", program=name)
+    started.wait()
+    assert [row["failure"] for row in started.programs.describe()] == ["__name:=hero_monitor_design_1_1_1"]
+
+
 def test_all_programs_are_told_to_end_before_one_is_waited_for(started, monkeypatch):
     read = wait_for_output(monkeypatch)
     children = [started.start(OBEDIENT, robots=["hero_%d" % number]) for number in range(2)]

@@ -10,10 +10,11 @@ import json
 import os
 from typing import Any, Dict, List, Sequence, Type
 
-from hero_node import print_error
+from hero_node import HeroError, print_error
+from hero_sim.world import load_arena
 
 from .behavior import Behavior
-from .behaviors import find_behavior, list_classes, list_names
+from .behaviors import POLICY_ENDING, find_behavior, list_classes, list_names
 from .machines.machine_file import ENDING
 from .sources import Sources
 
@@ -28,12 +29,15 @@ def main() -> None:
 def describe_behaviors(folders: Sequence[str] = ()) -> List[Dict[str, Any]]:
     """Return what pages need of each behavior; a file that cannot be loaded is told of and left out."""
     found = [_describe(name, name, find_behavior(name)) for name in list_names()]
-    patterns = [os.path.join(folder, "*" + ending) for folder in folders for ending in (".py", ENDING)]
+    endings = ".py", ENDING, POLICY_ENDING
+    patterns = [os.path.join(folder, "*" + ending) for folder in folders for ending in endings]
     for path in (path for pattern in patterns for path in sorted(glob.glob(pattern))):
         try:
             classes = list_classes(path, Sources()) if path.endswith(".py") else {"": find_behavior(path)}
-        except ValueError as error:
-            print_error(str(error))
+            for arena in {kind.arena for kind in classes.values()} - {""}:
+                load_arena(arena)
+        except (HeroError, ValueError) as error:
+            print_error(str(error) if path in str(error) else f"{path}: {error}")
             continue
         for class_name, kind in classes.items():
             name = os.path.splitext(os.path.basename(path))[0]

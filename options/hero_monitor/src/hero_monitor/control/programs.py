@@ -10,6 +10,7 @@ import itertools
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -181,7 +182,8 @@ class Programs:
         number = next(self._numbers)
         self._running[number] = child
         self._failed.clear()  # the user who starts the next one has read it
-        name = "__name:=%s_%s_%d" % (self._node_name, child.program, number)
+        title = re.sub(r"\W", "_", os.path.splitext(os.path.basename(child.program))[0])  # of a path, too
+        name = "__name:=%s_%s_%d" % (self._node_name, title, number)
         command = [self.paths[child.program], *arguments, name]
         child.thread = threading.Thread(target=self._run, args=(number, child, command), daemon=True)
         child.thread.start()

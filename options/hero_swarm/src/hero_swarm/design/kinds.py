@@ -124,7 +124,7 @@ class Networks(Kind):
 
     def dump(self, genome: np.ndarray, arena: str, remark: str) -> bytes:
         weights, biases = self._split(genome[None])
-        return dump_policy([(weights[0], biases[0, 0])], self._observation, RATE_HZ)
+        return dump_policy([(weights[0], biases[0, 0])], self._observation, RATE_HZ, arena)
 
 
 class Numbers(Kind):

@@ -13,6 +13,7 @@ import numpy as np
 from hero_client.values import MAX_LINEAR_M_S
 from hero_node import one_line
 from hero_node.files import write_file
+from hero_sim.world import locate_arena
 
 from .. import behavior as known
 from ..behavior import Behavior, Command, Random, Sensed
@@ -37,8 +38,10 @@ def save_policy(path: str, layers: Layers, observation: Observation, rate_hz: fl
     write_file(path, dump_policy(layers, observation, rate_hz))
 
 
-def dump_policy(layers: Layers, observation: Observation, rate_hz: float) -> bytes:
+def dump_policy(layers: Layers, observation: Observation, rate_hz: float, arena: str = "") -> bytes:
     """Return the file of a policy; observation, rate_hz: of the environment in which it was learned.
+
+    arena: of its virtual sensors, where the program is given none: shipped, or a path from the file.
 
     Raises: ValueError for layers that do not fit each other, or a sensor of your own.
     """
@@ -47,7 +50,7 @@ def dump_policy(layers: Layers, observation: Observation, rate_hz: float) -> byt
             raise ValueError(f"sensor {name}: only built-in sensors can be saved, not {type(sensor).__name__}")
     _check_layers(layers, layers[0][0].shape[0])
     sensors = {name: [type(sensor).__name__, sensor._asdict()] for name, sensor in observation.sensors.items()}
-    about = {"version": VERSION, "rate_hz": rate_hz, **observation._asdict(), "sensors": sensors}
+    about = {"version": VERSION, "rate_hz": rate_hz, "arena": arena, **observation._asdict(), "sensors": sensors}
     arrays = {f"{kind}_{number}": array for number, layer in enumerate(layers) for kind, array in zip("wb", layer)}
     content = io.BytesIO()
     np.savez(content, about=np.array(json.dumps(about)), **arrays)
@@ -67,7 +70,8 @@ def load_policy(path: str, content: bytes) -> Type[Behavior]:
         given = {name: getattr(known, kind)(**fields) for name, (kind, fields) in about["sensors"].items()}
         observation = Observation(tuple(about["bounds_m"]), about["neighbors"], about["range_m"], given)
         _check_layers(layers, len(layers[0][0]))
-        return make_policy(layers, observation, about["rate_hz"], path)
+        arena = locate_arena(path, about.get("arena", ""))
+        return type("Policy", (make_policy(layers, observation, about["rate_hz"], path),), {"arena": arena})
     except (OSError, ValueError, LookupError, TypeError, AttributeError, zipfile.BadZipFile) as error:
         raise ValueError(f"policy {path} cannot be read: {one_line(error)}; save_policy() writes such files") from error
 

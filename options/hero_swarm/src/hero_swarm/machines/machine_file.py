@@ -9,11 +9,10 @@ or `tree: [{do: exploration, turn_steps: 20, until: {when: black floor, probabil
 acts until its condition holds, the first after the last; or `behavior: segregation` with `numbers: {own_m: 0.2}`.
 """
 
-import os
 from typing import Any, Dict, List, NamedTuple
 
 from hero_node.files import Entry, EntryError, decode_text, read_entries
-from hero_sim.world import SHIPPED
+from hero_sim.world import locate_arena
 
 from .modules import DO, LIMITS, MAX_NEXT, WHEN, WHOLE_LIMITS, Kinds, State, follow
 
@@ -39,8 +38,7 @@ def read_controller(path: str, content: bytes) -> Controller:
     if len(kinds) != 1:
         raise EntryError(f"{path}: needs states, a tree or a behavior, such as {_EXAMPLE}")
     given = root.mapping(("arena", *kinds, *(["numbers"] if kinds == ["behavior"] else [])))
-    arena = given["arena"].text() if "arena" in given else ""
-    arena = arena if not arena or arena in SHIPPED else os.path.join(os.path.dirname(path), arena)
+    arena = locate_arena(path, given["arena"].text() if "arena" in given else "")
     if "behavior" in given:
         if given["behavior"].text().endswith(ENDING):
             given["behavior"].refuse("built in, FILE.py or FILE.py:Class")

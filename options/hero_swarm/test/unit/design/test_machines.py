@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from hero_sim.world import load_arena
-from hero_swarm.behavior import Random, sense
+from hero_swarm.behavior import Floor, Random, sense
 from hero_swarm.behaviors import find_behavior, list_names
 from hero_swarm.behaviors.machine import make_machine
 from hero_swarm.describe import describe_behaviors
+from hero_swarm.learning.observation import Observation, count_observations
+from hero_swarm.learning.policy import dump_policy
 from hero_swarm.machines.machine_file import read_controller
 from hero_swarm.machines.modules import draw_dot, follow
 from hero_swarm.trial import Trial
@@ -158,6 +160,19 @@ def test_pages_offer_the_controllers_of_a_folder(folder, capsys):
     offer = offers[str(folder / "search.controller")]
     assert offer["title"] == "search" and offer["sentence"] == "A machine whose states robots show by their lights."
     assert "wrong.controller, line 1: states is" in capsys.readouterr().err and len(offers) == len(list_names()) + 1
+
+
+def test_pages_offer_networks_but_nothing_whose_arena_was_left_behind(folder, capsys):
+    observation = Observation((-2.0, -2.0, 2.0, 2.0), 5, 0.5, {"floor": Floor()})
+    layers = [(np.zeros((count_observations(5) + 4, 2)), np.zeros(2))]
+    (folder / "net.npz").write_bytes(dump_policy(layers, observation, 10.0, "arena.yaml"))
+    assert find_behavior(str(folder / "net.npz")).arena == str(folder / "arena.yaml")
+    assert [offer["title"] for offer in describe_behaviors([str(folder)])[-2:]] == ["search", "net"]
+    (folder / "arena.yaml").rename(folder / "other.yaml")
+    assert len(describe_behaviors([str(folder)])) == len(list_names())
+    told = capsys.readouterr().err
+    for name in ("net.npz", "search.controller"):
+        assert f"{name}: arena {folder}/arena.yaml: cannot be read" in told
 
 
 def test_a_machine_is_drawn_with_its_conditions(folder):
