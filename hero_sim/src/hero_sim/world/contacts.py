@@ -308,7 +308,7 @@ class Contacts:
         places_m = self.poses[:2]
         pairs = self._find_pairs(2.0 * float(self._radii_m.max()))
         distances_m = np.sqrt(square_length(places_m[:, pairs[0]] - places_m[:, pairs[1]]))
-        depths_m = np.maximum(self._radii_m[pairs].sum(axis=0) - distances_m, 0.0)
+        depths_m = self._radii_m[pairs].sum(axis=0) - distances_m
         robots_m = np.zeros(self._rows)
         # Not broadcast: numpy 2.2 reads past the end of values that are.
         np.maximum.at(robots_m, pairs.ravel(), np.tile(depths_m, 2))

@@ -1,10 +1,12 @@
 """Clocks of cameras and motion capture that differ from odometry's: found while robots drive, named and corrected."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 
+from hero_localization.filter.odometry_history import OdometryHistory
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.source_clocks import SourceClocks
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
@@ -170,6 +172,29 @@ def test_a_clock_that_is_set_right_is_found_again():
     drive.delays_s = [0.0]
     drive.run(20.0)
     assert list_clocks(drive) == [] and drive.run(3.0) < 0.003
+
+
+def add_drive(clocks, begin_s, duration_s, delay_s, robots):
+    """Add poses of robots that all drive to and fro alike, with stamps that are late by a delay."""
+    odometry = OdometryHistory()
+    for time_s in np.arange(0.0, duration_s, 0.02):
+        pose = Pose(0.1 * (1.0 - math.cos(3.0 * time_s)), 0.0, 0.0)
+        odometry.add(begin_s + time_s, pose)
+        measurement = StampedPose(begin_s + time_s + delay_s, pose, COVARIANCE, TRACK)
+        for robot_id in range(robots):
+            clocks.add(robot_id, measurement, odometry)
+    clocks.correct(measurement, begin_s + duration_s)
+
+
+@pytest.mark.parametrize(("robots", "set_clock"), [(1, lambda clocks: None), (20, SourceClocks.forget_poses)])
+def test_poses_from_before_a_clock_was_set_back_are_not_waited_for(robots, set_clock):
+    """The clock of the camera, or that of this PC, which compares many robots by turns."""
+    clocks = SourceClocks(True)
+    add_drive(clocks, 1000.0, 2.0, 0.0, robots)
+    set_clock(clocks)
+    add_drive(clocks, 10.0, 8.0, 0.1, robots)
+    (text,) = clocks.list_off().values()
+    assert abs(int(re.search(r" stamps (\d+) ms late, which is corrected", text).group(1)) - 100) <= 2
 
 
 @pytest.mark.slow
