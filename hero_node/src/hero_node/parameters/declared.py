@@ -3,11 +3,13 @@
 import argparse
 import dataclasses
 import math
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, Type, TypeVar
 
 from ..errors import ProgramError
 from ..texts import suggest
 from .number_checks import is_number
+
+T = TypeVar("T")
 
 ALL_ROBOTS = "all"
 
@@ -150,17 +152,21 @@ def parse_explicit_ids(name: str, value: Any) -> List[int]:
     return ids
 
 
-def robot_ids_option(text: str, parse: Callable[[str, Any], Optional[List[int]]] = parse_robot_ids) -> Any:
+def robot_ids_option(text: str) -> Optional[List[int]]:
     """Return the ids in the value of a command line option, None for "all". Raises: argparse.ArgumentTypeError."""
+    return _read_option(parse_robot_ids, text)
+
+
+def explicit_ids_option(text: str) -> List[int]:
+    """As robot_ids_option(), but "all" is refused. Raises: argparse.ArgumentTypeError."""
+    return _read_option(parse_explicit_ids, text)
+
+
+def _read_option(parse: Callable[[str, Any], T], text: str) -> T:
     try:
         return parse("robots", text)
     except ProgramError as error:
         raise argparse.ArgumentTypeError(str(error).replace("~robots", "it")) from error
-
-
-def explicit_ids_option(text: str) -> Any:
-    """As robot_ids_option(), but "all" is refused. Raises: argparse.ArgumentTypeError."""
-    return robot_ids_option(text, parse_explicit_ids)
 
 
 def within(low: float, high: float, kind: Type[Any] = float) -> Callable[[str], Any]:
