@@ -27,7 +27,7 @@ from .ros.robot_bridge import RobotBridge
 from .ros.robot_commands import Stops
 from .rosserial.payloads import Log
 from .rosserial.session import Event, MessagesReceived, Problem, Session, SessionEnded, Topic
-from .stops.delivery import StopDelivery, can_move, describe_doubt, find_stop_payload
+from .stops.delivery import StopDelivery, can_move, find_stop_payload
 from .transport.call_queue import Worker
 from .transport.event_loop import THE_DRIVER_ENDS, EventLoop
 from .transport.link import READ_LENGTH, Link, LinkHandler
@@ -263,7 +263,7 @@ class Gateway(LinkHandler):
         address = peer.link.address
         if identity is None:
             if topic.info.name in namespaces.TF_TOPICS:
-                peer.early_topics = [*peer.early_topics[-7:], topic]
+                peer.keep(topic)
             else:
                 self.warn_robot(peer, f"topic {topic.info.name!a} refused: not a name below /hero_N")
             return
@@ -307,12 +307,9 @@ class Gateway(LinkHandler):
         text = f"{bridge.label} {decision.verdict.value} ({peer.link.address})"
         self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
         self.note_change()
-        early_topics, peer.early_topics = peer.early_topics, []
-        for topic in early_topics:
-            self._declare(peer, topic, record.joined_s)
-        early_logs, peer.early_logs = peer.early_logs, []
-        for log in early_logs:
-            self._robot_log.receive(peer, log, record.joined_s)
+        early, peer.early = peer.early, []
+        for event in early:
+            self._receive_event(peer, event, record.joined_s)
 
     def _admit_duplicates(self, record: RobotRecord, may_come: Callable[[str], bool]) -> None:
         """Close connections that waited because another robot has their id: they dial again, and are admitted."""
@@ -348,12 +345,10 @@ class Gateway(LinkHandler):
         answer(names)
 
     def list_stops(self) -> Stops:
-        """Return name and stop of every connection that can move a robot, and None for robots that are away."""
-        records = sorted(self.fleet.robots.values(), key=lambda record: record.identity.number)
+        """Return the stop of every connection that can move a robot, and None for each robot that is away."""
         connected = [peer for peer in self.peers.values() if peer.bridge is not None or can_move(peer)]
-        connected.sort(key=lambda peer: 0 if peer.record is None else peer.record.identity.number)
-        away = [record.identity.namespace.lstrip("/") for record in records if record.link is None]
-        return [(peer.label, self._stops.find_state(peer)) for peer in connected] + [(name, None) for name in away]
+        away = [None for record in self.fleet.robots.values() if record.link is None]
+        return [*map(self._stops.find_state, connected), *away]
 
     # Stop.
 
@@ -372,7 +367,7 @@ class Gateway(LinkHandler):
         self.stopped = True
         doubtful = self._stops.stop_and_wait(self._list_stoppable(), time.monotonic() + STOP_LIMIT_S, self._serve)
         if doubtful:
-            names = ", ".join(f"{peer.label} ({describe_doubt(peer)})" for peer in doubtful)
+            names = ", ".join(f"{peer.label} ({self._stops.find_state(peer).name})" for peer in doubtful)
             self._log.log("error", f"the driver ends, and these robots are not known to be at rest: {names}")
 
     def _list_stoppable(self) -> List[Peer]:

@@ -15,10 +15,12 @@ from .fleet.registry import RobotRecord
 from .ros.robot_bridge import RobotBridge
 from .ros.robot_commands import Owner
 from .rosserial.packets import RosserialError
-from .rosserial.payloads import Log
-from .rosserial.session import Session, Topic
+from .rosserial.session import Event, Session, Topic
 from .transport.event_loop import CallLater
 from .transport.link import Link
+
+EARLY_EVENTS_MAX = 18
+"""A robot logs a few lines at its start, and declares /tf among its first topics."""
 
 LOG_LINES_PER_S = 100
 """Log lines of one robot that reach /rosout; a robot that tunes its motors sends 47 per second."""
@@ -41,8 +43,7 @@ class Peer:
     wheels: WheelMotion = field(default_factory=WheelMotion)
     refused: bool = False  # a duplicate: kept open and only stopped, so that it does not dial in 20 times per second
     boot: Optional[log_lines.BootLine] = None
-    early_logs: List[Log] = field(default_factory=list)
-    early_topics: List[Topic] = field(default_factory=list)  # /tf, declared before a name that tells who it is
+    early: List[Event] = field(default_factory=list)  # log lines, and /tf, before a name that tells who it is
     log_lines: TokenBucket = field(default_factory=lambda: TokenBucket(LOG_LINES_PER_S, LOG_LINES_PER_S, 0.0))
     motion_mark: int = 0  # how much was written when the last motion command was
     send_due: bool = False  # a timer is set for commands that have to wait
@@ -59,6 +60,11 @@ class Peer:
         if self.record is not None:
             return f"{self.record.identity.namespace.lstrip('/')} at {self.link.address} (refused)"
         return str(self.link.address)
+
+    def keep(self, event: Event) -> None:
+        """Keep an event until it is known which robot this is; of many the first ones."""
+        if len(self.early) < EARLY_EVENTS_MAX:
+            self.early.append(event)
 
     def watch_wheels(self, topic: Topic) -> None:
         """Read the wheels of a robot without a bridge from its encoder."""

@@ -167,7 +167,7 @@ class TestDriverStop(OwnDriverCase):
         robots[0].motors.is_pushed = True
         driver.process.send_signal(signal.SIGINT)
         self.assertEqual(driver.wait_end(), 0, driver.lines)
-        self.assertRegex(driver.lines[-1], r"not known to be at rest: hero_75 \(its wheels turn\)")
+        self.assertRegex(driver.lines[-1], r"not known to be at rest: hero_75 \(MOVING\)")
 
     # What is known of it.
 
@@ -182,10 +182,10 @@ class TestDriverStop(OwnDriverCase):
         driver.wait_line("hero_55: its wheels turn although it was stopped")
         for name in ("driver", "hero_55"):
             diagnostics.wait_message(lambda array, name=name: is_error(array, name), "an error of " + name)
-        self.assertIn("1 still moving: hero_55", self.call_stop(driver, True))
+        self.assertIn("1 MOVING", self.call_stop(driver, True))
         robot.motors.is_pushed = False
         self.wait_at_rest(driver, robot)
-        self.assertIn("1 at rest", self.call_stop(driver, True))
+        self.assertIn("1 AT_REST", self.call_stop(driver, True))
 
     def test_a_robot_without_readings_is_stopped_and_not_confirmed(self):
         driver = self.share()
@@ -220,7 +220,7 @@ class TestDriverStop(OwnDriverCase):
             driver.fleet.wait("/hero_80", state, "at rest", lambda entry: entry.stop_state == Robot.AT_REST)
         self.assertFalse(first.motors.is_turning or second.motors.is_turning)
         self.assertTrue(all(velocity.is_zero for velocity in nonempty(second.velocities)))
-        self.assertIn("2 at rest", self.call_stop(driver, True))
+        self.assertIn("2 AT_REST", self.call_stop(driver, True))
 
     # Who asks for it.
 

@@ -12,6 +12,7 @@ from hero_driver.commands.stop_progress import StopState
 from hero_driver.config import read_config
 from hero_driver.fleet.admission import GARBAGE_BURST_LENGTH
 from hero_driver.gateway import Gateway
+from hero_driver.peer import EARLY_EVENTS_MAX, Peer
 from hero_driver.rosserial.packets import encode_packet
 from hero_driver.rosserial.payloads import TopicInfo
 from hero_driver.rosserial.session import Topic, TopicKind
@@ -252,11 +253,18 @@ def test_a_robot_that_comes_again_keeps_its_topics(driver, monkeypatch):
     assert driver.list_rows()[0].reconnects == 2
 
 
+def test_of_events_before_the_name_the_first_ones_are_kept():
+    peer = Peer(*[None] * 5)
+    for number in range(EARLY_EVENTS_MAX + 3):
+        peer.keep(number)
+    assert peer.early == list(range(EARLY_EVENTS_MAX))
+
+
 def test_transforms_declared_before_the_name_are_the_robots(driver):
     link = driver.connect()
     transforms_first = sorted(PUBLISHED, key=lambda entry: entry.name != "/tf")
     driver.receive(link, FakeRobot(0, transforms_first).encode_declarations())
-    assert driver.gateway.peers[link].early_topics == [] and not [line for line in driver.lines if line[0] == "error"]
+    assert driver.gateway.peers[link].early == [] and not [line for line in driver.lines if line[0] == "error"]
     stranger = driver.connect(OTHER_HOST)
     driver.receive(stranger, encode_declaration(101, "/chatter", "std_msgs/String"))
     assert driver.lines[-1][1].endswith("topic '/chatter' refused: not a name below /hero_N") and not stranger.closed
@@ -270,7 +278,7 @@ def encode_declaration(topic_id, name, kind):
 def test_a_robot_that_joins_while_all_are_stopped_is_stopped(driver):
     driver.gateway.set_stopped(True)
     link = driver.join(declarations=STOCK_DECLARATIONS)
-    assert driver.gateway.list_stops() == [("hero_0", StopState.STOPPING)]
+    assert driver.gateway.list_stops() == [StopState.STOPPING]
     before = len(link.sent)
     driver.run_soon()
     assert len(link.sent) > before and driver.gateway.peers[link].stop is not None
@@ -280,7 +288,7 @@ def test_a_robot_that_joins_while_all_are_stopped_is_stopped(driver):
     driver.run_soon()
     assert driver.gateway.peers[other].stop is None
     other.close("closed by the robot")
-    assert driver.gateway.list_stops()[-1] == ("hero_1", None)
+    assert driver.gateway.list_stops()[-1] is None
     driver.gateway.stop_robot(driver.gateway.peers[link])
     assert driver.gateway.peers[link].stop is not None
 
@@ -290,9 +298,7 @@ def test_the_end_waits_for_robots_and_names_those_that_may_move(driver):
     driver.gateway.stop_at_end()
     assert driver.gateway.stopped and link.sent and 1.0 <= driver.now_s - began_s < 1.1
     (line,) = [text for level, text in driver.lines if level == "error"]
-    assert line == (
-        "the driver ends, and these robots are not known to be at rest: hero_0 (it sends no readings of its wheels)"
-    )
+    assert line == ("the driver ends, and these robots are not known to be at rest: hero_0 (UNCONFIRMED)")
 
 
 def test_a_pause_of_the_driver_forgives_silence_and_renews_stops(driver):
@@ -357,7 +363,7 @@ def test_the_end_waits_two_seconds_for_wheels_that_turn(driver):
     driver.gateway.stop_at_end()
     assert 2.0 <= driver.now_s - began_s < 2.03
     (line,) = [text for level, text in driver.lines if level == "error" and "the driver ends" in text]
-    assert line.endswith("hero_0 (its wheels turn)")
+    assert line.endswith("hero_0 (MOVING)")
 
 
 class TurningRobot:
@@ -394,12 +400,12 @@ def test_an_overloaded_pc_is_named_instead_of_robots_until_it_is_not(driver, mon
     assert bool(said) == (lateness_s > 0.0), "a network that is late says nothing of the PC"
     assert all(text.startswith("the PC is overloaded (load 71.3 on ") and "up to 0.4 s late" in text for text in said)
     assert {key for key in driver.keys if "overload" in key} <= {"overload"}, "one line for all robots"
-    assert {state for _, state in driver.gateway.list_stops()} == {StopState.STOPPING}
+    assert set(driver.gateway.list_stops()) == {StopState.STOPPING}
     for _ in range(40):
         for robot in robots:
             robot.read(1)
         driver.run(0.034)
-    assert {state for _, state in driver.gateway.list_stops()} == {StopState.MOVING}
+    assert set(driver.gateway.list_stops()) == {StopState.MOVING}
 
 
 def test_a_robot_that_has_said_who_it_is_leaves_the_unidentified_ones(driver):

@@ -142,8 +142,9 @@ def test_more_lines_than_fit_a_second_are_counted_and_not_passed_on(lines):
 
 def test_ten_lines_of_a_robot_without_a_name_are_kept(lines):
     robot_log, peer = RobotLog(LogRelay(), None, None), make_peer()
-    peer.bridge, peer.early_logs = None, []
+    peer.bridge, kept = None, []
+    peer.keep = kept.append
     logs = [Log(LOG_INFO, "line %d" % number) for number in range(12)]
     for log in logs:
         robot_log.receive(peer, log, NOW_S)
-    assert peer.early_logs == logs[:10] and lines == []
+    assert kept == logs and lines == []

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hero_driver.commands.stop_progress import StopState
 from hero_driver.rosserial.packets import RosserialError
 from hero_driver.stops import delivery
-from hero_driver.stops.delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, describe_doubt, encode_stop, is_light
+from hero_driver.stops.delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, encode_stop, is_light
 from hero_node import MD5SUMS
 from hero_test.fake_motors import LAG_S, FakeMotors
 
@@ -349,21 +349,6 @@ def test_a_deadline_that_has_come_is_not_waited_for():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "pulses")
         assert robot.stops.stop_and_wait([robot.peer], clock.now_s, None) == [robot.peer]
-
-
-def test_why_a_robot_may_still_move_is_said_in_words():
-    for is_closed, state, is_late, text in (
-        (True, StopState.MOVING, False, "its connection ended"),
-        (False, StopState.MOVING, True, "its wheels turn"),
-        (False, StopState.UNCONFIRMED, False, "it sends no readings of its wheels"),
-        (False, StopState.STOPPING, True, "what it sends is read late"),
-        (False, StopState.STOPPING, False, "it does not answer"),
-        (False, None, False, "it does not answer"),
-    ):
-        progress = None if state is None else SimpleNamespace(state=state)
-        wheels = SimpleNamespace(is_late=is_late)
-        peer = SimpleNamespace(link=SimpleNamespace(closed=is_closed), stop=progress, wheels=wheels)
-        assert describe_doubt(peer) == text
 
 
 def test_the_end_reads_and_advances_until_all_rest_or_its_deadline():

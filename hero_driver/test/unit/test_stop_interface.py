@@ -6,6 +6,7 @@ from unittest import mock
 import pytest
 from std_srvs.srv import SetBoolRequest
 
+from hero_driver.commands.stop_progress import StopState
 from hero_driver.ros.log_relay import LogRelay
 from hero_driver.stops import interface
 from hero_driver.stops.store import StopStore
@@ -54,3 +55,9 @@ def test_a_stop_that_cannot_be_kept_is_answered_with_what_is_lost(stops):
     answer = serve(stops, True)
     assert answer.success and stops.interface._fleet.stopped
     assert "will not survive a restart of the driver: /kept cannot be written (No space left" in answer.message
+
+
+def test_a_stop_is_answered_with_the_states_of_robots(stops):
+    assert serve(stops, True).message == "no robot is connected"
+    stops.interface._fleet.list_stops = lambda: [StopState.MOVING, None, StopState.AT_REST, StopState.AT_REST]
+    assert serve(stops, True).message == "1 MOVING, 1 AWAY, 2 AT_REST"

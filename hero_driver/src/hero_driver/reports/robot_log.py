@@ -11,9 +11,6 @@ from ..rosserial.payloads import LOG_DEBUG, LOG_ERROR, LOG_FATAL, LOG_INFO, LOG_
 
 LEVELS = {LOG_DEBUG: "debug", LOG_INFO: "info", LOG_WARN: "warn", LOG_ERROR: "error", LOG_FATAL: "fatal"}
 
-EARLY_LINES_MAX = 10
-"""Lines that are kept until a robot has said who it is."""
-
 
 class RobotLog:
     """The log of all robots' lines."""
@@ -30,8 +27,7 @@ class RobotLog:
         if line.boot is not None:
             peer.boot = line.boot
         if peer.bridge is None or peer.record is None:
-            if len(peer.early_logs) < EARLY_LINES_MAX:
-                peer.early_logs.append(log)
+            peer.keep(log)
             return
         record = peer.record
         if line.boot is not None:

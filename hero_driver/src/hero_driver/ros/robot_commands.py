@@ -6,7 +6,7 @@ make_subscriber() -> _receive_motion() or _receive_command() -> CommandQueue
 import functools
 import math
 import time
-from typing import Any, Callable, Dict, List, Optional, Protocol, Tuple
+from typing import Any, Callable, Dict, List, Optional, Protocol
 
 from ..commands.command_queue import CommandQueue, CommandSettings
 from ..commands.command_sources import CommandSources
@@ -32,8 +32,8 @@ SUPERSEDED_S = 1.0
 TUNING_SILENCE_S = 1.0
 """A robot that tunes itself logs up to 47 lines per second (VelocityControl.ino:118)."""
 
-Stops = List[Tuple[str, Optional[StopState]]]
-"""Name and stop of each connection that can move a robot, and None for each robot that is away."""
+Stops = List[Optional[StopState]]
+"""State of each connection that can move a robot, and None for each robot that is away."""
 
 
 class Owner(Protocol):

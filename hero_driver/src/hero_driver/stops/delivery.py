@@ -194,16 +194,3 @@ def _is_pending(peer: Peer) -> bool:
     if peer.stop is None or peer.link.closed:
         return False
     return peer.stop.state not in (StopState.AT_REST, StopState.UNCONFIRMED)
-
-
-def describe_doubt(peer: Peer) -> str:
-    """Return why a robot is not known to be at rest."""
-    if peer.link.closed:
-        return "its connection ended"
-    if peer.stop is not None and peer.stop.state is StopState.MOVING:
-        return "its wheels turn"
-    if peer.stop is not None and peer.stop.state is StopState.UNCONFIRMED:
-        return "it sends no readings of its wheels"
-    if peer.wheels.is_late:
-        return "what it sends is read late"
-    return "it does not answer"

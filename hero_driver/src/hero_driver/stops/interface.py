@@ -3,6 +3,7 @@
 Programs connect to ~stop_request at their start, so that it works while the ROS master is dead, hung or slow.
 """
 
+import collections
 import queue
 import time
 import weakref
@@ -12,7 +13,6 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool, SetBoolResponse
 
-from ..commands.stop_progress import StopState
 from ..ros.log_relay import LogRelay
 from ..ros.robot_commands import Owner, Stops
 from ..ros.rospy_internals import find_connection, is_latched_before, list_publishers
@@ -145,15 +145,6 @@ def describe_time(since_s: float) -> str:
 
 
 def describe_stop(stops: Stops) -> str:
-    """Return how far the stop of all robots has come, for users."""
-    parts = ["%d at rest" % sum(state is StopState.AT_REST for _, state in stops)]
-    for text, state in (
-        ("still moving", StopState.MOVING),
-        ("being stopped", StopState.STOPPING),
-        ("not confirmed, they send no readings of their wheels", StopState.UNCONFIRMED),
-        ("away, stopped when they return", None),
-    ):
-        names = [name for name, its_state in stops if its_state is state]
-        if names:
-            parts.append(f"{len(names)} {text}: {', '.join(names)}")
-    return "; ".join(parts)
+    """Return how many robots are in which state of a stop, for users, such as "2 AT_REST, 1 AWAY"."""
+    counts = collections.Counter("AWAY" if state is None else state.name for state in stops)
+    return ", ".join(f"{count} {name}" for name, count in counts.items()) or "no robot is connected"
