@@ -58,25 +58,25 @@ def test_a_command_that_waited_goes_to_the_first_subscriber_only(ros):
 def test_a_stop_takes_the_place_of_an_early_command(ros):
     ros.topic.publish("fast")
     for _ in range(2):
-        ros.topic.publish_stop("stop")
+        ros.topic.publish("stop", is_stop=True)
     assert ros.sent == [] and len(ros.warned) == 1
     subscribe(ros)
     assert ros.sent == ["stop"] and len(ros.warned) == 1
 
 
 def test_an_early_stop_waits_and_is_not_warned_about(ros):
-    ros.topic.publish_stop("stop")
+    ros.topic.publish("stop", is_stop=True)
     assert ros.sent == []
     subscribe(ros)
     assert ros.sent == ["stop"]
     ros.subscribers = 0
     ros.now_s += CONNECT_S + 0.1
-    ros.topic.publish_stop("stop")
+    ros.topic.publish("stop", is_stop=True)
     assert ros.sent == ["stop"] * 2 and ros.warned == []  # rospy drops it without a subscriber
 
 
 def test_a_command_that_follows_an_early_stop_is_warned_about_in_time(ros):
-    ros.topic.publish_stop("stop")
+    ros.topic.publish("stop", is_stop=True)
     ros.topic.publish("fast")
     ros.now_s += CONNECT_S
     ros.timers[0]()

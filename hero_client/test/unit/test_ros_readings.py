@@ -46,8 +46,8 @@ def make_time(monkeypatch):
 def test_messages_age_and_the_next_ones_are_counted(monkeypatch, time):
     subscribed = []
 
-    def subscribe(name, *arguments, queue_size, tcp_nodelay, callback_args):
-        assert (queue_size, tcp_nodelay, callback_args) == (1, True, "odom"), "only the newest counts, and at once"
+    def subscribe(name, message_class, receive, topic, queue_size, tcp_nodelay):
+        assert (queue_size, tcp_nodelay, topic) == (1, True, "odom"), "only the newest counts, and at once"
         subscribed.append(name)
         return SimpleNamespace(unregister=lambda: subscribed.append("left"))
 
@@ -168,12 +168,11 @@ def test_why_a_robot_cannot_be_driven_is_told_in_order():
 def test_only_a_stop_is_sent_without_a_warning():
     link, sent = RosLink.__new__(RosLink), []
     link._cmd_vel = SimpleNamespace(
-        publish=lambda twist: sent.append(("move", twist.linear.x, twist.angular.z)),
-        publish_stop=lambda twist: sent.append(("stop", twist.linear.x, twist.angular.z)),
+        publish=lambda twist, is_stop: sent.append((is_stop, twist.linear.x, twist.angular.z)),
     )
     for velocity in ((0.1, 0.0), (0.0, -0.5), (0.0, 0.0)):
         link.send_velocity(*velocity)
-    assert sent == [("move", 0.1, 0.0), ("move", 0.0, -0.5), ("stop", 0.0, 0.0)]
+    assert sent == [(False, 0.1, 0.0), (False, 0.0, -0.5), (True, 0.0, 0.0)]
 
 
 def test_odometry_is_set_or_why_it_is_not_is_told(monkeypatch):

@@ -89,14 +89,9 @@ def _circle(count: int, spacing_m: float) -> List[Point]:
 
 
 def _grid(count: int, spacing_m: float, columns: int) -> List[Point]:
-    rows = math.ceil(count / columns)
-    return [
-        (
-            (index % columns - (columns - 1) / 2.0) * spacing_m,
-            ((rows - 1) / 2.0 - index // columns) * spacing_m,
-        )
-        for index in range(count)
-    ]
+    left, top = (columns - 1) / 2.0, (math.ceil(count / columns) - 1) / 2.0
+    cells = [(index % columns, index // columns) for index in range(count)]
+    return [((column - left) * spacing_m, (top - row) * spacing_m) for column, row in cells]
 
 
 def _read_number(fields: Dict[str, Entry], key: str, default: float) -> float:

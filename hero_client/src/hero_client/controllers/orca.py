@@ -61,7 +61,8 @@ def keep_apart(
     offsets: other minus own places (..., 2). velocities: own minus other ones. radius_m: sum of both radii. step_s:
     time in which discs that overlap already shall come apart. depth is for both robots together.
     """
-    distances_m = np.hypot(offsets[..., 0], offsets[..., 1])
+    x_m, y_m = offsets[..., 0], offsets[..., 1]
+    distances_m = np.hypot(x_m, y_m)
     overlap = distances_m <= radius_m
     # The forbidden velocities are a cone towards the other robot, cut off by a disc at offset / time.
     times_s = np.where(overlap, step_s, horizon_s)
@@ -69,19 +70,11 @@ def keep_apart(
     speeds, towards = np.hypot(off[..., 0], off[..., 1]), (off * offsets).sum(axis=-1)
     at_disc = overlap | ((towards < 0.0) & (towards**2 > radius_m**2 * speeds**2))
     from_disc = np.where(speeds[..., None] > 1e-9, off / np.maximum(speeds, 1e-9)[..., None], (-1.0, 0.0))
-    side = np.where(offsets[..., 0] * off[..., 1] > offsets[..., 1] * off[..., 0], 1.0, -1.0)
+    side = np.where(x_m * off[..., 1] > y_m * off[..., 0], 1.0, -1.0)
     leg_m = side * np.sqrt(np.maximum(distances_m**2 - radius_m**2, 0.0))
     # Across the leg of the cone on the side where the velocity lies.
-    from_leg = (
-        np.stack(
-            (
-                -offsets[..., 0] * radius_m - leg_m * offsets[..., 1],
-                leg_m * offsets[..., 0] - offsets[..., 1] * radius_m,
-            ),
-            axis=-1,
-        )
-        / np.maximum(distances_m**2, 1e-18)[..., None]
-    )
+    across = np.stack((-x_m * radius_m - leg_m * y_m, leg_m * x_m - y_m * radius_m), axis=-1)
+    from_leg = across / np.maximum(distances_m**2, 1e-18)[..., None]
     normals = np.where(at_disc[..., None], from_disc, from_leg)
     return normals, np.where(at_disc, radius_m / times_s - speeds, -(velocities * normals).sum(axis=-1))
 

@@ -75,13 +75,9 @@ def go_to_pose(pose: Pose, goal: Pose, law: GoToLaw = GO_TO, at_goal: bool = Fal
     sight_rad = math.atan2(goal.y_m - pose.y_m, goal.x_m - pose.x_m)
     goal_off_rad = wrap_angle(goal.yaw_rad - sight_rad)  # theta of the paper
     own_off_rad = wrap_angle(pose.yaw_rad - sight_rad)  # delta of the paper
-    curvature_1_m = (
-        -(
-            K2 * (own_off_rad - math.atan(-K1 * goal_off_rad))
-            + (1.0 + K1 / (1.0 + (K1 * goal_off_rad) ** 2)) * math.sin(own_off_rad)
-        )
-        / distance_m
-    )
+    pull = K2 * (own_off_rad - math.atan(-K1 * goal_off_rad))
+    pull += (1.0 + K1 / (1.0 + (K1 * goal_off_rad) ** 2)) * math.sin(own_off_rad)
+    curvature_1_m = -pull / distance_m
     linear_m_s = law.max_linear_m_s / (1.0 + SLOWING_M2 * curvature_1_m**2)
     linear_m_s = min(linear_m_s, law.linear_gain * distance_m)
     angular_rad_s = curvature_1_m * linear_m_s

@@ -32,13 +32,9 @@ class NewestMessages:
     def subscribe(self, topic: str) -> None:
         """Subscribe to a topic, unless that was done before."""
         if topic not in self._subscribers:
+            name = f"{self._namespace}/{topic}"
             self._subscribers[topic] = rospy.Subscriber(
-                f"{self._namespace}/{topic}",
-                self._classes[topic],
-                self._receive_message,
-                callback_args=topic,
-                queue_size=1,
-                tcp_nodelay=True,
+                name, self._classes[topic], self._receive_message, topic, queue_size=1, tcp_nodelay=True
             )
 
     def _receive_message(self, message: Any, topic: str) -> None:
@@ -94,37 +90,27 @@ class CommandTopic(rospy.SubscribeListener):
         """Return whether anything subscribes to the topic: the driver does while it knows the robot."""
         return bool(self._publisher.get_num_connections() > 0)
 
-    def publish(self, message: Any) -> None:
+    def publish(self, message: Any, is_stop: bool = False) -> None:
         """Send a command; returns at once. One without a subscriber is warned about, once until there is one again.
 
-        In the first CONNECT_S after the start the newest command waits for the driver's subscription instead.
+        In the first CONNECT_S after the start the newest command waits for the driver's subscription instead. An absent
+        robot needs no stop: one is warned about only if it takes the place of a command that waits.
         """
         with self._turn:
-            waits = self._put(message)
-            if waits and self._timer is None:
-                self._timer = threading.Timer(self._connect_deadline_s - time.monotonic(), self._give_up)
-                self._timer.daemon = True
-                self._timer.start()
-        if self.connected:
-            self._has_warned = False
-        elif not waits:
-            self._warn()
-
-    def publish_stop(self, message: Any) -> None:
-        """Send a stop, as publish() does, without a warning: an absent robot does not need it."""
-        with self._turn:
-            waiting = self._waiting
-            is_lost = self._put(message) and waiting not in (None, message)
+            replaced, self._waiting = self._waiting, None
+            is_lost = not self.connected and not is_stop
+            if not self.connected and time.monotonic() < self._connect_deadline_s:
+                self._waiting, is_lost = message, is_stop and replaced not in (None, message)
+                if self._timer is None and not is_stop:
+                    self._timer = threading.Timer(self._connect_deadline_s - time.monotonic(), self._give_up)
+                    self._timer.daemon = True
+                    self._timer.start()
+            elif not rospy.is_shutdown():
+                self._publisher.publish(message)
         if is_lost:
             self._warn()
-
-    def _put(self, message: Any) -> bool:
-        """Send a message, or have it wait in place of an earlier one; return whether it waits."""
-        waits = not self.connected and time.monotonic() < self._connect_deadline_s
-        self._waiting = message if waits else None
-        if not (waits or rospy.is_shutdown()):
-            self._publisher.publish(message)
-        return waits
+        elif self.connected:
+            self._has_warned = False
 
     def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
         """Send the command that waited for this subscription; rospy calls it on its own thread."""

@@ -167,10 +167,7 @@ class RosLink(NewestMessages, RobotLink):
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         twist = Twist()
         twist.linear.x, twist.angular.z = linear_m_s, angular_rad_s
-        if linear_m_s or angular_rad_s:
-            self._cmd_vel.publish(twist)
-        else:
-            self._cmd_vel.publish_stop(twist)
+        self._cmd_vel.publish(twist, is_stop=not (linear_m_s or angular_rad_s))
 
     def send_color(self, rgb: Tuple[float, float, float]) -> None:
         self._led.wait_until_connected()  # a script that ends with it would end before

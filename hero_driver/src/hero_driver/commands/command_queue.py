@@ -32,23 +32,14 @@ class CommandSettings:
     """Permissions and time limits of commands."""
 
     allow_self_tuning: bool = declare(
-        flag(
-            False,
-            "allow pid_calibration, with which a robot spins for up to a minute, or for ever without driver or Wi-Fi,"
-            " and keeps no gains",
-        )
+        flag(False, "allow pid_calibration, with which a robot spins for a minute or for ever, and keeps no gains")
     )
     orphan_stop_s: float = declare(
         number(0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends")
     )
     silent_stop_s: float = declare(
         number(
-            0.5,
-            0.0,
-            10.0,
-            "s",
-            "silence, of at least four periods, after which the robot of a program that sent six commands is stopped;"
-            " 0: never",
+            0.5, 0.0, 10.0, "s", "silence, four periods at least, after which a driven robot is stopped; 0: never"
         )
     )
     service_timeout_s: float = declare(number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call"))

@@ -102,10 +102,8 @@ class TickOdometry:
         """Take a reading of the counters (ticks since boot or set_odom); return whether the pose is another one now."""
         # A sum of the two is finite only if both are.
         if not math.isfinite(left_ticks + right_ticks):
-            self.fault = "encoder counts %g and %g ticks, which odometry ignores: reboot the robot" % (
-                left_ticks,
-                right_ticks,
-            )
+            text = "encoder counts %g and %g ticks, which odometry ignores: reboot the robot"
+            self.fault = text % (left_ticks, right_ticks)
             return False
         self.has_reading = True
         last, self._ticks = self._ticks, (left_ticks, right_ticks)

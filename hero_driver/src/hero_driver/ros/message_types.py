@@ -91,17 +91,13 @@ def find_service_class(type_name: str, request_md5sum: str, response_md5sum: str
 def _load(loader: Any, kind: str, ros_type: str) -> Any:
     package, _, name = ros_type.partition("/")
     if not _is_generated(package, kind, name):
-        raise MessageTypeError(
-            "type %s is not known here: install or build the package %s and source its workspace"
-            " before the driver starts" % (ros_type, package)
-        )
+        text = "type %s is not known here: install or build the package %s and source its workspace before the driver"
+        raise MessageTypeError(text % (ros_type, package) + " starts")
     try:
         return loader(ros_type)
     except (ImportError, ValueError) as error:
-        raise MessageTypeError(
-            "type %s cannot be loaded (%s): build the package %s again and source its workspace"
-            % (ros_type, error, package)
-        ) from error
+        text = "type %s cannot be loaded (%s): build the package %s again and source its workspace"
+        raise MessageTypeError(text % (ros_type, error, package)) from error
 
 
 def _is_generated(package: str, kind: str, name: str) -> bool:
@@ -116,8 +112,6 @@ def _is_generated(package: str, kind: str, name: str) -> bool:
 
 def _check_md5sum(what: str, type_name: str, ros_type: str, theirs: str, ours: str) -> None:
     if theirs != ours:
-        raise MessageTypeError(
-            "%s %s has md5 %s at the robot, but %s has %s here: build the version of package %s that fits the"
-            " robot's firmware and source its workspace"
-            % (what, type_name, theirs, ros_type, ours, ros_type.partition("/")[0])
-        )
+        text = "%s %s has md5 %s at the robot, but %s has %s here: build the version of package %s that fits the"
+        text += " robot's firmware and source its workspace"
+        raise MessageTypeError(text % (what, type_name, theirs, ros_type, ours, ros_type.partition("/")[0]))

@@ -79,15 +79,8 @@ class _Cursor:
 
 def encode_topic_info(info: TopicInfo) -> bytes:
     """Return the payload that declares info (packet ids 0..5 say in which direction)."""
-    return b"".join(
-        (
-            _UINT16.pack(info.topic_id),
-            encode_text(info.name),
-            encode_text(info.message_type),
-            encode_text(info.md5sum),
-            _INT32.pack(info.buffer_length),
-        )
-    )
+    texts = map(encode_text, (info.name, info.message_type, info.md5sum))
+    return b"".join((_UINT16.pack(info.topic_id), *texts, _INT32.pack(info.buffer_length)))
 
 
 def decode_topic_info(payload: Bytes) -> TopicInfo:

@@ -200,10 +200,8 @@ class Session:
         if topic is None:
             raise RosserialError("id %d was not declared as something that this robot receives" % topic_id)
         if len(payload) > topic.info.buffer_length:
-            raise RosserialError(
-                "%s: a message of %d bytes does not fit the robot's buffer of %d bytes"
-                % (topic.info.name, len(payload), topic.info.buffer_length)
-            )
+            text = "%s: a message of %d bytes does not fit the robot's buffer of %d bytes"
+            raise RosserialError(text % (topic.info.name, len(payload), topic.info.buffer_length))
         return encode_packet(topic_id, payload)
 
     def _receive_special(self, topic_id: int, payload: bytes, now_s: float, time_of_day_s: float) -> Optional[Event]:
@@ -263,10 +261,8 @@ class Session:
             # A robot with other topics is one that was restarted, and that dials again.
             self._changes += 1
             if self._changes > self._limits.max_topics:
-                return Problem(
-                    "topic %s refused: ids were declared as something else more than %d times (max_topics)"
-                    % (info.name, self._limits.max_topics)
-                )
+                text = "topic %s refused: ids were declared as something else more than %d times (max_topics)"
+                return Problem(text % (info.name, self._limits.max_topics))
         for topics, holds in (
             (self.topics, True),
             (self._messages, kind.is_from_robot),
