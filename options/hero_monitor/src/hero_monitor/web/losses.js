@@ -16,10 +16,13 @@ export function wordOf(robot, state) {
 const COUNTED_AS = { READY: "ready", STOPPED: "stopped", JOINING: "joining", AWAY: "lost", UNKNOWN: "unknown" };
 
 /** How many robots are ready, stopped, joining, lost and unknown: each counts once; those that are gone are lost. */
-export function countRobots(robots, state, gone = 0) {
+export function describeCounts(robots, state, gone) {
   const counts = { ready: 0, stopped: 0, joining: 0, lost: gone, unknown: 0 };
   for (const robot of robots) if (robot.state !== "REFUSED") counts[COUNTED_AS[wordOf(robot, state)]] += 1;
-  return counts;
+  const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
+  if (counts.unknown) return `${counts.unknown} of ${total} unknown`;
+  const others = Object.entries(counts).filter(([name, count]) => count && name !== "ready");
+  return [`${counts.ready} of ${total} ready`, ...others.map(([name, count]) => `${count} ${name}`)].join(", ");
 }
 
 /** What a robot's place on the map is known by. */

@@ -26,6 +26,11 @@ function stateText(robot, state) {
   return shown === "READY" && robot.odom === 0 ? "READY, no data" : shown;
 }
 
+function lightText(robot, state) {
+  const light = state.lights[robot.name] || "off";
+  return LIGHTS[light] || light;
+}
+
 /** Coordinates on the map, and what they are known by unless that is odometry. */
 function poseText(robot, state) {
   const source = sourceOf(robot, state) || "own odometry";
@@ -34,47 +39,39 @@ function poseText(robot, state) {
   return source === "odometry" && place ? place : `${place} ${source}`.trim();
 }
 
-const versionsOf = ({ firmware, hardware, config }) => [firmware, hardware, config].filter(Boolean).join(", ");
-const lossesOf = ({ dropped, bad }) => `${dropped} messages, ${bad} bad packets`;
-const nearestRange = (robot, state) => nearestOf(state.ranges[robot.name]);
-
 /**
- * value: what the table sorts by; text: of a value; lasting: it stays true of a robot that is unknown now;
+ * text: of a robot, empty if there is nothing to say; lasting: it stays true of a robot that is unknown now;
  * byName: it comes from topics of the robot's name, which of a refused robot are another one's.
  */
 const COLUMNS = [
-  { title: "Robot", value: (robot) => robot.id, text: (id, robot) => robot.name || robot.address, lasting: true },
-  { title: "State", value: stateText, tag: "state", lasting: true },
-  { title: "Stop", value: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", className: "stop", lasting: true },
-  { title: "Light", value: (robot, state) => state.lights[robot.name] || "", text: (light) => LIGHTS[light] || light || "off", byName: true },
-  { title: "Nearest", value: nearestRange, text: (mm) => nearestText(mm, 2), className: "number", byName: true },
-  { title: "Speed", value: (robot) => robot.speed, text: (speed) => number(speed, 2, " m/s"), className: "number", byName: true },
-  { title: "Pose", value: poseText, text: String, className: "pose", lasting: true, byName: true },
-  { title: "Note", value: (robot) => robot.note ?? "", className: "details", lasting: true },
-  { title: "Address", value: (robot) => robot.address, className: "details", lasting: true },
-  { title: "Odom", value: (robot) => robot.odom, text: (rate) => number(rate, 1, " Hz"), className: "details number" },
-  { title: "From robot", value: (robot) => robot.bytes, text: (bytes) => number(bytes / 1000, 1, " kB/s"), className: "details number" },
-  { title: "Clock", value: (robot) => robot.clock, text: (clock) => number(clock === null ? null : clock * 1000, 1, " ms"), className: "details number" },
-  { title: "Distance", value: (robot) => robot.distance, text: (meters) => number(meters, 2, " m"), className: "details number" },
-  { title: "Model", value: (robot) => robot.model ?? "", className: "details", lasting: true },
-  { title: "Versions", value: versionsOf, className: "details", lasting: true },
-  { title: "Up for", value: (robot) => robot.uptime, text: (seconds) => (seconds ? spanOf(seconds) : "-"), className: "details" },
-  { title: "State since", value: (robot) => robot.since, text: spanOf, className: "details", lasting: true },
-  { title: "Reconnects", value: (robot) => robot.reconnects, className: "details number", lasting: true },
-  { title: "Dropped", value: lossesOf, text: String, className: "details", lasting: true },
-  { title: "Last error", value: healthOf, text: String, className: "details error", lasting: true },
+  { title: "Robot", text: (robot) => robot.name || robot.address, lasting: true },
+  { title: "State", text: stateText, tag: "state", lasting: true },
+  { title: "Stop", text: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", className: "stop", lasting: true },
+  { title: "Light", text: lightText, byName: true },
+  { title: "Nearest", text: (robot, state) => nearestText(nearestOf(state.ranges[robot.name]), 2), className: "number", byName: true },
+  { title: "Speed", text: ({ speed }) => number(speed, 2, " m/s"), className: "number", byName: true },
+  { title: "Pose", text: poseText, className: "pose", lasting: true, byName: true },
+  { title: "Note", text: ({ note }) => note, className: "details", lasting: true },
+  { title: "Address", text: ({ address }) => address, className: "details", lasting: true },
+  { title: "Odom", text: ({ odom }) => number(odom, 1, " Hz"), className: "details number" },
+  { title: "From robot", text: ({ bytes }) => number(bytes / 1000, 1, " kB/s"), className: "details number" },
+  { title: "Clock", text: ({ clock }) => number(clock === null ? null : clock * 1000, 1, " ms"), className: "details number" },
+  { title: "Distance", text: ({ distance }) => number(distance, 2, " m"), className: "details number" },
+  { title: "Model", text: ({ model }) => model, className: "details", lasting: true },
+  { title: "Versions", text: ({ firmware, hardware, config }) => [firmware, hardware, config].filter(Boolean).join(", "), className: "details", lasting: true },
+  { title: "Up for", text: ({ uptime }) => spanOf(uptime || null), className: "details" },
+  { title: "State since", text: ({ since }) => spanOf(since), className: "details", lasting: true },
+  { title: "Reconnects", text: ({ reconnects }) => String(reconnects), className: "details number", lasting: true },
+  { title: "Dropped", text: ({ dropped, bad }) => `${dropped} messages, ${bad} bad packets`, className: "details", lasting: true },
+  { title: "Last error", text: healthOf, className: "details error", lasting: true },
 ];
 
-/**
- * Text of a robot in a column; now: its value there.
- * @param {any} column
- */
-function textOf(column, robot, state, now = column.value(robot, state)) {
-  const { text, tag, lasting, byName } = column;
+/** @param {any} column */
+function textOf(column, robot, state) {
   const shownState = stateOf(robot, state);
   const isOutdated = shownState !== "READY" && shownState !== "JOINING";
-  if ((isOutdated && !lasting) || (robot.state === "REFUSED" && byName)) return "-";
-  return text ? text(now, robot) : now === "" && !tag ? "-" : String(now);
+  if ((isOutdated && !column.lasting) || (robot.state === "REFUSED" && column.byName)) return "-";
+  return column.text(robot, state) || (column.tag ? "" : "-");
 }
 
 const SHOWN_ABOVE = ["Robot", "State", "Pose", "Last error"]; // of the facts
@@ -85,20 +82,12 @@ export function listFacts(robot, state) {
   return columns.map((column) => [column.title.toLowerCase(), textOf(column, robot, state) || "-"]);
 }
 
-function compare(a, b) {
-  if (a === b) return 0;
-  if (a === null || b === null) return a === null ? -1 : 1;
-  return a < b ? -1 : 1;
-}
-
 export class FleetTable {
   choose; isAdding;
 
   /** isAdding(): whether clicks choose robots in addition, without Shift, too. */
   constructor({ choose, isAdding }) {
     Object.assign(this, { choose, isAdding });
-    this.column = COLUMNS[0];
-    this.down = false;
     this.table = /** @type {HTMLTableElement} */ (document.querySelector("#fleet table"));
     this.build();
     const details = element("details");
@@ -114,43 +103,24 @@ export class FleetTable {
   build() {
     this.table.tBodies[0].replaceChildren();
     this.rows = new Lines(this.table.tBodies[0], () => this.makeRow());
-    this.heads = COLUMNS.map((column) => this.makeHead(column));
-    this.table.tHead.rows[0].replaceChildren(...this.heads);
+    const heads = COLUMNS.map(({ title, className = "" }) => make("th", { scope: "col", className }, title));
+    this.table.tHead.rows[0].replaceChildren(...heads);
   }
 
   /** Add a column for each topic [name, unit] of fleet.yaml, behind the pose. */
   addTopics(topics) {
-    const text = (value, unit) => (value === null ? "-" : `${typeof value === "number" ? value.toFixed(2) : value} ${unit}`.trim());
-    const columns = topics.map(([name, unit]) => ({
-      title: name, value: (robot) => robot.values?.[name] ?? null, text: (value) => text(value, unit), className: "number", byName: true,
-    }));
+    const columns = topics.map(([name, unit]) => {
+      const describe = (value) => `${typeof value === "number" ? value.toFixed(2) : value} ${unit}`.trim();
+      const text = ({ values }) => (values?.[name] === undefined ? "" : describe(values[name]));
+      return { title: name, text, className: "number", byName: true };
+    });
     COLUMNS.splice(COLUMNS.findIndex(({ title }) => title === "Note"), 0, ...columns);
     this.build();
   }
 
-  makeHead(column) {
-    const button = make("button", { type: "button" }, column.title);
-    button.addEventListener("click", () => this.sortBy(column));
-    return make("th", { scope: "col", className: column.className || "" }, button);
-  }
-
-  sortBy(column) {
-    this.down = this.column === column ? !this.down : false;
-    this.column = column;
-    if (this.last) this.show(this.last);
-  }
-
+  /** Show the robots by their numbers, as the monitor lists them. */
   show(state) {
-    this.last = state;
-    const sign = this.down ? -1 : 1;
-    const valueOf = (robot) => this.column.value(robot, state);
-    const robots = [...state.fleet.robots].sort(
-      (one, other) => sign * compare(valueOf(one), valueOf(other)) || one.id - other.id,
-    );
-    this.heads.forEach((cell, index) => {
-      const order = COLUMNS[index] !== this.column ? "none" : this.down ? "descending" : "ascending";
-      if (cell.getAttribute("aria-sort") !== order) cell.setAttribute("aria-sort", order);
-    });
+    const { robots } = state.fleet;
     this.table.classList.toggle("stopping", robots.some((robot) => robot.stop));
     const keyOf = (robot) => `${robot.name} ${robot.address} ${robot.state === "REFUSED"}`;
     this.rows.show(robots, keyOf, (row, robot) => this.fill(row, robot, state));
@@ -180,14 +150,13 @@ export class FleetTable {
   fill(row, robot, state) {
     row.robot = robot;
     COLUMNS.forEach((column, index) => {
-      const now = column.value(robot, state);
-      const shown = textOf(column, robot, state, now);
+      const shown = textOf(column, robot, state);
       if (row.texts[index] === shown) return;
       row.texts[index] = shown;
       const target = row.targets[index];
       target.textContent = shown;
       if (column.tag) target.dataset[column.tag] = shown;
-      if (column.title === "Light") target.style.setProperty("--light", shown === "-" || !now ? "transparent" : now);
+      if (column.title === "Light") target.style.setProperty("--light", shown === "-" ? "transparent" : state.lights[robot.name] || "transparent");
       if (column.title === "Last error") target.title = shown;
     });
     row.chip.style.background = colorOf(robot.id);
