@@ -40,7 +40,7 @@ class Client:
         """Connect as a page does."""
         request = HTTPRequest(f"ws://{self.url}/live", headers={"Origin": "http://" + self.url})
         self.socket = await websocket_connect(request)
-        await self.socket.write_message(json.dumps({"do": "show", "picture": False, "visible": True}))
+        await self.socket.write_message(json.dumps({"do": "show", "picture": False}))
         self.reader = asyncio.ensure_future(self.read())
 
     async def read(self):

@@ -15,7 +15,7 @@ from .control.activity import Activity
 from .control.drive_requests import DriveRequests
 from .control.offers import OFFERS, check_values, make_arguments, place_robots
 from .control.programs import PROGRAMS_MAX, ChildProcess, Programs
-from .control.requests import AGE_MAX_S, RequestError, is_fresh, read_clock_ms, read_request
+from .control.requests import RequestError, is_fresh, read_clock_ms, read_request
 from .fleet_feed.feed import FleetFeed
 from .parameters import Parameters
 from .serving.lesson import Lesson
@@ -35,9 +35,6 @@ NOTED = ("stop", "release", "stop_some", "goal", "start", "end", "record", "code
 
 INERT_S = 2.0
 """After a stop no release counts: the finger that stopped all robots may tap again."""
-
-
-UNSERVED = "too many pages are open: only STOP ALL works on this one"
 
 
 class RefusedError(Exception):
@@ -80,8 +77,6 @@ class PageRequests:
             return
         do = request["do"]
         try:
-            if do in AGE_MAX_S and not page.is_served:
-                raise RefusedError(UNSERVED)
             self._carry_out(page, request)
             if do in ("stop", "release"):
                 page.acknowledge(do)
@@ -130,7 +125,7 @@ class PageRequests:
     # ---------------------------------------------------------------- view and stops
 
     def _do_show(self, page: "PageSocket", request: Request) -> None:
-        page.picture, page.visible = request["picture"], request["visible"]
+        page.picture = request["picture"]
 
     def _do_stop(self, page: "PageSocket", request: Request) -> None:
         """Stop all robots, or release them."""

@@ -163,7 +163,7 @@ class Monitor:
         self._feed.update_subscriptions(has_pages=False, picture=False)
 
     def _update_pages(self) -> None:
-        pages = self._server.served_pages()
+        pages = self._server.pages
         self._feed.update_subscriptions(True, any(page.picture for page in pages))
         self._feed.read()
         self._feed.page_state.put("programs", self._programs.describe())
@@ -181,12 +181,10 @@ class Monitor:
             self._broadcast_updates()
 
     def _send_clock(self) -> None:
-        """Tell each page the time, which tells it that the monitor runs, and whether it is among those served."""
-        served = set(self._server.served_pages())
+        """Tell each page the time, which tells it that the monitor runs, and what its user may do."""
         for page in self._server.pages:
-            page.is_served = page in served
             if page.ready:
-                message: Dict[str, Any] = {"clock_ms": read_clock_ms(), "served": page.is_served}
+                message: Dict[str, Any] = {"clock_ms": read_clock_ms()}
                 user = page.user
                 if user != page.shown_user:
                     page.shown_user = user
@@ -195,13 +193,13 @@ class Monitor:
 
     def _broadcast_updates(self) -> None:
         """Send the pages what is new to them; a page that is still receiving the last update gets it later."""
-        state, served = self._feed.page_state, set(self._server.served_pages())
+        state = self._feed.page_state
         for page in self._server.pages:
             page.send_waiting()
             if page.ready:
                 # Codes are for teachers.
                 names = None if page.user.role == TEACHER else state.list_names(LESSON)
-                updates = state.take_updates(page.seen, names if page in served else ["stop"])
+                updates = state.take_updates(page.seen, names)
                 if updates is not None:
                     page.send(updates)
 

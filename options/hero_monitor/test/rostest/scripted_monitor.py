@@ -82,7 +82,6 @@ class ScriptedMonitor:
         offers = {"programs": describe_offers(list(OFFERS)), "record": True}
         hello = {"control": True, "node": "hero_monitor"}
         self.state = {"hello": hello, "offers": offers, "fleet": make_fleet(), "losses": [], "stop": None}
-        self.served = True
         self.is_silent = False
         self._ready = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -119,7 +118,7 @@ class ScriptedMonitor:
 
     def _send_clock(self):
         if not self.is_silent:
-            self._send({"clock_ms": read_clock_ms(), "served": self.served})
+            self._send({"clock_ms": read_clock_ms()})
 
     def _send(self, updates):
         for page in self._server.pages:

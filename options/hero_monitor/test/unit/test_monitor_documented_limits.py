@@ -16,7 +16,7 @@ from hero_monitor.page_requests import INERT_S
 from hero_monitor.program import Monitor
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
 from hero_monitor.serving.client_limits import ClientLimits
-from hero_monitor.serving.server import COOKIE, PAGES_MAX, BaseHandler, Server, choose_served
+from hero_monitor.serving.server import COOKIE, PAGES_MAX, BaseHandler, Server
 
 DOCS = Path(__file__).resolve().parents[4] / "docs"
 README = Path(__file__).resolve().parents[2] / "README.md"
@@ -36,7 +36,7 @@ MONITOR, SECURITY = DOCS / "monitor.md", DOCS / "security.md"
 
 def test_limits_are_those_of_the_document():
     for page, pattern, limits in (
-        (MONITOR, r"(\w+) pages are served; on others", [PAGES_MAX]),
+        (MONITOR, r"(\w+) pages can be open at once", [PAGES_MAX]),
         (MONITOR, r"- (\w+) clients at most", [CLIENTS_MAX]),
         (MONITOR, r"is killed, or hangs for (\d+) s", [guard.SILENT_POLLS * guard.POLL_S]),
         (MONITOR, r"(\d+) s after a stop at the earliest", [INERT_S]),
@@ -115,9 +115,3 @@ def test_programs_end_the_documented_time_after_the_last_page():
     assert not monitor._loop.call_later.called
     monitor._leave(1)
     monitor._loop.call_later.assert_called_once_with(pytest.approx(linger_s), monitor._rest)
-
-
-def test_pages_beyond_the_documented_number_are_not_served():
-    (count,) = find_limits(MONITOR, r"(\w+) pages are served; on others")
-    pages = [SimpleNamespace(number=number, is_idle=False) for number in range(int(count) + 1)]
-    assert choose_served(pages) == pages[:-1]

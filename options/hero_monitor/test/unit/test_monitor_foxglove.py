@@ -2,6 +2,7 @@
 
 import json
 import struct
+from concurrent.futures import Future
 from types import SimpleNamespace
 from unittest import mock
 
@@ -59,6 +60,7 @@ class Client(FoxgloveSocket):
 
     def write_message(self, message, binary=False):
         self.texts.append(json.loads(message))
+        return Future()
 
     def keep(self, data):
         self.writes.append(data)

@@ -1,12 +1,9 @@
 """What is not known is named with cause and remedy within 2 s; old requests move no robot."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from hero_monitor.control.requests import AGE_MAX_S, is_fresh
 from hero_monitor.fleet_feed.losses import FORGOTTEN_S, NO_DRIVER, SILENT_S, LocalizationWatch, list_losses
-from hero_monitor.serving.server import PAGES_MAX, choose_served
 
 
 def list_sources(drivers, localization=None, now_s=0.0):
@@ -67,13 +64,6 @@ def test_a_request_that_a_socket_held_moves_no_robot(kind):
 def test_a_stop_counts_at_any_age():
     assert is_fresh({"do": "stop", "heard_ms": 0}, 1000000)
     assert is_fresh({"do": "end_drive", "robots": ["hero_0"]}, 1000000)
-
-
-def test_pages_that_no_one_can_see_give_way_to_others():
-    pages = [SimpleNamespace(number=number, is_idle=number < 5) for number in range(PAGES_MAX + 3)]
-    served = [page.number for page in choose_served(pages)]
-    assert len(served) == PAGES_MAX
-    assert served == [*range(5, PAGES_MAX + 3), 0, 1]
 
 
 def test_losses_begin_and_end_at_their_times():

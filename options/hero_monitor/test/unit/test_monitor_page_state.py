@@ -46,7 +46,7 @@ def test_a_page_that_missed_updates_gets_the_newest():
     assert json.loads(state.take_updates(slow)) == {"poses": {"hero_0": [9]}}
 
 
-def test_a_page_that_is_not_served_gets_the_status_of_a_stop_alone():
+def test_a_page_gets_no_more_parts_than_those_that_are_named():
     state, page = PageState(), {}
     assert state.take_updates(page, ["stop"]) is None
     state.put("fleet", {})
@@ -205,7 +205,7 @@ def read(**fields):
         {"do": "goal", "robots": ["hero_1"], "x": 1, "y": 2, "heard_ms": 5},
         {"do": "goal", "robots": ["hero_1"], "x": 1, "y": 2, "yaw": 3, "heard_ms": 5},
         {"do": "goal", "robots": ["hero_1"], "x": 1, "y": 2, "yaw": None, "heard_ms": 5},
-        {"do": "show", "picture": True, "visible": True},
+        {"do": "show", "picture": True},
     ],
 )
 def test_requests_of_the_page_are_parsed(request_fields):
@@ -242,7 +242,7 @@ def test_requests_of_the_page_are_parsed(request_fields):
         '{"do":"start","program":"led_show","robots":["hero_0"],"values":[],"heard_ms":5}',
         '{"do":"record","on":true}',
         '{"do":"show"}',
-        '{"do":"show","picture":false}',
+        '{"do":"show","picture":0}',
         '{"do":"reboot"}',
         '{"do":["stop"],"stop":true}',
     ],

@@ -28,8 +28,7 @@ class Page:
 
     def __init__(self, number=1):
         self.number, self.told, self.received = number, [], []
-        self.picture = self.visible = None
-        self.is_served, self.ended = True, []
+        self.picture, self.ended = None, []
         self.user, self.who = User("", TEACHER), "a teacher, page %d" % number
 
     def tell(self, level, text):
@@ -223,15 +222,6 @@ def test_a_stop_of_one_robot_ends_its_hold_and_both_pages_are_told(desk):
     assert [words[0] for words in desk.take()] == ["drive", "drive"]
 
 
-def test_a_page_that_is_not_served_can_stop_robots_and_move_none(desk):
-    desk.pages[0].is_served = False
-    for do, fields in (*MOVING, ("release", {}), ("record", {"on": True})):
-        assert desk.ask(do, **fields) == ["too many pages are open: only STOP ALL works on this one"]
-    assert desk.noted == [] and desk.started == [] and desk.pages[0].received == []
-    assert desk.ask("stop") == [] and desk.pages[0].received == ["stop"]
-    assert desk.ask("show", picture=False, visible=True) == []
-
-
 def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
     assert desk.ask("goal", yaw=1.5, **GOAL) == [] == desk.ask("goal", **GOAL)
     (robot, frame, goal, with_heading), future = desk.submitted[0]
@@ -300,8 +290,8 @@ def test_a_recording_begins_once_and_ends_on_request(desk, monkeypatch):
 
 
 def test_a_page_says_what_it_shows(desk):
-    assert desk.ask("show", page=1, picture=True, visible=False) == []
-    assert (desk.pages[1].picture, desk.pages[1].visible) == (True, False)
+    assert desk.ask("show", page=1, picture=True) == []
+    assert desk.pages[1].picture is True
 
 
 class Ros:

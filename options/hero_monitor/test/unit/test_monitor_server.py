@@ -13,13 +13,12 @@ from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.lesson import Lesson
 from hero_monitor.serving.server import (
-    SOCKETS_MAX,
+    PAGES_MAX,
     FileHandler,
     LoginHandler,
     PageSocket,
     PictureHandler,
     Server,
-    choose_served,
 )
 
 TOKEN = "a secret of more than sixteen letters"
@@ -54,12 +53,12 @@ def ask_for_socket(pages=0, headers=OURS, **options):
     return ask(PageSocket, headers=headers, actions=None, pages=[None] * pages, **options)
 
 
-@pytest.mark.parametrize("pages", [SOCKETS_MAX, SOCKETS_MAX + 1])
+@pytest.mark.parametrize("pages", [PAGES_MAX, PAGES_MAX + 1])
 def test_a_page_beyond_the_limit_is_told_how_to_stop_all_robots(pages):
     status, _, text = ask_for_socket(pages)
     assert status == 503
     assert text == "too many pages are open; to stop all robots: rosservice call /hero_driver/stop true\n"
-    assert ask_for_socket(SOCKETS_MAX - 1)[0] == ASKS_TO_UPGRADE
+    assert ask_for_socket(PAGES_MAX - 1)[0] == ASKS_TO_UPGRADE
 
 
 def test_only_our_own_page_may_open_a_socket():
@@ -73,7 +72,7 @@ def test_only_our_own_page_may_open_a_socket():
 
 
 def test_every_answer_keeps_foreign_content_out():
-    answers = [ask(FileHandler, "style.css"), ask(FileHandler, "../server.py"), ask_for_socket(SOCKETS_MAX)]
+    answers = [ask(FileHandler, "style.css"), ask(FileHandler, "../server.py"), ask_for_socket(PAGES_MAX)]
     for status, headers, _ in answers:
         assert status in (200, 404, 503)
         assert headers["Content-Security-Policy"].startswith("default-src 'none'; script-src 'self';")
@@ -136,12 +135,6 @@ def test_wrong_tokens_are_refused_and_counted(body):
     assert status == 429
     assert "Set-Cookie" not in headers
     assert "wait 5 s" in text
-
-
-def test_pages_that_can_be_seen_are_served_first():
-    pages = [mock.Mock(is_idle=number < 3) for number in range(40)]
-    assert choose_served(pages) == pages[3:33]
-    assert choose_served(pages[:10]) == [*pages[3:10], *pages[:3]]
 
 
 def test_too_many_wrong_tokens_make_their_address_wait_and_no_other(clock):

@@ -73,14 +73,14 @@ REQUESTS: Dict[str, Dict[str, Callable[[Any], bool]]] = {
     "dismiss": {},
     "code": {"robots": _is_names},
     "withdraw": {"code": _is_name},
-    "show": {"picture": _is_flag, "visible": _is_flag},
+    "show": {"picture": _is_flag},
 }
 """Requests of a page by its field "do", with the fields that it needs and their checks.
 
 drive: a button is held; velocity in m/s and rad/s, and the clock as heard when it was pressed. end_drive: it is let go.
 stop_some: end what drives these robots, and stop them. goal: a pose on the map in m; yaw (rad) may be added. start: a
 program of offers.OFFERS, with values for its fields. dismiss: list robots that are gone no longer. code: make a code
-for the drivers of these robots. show: whether the page is visible, and shows the camera's picture.
+for the drivers of these robots. show: whether the page shows the camera's picture.
 """
 
 

@@ -19,7 +19,7 @@ from hero_node import shorten
 from hero_node.parameters import is_whole_number
 
 from ..serving.lesson import User
-from ..serving.server import BaseHandler, Route
+from ..serving.server import BaseHandler, Route, send_text
 from .topics import Channel, RosTopics
 
 SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
@@ -114,8 +114,7 @@ class FoxgloveSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 
     def _tell(self, operation: str, **fields: Any) -> None:
         """Send a text of the protocol."""
-        with contextlib.suppress(tornado.websocket.WebSocketClosedError):
-            self.write_message(json.dumps({"op": operation, **fields}))
+        send_text(self, json.dumps({"op": operation, **fields}))
 
     def _warn(self, text: str) -> None:
         """Send a line for the users of the client."""

@@ -49,14 +49,8 @@ TOKEN_BURST = 5
 TOKEN_PERIOD_S = 5.0
 """An address may try TOKEN_BURST wrong tokens at once, then one in TOKEN_PERIOD_S."""
 
-PAGES_MAX = 30
-"""Pages that are served: those that can be seen come first. Others get STOP ALL alone."""
-
-SOCKETS_MAX = 200
-"""Pages in all."""
-
-STUCK_S = 5.0
-"""A page that has taken nothing for this time counts as not visible."""
+PAGES_MAX = 200
+"""With 20 robots they take a fifth of a core; a page that is slow misses updates."""
 
 SEND_BUFFER = 65536
 """Bytes that the kernel may buffer for one page: about a second of a large swarm."""
@@ -206,17 +200,27 @@ class LoginHandler(BaseHandler):
         self.set_status(204)
 
 
+def send_text(handler: tornado.websocket.WebSocketHandler, text: str) -> Any:
+    """Return a future that is done when the text has left, or the client has; None if it left before."""
+    try:
+        sending: Any = handler.write_message(text)
+    except tornado.websocket.WebSocketClosedError:
+        return None
+    sending.add_done_callback(lambda sent: sent.cancelled() or sent.exception())  # else asyncio logs it
+    return sending
+
+
 class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     """The socket of one page."""
 
     numbers = itertools.count(1)
 
     def prepare(self) -> Optional[Awaitable[None]]:
-        """Refuse pages of other servers, browsers that are not logged in, and pages beyond SOCKETS_MAX."""
+        """Refuse pages of other servers, browsers that are not logged in, and pages beyond PAGES_MAX."""
         BaseHandler.prepare(self)
         if not (self.is_logged_in and self.is_own_page):
             raise tornado.web.HTTPError(403)
-        if len(self.pages) >= SOCKETS_MAX:
+        if len(self.pages) >= PAGES_MAX:
             raise tornado.web.HTTPError(503)
         return None
 
@@ -228,10 +232,9 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
         """Register a page."""
         self.number = next(PageSocket.numbers)
         self.seen: Dict[str, Any] = {}
-        self.visible, self.picture, self.is_served = True, False, False
+        self.picture = False
         self.shown_user: Optional[User] = None
-        self._sent_s = time.monotonic()
-        self._sending: Optional[Awaitable[None]] = None
+        self._sending: Any = None
         self._waiting: Deque[str] = deque(maxlen=WAITING_MAX)
         self.set_nodelay(True)
         stream = getattr(self.ws_connection, "stream", None)
@@ -263,21 +266,11 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
     @property
     def ready(self) -> bool:
         """Return whether everything has been sent."""
-        return self._sending is None or self._sending.done()  # type: ignore[attr-defined]
-
-    @property
-    def is_idle(self) -> bool:
-        """Return whether no one can see this page: it is hidden, or takes nothing."""
-        return not self.visible or (not self.ready and time.monotonic() - self._sent_s > STUCK_S)
+        return self._sending is None or self._sending.done()
 
     def send(self, text: str) -> None:
         """Send a text to this page."""
-        if self.ready:
-            self._sent_s = time.monotonic()
-        try:
-            self._sending = self.write_message(text)
-        except tornado.websocket.WebSocketClosedError:
-            return
+        self._sending = send_text(self, text) or self._sending
 
     def tell(self, level: str, text: str) -> None:
         """Show a notice on this page."""
@@ -307,11 +300,6 @@ class MonotonicLoop(tornado.platform.asyncio.AsyncIOLoop):
     def time(self) -> float:
         """Return the time by which timers run, in s."""
         return time.monotonic()
-
-
-def choose_served(pages: List[PageSocket]) -> List[PageSocket]:
-    """Return at most PAGES_MAX: first those that can be seen, in the order in which they came."""
-    return sorted(pages, key=lambda page: page.is_idle)[:PAGES_MAX]
 
 
 class LimitedServer(tornado.httpserver.HTTPServer):
@@ -374,10 +362,6 @@ class Server:
         self._http.add_sockets(sockets)
         self._expiry.start()
         return int(sockets[0].getsockname()[1])
-
-    def served_pages(self) -> List[PageSocket]:
-        """Return the pages that get updates."""
-        return choose_served(self.pages)
 
     def close(self) -> None:
         """Disconnect all pages."""

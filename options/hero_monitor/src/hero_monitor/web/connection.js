@@ -19,7 +19,6 @@ export class Connection {
     Object.assign(this, handlers);
     this.socket = null;
     this.clockMs = this.clockHeardMs = 0;
-    this.served = true;
     this.heardMs = 0; // when anything arrived
     this.steppedMs = Date.now();
     this.isFresh = false;
@@ -65,20 +64,12 @@ export class Connection {
     this.onChange();
   }
 
-  /** Whether this page is among those that the monitor serves. */
-  noteServed(served) {
-    if (served === this.served) return;
-    this.served = served;
-    this.onChange();
-  }
-
   open() {
     const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
     this.socket = socket;
     let opened = false;
     socket.addEventListener("open", () => {
       opened = true;
-      this.served = true;
       this.onOpen();
     });
     socket.addEventListener("message", (event) => {
@@ -87,7 +78,6 @@ export class Connection {
       if ("clock_ms" in updates) {
         this.clockMs = updates.clock_ms;
         this.clockHeardMs = performance.now();
-        this.noteServed(updates.served);
       }
       this.updateFreshness();
       this.onUpdates(updates);

@@ -135,7 +135,7 @@ function showHead() {
 
 /** Show the state in all panels. */
 function showAll() {
-  state.isFresh = connection.isFresh && connection.served;
+  state.isFresh = connection.isFresh;
   const present = [...state.chosen].filter((name) => state.fleet.robots.some((robot) => robot.name === name));
   if (present.length < state.chosen.size) choose(present);
   table.show(state);
@@ -168,8 +168,6 @@ function receive(updates) {
   if ("user" in updates && !state.chosen.size) choose(state.user.robots); // a driver's own
   if (RECEIVED.some((name) => name in updates)) map.update(updates); // most carry the clock alone
 }
-
-document.addEventListener("visibilitychange", () => map.requestShown());
 
 element("all").addEventListener("click", () => {
   const names = listPresent().map((robot) => robot.name);

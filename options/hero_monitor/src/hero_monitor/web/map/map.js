@@ -65,9 +65,9 @@ export class FleetMap {
     this.draw();
   }
 
-  /** Tell what is to be seen here; to be repeated on each connection. */
+  /** Tell whether the picture is shown here; to be repeated on each connection. */
   requestShown() {
-    this.connection.send({ do: "show", picture: this.shows.picture, visible: !document.hidden });
+    this.connection.send({ do: "show", picture: this.shows.picture });
   }
 
   /** Ask for places, with a hint, until a hint of null: onPlace({x, y, yaw}) in m and rad, yaw after a drag alone. */
