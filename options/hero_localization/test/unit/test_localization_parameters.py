@@ -25,7 +25,7 @@ def test_the_readme_has_the_list_of_a_program(program):
         "four that agree with each other, over %g s or more, reset the pose" % pose_filter.MOVED_S,
         "While poses of one source disagree for %g s" % pose_sources.DISAGREEING_S,
         "Poses stamped %g s ahead of the clock are not used" % swarm_localizer.AHEAD_S,
-        "%g ms or more are named and corrected" % (1e3 * source_clocks.NAMED_S),
+        "%g ms or more are corrected, and named after %g s" % (1e3 * source_clocks.NAMED_S, source_clocks.CONFIRMED_S),
         "with the tags found, at most %g Hz" % (1.0 / track.PICTURE_PERIOD_S),
         "this many images (at least %d)" % MIN_VIEWS,
         "Discs of %g mm" % ROBOT_DIAMETER_MM,
