@@ -144,7 +144,8 @@ def _choose_fit(views: Sequence[BoardView], width_px: int, height_px: int) -> _F
     fits = [plain]
     for model in (RATIONAL, EQUIDISTANT) if plain.rms_px > WIDE_RMS_PX else ():
         with suppress(CalibrationError):  # the views do not suffice for this model
-            fits.append(_fit(views, width_px, height_px, model))
+            # OpenCV seeks the rational one's many numbers too far away without a guess.
+            fits.append(_fit(views, width_px, height_px, model, plain.lens if model == RATIONAL else None))
     best = min(fits, key=lambda fit: fit.rms_px)
     return best if best.rms_px < WIDE_SHARE * plain.rms_px else plain
 
@@ -163,7 +164,8 @@ def _fit(
     matrix, distortion = np.eye(3), np.zeros(MODELS[model][-1])
     if guess is not None:
         flags |= module.CALIB_USE_INTRINSIC_GUESS
-        matrix, distortion = guess.matrix.copy(), guess.distortion.copy()
+        matrix = guess.matrix.copy()
+        distortion[: len(guess.distortion)] = guess.distortion
     corners_m = [list_board_corners()[view.ids] for view in views]
     objects = [corners[:, None].astype(kind) for corners in corners_m]
     pixels = [view.pixels[:, None].astype(kind) for view in views]
