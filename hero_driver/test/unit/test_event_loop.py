@@ -405,8 +405,10 @@ def test_the_loop_listens_where_it_was_told_to():
     loop.open(Notes())
     assert loop.listening.host == "127.0.0.2"
     again = EventLoop("127.0.0.2", loop.listening.port, 1.0)
-    with pytest.raises(OSError, match="in use"):
+    descriptors = os.listdir("/proc/self/fd")
+    with pytest.raises(OSError, match="in use") as refused:
         again.open(Notes())
+    assert os.listdir("/proc/self/fd") == descriptors, refused
     for opened in (loop, again):
         opened._close_all()
 

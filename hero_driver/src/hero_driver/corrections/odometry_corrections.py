@@ -61,7 +61,7 @@ class OdometryCorrector:
     def restart(self, rebooted: bool, wheels: WheelMotion) -> None:
         """Begin a new connection, after a reboot with counters that begin anew; wheels are told of all its readings."""
         self.wheels = wheels
-        self._readings: Optional[int] = None  # of the encoder, on this connection; None before it is declared
+        self._is_read: Optional[bool] = None  # the encoder, on this connection; None before it is declared
         self._encoder_stamp_ns = self._odom_stamp_ns = -BURST_NS
         self._reading_follows = True  # in a burst, behind odom
         self._waiting: List[Tuple[Callable[..., None], Tuple[Any, ...]]] = []  # what writes messages, its arguments
@@ -86,12 +86,12 @@ class OdometryCorrector:
 
     def expect_readings(self) -> None:
         """The robot has declared its encoder."""
-        self._readings = 0
+        self._is_read = False
 
     def receive_odometry(self, name: str, sink: Sink, payload: bytes, stamp_ns: int, arrival_ns: int) -> None:
         """Take the robot's own odometry, which begins with a header of this stamp; sink takes the corrected one."""
         corrected_ns = self._stamps.correct(name, stamp_ns, arrival_ns)
-        if self._readings is None:
+        if self._is_read is None:
             velocity = message_layouts.read_odometry_velocity(payload)
             if velocity is not None:
                 self.wheels.read_velocity(*velocity)
@@ -124,12 +124,12 @@ class OdometryCorrector:
         self.wheels.read_ticks(left_ticks, right_ticks)
         self._encoder_stamp_ns = stamp_ns
         self._reading_follows = abs(stamp_ns - self._odom_stamp_ns) <= BURST_NS
-        if not self._readings:
+        if not self._is_read:
             # The boot line may have gone down another connection, which never said who it was.
             counts_from_boot = abs(arrival_ns - stamp_ns) > MAX_AGE_NS
             if counts_from_boot or self.ticks.looks_reset(left_ticks, right_ticks):
                 self.note_reboot()
-        self._readings = (self._readings or 0) + 1
+        self._is_read = True
         if self.ticks.integrate(left_ticks, right_ticks, stamp_ns / NS_PER_S):
             # One pose goes out twice, as odometry and as a transform.
             self._packed_pose = self._pack_pose()
@@ -147,7 +147,7 @@ class OdometryCorrector:
 
     def _write_odometry(self, name: str, sink: Sink, stamp_ns: int, payload: bytes) -> None:
         ticks, estimate = self.ticks, None
-        if ticks.has_reading and self._readings is not None:
+        if ticks.has_reading and self._is_read is not None:
             estimate = self._packed_pose, ticks.linear_m_s, ticks.angular_rad_s
         written = self._writer.rewrite(payload, self._stamps.count(name), stamp_ns, estimate)
         if written is None:
@@ -156,7 +156,7 @@ class OdometryCorrector:
             sink.publish(written)
 
     def _write_transform(self, head: bytes, tail: bytes) -> None:
-        if self.ticks.has_reading and self._readings is not None:
+        if self.ticks.has_reading and self._is_read is not None:
             self._add_transform(head + self._packed_pose)
             return
         fault = message_layouts.find_transform_fault(tail)
