@@ -4,6 +4,7 @@ rosrun hero_driver hero_driver _port:=11412
 """
 
 import errno
+import functools
 import io
 import logging
 import os
@@ -78,19 +79,15 @@ class DriverNode:
     """The whole driver: open() until close()."""
 
     def __init__(self, config: DriverConfig, log: LogRelay, threads: ThreadWatch) -> None:
+        """Serve nothing before open(); for the time after rospy.init_node()."""
         self._config = config
         self._threads = threads
         # Not an Event: a signal handler that interrupts the waiting thread would wait for the Event's lock for ever.
         self._ends: queue.SimpleQueue[None] = queue.SimpleQueue()
         self._changed = threading.Event()
         self._log = log
-        self._registrar = Worker(
-            "registrar",
-            REGISTRAR_QUEUE_LENGTH,
-            lambda error: self._log.log(
-                "error", f"a topic or service could not be set up: {type(error).__name__}: {error}"
-            ),
-        )
+        failure, tell = "a topic or service could not be set up", functools.partial(log.log, "error")
+        self._registrar = Worker("registrar", REGISTRAR_QUEUE_LENGTH, failure, tell)
         self._loop = EventLoop(config.host, config.port, config.silence_timeout_s)
         self._gateway = Gateway(
             config, self._loop, log, self._registrar, rospy.get_name(), make_ros_clock(), self._changed.set
@@ -268,10 +265,8 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     _wait_for_master(read_master_uri())
     running = find_running_node(NODE_NAME)
     if running:
-        raise ProgramError(
-            "a driver already runs as %s: end it, or start this one with another name:= and port:= (simulated robots"
-            " alone: roslaunch hero_sim hero_sim.launch)" % running
-        )
+        text = "a driver already runs as %s: end it, or start this one with another name:= and port:= (simulated robots"
+        raise ProgramError(text % running + " alone: roslaunch hero_sim hero_sim.launch)")
     # A log line that cannot be written must not become a dozen lines of traceback.
     logging.raiseExceptions = False
     limit_xmlrpc_connections()

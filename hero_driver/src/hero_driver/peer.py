@@ -70,12 +70,13 @@ class Peer:
         """Read the wheels of a robot without a bridge from its encoder."""
         if topic.info.message_type.endswith("/Encoder"):
             convert = CONVERSIONS.get(("hero_msgs/Encoder", topic.info.md5sum), bytes)
-            topic.receive = lambda payload, _arrival_ns: self._read_wheels(convert(payload))
 
-    def _read_wheels(self, payload: bytes) -> None:
-        reading = read_encoder(payload)
-        if reading is not None:
-            self.wheels.read_ticks(reading[1], reading[2])
+            def read(payload: bytes, arrival_ns: int) -> None:
+                reading = read_encoder(convert(payload))
+                if reading is not None:
+                    self.wheels.read_ticks(*reading[1:])
+
+            topic.receive = read
 
     def has_acknowledged_motion(self) -> bool:
         """Return whether the robot's TCP has acknowledged the last motion command."""

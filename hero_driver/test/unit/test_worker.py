@@ -13,11 +13,11 @@ DEADLINE_S = 60.0
 class Calls:
     """A worker whose calls can be held until they are let go."""
 
-    def __init__(self, queue_length=10, on_error=None):
+    def __init__(self, queue_length=10, tell=None):
         self.errors = []
         self.done = []
         self.gate = threading.Event()
-        self.worker = Worker("calls", queue_length, on_error or self.errors.append)
+        self.worker = Worker("calls", queue_length, "a call failed", tell or self.errors.append)
 
     def hold(self):
         """Keep the worker busy; return when it is."""
@@ -84,15 +84,15 @@ def test_a_call_that_fails_is_reported_and_the_next_one_is_made(error):
     calls.worker.submit(fail)
     calls.submit(1)
     calls.wait()
-    assert [type(reported) for reported in calls.errors] == [error]
+    assert calls.errors == [f"a call failed: {error.__name__}: bad call"]
     assert calls.done == [1]
 
 
 def test_an_error_that_cannot_be_reported_does_not_end_the_thread():
-    def fail(error):
+    def fail(text):
         raise OSError("the terminal is gone")
 
-    calls = Calls(on_error=fail)
+    calls = Calls(tell=fail)
     calls.worker.submit(sys.exit)
     calls.submit(1)
     calls.wait()

@@ -108,11 +108,8 @@ class JoystickTeleop:
 
         Raises: ProgramError if the joystick lacks an axis or button, or a stop of all robots was not obeyed.
         """
-        rospy.loginfo(
-            "hold button %d and move the stick; button %d stops all robots of all drivers",
-            self._mapping.enable_button,
-            self._mapping.stop_button,
-        )
+        text = "hold button %d and move the stick; button %d stops all robots of all drivers"
+        rospy.loginfo(text, self._mapping.enable_button, self._mapping.stop_button)
         rospy.Subscriber("/joy", Joy, self.receive, queue_size=10, tcp_nodelay=True)
         for _ in program.rate(STEP_HZ):
             self.step(self._swarm.now_s)
@@ -130,10 +127,8 @@ class JoystickTeleop:
             command = self._mapping.read(self._newest)
         elif now_s >= self._next_warning_s:
             self._next_warning_s = now_s + REPORT_PERIOD_S
-            rospy.logwarn(
-                "nothing on %s: is a joystick plugged in, and does its driver (package joy) run?",
-                rospy.resolve_name("/joy"),
-            )
+            text = "nothing on %s: is a joystick plugged in, and does its driver (package joy) run?"
+            rospy.logwarn(text, rospy.resolve_name("/joy"))
         while self._presses:
             buttons = self._presses.popleft()
             self._output.note_hold(is_held(buttons, self._mapping.enable_button))

@@ -224,11 +224,8 @@ class KeyboardTeleop:
     def describe(self) -> Tuple[str, str]:
         """Return level and text of the live line: robot, command, pose, nearest obstacle, or the outcome of a stop."""
         robots = f"all {len(self._swarm)} robots" if len(self._chosen) > 1 else self._chosen[0].name
-        speeds = "%+.2f m/s %+.2f rad/s (keys: %.2f, %.2f)" % (
-            *self._sent,
-            self._drive.linear_m_s,
-            self._drive.angular_rad_s,
-        )
+        by_keys = self._drive.linear_m_s, self._drive.angular_rad_s
+        speeds = "%+.2f m/s %+.2f rad/s (keys: %.2f, %.2f)" % (*self._sent, *by_keys)
         level, stop = self._describe_stop()
         if stop:
             return level, f"{robots} | {stop}"

@@ -182,10 +182,8 @@ class MotionController:
         if not is_told_to_move or last is None or is_apart(last, odometry, SAME_M, SAME_RAD):
             self._moved_pose, self._moved_s = odometry, seen_s
         elif seen_s - self._moved_s >= STALL_S:
-            self._fail(
-                "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
-                " stop the robot?"
-            )
+            text = "its wheels do not turn: is something blocking them, is the battery empty, or does another program"
+            self._fail(text + " stop the robot?")
 
     def _fail(self, reason: str) -> Velocity:
         self.state = State.FAILED

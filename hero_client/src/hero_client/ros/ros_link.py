@@ -151,10 +151,8 @@ class RosLink(NewestMessages, RobotLink):
     def read_neighbors(self) -> List[Neighbor]:
         message = self.read("neighbors")
         if not message.is_known:
-            raise StaleDataError(
-                "%s senses no neighbors, as its own pose is not known or old: does localize run, and is its tag in view"
-                " of the camera?" % self._name
-            )
+            text = "senses no neighbors, as its own pose is not known or old: does localize run, and is its tag in view"
+            raise StaleDataError(f"{self._name} {text} of the camera?")
         return [Neighbor(found.id, found.range, found.bearing, found.heading) for found in message.neighbors]
 
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:

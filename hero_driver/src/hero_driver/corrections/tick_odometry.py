@@ -124,10 +124,9 @@ class TickOdometry:
                 self._move(left_m, right_m)
             else:
                 self.resets += 1
-                self.fault = (
-                    "encoder jumped by %g and %g ticks, which odometry ignores: check where the robot is, and the"
-                    " encoders' wires if it happens again" % (left_ticks - last[0], right_ticks - last[1])
-                )
+                text = "encoder jumped by %g and %g ticks, which odometry ignores: check where the robot is, and the"
+                text += " encoders' wires if it happens again"
+                self.fault = text % (left_ticks - last[0], right_ticks - last[1])
                 self._forget_velocity()
                 is_moving = False
         if not 0.0 < elapsed_s <= MAX_STEP_S:

@@ -105,10 +105,8 @@ class Admission:
         """Count a new robot of host, which costs calls to the master; return why it has to wait, or None."""
         if self._new_robots.take(host, 1.0, now_s):
             return None
-        return "more than %d new robots from one address, and %g more per second" % (
-            self._limits.max_connections_per_address,
-            NEW_ROBOTS_PER_S,
-        )
+        most = self._limits.max_connections_per_address
+        return "more than %d new robots from one address, and %g more per second" % (most, NEW_ROBOTS_PER_S)
 
     def admit_garbage(self, host: str, length: int, now_s: float) -> Optional[str]:
         """Count bytes of host that belong to no packet; return why its connection has to end, None if it may stay."""
@@ -125,9 +123,8 @@ class Admission:
             if not any((mapped or address) in network for network in limits.allow):
                 return "address not in ~allow"
         if self._connected.count(host) >= limits.max_connections_per_address:
-            return "more than %d connections of one address (~max_connections_per_address)" % (
-                limits.max_connections_per_address
-            )
+            text = "more than %d connections of one address (~max_connections_per_address)"
+            return text % limits.max_connections_per_address
         return None
 
 

@@ -25,7 +25,7 @@ class LogRelay:
     """The log for every other thread of the driver."""
 
     def __init__(self) -> None:
-        self._worker = Worker("log relay", QUEUE_LENGTH, _report_lost_line)
+        self._worker = Worker("log relay", QUEUE_LENGTH, "a log line was lost", print_error)
         self._last: Dict[str, Tuple[float, int]] = {}
         self._robots = TokenBuckets(ROBOT_LINES_MAX, ROBOT_LINES_MAX / THROTTLE_S)
         self._hosts = TokenBuckets(HOST_LINES_MAX, HOST_LINES_MAX / THROTTLE_S)
@@ -82,7 +82,3 @@ def report_dropped_log_lines() -> None:
 
     for handler in list_log_handlers():
         handler.handleError = tell  # type: ignore[method-assign]
-
-
-def _report_lost_line(error: BaseException) -> None:
-    print_error(f"a log line was lost: {type(error).__name__}: {error}")

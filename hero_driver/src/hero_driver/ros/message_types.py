@@ -50,13 +50,8 @@ class RawMessage(genpy.Message):
 @functools.lru_cache(maxsize=None)
 def make_raw_class(message_class: Any) -> Any:
     """Return the class that carries messages of message_class as bytes; the same one for every call."""
-    fields = {
-        "__slots__": [],
-        "_type": message_class._type,
-        "_md5sum": message_class._md5sum,
-        "_full_text": message_class._full_text,
-    }
-    return type("Raw" + message_class.__name__, (RawMessage,), fields)
+    fields = {name: getattr(message_class, name) for name in ("_type", "_md5sum", "_full_text")}
+    return type("Raw" + message_class.__name__, (RawMessage,), {"__slots__": [], **fields})
 
 
 @functools.lru_cache(maxsize=None)

@@ -192,10 +192,8 @@ class RobotCommands:
             return fault
         if name.endswith(CALIBRATION_SUFFIX):
             if not self._settings.allow_self_tuning:
-                return (
-                    "self-tuning spins the robot for up to a minute and finds no gains that the firmware keeps; measure"
-                    " them with hero_calibration calibrate, or set ~allow_self_tuning"
-                )
+                text = "self-tuning spins the robot for up to a minute and finds no gains that the firmware keeps;"
+                return text + " measure them with hero_calibration calibrate, or set ~allow_self_tuning"
             if self._owner.stopped:
                 return "it moves the robot, and all robots are stopped (~stop)"
             self.was_told_to_tune = self._may_tune = True

@@ -4,6 +4,7 @@ Programs connect to ~stop_request at their start, so that it works while the ROS
 """
 
 import collections
+import functools
 import queue
 import time
 import weakref
@@ -44,11 +45,7 @@ class StopInterface:
         self.stopped_by = ""
         """Node that stopped the robots; empty if they are not, or were stopped before the driver's start."""
         self.stopped_s: Optional[float] = None  # monotonic; None: not stopped, or unknown
-        self._keeper = Worker(
-            "stop keeper",
-            100,
-            lambda error: log.log("error", f"~stopped was not published: {type(error).__name__}: {error}"),
-        )
+        self._keeper = Worker("stop keeper", 100, "~stopped was not published", functools.partial(log.log, "error"))
 
     def open(self, stopped: bool, since_s: Optional[float]) -> None:
         """Serve; begin as stopped says. The loop does not run yet. since_s: as StopStore.read_since() returns it."""

@@ -59,10 +59,12 @@ class CallQueue:
 class Worker(CallQueue):
     """A thread for what can block (the ROS master, files, terminals): it makes the calls of its queue."""
 
-    def __init__(self, name: str, queue_length: int, on_error: Callable[[BaseException], None]) -> None:
-        """on_error gets what a call raises, on the worker's thread; the next call is made all the same."""
+    def __init__(self, name: str, queue_length: int, failure: str, tell: Callable[[str], None]) -> None:
+        """Start it; tell() is told of a call's failure and what it raised, and the next call is made all the same."""
         self._ready = threading.Event()
-        super().__init__(queue_length, self._ready.set, on_error)
+        super().__init__(
+            queue_length, self._ready.set, lambda error: tell(f"{failure}: {type(error).__name__}: {error}")
+        )
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 

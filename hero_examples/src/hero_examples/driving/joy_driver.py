@@ -68,14 +68,11 @@ class JoystickDevice:
         # The kernel gives whole records only.
         for _, value, kind, index in _RECORD.iter_unpack(data[: len(data) // _RECORD.size * _RECORD.size]):
             if kind & ~_INITIAL == _AXIS:
-                self._set(self.axes, index, self._scale(-value / _FULL))
+                # Without the dead zone: what lies beyond it starts at 0.
+                beyond = max(0.0, min(1.0, abs(value) / _FULL) - self._deadzone) / (1.0 - self._deadzone)
+                self._set(self.axes, index, -beyond if value > 0 else beyond)
             elif kind & ~_INITIAL == _BUTTON:
                 self._set(self.buttons, index, value)
-
-    def _scale(self, value: float) -> float:
-        """Return a value with the deadzone taken out, so that it starts at 0 beyond it."""
-        beyond = max(0.0, min(1.0, abs(value)) - self._deadzone) / (1.0 - self._deadzone)
-        return beyond if value > 0.0 else -beyond
 
     @staticmethod
     def _set(values: List, index: int, value: float) -> None:
