@@ -36,12 +36,8 @@ from .config import DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
 from .reports.reporter import FleetStatus, Reporter
 from .reports.robot_status import find_stamp
+from .ros import rospy_internals
 from .ros.log_relay import LogRelay, report_dropped_log_lines
-from .ros.rospy_internals import (
-    call_before_shutdown,
-    keep_publishers_connected,
-    leave_topics_out_of_rosout,
-)
 from .ros.thread_watch import ThreadWatch
 from .stops.interface import StopInterface
 from .stops.store import StopStore
@@ -243,7 +239,7 @@ def _run(argv: Optional[List[str]], threads: ThreadWatch) -> int:
         # The driver handles signals itself: robots are stopped before ROS goes down.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, lambda *_: node.end())
-        call_before_shutdown(node.end)
+        rospy_internals.call_before_shutdown(node.end)
         node.open()
     except KeyboardInterrupt:
         return 130
@@ -271,9 +267,9 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     logging.raiseExceptions = False
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
-    keep_publishers_connected()
+    rospy_internals.keep_publishers_connected()
     init_ros_node(NODE_NAME, arguments=argv)
-    leave_topics_out_of_rosout()
+    rospy_internals.leave_topics_out_of_rosout()
     report_dropped_log_lines()
 
 

@@ -70,7 +70,7 @@ class Bench:
 
         monkeypatch.setattr(rospy, "Subscriber", Subscriber)
         topics = SimpleNamespace(get_subscriber_impl={"/topic": self.impl}.get)
-        monkeypatch.setattr(rospy_internals, "get_topic_manager", lambda: topics)
+        monkeypatch.setattr(rospy_internals.registration, "get_topic_manager", lambda: topics)
         self.old = []  # payloads that were called old
         self.subscriber = RawSubscriber(self.receive, self.loop)
         self.subscriber.open("/topic", RAW_CLASS, 50)

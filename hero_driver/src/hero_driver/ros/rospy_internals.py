@@ -11,12 +11,7 @@ from typing import Any, Callable, FrozenSet, List, Optional, Tuple
 
 import rosgraph
 import rospy
-from rospy.impl import rosout, tcpros_pubsub
-from rospy.impl.registration import (
-    RegManager,
-    get_registration_listeners,
-    get_topic_manager,
-)
+from rospy.impl import registration, rosout, tcpros_pubsub
 
 RECONNECT_PAUSE_S = 0.5
 """As rospy waits before it connects again; a publisher that breaks each connection costs no more than this."""
@@ -40,15 +35,15 @@ def keep_publishers_connected() -> None:
     def connect_and_look_again(connection: Any, *arguments: Any) -> None:
         connect(connection, *arguments)
         _, _, uri, _, topic = arguments
-        subscriber = get_topic_manager().get_subscriber_impl(topic)
+        subscriber = registration.get_topic_manager().get_subscriber_impl(topic)
         if subscriber is None or rospy.is_shutdown():
             return
         if connection in subscriber.connections:
             subscriber.remove_connection(connection)
         time.sleep(RECONNECT_PAUSE_S)
         if tcpros_pubsub.check_if_still_publisher(topic, uri):
-            for listener in get_registration_listeners().listeners:
-                if isinstance(listener, RegManager):
+            for listener in registration.get_registration_listeners().listeners:
+                if isinstance(listener, registration.RegManager):
                     listener.handler._connect_topic(topic, uri)
 
     tcpros_pubsub.robust_connect_subscriber = connect_and_look_again
@@ -102,7 +97,7 @@ def is_latched_before(connection: Any, earlier: Optional[FrozenSet[str]]) -> boo
 
 def find_connection(name: str, message: Any) -> Any:
     """Return a message's connection; None where rospy has to read it on, as for statistics (/enable_statistics)."""
-    impl = get_topic_manager().get_subscriber_impl(name)
+    impl = registration.get_topic_manager().get_subscriber_impl(name)
     if impl is None or impl.statistics_logger is not None:
         return None
     for connection in impl.connections:
