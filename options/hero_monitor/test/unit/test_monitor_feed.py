@@ -334,7 +334,9 @@ def test_lines_of_the_log_are_counted_and_known_by_their_robot(fleet):
     assert len(fleet.feed._log_bytes) == LOG_LINES_KEPT
 
 
-def test_a_grid_is_drawn_in_its_frame_and_a_replay_while_it_runs(fleet):
+def test_a_grid_is_drawn_in_its_frame_and_a_replay_while_it_runs(fleet, monkeypatch):
+    encode = create_autospec(feed_module.encode_grid, side_effect=feed_module.encode_grid)
+    monkeypatch.setattr(feed_module, "encode_grid", encode)
     fleet.receive(make_row(0), make_row(1))
     fleet.subscribe()
     for number, feed in enumerate(fleet.feed._feeds.values()):
@@ -347,6 +349,7 @@ def test_a_grid_is_drawn_in_its_frame_and_a_replay_while_it_runs(fleet):
     fleet.put("/hero_sim/replay", MarkerArray([heading, make_marker(9, 1, 1, 1, ns="names", text="hero_7")]))
     state = fleet.read()
     assert state["poses"] == {"hero_0": [-500, 0, 0], "hero_1": [600, 0, 0]}, "side by side"
+    assert fleet.read()["grid"] == state["grid"] and encode.call_count == 1, "large, and the same as before"
     assert state["grid"]["runs"] == [1, 1, 2, 1] and state["replay"] == {"hero_7": [1000, 0, 0]}
     report = RobotPoses(robots=[RobotPose(id=0, state=RobotPose.TRACKED)])
     report.header.frame_id = "map"

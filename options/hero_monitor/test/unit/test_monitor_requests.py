@@ -11,6 +11,7 @@ from hero_client.apps.formations import FormationError
 from hero_client.ros import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import drive_requests as commander_module
+from hero_monitor.control import requests
 from hero_monitor.control.dead_man import HOLD_TIMEOUT_S
 from hero_monitor.control.drive_requests import LISTENER_TIMEOUT_S, DriveRequests
 from hero_monitor.control.programs import PROGRAMS_MAX
@@ -179,9 +180,12 @@ def test_what_makes_robots_move_is_refused_with_the_reason(monkeypatch, desk):
 def test_a_stop_always_counts_and_a_release_only_when_it_is_meant(monkeypatch):
     for control in (True, False):
         desk = Desk(monkeypatch, control)
+        desk.feed.stopped = True
         assert desk.ask("stop", age_s=60.0) == []
         assert [words for words in desk.take() if words[0] != "warn"] == [
             ("request_stop", True),
+            ("end_all",),
+            ("end_all_holds", desk.now_ms),
             ("read_stop",),
             ("broadcast",),
         ]
@@ -391,6 +395,14 @@ def test_silence_the_end_of_a_page_and_a_stop_of_all_stop_robots(monkeypatch):
         ros.commander.step()
         assert ros.take() == [(TOPIC, 0.0, 0.0)]
         assert ros.commander.drive(2, *MOVE)
+    ros.take()
+    ros.commander.request_stop(True)
+    assert ros.take() == [(TOPIC, 0.0, 0.0)], "at once, not at the next step"
+
+
+def test_the_clock_of_holds_is_in_ms_and_runs_while_the_pc_sleeps(monkeypatch):
+    monkeypatch.setattr(requests.time, "clock_gettime", {requests.time.CLOCK_BOOTTIME: 12.3456}.__getitem__)
+    assert requests.read_clock_ms() == 12346
 
 
 def test_pages_may_drive_when_the_outcome_of_a_stop_is_known(monkeypatch):
