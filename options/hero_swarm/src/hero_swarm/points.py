@@ -8,6 +8,8 @@ import numpy as np
 from hero_client.controllers import FAR_LOOKAHEAD_M
 from hero_sim.world import World
 
+from .behavior import turn
+
 
 class PointRows:
     """The points of one or more worlds, as a trial steps them in place of RobotRows.
@@ -39,8 +41,6 @@ class PointRows:
     def advance(self, until_ms: int) -> None:
         """Move all points on."""
         time_s, poses, arena = (until_ms - self.now_ms) / 1000.0, self.world.poses, self.world.arena
-        cosine, sine = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        poses[:, 0] += time_s * (cosine * self._ahead_m_s - sine * self._left_m_s)
-        poses[:, 1] += time_s * (sine * self._ahead_m_s + cosine * self._left_m_s)
+        poses[:, :2] += time_s * turn((self._ahead_m_s, self._left_m_s), poses[:, 2]).T
         np.clip(poses[:, :2], arena.bounds_m[:2], arena.bounds_m[2:], out=poses[:, :2])
         self.now_ms = until_ms

@@ -37,7 +37,12 @@ class State(NamedTuple):
     kept: Any = None
 
     def by_world(self, values: Any) -> np.ndarray:
-        """Return values of all robots (R, ...), as those of sensed and memory are, by world (W, N, ...)."""
+        """Return values of all robots (R, ...), as those of sensed and memory are, by world (W, N, ...).
+
+        Raises: ValueError for None, what the behavior does not have.
+        """
+        if values is None:
+            raise ValueError("the behavior keeps no memory, or shows no colors: None has no rows of robots")
         array = np.asarray(values)
         return array.reshape(self.poses.shape[:2] + array.shape[1:])
 

@@ -10,7 +10,7 @@ from visualization_msgs.msg import Marker
 
 from hero_client.values import BODY_RADIUS_M
 
-from ..behavior import Behavior, Binary, Sensed, Sight
+from ..behavior import Behavior, Binary, Sensed, Sight, turn
 
 BEAM_M = 3.0
 """Length at which a beam of endless range is drawn."""
@@ -64,8 +64,7 @@ class BehaviorMarkers:
             forward_m, left_m = reading.forward_m[rows, columns], reading.left_m[rows, columns]
             hits = np.zeros(len(rows), dtype=bool)
         x_m, y_m, yaw_rad = poses[rows].T
-        cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
-        ends = x_m + cosine * forward_m - sine * left_m, y_m + sine * forward_m + cosine * left_m
+        ends = turn((forward_m, left_m), yaw_rad) + (x_m, y_m)
         for x, y, end_x, end_y, is_hit in np.column_stack((x_m, y_m, *ends, hits)).tolist():
             marker.points += [Point(x, y, 0.03), Point(end_x, end_y, 0.03)]
             marker.colors += [_SEEN_COLOR if is_hit else _FREE_COLOR] * 2

@@ -97,6 +97,7 @@ def test_an_edited_metric_or_module_of_it_is_other_code(path):
         ),
         ("return 'many'", r"steps \(line \d+\) gives 'many', but must give numbers"),
         ("return state.poses[:, 0, 0] * np.nan", r"steps \(line \d+\) gives nan at 0 s, .*\(hero_swarm/metrics/own.py"),
+        ("return state.by_world(None)", r"ValueError: the behavior keeps no memory, or shows no colors"),
         ("return state.memory['x']", r"IndexError: .*\(own.py, line 16\)"),
         ("state.poses[:] = 0.0", r"ValueError: .*read-only \(own.py, line 16\)"),
         ("raise SystemError('no')", r"SystemError: no \(own.py, line 16\)"),
