@@ -1,15 +1,17 @@
 """Program export: writes recordings as tables (CSV), a folder per robot and a file per kind of message.
 
-What is written is in OUT.part until it is complete. No file stays open: a recording of 100 robots has a thousand
-tables.
+What is written is in OUT.part until it is complete.
 """
 
 import argparse
 import csv
 import os
 import shutil
-from typing import Dict, List, Optional, Sequence, Tuple
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Dict, Optional, Sequence, Tuple
 
+from hero_node import raise_file_limit
 from hero_node.files import read_fleet_file
 from hero_node.parameters import robot_ids_option
 
@@ -18,14 +20,11 @@ from .bags.tables import TABLES, Row, declare_tables, is_exported, read_rows
 from .bags.topics import Message
 from .errors import RecordingError, explain_write_errors
 
-BATCH_ROWS = 4096
-"""Buffered rows of a table: 8 numbers take some 0.8 MB."""
-
 TIME_COLUMN = "time_s"
 
 
-class CsvFiles:
-    """All tables of an export, in a folder per robot.
+class CsvFiles(ExitStack):
+    """All tables of an export, in a folder per robot, open until close().
 
     Attributes:
         rows: how many rows were written, by robot and kind.
@@ -33,34 +32,24 @@ class CsvFiles:
 
     def __init__(self, folder: str) -> None:
         """Write to folder, which is created."""
+        super().__init__()
+        raise_file_limit()  # 100 robots have a thousand tables
         self.rows: Dict[Tuple[int, str], int] = {}
         self._folder = folder
-        self._buffers: Dict[Tuple[int, str], List[Row]] = {}
+        self._writers: Dict[Tuple[int, str], Any] = {}
 
     def add(self, robot_id: int, kind: str, row: Row) -> None:
         """Add a row. Raises: RecordingError if a file cannot be written."""
-        buffer = self._buffers.setdefault((robot_id, kind), [])
-        buffer.append(row)
-        if len(buffer) >= BATCH_ROWS:
-            self._write(robot_id, kind)
-
-    def flush(self) -> None:
-        """Write all buffered rows. Raises: RecordingError if a file cannot be written."""
-        for robot_id, kind in list(self._buffers):
-            self._write(robot_id, kind)
-
-    def _write(self, robot_id: int, kind: str) -> None:
-        key = (robot_id, kind)
-        rows = self._buffers.pop(key)
-        path = os.path.join(self._folder, "hero_%d" % robot_id, kind + ".csv")
-        with explain_write_errors(path):
-            os.makedirs(os.path.dirname(path), exist_ok=True)
-            with open(path, "a", encoding="utf-8", newline="") as file:
-                writer = csv.writer(file)
-                if key not in self.rows:
-                    writer.writerow((TIME_COLUMN, *TABLES[kind]))
-                writer.writerows(rows)
-        self.rows[key] = self.rows.get(key, 0) + len(rows)
+        key = robot_id, kind
+        path = Path(self._folder, "hero_%d" % robot_id, kind + ".csv")
+        with explain_write_errors(str(path)):
+            if key not in self._writers:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                file = self.enter_context(path.open("w", encoding="utf-8", newline=""))
+                self._writers[key] = csv.writer(file)
+                self._writers[key].writerow((TIME_COLUMN, *TABLES[kind]))
+            self._writers[key].writerow(row)
+        self.rows[key] = self.rows.get(key, 0) + 1
 
 
 def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
@@ -81,8 +70,8 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
             if options.robots is None or robot_id in options.robots:
                 files.add(robot_id, kind, row)
 
-    bags.read(is_exported, receive)
-    files.flush()
+    with explain_write_errors(folder), files:
+        bags.read(is_exported, receive)
     if not files.rows:
         raise RecordingError(
             "%s: nothing of these robots in it; its topics: %s" % (", ".join(bags.paths), bags.describe_topics())

@@ -88,10 +88,10 @@ def test_an_interrupted_export_leaves_nothing_behind(bag, tmp_path, capsys, monk
     assert not list(tmp_path.iterdir())
 
 
-def test_all_buffered_rows_are_written(bag, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("hero_recording.export.BATCH_ROWS", 10)
+def test_each_message_is_a_row(bag, tmp_path, capsys):
     run_export(capsys, bag, "--out", tmp_path / "out")
-    assert len(read_csv(tmp_path / "out" / "hero_0" / "odometry.csv")) == 117
+    for robot in ("hero_0", "hero_3"):
+        assert len(read_csv(tmp_path / "out" / robot / "odometry.csv")) == 117
 
 
 def test_wrong_options_of_export_are_refused_by_name(bag, capsys):
