@@ -1,6 +1,6 @@
 """Makes the pictures of recordings as their page says, by the programs themselves: script/pictures.
 
-recording_paths (with speeds, connections, errors): ten robots in a hotspot's network, of which one loses its
+recording_paths (with speeds, errors): ten robots in a hotspot's network, of which one loses its
 power and one its connection.
 """
 
@@ -64,7 +64,7 @@ def shrink(path):
 
 
 def record_ten(picture):
-    """Paths, speeds, connections and errors."""
+    """Paths, speeds and errors."""
     with RunningSuite(10, "arena:=obstacles", "wifi:=hotspot") as stage, tempfile.TemporaryDirectory() as folder:
         bag = record(stage, folder).rename(Path(folder) / "ten.bag")
         prefix = picture.with_name("recording")

@@ -18,7 +18,6 @@ from .plots.observations import Observations, RobotObservations
 FIGURES = {
     "paths": "/hero_N/odom",
     "speeds": "/hero_N/odom",
-    "connections": "/hero_driver/robots",
     "errors": "/hero_N/odom or /hero_N/pose with /hero_N/ground_truth",
 }
 """And the topics without which there is nothing to draw."""
@@ -106,7 +105,7 @@ def describe_robot(robot: RobotObservations) -> Dict[str, str]:
         "LONGEST GAP": f"{intervals_s.max():.2f} s" if len(intervals_s) else "-",
         "MESSAGE DELAY": f"{np.median(delays_ms):.0f} ms" if len(delays_ms) else "-",
         "99 %": f"{np.percentile(delays_ms, 99):.0f} ms" if len(delays_ms) else "-",
-        "RECONNECTS": "%d" % robot.states[-1].reconnects if robot.states else "-",
+        "RECONNECTS": "-" if robot.reconnects is None else "%d" % robot.reconnects,
         "FINAL ERROR": error,
         "LOCALIZATION RMS": "-"
         if localization is None

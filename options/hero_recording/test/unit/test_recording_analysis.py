@@ -24,7 +24,7 @@ from hero_recording.bags.topics import Message, find_robot_topic, is_fleet_topic
 from hero_recording.errors import RecordingError
 from hero_recording.plots import analysis
 from hero_recording.plots.figures import MAX_NAMED, Figures, choose_colors
-from hero_recording.plots.observations import Observations, Origin, RobotObservations, StateReport
+from hero_recording.plots.observations import Observations, Origin, RobotObservations
 
 
 def observe(path, robot_ids=None):
@@ -191,17 +191,6 @@ def test_messages_with_absurd_numbers_are_skipped_and_counted():
     assert plot.format_table(observations)[-1].startswith("hero_0: skipped 3 messages")
 
 
-def test_states_become_spans_with_gaps_where_the_driver_was_silent():
-    reports = [
-        StateReport(0.0, "ready", 0),
-        StateReport(1.0, "ready", 0),
-        StateReport(1.5, "away", 0),
-        StateReport(2.5, "away", 0),
-        StateReport(10.0, "ready", 1),
-    ]
-    assert analysis.find_spans(reports) == [(0.0, 1.5, "ready"), (1.5, 2.5, "away"), (10.0, 10.0, "ready")]
-
-
 def test_few_robots_have_distinct_colors_and_many_a_scale():
     assert len(set(choose_colors(range(MAX_NAMED)).values())) == MAX_NAMED
     assert len(set(map(tuple, choose_colors(range(50)).values()))) == 50
@@ -216,7 +205,6 @@ def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_
     drawing = Figures(observe(path), START_S, START_S + 1.5, "fleet.bag")
     figures = {
         "speeds": drawing.draw_speeds(),
-        "connections": drawing.draw_connections(),
         "errors": drawing.draw_errors(),
         "paths": drawing.draw_paths(),
     }
@@ -225,8 +213,6 @@ def test_figures_of_one_and_of_many_robots_have_titles_units_and_ids(count, tmp_
         labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel(), axes.get_title())]
         assert any("(m" in label or "(s)" in label for label in labels), name
         assert "fleet.bag" in "".join(text.get_text() for text in figure.texts)
-    names = [label.get_text() for label in figures["connections"].axes[0].get_yticklabels()]
-    assert names == ["hero_%d" % number for number in range(count)]
     numbers = {text.get_text() for text in figures["paths"].axes[0].texts}
     assert numbers == (set() if count == 1 else {str(number) for number in range(count)})
 
@@ -267,9 +253,6 @@ def write_parts(path, robot_ids, *kinds):
 def test_figures_for_which_a_topic_is_missing_are_named_with_it(tmp_path, capsys):
     output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/odom"))
     assert "no figure of errors: nothing of /hero_N/odom or /hero_N/pose with /hero_N/ground_truth" in output
-    output = run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/robots"))
-    assert output.count("no figure of") == 3
-    assert "part_connections.png" in output
     with pytest.raises(RecordingError, match=r"part\.bag: no figure of paths: nothing of /hero_N/odom"):
         run_plot(capsys, write_parts(tmp_path / "part.bag", (0,), "/cmd_vel"))
 

@@ -1,4 +1,4 @@
-"""Figures show the numbers of the recording: states, gaps and errors at their robot, time and size."""
+"""Figures show the numbers of the recording: speeds, paths and errors at their robot, time and size."""
 
 import math
 
@@ -11,8 +11,8 @@ from synthetic_bag import START_S
 
 from hero_client.values import BODY_RADIUS_M
 from hero_recording.plots import analysis
-from hero_recording.plots.figures import STATE_COLORS, STYLE, Figures
-from hero_recording.plots.observations import Observations, Origin, RobotObservations, StateReport
+from hero_recording.plots.figures import STYLE, Figures
+from hero_recording.plots.observations import Observations, Origin, RobotObservations
 from hero_test.nonempty import maybe_empty, nonempty
 
 PERIOD_S = 0.1
@@ -33,22 +33,6 @@ def draw(*robots):
     for robot_id, robot in enumerate(robots):
         seen.robots[robot_id] = robot
     return Figures(seen, START_S, START_S + END_S, "test.bag")
-
-
-def test_states_and_gaps_are_drawn_at_their_times():
-    told, untold = RobotObservations(), RobotObservations()
-    told.states += [StateReport(START_S + time_s, "ready", 0) for time_s in (2.0, 3.0, 4.0)]
-    told.states.append(StateReport(START_S + 5.0, "away", 0))
-    for robot in (told, untold):
-        add_odometry(robot, [*np.arange(1.0, 3.0, PERIOD_S), *np.arange(6.0, 7.05, PERIOD_S)])
-    axes = draw(told, untold).draw_connections().axes[0]
-    bars = [(bar.get_x(), bar.get_width(), round(bar.get_y() + bar.get_height() / 2)) for bar in axes.patches]
-    assert np.allclose(bars, [(2.0, 3.0, 0), (5.0, 0.02, 0)])
-    assert bars and axes.patches[0].get_facecolor()[:3] != axes.patches[1].get_facecolor()[:3]
-    lines = sorted((*segment[0], *segment[1]) for lines in axes.collections for segment in lines.get_segments())
-    assert np.allclose(lines, [(2.9, 0, 6.0, 0), (2.9, 1, 6.0, 1)])
-    texts = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert texts[:-1] == [state for state in STATE_COLORS if state in ("ready", "away")]
 
 
 def test_errors_of_odometry_and_of_localization_are_side_by_side():
@@ -91,11 +75,10 @@ def make_driven(count):
         robot.commands.add(START_S + 4.0, 0.1, 0.0)
         robot.poses.add(START_S + 1.0, START_S + 1.0, 0.1, 0.025 + number, 0.1)
         robot.poses.add(START_S + 2.0, START_S + 2.0, 0.2, 0.025 + number, math.pi / 3.0)
-        robot.states.append(StateReport(START_S, "ready", 0))
     return robots
 
 
-FIGURES = ("paths", "speeds", "connections", "errors")
+FIGURES = ("paths", "speeds", "errors")
 
 
 def draw_page(name, robots, duration_s=END_S):
@@ -110,8 +93,6 @@ def draw_page(name, robots, duration_s=END_S):
 def test_a_page_grows_with_its_robots():
     for name, count, height_in in (
         ("paths", 9, 8.0), ("errors", 9, 6.0), ("speeds", 3, 5.7), ("speeds", 9, 13.2),
-        ("connections", 1, 2.5), ("connections", 3, 2.5), ("connections", 4, 2.8), ("connections", 20, 7.6),
-        ("connections", 21, 4.96),
     ):  # fmt: skip
         robots = make_driven(1) + [RobotObservations() for _ in range(count - 1)]
         for robot in robots if name == "speeds" else ():
@@ -120,7 +101,7 @@ def test_a_page_grows_with_its_robots():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2), ("connections", 21)])
+@pytest.mark.parametrize(("name", "count"), [("paths", 2), ("speeds", 2), ("errors", 2)])
 def test_texts_of_a_page_lie_on_it_and_apart(name, count):
     figure = draw_page(name, make_driven(count))
     FigureCanvasAgg(figure).draw()
@@ -135,11 +116,6 @@ def test_texts_of_a_page_lie_on_it_and_apart(name, count):
     tops = [axes.title.get_window_extent(renderer).y1 for axes in figure.axes]
     assert subtitle.get_window_extent(renderer).y0 >= max(tops) - 1
     assert {text.get_fontsize() for text in (subtitle, *(text for one in legends for text in one.get_texts()))} == {8.0}
-    if name == "connections":
-        (ticks,) = [axes.get_yticklabels() for axes in figure.axes[:1]]
-        assert [tick.get_text() for tick in ticks] == ["hero_%d" % number for number in range(count)]
-        middles = [tick.get_window_extent(renderer).y0 for tick in ticks]
-        assert middles == sorted(middles, reverse=True) and min(-np.diff(middles)) > 0.14 * figure.dpi
     for legend in maybe_empty(legends):
         names = [text.get_text() for text in legend.get_texts()]
         assert ("hero_1" in names) == (count == 2 and name in ("paths", "errors"))
@@ -155,7 +131,6 @@ def test_every_figure_says_what_its_axes_are():
     assert labels["speeds"] == [
         ("linear (m/s)", "", "hero_0"), ("angular (rad/s)", "", ""), ("", "time (s)", "hero_1"), ("", "time (s)", "")
     ]  # fmt: skip
-    assert labels["connections"] == [("", "time (s)", "")]
     heading = "heading error (degrees),\npositive: counter-clockwise"
     assert labels["errors"] == [
         ("odometry", "", "position error (mm)"), ("localization", "", ""),
@@ -164,10 +139,7 @@ def test_every_figure_says_what_its_axes_are():
     for name in ("speeds", "errors"):
         (above, _, below, _) = draw_page(name, make_driven(2)).axes
         assert above.get_shared_x_axes().joined(above, below), "one time for all"
-    silent = make_driven(1)
-    silent[0].states.clear()
-    assert draw_page("connections", silent) is None
-    for name in ("speeds", "errors", "connections"):
+    for name in ("speeds", "errors"):
         for axes in nonempty(draw_page(name, make_driven(2)).axes):
             assert axes.get_xlim() == (0.0, END_S)
         assert draw_page(name, make_driven(1), duration_s=0.0).axes[0].get_xlim() == (0.0, 1e-3), "one message alone"

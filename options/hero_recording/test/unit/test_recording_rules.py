@@ -20,8 +20,8 @@ from hero_recording.bags.tables import BEAMS, TABLES, read_rows, to_seconds
 from hero_recording.bags.topics import Message
 from hero_recording.errors import RecordingError
 from hero_recording.plots import analysis
-from hero_recording.plots.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, REPORT_GAP_S, SAME_TIME_S
-from hero_recording.plots.observations import MAX_VALUE, Observations, Origin, RobotObservations, StateReport
+from hero_recording.plots.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, SAME_TIME_S
+from hero_recording.plots.observations import MAX_VALUE, Observations, Origin, RobotObservations
 from hero_recording.record import CHECK_PERIOD_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
 from hero_recording.step_recorder import StepRecorder
 from hero_sim.stepped import LATCHED, StepSwarm
@@ -60,14 +60,7 @@ def test_odometry_without_an_origin_is_laid_on_the_first_true_pose():
 
 
 def test_gaps_begin_beyond_their_limits():
-    reports = [
-        StateReport(0.0, "ready", 0),
-        StateReport(REPORT_GAP_S, "ready", 0),
-        StateReport(2.0 * REPORT_GAP_S + 0.1, "ready", 0),
-    ]
-    assert [span[:2] for span in analysis.find_spans(reports)] == [(0.0, 3.0), (6.1, 6.1)]
     times_s = np.array([0.0, ODOMETRY_GAP_S, 2.0 * ODOMETRY_GAP_S + 0.1, 1.2])
-    assert analysis.find_gaps(times_s) == [(0.5, 1.1)]
     broken_s, values = analysis.break_at_gaps(times_s, np.arange(4.0))
     assert broken_s.tolist() == [0.0, 0.5, 1.1, 1.1, 1.2] and np.isnan(values[2]) and values[3] == 2.0
     ended = analysis.end_commands(np.array([0.0, COMMAND_TIMEOUT_S, 5.0]), np.ones(3), np.ones(3))
@@ -84,7 +77,7 @@ def test_the_table_gives_errors_as_a_share_only_of_a_drive():
         true_rows = [(0.1 * step, 0.0, 0.0, 0.0) for step in range(11)]
         robot = make_robot(*((0.1 * step, 0.1 * length_m * step, 0.0, 0.0) for step in range(11)), true_rows=true_rows)
         robot.origins.append(Origin(0.0, 0.0, 0.0, 0.0))
-        robot.states.append(StateReport(0.0, "ready", 3))
+        robot.reconnects = 3
         return plot.describe_robot(robot)
 
     cells = describe(0.2)

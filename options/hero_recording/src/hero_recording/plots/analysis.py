@@ -1,19 +1,16 @@
-"""Computes paths, errors, delays and connections from the recorded data of a robot. Pure: numpy only.
+"""Computes paths, errors and delays from the recorded data of a robot. Pure: numpy only.
 
 Units: m, rad, s. Times are the recorder's, seconds since 1970.
 """
 
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .observations import Origin, RobotObservations, Series, StateReport
+from .observations import Origin, RobotObservations, Series
 
 COMMAND_TIMEOUT_S = 2.0
 """The robot's watchdog stops it this long after a command."""
-
-REPORT_GAP_S = 3.0
-"""The driver reports every second; after a longer silence the state is unknown."""
 
 ODOMETRY_GAP_S = 0.5
 """Longer gaps in the odometry are shown; hotspots pause for 0.1 to 0.3 s."""
@@ -43,14 +40,6 @@ class PoseErrors(NamedTuple):
     times_s: np.ndarray
     position_m: np.ndarray
     yaw_rad: np.ndarray
-
-
-class Span(NamedTuple):
-    """A period in one state."""
-
-    start_s: float
-    end_s: float
-    state: str
 
 
 def read_path(robot: RobotObservations) -> Path:
@@ -125,24 +114,6 @@ def compute_message_delays(robot: RobotObservations) -> np.ndarray:
     """Return arrival minus stamp of every odometry message (s)."""
     arrival_s, stamp_s, *_ = robot.odometry.columns()
     return arrival_s - stamp_s
-
-
-def find_spans(reports: Sequence[StateReport]) -> List[Span]:
-    """Return the periods in each state, with gaps where the driver reported nothing."""
-    spans: List[Span] = []
-    for report in reports:
-        if spans and report.time_s - spans[-1].end_s <= REPORT_GAP_S:
-            spans[-1] = spans[-1]._replace(end_s=report.time_s)
-            if spans[-1].state == report.state:
-                continue
-        spans.append(Span(report.time_s, report.time_s, report.state))
-    return spans
-
-
-def find_gaps(times_s: np.ndarray) -> List[Tuple[float, float]]:
-    """Return start and end of every gap in the odometry that is longer than ODOMETRY_GAP_S."""
-    where = np.flatnonzero(np.diff(times_s) > ODOMETRY_GAP_S)
-    return [(float(times_s[index]), float(times_s[index + 1])) for index in where]
 
 
 def break_at_gaps(times_s: np.ndarray, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

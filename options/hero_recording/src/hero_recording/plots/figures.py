@@ -53,8 +53,6 @@ _FEW = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0000
 MAX_NAMED = len(_FEW)
 """Up to this many robots have a color and a line in the legend; more have a shade and are labeled with their id."""
 
-STATE_COLORS = {"ready": "#009E73", "joining": "#56B4E9", "away": "#D55E00", "refused": "#000000"}
-
 
 def choose_colors(robot_ids: Sequence[int]) -> Dict[int, Any]:
     """Return a color for each robot: distinct ones for few, a scale in order of their ids for many."""
@@ -80,7 +78,6 @@ class Figures:
         self._start_s, self._duration_s = start_s, max(1e-3, end_s - start_s)
         self._title = title
         self._has_legend = len(self._robots) <= MAX_NAMED
-        self._row_height = 1.6 + max(3, len(self._robots)) * (0.3 if len(self._robots) <= 20 else 0.16)
 
     # -- shared by all figures -----------------------------------------------------------------------------
 
@@ -93,19 +90,13 @@ class Figures:
         figure.text(0.5, 0.995, "\n" + self._title, ha="center", va="top", color=_GRAY, linespacing=2.2)
         return figure, axes
 
-    def _add_legend(self, axes: Axes, others: Sequence[Any] = (), with_robots: bool = True) -> None:
+    def _add_legend(self, axes: Axes, others: Sequence[Any] = ()) -> None:
         handles = list(others)
-        if with_robots and self._has_legend and len(self._robots) > 1:
+        if self._has_legend and len(self._robots) > 1:
             robots = [Line2D([], [], color=color, label="hero_%d" % key) for key, color in self._colors.items()]
             handles = robots + handles
         if handles:
             axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0))
-
-    def _label_rows(self, axes: Axes) -> None:
-        """Give each robot a row, the first one on top."""
-        axes.set_ylim(len(self._robots) - 0.4, -0.6)
-        axes.set_yticks(range(len(self._robots)))
-        axes.set_yticklabels(["hero_%d" % key for key in self._robots])
 
     def _set_time_axis(self, axes: Axes) -> None:
         axes.set_xlim(0.0, self._duration_s)
@@ -208,31 +199,6 @@ class Figures:
             Line2D([], [], color=_GRAY, label="commanded" if is_commanded else NO_COMMANDS),
         ]
         figure.legend(handles=handles, loc="upper right", ncol=2)
-        return figure
-
-    # -- connections -------------------------------------------------------------------------------------
-
-    def draw_connections(self) -> Optional[Figure]:
-        """Draw the state of each robot over time, and gaps in its odometry."""
-        if not any(robot.states for robot in self._robots.values()):
-            return None
-        figure, grid = self._begin(self._row_height, "Connections")
-        axes = grid[0][0]
-        for row, robot in enumerate(self._robots.values()):
-            for span in analysis.find_spans(robot.states):
-                width_s, color = max(0.02, span.end_s - span.start_s), STATE_COLORS.get(span.state, _GRAY)
-                axes.barh(row, width_s, left=span.start_s - self._start_s, height=0.7, color=color)
-            times_s = robot.odometry.columns()[0] - self._start_s
-            for start_s, end_s in analysis.find_gaps(times_s):
-                axes.hlines(row, start_s, end_s, color="white", linewidth=2.5)
-        self._label_rows(axes)
-        axes.set_xlim(0.0, self._duration_s)
-        axes.set_xlabel("time (s)")
-        seen = {report.state for robot in self._robots.values() for report in robot.states}
-        handles = [patches.Patch(color=STATE_COLORS[key], label=key) for key in STATE_COLORS if key in seen]
-        gap = f"no odom for\nmore than {analysis.ODOMETRY_GAP_S:g} s"
-        handles.append(patches.Patch(facecolor="white", edgecolor=_GRAY, label=gap))
-        self._add_legend(axes, handles, with_robots=False)
         return figure
 
     # -- errors --------------------------------------------------------------------------------------------

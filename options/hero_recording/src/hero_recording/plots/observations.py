@@ -69,14 +69,6 @@ class Origin(NamedTuple):
     yaw_rad: float
 
 
-class StateReport(NamedTuple):
-    """State of a robot as its driver reported it."""
-
-    time_s: float
-    state: str
-    reconnects: int
-
-
 class RobotObservations:
     """The recorded data of one robot.
 
@@ -85,7 +77,7 @@ class RobotObservations:
         poses: rows of arrival s, stamp s, x m, y m, yaw rad, by localization.
         commands: rows of arrival s, linear m/s, angular rad/s, of both controllers.
         origins: poses of its odom frame in the frame that all robots share.
-        states: reports of the driver.
+        reconnects: so far, as its driver reported it last; None without a report.
     """
 
     def __init__(self) -> None:
@@ -94,13 +86,12 @@ class RobotObservations:
         self.poses = Series(2, 3)
         self.commands = Series(1, 2)
         self.origins: List[Origin] = []
-        self.states: List[StateReport] = []
+        self.reconnects: Optional[int] = None
 
     def add(self, kind: str, row: Row) -> None:
         """Store a row of a table."""
         if kind == "status":
-            columns = dict(zip(TABLES["status"], row[1:]))
-            self.states.append(StateReport(row[0], columns["state"], columns["reconnects"]))
+            self.reconnects = dict(zip(TABLES["status"], row[1:]))["reconnects"]
         elif kind == "pose":
             self.poses.add(*row[:5])
         else:
