@@ -6,7 +6,8 @@ import numpy as np
 def _count(state, wanted):
     """Return which robots are on areas of which wanted(area) holds (W, N)."""
     x_m, y_m = state.poses[..., 0], state.poses[..., 1]
-    return np.any([area.covers(x_m, y_m) for area in state.arena.areas if wanted(area)], axis=0)
+    places = [area.covers(x_m, y_m) for area in state.arena.areas if wanted(area)]
+    return np.any([np.zeros_like(x_m, dtype=bool), *places], axis=0)
 
 
 def robots_on_black(state):

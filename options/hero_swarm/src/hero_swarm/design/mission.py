@@ -12,6 +12,7 @@ from typing import Any, Dict, NamedTuple
 
 from hero_node.files import Entry, EntryError, load_entries, mark_values
 
+from ..behaviors import find_behavior
 from ..experiments.errors import ExperimentError
 from ..experiments.experiment_file import ERROR_KEYS, SETTINGS, Experiment, check_experiment
 from ..sources import Sources
@@ -47,13 +48,21 @@ def read_mission(path: str) -> Mission:
             low, high = limits.numbers(2, -1e6, 1e6, "two numbers")
             if low >= high:
                 limits.refuse("the lower limit before the higher one")
-        if "baseline" in given:
-            given["baseline"].text()
         others = mark_values({"behavior": "aggregation", "seeds": {"count": 1}}, path).mapping()
         kept = {name: entry for name, entry in given.items() if name not in ("score", "baseline", "ranges")}
         metrics = Entry([given["score"]], "score", given["score"].place)
         entry = Entry({**others, **kept, "metrics": metrics}, "", root.place)
         experiment = check_experiment(entry, os.path.abspath(os.path.dirname(path)), Sources())
+        if "baseline" in given:
+            _check_baseline(given["baseline"], experiment)
         return Mission(experiment, root.plain(), -1.0 if experiment.metrics[0].falls else 1.0)
     except EntryError as error:
         raise ExperimentError(str(error)) from None
+
+
+def _check_baseline(given: Entry, experiment: Experiment) -> None:
+    """Load the behavior, which runs last, perhaps hours later. Raises: ExperimentError with file and line."""
+    try:
+        find_behavior(experiment.locate(given.text()))
+    except ValueError as error:
+        raise ExperimentError(f"{given.place}: baseline: {error}") from None

@@ -87,13 +87,14 @@ def test_missions_that_come_with_it_are_scored_with_their_baseline(name):
     assert find_behavior(mission.experiment.locate(mission.content["baseline"])) is not None
 
 
-def measure(mission, poses, times=1):
-    """Return the score of a mission with all robots resting at poses."""
+def measure(mission, poses, **changes):
+    """Return the score of a mission with all robots resting at poses; changes: of its arena."""
     experiment = read_mission(str(MISSIONS / (mission + ".yaml"))).experiment
     trial = set_up(experiment, experiment.cells[0]).build_trial([1])
     function = evaluation.run_trial.__globals__["measure"]
     for place in poses:
         state = trial.state._replace(poses=np.full((1, 20, 3), place))
+        state = state._replace(arena=state.arena._replace(**changes))
         values = function(experiment, state)[0]
     return values[0, 0]
 
@@ -104,6 +105,7 @@ def test_scores_count_what_they_say():
     source, between, nest = (0.75, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.9, 0.0)
     assert measure("foraging", [source, between, nest, between, nest, source]) == 20.0, "an item each, once"
     assert measure("foraging", [nest, source]) == 0.0
+    assert measure("black_spot", [source], areas=()) == 0.0, "no area counts"
     assert measure("grid_exploration", [(0.0, 0.0, 0.0)]) == 0.0, "no cell is old at the start"
     assert measure("sorting", [(0.0, 0.0, 0.0)]) == 0.45, "all are near robot 0, which is near robot 1"
 
@@ -298,6 +300,8 @@ def test_cma_designs_the_numbers_of_a_behavior(path, light, monkeypatch):
         ),
         ("score.py:right", "score.py:left", "the file has no function left"),
         ("score.py:right", "unknown", "line 4: .* is 'unknown'|unknown"),
+        ("baseline: dispersion", "baseline: none.py", "line 5: baseline: behavior .*none.py: no such file"),
+        ("baseline: dispersion", "baseline: dispersal_", "line 5: baseline: behavior 'dispersal_'"),
         ("arena.yaml", "none.yaml", "line 2: arena none.yaml cannot be read|line 2: arena .*none.yaml cannot be read"),
         ("baseline: dispersion", "seeds: {count: 3}", "line 5: unknown 'seeds'"),
         (
