@@ -166,22 +166,16 @@ def test_robots_that_stream_expect_all_of_their_readings():
     assert len(looks) < 0.8 * sent
 
 
-def look(x=1.0, y=0.0, reach_m=0.65):
-    """Return one ray of one robot at the origin."""
-    return range_sensors.Rays(np.array([[x]]), np.array([[y]]), reach_m)
-
-
 NOTHING = (1e6, 0.0)
 
 
-def meet(walls=NO_WALLS, circles=NO_CIRCLES, place_m=(0.0, 0.0), **ray):
+def meet(walls=NO_WALLS, circles=NO_CIRCLES, place_m=(0.0, 0.0), x=1.0, y=0.0, reach_m=0.65):
     """Return how far away a ray from a place meets the first of some things, and the cosine of its incidence."""
-    rays, (x_m, y_m), circles = look(**ray), place_m, np.array(circles, dtype=float).reshape(-1, 3)
     walls = Segments.from_ends(np.array(walls, dtype=float).reshape(-1, 4))
-    rays.meet_walls(np.array([[x_m]]), np.array([[y_m]]), walls)
-    rays.meet_circles(circles[None, :, 0] - x_m, circles[None, :, 1] - y_m, circles[:, 2])
-    distance_m = float(rays.distance_m[0, 0])
-    return NOTHING if distance_m == 1e6 else (distance_m, float(rays.cosine[0, 0]))
+    place_m, circles = np.array([place_m]), np.array(circles, dtype=float).reshape(-1, 3)
+    sight = range_sensors.Sight(place_m, np.eye(2)[:1], place_m[None], np.full(1, BODY_RADIUS_M), walls, circles)
+    distance_m, cosine = range_sensors.meet_first(np.array([[x]]), np.array([[y]]), sight, reach_m)
+    return float(distance_m[0, 0]), float(cosine[0, 0])
 
 
 def test_a_ray_meets_a_wall_between_its_ends_and_ahead_of_it():
@@ -255,7 +249,7 @@ def test_compiled_sensors_see_the_same_bytes(monkeypatch):
         errors = draw_errors([np.random.RandomState(row) for row in range(60)])
         world = World(arena, poses, [np.random.RandomState(seed) for seed in range(3)], errors)
         sights = [sight for _, sight in world._look(np.arange(60), world.observe())]
-        signals = [range_sensors.measure_signals(sight, ALPHA, BETA) for sight in sights]
-        read.append([world.read_infrared(np.arange(60)).tobytes(), *(each.tobytes() for each in signals)])
+        signals = np.concatenate([range_sensors.measure_signals(sight, ALPHA, BETA) for sight in sights])
+        read.append([world.read_infrared(np.arange(60)).tobytes(), signals.tobytes()])
         assert len(np.unique(signals)) > 200
     assert read[0] == read[1]

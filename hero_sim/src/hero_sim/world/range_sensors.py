@@ -5,7 +5,7 @@ model: measurements published by the robot's authors (signal of a TCRT5000 again
 """
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
@@ -56,65 +56,6 @@ _FAR_M = 1e6
 _LIMITS_M = REACH_M, _FAR_M, BODY_RADIUS_M
 
 
-class Rays:
-    """The rays of some robots, A of each, in the world, and what they have met so far.
-
-    Attributes:
-        x, y: directions (K, A).
-        distance_m: of the first thing on each ray from the robot's center (K, A); 1e6 if there is none.
-        cosine: of the angle of incidence on it (K, A).
-    """
-
-    def __init__(self, x: np.ndarray, y: np.ndarray, reach_m: float = REACH_M) -> None:
-        """Begin with rays that have met nothing, and look for nothing beyond reach_m from the robot's center."""
-        self.x, self.y, self._reach_m = x, y, reach_m
-        self.distance_m, self.cosine = np.full(x.shape, _FAR_M), np.zeros(x.shape)
-
-    def meet_walls(self, x_m: np.ndarray, y_m: np.ndarray, walls: Segments) -> None:
-        """Cut rays from x_m and y_m (K, 1), which have met nothing yet, at walls."""
-        start_x, start_y = walls.start_m[0] - x_m, walls.start_m[1] - y_m
-        area_m2 = start_x * walls.along_m[1] - start_y * walls.along_m[0]
-        robots, seen = (area_m2 * area_m2 < (self._reach_m * self._reach_m) * walls.length_m2).nonzero()
-        if not len(robots):
-            return
-        ray_x, ray_y = self.x[robots], self.y[robots]
-        start_x, start_y, area_m2 = (array[robots, seen, None] for array in (start_x, start_y, area_m2))
-        along_x, along_y = walls.along_m[:, seen, None]
-        length_m2 = walls.length_m2[seen, None]
-        cross, across_m2 = ray_x * along_y - ray_y * along_x, start_x * ray_y - start_y * ray_x
-        meets = (area_m2 * cross > 0.0) & (across_m2 * cross >= 0.0) & (np.abs(across_m2) <= np.abs(cross))
-        distance_m = np.divide(area_m2, cross, out=np.full(cross.shape, _FAR_M), where=meets)
-        # The walls that one robot sees follow each other.
-        first = np.concatenate(([True], robots[1:] != robots[:-1])).nonzero()[0]
-        self.distance_m[robots[first]] = np.minimum.reduceat(distance_m, first)
-        nearest = meets & (distance_m == self.distance_m[robots])
-        cosine = np.where(nearest, np.abs(cross) / np.sqrt(length_m2), 0.0)
-        self.cosine[robots[first]] = np.maximum.reduceat(cosine, first)
-
-    def meet_circles(self, to_x_m: np.ndarray, to_y_m: np.ndarray, radii_m: np.ndarray) -> None:
-        """Cut rays at circles (C,) whose centers are to_x_m and to_y_m (K, C) from the robots'.
-
-        A circle around the robot's own center, its body, is not seen.
-        """
-        center_m2, reach_m = to_x_m * to_x_m + to_y_m * to_y_m, self._reach_m + radii_m
-        robots, circles = ((center_m2 < reach_m * reach_m) & (center_m2 > 0.0)).nonzero()
-        if not len(robots):
-            return
-        x, y, radius_m = self.x[robots], self.y[robots], radii_m[circles]
-        to_x_m, to_y_m = to_x_m[robots, circles], to_y_m[robots, circles]
-        across_m = x * to_y_m[:, None] - y * to_x_m[:, None]
-        pairs, rays = (across_m * across_m < (radius_m * radius_m)[:, None]).nonzero()
-        along_m = x[pairs, rays] * to_x_m[pairs] + y[pairs, rays] * to_y_m[pairs]
-        front = along_m > 0.0
-        pairs, rays, along_m = pairs[front], rays[front], along_m[front]
-        across_m, radius_m, robots = across_m[pairs, rays], radius_m[pairs], robots[pairs]
-        depth_m = np.sqrt(radius_m * radius_m - across_m * across_m)
-        distance_m = np.maximum(along_m - depth_m, 0.0)
-        np.minimum.at(self.distance_m, (robots, rays), distance_m)
-        nearest = distance_m == self.distance_m[robots, rays]
-        self.cosine[robots[nearest], rays[nearest]] = (depth_m / radius_m)[nearest]
-
-
 class Sight(NamedTuple):
     """Robots, with the walls and obstacles that they may see.
 
@@ -156,25 +97,46 @@ def _measure_brightness(sight: Sight) -> np.ndarray:
         )
         return brightest
     cosine, sine = sight.headings[:, :1], sight.headings[:, 1:]
-    rays = Rays(cosine * _RAYS_X - sine * _RAYS_Y, sine * _RAYS_X + cosine * _RAYS_Y)
-    _meet_all(rays, sight)
-    distance_m = np.maximum(rays.distance_m - BODY_RADIUS_M, 1e-3)
-    bright = rays.cosine / (distance_m * distance_m)
-    weighed = bright.reshape(-1, len(_CONE_RAD), BEAMS) * _CONE_WEIGHT[:, None]
-    return np.maximum.reduce(weighed, axis=1)
+    met_m, incidence = meet_first(cosine * _RAYS_X - sine * _RAYS_Y, sine * _RAYS_X + cosine * _RAYS_Y, sight, REACH_M)
+    gap_m = np.maximum(met_m - BODY_RADIUS_M, 1e-3)
+    bright = (incidence / (gap_m * gap_m)).reshape(-1, len(_CONE_RAD), BEAMS) * _CONE_WEIGHT[:, None]
+    return np.maximum.reduce(bright, axis=1)
 
 
 def measure_distances(sight: Sight) -> np.ndarray:
     """Return how far (m) ahead of each robot's center something is (K,), DISTANCE_REACH_M at most."""
-    rays = Rays(sight.headings[:, :1], sight.headings[:, 1:], DISTANCE_REACH_M)
-    _meet_all(rays, sight)
-    return np.minimum(rays.distance_m[:, 0], DISTANCE_REACH_M)
+    met_m, _ = meet_first(sight.headings[:, :1], sight.headings[:, 1:], sight, DISTANCE_REACH_M)
+    return np.minimum(met_m[:, 0], DISTANCE_REACH_M)
 
 
-def _meet_all(rays: Rays, sight: Sight) -> None:
-    x_m, y_m = sight.places_m[:, :1], sight.places_m[:, 1:]
-    rays.meet_walls(x_m, y_m, sight.walls)
-    rays.meet_circles(sight.bodies_m[..., 0] - x_m, sight.bodies_m[..., 1] - y_m, sight.radii_m)
-    if len(sight.circles_m):
-        circles_m = sight.circles_m
-        rays.meet_circles(circles_m[:, 0] - x_m, circles_m[:, 1] - y_m, circles_m[:, 2])
+def meet_first(x: np.ndarray, y: np.ndarray, sight: Sight, reach_m: float) -> Tuple[np.ndarray, np.ndarray]:
+    """Return how far the first thing on each ray is from the robot's center, and the cosine of the incidence (K, A).
+
+    x, y (K, A): directions of the rays, A of each robot. Nothing is looked for beyond reach_m: 1e6 m, 0. A circle
+    around the robot's own center, its body, is not seen. Of equally far things the first one counts, walls before all.
+    """
+    x, y, places_m = x[:, None], y[:, None], sight.places_m.T[..., None]
+    (start_x, start_y), (along_x, along_y) = sight.walls.start_m[:, None] - places_m, sight.walls.along_m
+    area_m2, length_m2 = start_x * along_y - start_y * along_x, sight.walls.length_m2
+    is_near = area_m2 * area_m2 < (reach_m * reach_m) * length_m2
+    area_m2 = area_m2[..., None]
+    cross, across_m2 = x * along_y[:, None] - y * along_x[:, None], start_x[..., None] * y - start_y[..., None] * x
+    meets = (area_m2 * cross > 0.0) & (across_m2 * cross >= 0.0) & (np.abs(across_m2) <= np.abs(cross))
+    meets &= is_near[..., None]
+    walls_m = np.divide(area_m2, cross, out=np.full(cross.shape, _FAR_M), where=meets)
+    robots, (circles_x, circles_y, circles_radii_m) = len(sight.places_m), sight.circles_m.T
+    to_x, to_y = (
+        np.hstack((sight.bodies_m[..., axis], np.broadcast_to(circles, (robots, len(circles))))) - places_m[axis]
+        for axis, circles in enumerate((circles_x, circles_y))
+    )
+    radii_m = np.concatenate((sight.radii_m, circles_radii_m))
+    center_m2, radii_m2 = to_x * to_x + to_y * to_y, (radii_m * radii_m)[:, None]
+    is_near = (center_m2 > 0.0) & (center_m2 < (reach_m + radii_m) * (reach_m + radii_m))
+    across_m, along_m = x * to_y[..., None] - y * to_x[..., None], x * to_x[..., None] + y * to_y[..., None]
+    meets = (across_m * across_m < radii_m2) & (along_m > 0.0) & is_near[..., None]
+    depth_m = np.sqrt(np.maximum(radii_m2 - across_m * across_m, 0.0))
+    all_m = np.hstack((walls_m, np.where(meets, np.maximum(along_m - depth_m, 0.0), _FAR_M), np.full(x.shape, _FAR_M)))
+    slants = np.hstack((np.abs(cross) / np.sqrt(length_m2)[:, None], depth_m / radii_m[:, None], np.zeros(x.shape)))
+    first = all_m.argmin(axis=1)[:, None]
+    met_m = np.take_along_axis(all_m, first, axis=1)[:, 0]
+    return met_m, np.take_along_axis(slants, first, axis=1)[:, 0] * (met_m < _FAR_M)

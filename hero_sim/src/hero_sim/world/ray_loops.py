@@ -37,10 +37,9 @@ def measure_brightness(
                     cross = x[ray] * along_y_m - y[ray] * along_x_m
                     across_m2 = start_x_m * y[ray] - start_y_m * x[ray]
                     if area_m2 * cross > 0.0 and across_m2 * cross >= 0.0 and abs(across_m2) <= abs(cross):
-                        met_m, slant = area_m2 / cross, abs(cross) / math.sqrt(lengths_m2[wall])
-                        if met_m <= distance_m[ray]:
-                            cosine[ray] = max(cosine[ray], slant) if met_m == distance_m[ray] else slant
-                            distance_m[ray] = met_m
+                        met_m = area_m2 / cross
+                        if met_m < distance_m[ray]:
+                            distance_m[ray], cosine[ray] = met_m, abs(cross) / math.sqrt(lengths_m2[wall])
         for body in range(len(radii_m)):
             to_x_m, to_y_m = bodies_m[robot, body, 0] - place_x_m, bodies_m[robot, body, 1] - place_y_m
             meet_circle(x, y, distance_m, cosine, to_x_m, to_y_m, radii_m[body], reach_m)
@@ -66,5 +65,5 @@ def meet_circle(
             if across_m * across_m < radius_m * radius_m and along_m > 0.0:
                 depth_m = math.sqrt(radius_m * radius_m - across_m * across_m)
                 met_m = max(along_m - depth_m, 0.0)
-                if met_m <= distance_m[ray]:
+                if met_m < distance_m[ray]:
                     distance_m[ray], cosine[ray] = met_m, depth_m / radius_m

@@ -41,8 +41,8 @@ _BLOCK_STEPS = 32
 _CACHED = 8192
 """Random numbers that are computed at once: they fit the processor's cache."""
 
-_SCAN_ROWS = 200
-"""Robots whose sensors are computed at once: what they see fits the processor's cache."""
+_SCAN_ROWS = 20
+"""Robots whose sensors are computed at once without compiled loops: what they see fits the processor's cache."""
 
 _REST_M_S = 1e-6
 
@@ -289,8 +289,9 @@ class World:
         starts = (worlds[1:] != worlds[:-1]).nonzero()[0] + 1 if view.obstacles else ()
         for first, end in zip([0, *starts], [*starts, len(which)]):
             obstacles = view.obstacles[worlds[first]] if view.obstacles else (self._walls, self.arena.circles_m)
-            for start in range(first, end, _SCAN_ROWS):
-                rows = which[start : min(start + _SCAN_ROWS, end)]
+            at_once = _SCAN_ROWS if self._loops is None else end - first
+            for start in range(first, end, at_once):
+                rows = which[start : min(start + at_once, end)]
                 bodies_m = view.places_m.reshape(self.worlds, self._robots, 2)[rows // self._robots]
                 radii_m = self.errors.radius_m[: self._robots, 0]
                 yield rows, Sight(view.places_m[rows], view.headings[rows], bodies_m, radii_m, *obstacles)
