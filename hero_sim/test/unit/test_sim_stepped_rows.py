@@ -78,7 +78,7 @@ class ScalarRobot:
 
     def offer(self, now_ms, topic_id, payload):
         if SHAPED_TYPES[topic_id] == "geometry_msgs/Twist":
-            payload = check_twist(payload, clamp=False)
+            payload = check_twist(payload)
         self.shapers[topic_id].offer(payload)
         self.send(now_ms)  # the driver takes at once what may go
 
