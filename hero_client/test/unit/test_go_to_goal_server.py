@@ -221,15 +221,16 @@ def test_a_server_gives_each_goal_its_own_limits_or_those_of_the_server(monkeypa
         server._receive_action(Handle(**limits))
         assert put[-1][:4] == (Goal(0.3, 0.0), "map", *expected) and put[-1].handle is not None
     message = PoseStamped()
-    for z, yaw_rad in ((0.0, None), (1.0, math.pi)):
-        message.pose.orientation.z = z
+    right = -math.sqrt(0.5), math.sqrt(0.5), pytest.approx(-math.pi / 2.0)  # entries of no sum
+    for z, w, yaw_rad in ((0.0, 0.0, None), (1.0, 0.0, math.pi), right):
+        message.pose.orientation.z, message.pose.orientation.w = z, w
         server._receive_goal(message)
         assert put[-1] == (Goal(0.0, 0.0, yaw_rad), "", 0.02, 30.0, None)
     for limits in ({"tolerance": -1.0}, {"tolerance": math.inf}, {"timeout": math.nan}, {"timeout": -1e-9}):
         handle = Handle(**limits)
         server._receive_action(handle)
         assert handle.ends[0][0] == "set_rejected" and "tolerance and timeout" in handle.ends[0][1].reason
-    assert len(put) == 5 and logged == ["logerr"] * 4
+    assert len(put) == 6 and logged == ["logerr"] * 4
     logged.clear()
     monkeypatch.setattr(server, "_requests", mock.Mock(spec=server._requests))
     for outcome, end, level in (

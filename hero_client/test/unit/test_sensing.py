@@ -145,10 +145,11 @@ def test_what_a_sensor_does_not_have_draws_no_random_numbers():
 
 
 def test_a_body_between_two_robots_hides_them_from_each_other():
-    line = np.array([[(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)]])
-    assert sense_neighbors(line, Neighbors(occlusion=True)).counts.tolist() == [1, 2, 1]
-    line[0, 1, 1] = 1.01 * BODY_RADIUS_M
-    assert sense_neighbors(line, Neighbors(occlusion=True)).counts.tolist() == [2, 2, 2]
+    for ahead, across in ((1.0, 0.0), (0.6, 0.8), (-0.28, 0.96)):
+        line = np.array([[(0.0, 0.0, 0.0), (0.3 * ahead, 0.3 * across, 0.0), (0.6 * ahead, 0.6 * across, 0.0)]])
+        assert sense_neighbors(line, Neighbors(occlusion=True)).counts.tolist() == [1, 2, 1]
+        line[0, 1, :2] += 1.01 * BODY_RADIUS_M * np.array((-across, ahead))
+        assert sense_neighbors(line, Neighbors(occlusion=True)).counts.tolist() == [2, 2, 2]
 
 
 def test_a_robot_without_a_pose_senses_nothing_and_is_not_sensed():

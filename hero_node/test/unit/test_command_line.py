@@ -14,11 +14,15 @@ FEW, MANY = "print('text')", "print('text' * 100000)"
 TO_ITS_END = "def main():\n    for _ in range(100): command_line.say('text')\n    print('end', file=sys.stderr)\n"
 
 
-def run_python(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE):
-    """Return exit status and what came on stderr."""
+def run_python(code, stdout=subprocess.PIPE, stderr=subprocess.PIPE, script=None):
+    """Run code, or a script with it; return exit status and what came on stderr."""
     # PYTHONUNBUFFERED: empty is off, so that a text stays in the buffer until the end.
     environment = dict(os.environ, PYTHONUNBUFFERED="", PYTHONPATH=os.pathsep.join(filter(None, sys.path)))
-    process = subprocess.Popen([sys.executable, "-c", HEADER + code], stdout=stdout, stderr=stderr, env=environment)
+    arguments = ["-c", HEADER + code]
+    if script:
+        script.write_text(HEADER + code)
+        arguments = [str(script)]
+    process = subprocess.Popen([sys.executable, *arguments], stdout=stdout, stderr=stderr, env=environment)
     errors = process.communicate(timeout=60.0)[1]
     return process.returncode, (errors or b"").decode()
 
@@ -71,6 +75,12 @@ def test_an_expected_error_is_one_line_and_status_1_also_without_output(closed_p
     code = "def main(): print('text'); raise ValueError('a reason')\ncommand_line.run(main, ValueError)"
     assert run_python(code, closed_pipe) == (1, "-c: a reason\n")
     assert run_python(code, closed_pipe, closed_pipe)[0] == 1
+
+
+def test_an_expected_error_names_the_line_of_a_users_script(tmp_path):
+    code = "def main():\n    int('x')\ncommand_line.run(main, ValueError)\n"
+    status, errors = run_python(code, script=tmp_path / "own.py")
+    assert (status, errors.endswith(" (own.py, line 3)\n")) == (1, True), errors
 
 
 def test_a_file_that_cannot_be_opened_is_named_without_a_traceback():

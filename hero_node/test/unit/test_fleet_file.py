@@ -2,7 +2,15 @@
 
 import pytest
 
-from hero_node.files import EntryError, ExtraTopic, FleetFile, RobotNotes, name_fleet_file, read_fleet_file
+from hero_node.files import (
+    EntryError,
+    ExtraTopic,
+    FleetFile,
+    RobotNotes,
+    name_fleet_file,
+    read_entries,
+    read_fleet_file,
+)
 
 TEXT = """\
 robots:
@@ -49,3 +57,14 @@ def test_without_a_file_or_with_an_empty_one_there_are_no_notes(tmp_path, monkey
 def test_a_mistake_is_named_with_its_place(tmp_path, text, words):
     with pytest.raises(EntryError, match=words):
         read_fleet_file(write(tmp_path, text))
+
+
+def test_lists_hold_what_they_must_and_may_be_many():
+    text = "none: []\ntext: abc\npair: [1, 2.5]\nrows: [%s]\n" % ", ".join(["[1]"] * 100)
+    content = read_entries(text, "a.yaml", "pair: [1, 2]").mapping()
+    assert content["pair"].numbers(2, 0.0, 3.0, "two numbers") == [1.0, 2.5] and len(content["rows"].entries()) == 100
+    for line, name in enumerate(("none", "text"), 1):
+        with pytest.raises(EntryError, match=f"a.yaml, line {line}: .*not an empty one"):
+            content[name].entries()
+        with pytest.raises(EntryError, match=f"a.yaml, line {line}: .*two numbers"):
+            content[name].numbers(2, 0.0, 3.0, "two numbers")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_node.ros_messages import LENGTH, TooLongError, find_messages
+from hero_node.ros_messages import LENGTH, TooLongError, encode_text, find_messages
 
 MESSAGES = [b"first", b"", b"third one"]
 STREAM = b"".join(LENGTH.pack(len(message)) + message for message in MESSAGES)
@@ -28,3 +28,7 @@ def test_what_comes_before_a_length_that_no_message_has_is_found():
     assert [next(found)[1] for _ in MESSAGES][-1] == len(STREAM)
     with pytest.raises(TooLongError, match="a message of 101 bytes; at most 100 are accepted"):
         next(found)
+
+
+def test_a_text_is_its_length_in_bytes_and_then_utf_8():
+    assert encode_text("\u00b5m") == b"\3\0\0\0\xc2\xb5m"

@@ -45,7 +45,7 @@ class Lateness:
             self._period_s, self._held_until_s = period_s, now_s + HOLD_S
         self._worst_late_s = self._worst_age_s = 0.0
 
-    def find_share(self, pose_age_s: float = 0.0) -> float:
+    def find_share(self, pose_age_s: float) -> float:
         """Return the share, 0 to 1, of its speed at which a robot may drive whose pose is this old."""
         age_s = max(0.0, pose_age_s)
         late_s = self._period_s - self._planned_s + age_s

@@ -153,8 +153,8 @@ def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
     (shown,) = state["robots"]
     expected = {
         "name": "hero_3", "id": 3, "state": "READY", "known": True, "stop": "at rest", "since": 60, "uptime": 61,
-        "reconnects": 2, "speed": 0.123, "turn": 1.235, "bytes": 4001, "distance": 0.5, "dropped": 5, "bad": 6, "clock": -0.0123,
-        "source": "", "health": [0, ""],
+        "reconnects": 2, "speed": 0.123, "turn": 1.235, "bytes": 4001, "distance": 0.5, "dropped": 5, "bad": 6,
+        "clock": -0.0123, "source": "", "health": [0, ""],
     }  # fmt: skip
     assert {name: shown[name] for name in expected} == expected and len(shown["error"]) == MAX_LINE_LENGTH
 
