@@ -44,8 +44,9 @@ class Look(NamedTuple):
 
 FINE_LOOKS = (Look(1, 1.0, 1.0), Look(2, 3.0, 1.5))
 
-EVEN_CONTRAST, EVEN_FROM_PX = 8, 80 * 80
-"""Most that means of 4 x 4 px differ by on even ground, of 255; pixels of the smallest image that has much of it."""
+EVEN_CONTRAST, EVEN_FROM_PX = 8, 200 * 200
+"""Most that means of 4 x 4 px differ by on even ground, of 255; pixels of the smallest image that has much of it: in
+windows around tags of 50 px, to look for it costs as much as it saves."""
 
 MIN_MISTAKEN_TAGS = 3
 """Fewer may be noise."""
