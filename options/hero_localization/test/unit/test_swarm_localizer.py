@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hero_localization.filter.pose_hypothesis import StampedPose
-from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
+from hero_localization.filter.swarm_localizer import NAMED_S, RobotState, SwarmLocalizer
 from hero_msgs.msg import RobotPose
 from hero_node import Pose
 
@@ -193,7 +193,7 @@ def test_a_jump_back_in_time_gives_lost_robots_their_lines_again():
     swarm.now_s -= 50.0
     swarm.run(1.0, places, robots=robots).lines.clear()
     swarm.run(1.5, robots=robots)
-    assert swarm.lines == ["hero_%d lost: its pose follows its odometry" % robot_id for robot_id in robots]
+    assert swarm.lines == ["hero_3, hero_4, hero_5, hero_6 lost: their poses follow their odometry"]
 
 
 def test_states_are_those_of_the_message():
@@ -282,18 +282,18 @@ def test_robots_are_listed_by_id_each_with_the_origin_of_its_odometry():
     assert swarm[2].state is RobotState.TRACKED, "one that is expected already goes on"
 
 
-@pytest.mark.slow
-def test_four_lines_on_lost_robots_are_passed_on_and_the_others_counted():
+def test_robots_that_are_lost_together_have_one_line_and_at_times_only():
     robots = range(16)
     places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}
     swarm = Swarm(*robots).run(1.0, places, robots=robots)
     swarm.lines.clear()
-    swarm.run(9.9, robots=robots)
-    assert swarm.lines == ["hero_%d lost: its pose follows its odometry" % robot_id for robot_id in range(4)]
-    names = ", ".join("hero_%d" % robot_id for robot_id in range(4, 14))
-    assert swarm.run(2.0).lines[4:] == ["12 more lines on robots lost or found again: %s and 2 more" % names]
-    assert swarm.run(9.0, {0: places[0]}).lines[5:] == [], "not before ten seconds"
-    assert swarm.run(2.0, {0: places[0]}).lines[5:] == ["1 more lines on robots lost or found again: hero_0"]
-    assert len(swarm.run(50.0, {0: places[0]}).lines) == 6
+    swarm.run(2.0, robots=robots)
+    names = ", ".join("hero_%d" % robot_id for robot_id in range(10))
+    assert swarm.lines == [names + " and 6 more lost: their poses follow their odometry"]
     swarm.run(1.0, places, robots=robots)
-    assert len([line for line in swarm.lines[6:] if "found again after" in line]) == 4
+    assert len([line for line in swarm.lines[1:] if "found again after" in line]) == 16
+    for _ in range(3):
+        swarm.run(2.0, robots=robots).run(1.0, places, robots=robots)
+    assert len(swarm.lines) == 17, "while that goes on"
+    swarm.run(NAMED_S, places, robots=robots).run(2.0, robots=robots)
+    assert swarm.lines[17:] == swarm.lines[:1]

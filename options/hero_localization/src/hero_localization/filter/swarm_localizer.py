@@ -5,12 +5,11 @@ now_s and stamps are ROS time. now_s is that of this computer; other computers' 
 
 import enum
 import math
-from collections import Counter
 from typing import Dict, Iterable, List, NamedTuple, Optional
 
 import numpy as np
 
-from hero_node import Pose, TokenBucket, list_names, measure_distance, transform_pose, wrap_angle
+from hero_node import Pose, list_names, measure_distance, transform_pose, wrap_angle
 
 from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Outcome, PoseFilter, is_near
@@ -42,9 +41,6 @@ MAX_AHEAD_S = 0.15
 
 NAMED_S = 30.0
 """A cause is named once while it lasts; after this long without it, again."""
-
-LOSS_LINES, LOSS_PERIOD_S = 4, 10.0
-"""Burst and period of log lines on robots lost or found: a busy computer loses all robots at once."""
 
 PUBLISH_RATE_HZ = 25.0
 """Default publish rate of localize."""
@@ -99,8 +95,6 @@ class SwarmLocalizer:
         self.clocks = SourceClocks(is_correcting_clocks)
         self._robots: Dict[int, _Robot] = {}
         self._now_s = -math.inf
-        self._loss_lines = TokenBucket(LOSS_LINES, 1.0 / LOSS_PERIOD_S, 0.0)
-        self._summed: Dict[str, int] = Counter()
         self._named_s: Dict[str, float] = {}
 
     def add_robots(self, robot_ids: Iterable[int]) -> None:
@@ -198,7 +192,7 @@ class SwarmLocalizer:
         if was_lost:
             unseen_s = measurement.stamp_s - used_s
             line = "hero_%d found again after %.1f s, %s off its odometry" % (robot_id, unseen_s, step)
-            return self._tell_loss(robot_id, line)
+            return self._name("found %d" % robot_id, line)
         return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
 
     def distrust(self, stamp_s: float, robot_ids: Iterable[int], now_s: float) -> None:
@@ -213,17 +207,17 @@ class SwarmLocalizer:
     def find_lost(self, now_s: float) -> List[str]:
         """Notice robots that are not measured any more; return lines for users. Call it some times a second."""
         lines = self._follow_clock(now_s)
-        if self._summed and self._loss_lines.take(1.0, now_s):
-            text = "%d more lines on robots lost or found again: %s"
-            lines.append(text % (sum(self._summed.values()), list_names(list(self._summed))))
-            self._summed.clear()
+        lost = []
         for name, text in self.clocks.list_off().items():
             lines += self._name("clock " + name, text)
         for robot_id, robot in sorted(self._robots.items()):
             seen_s = max(robot.filter.used_s, robot.untrusted_s)
             if not robot.is_lost and -math.inf < seen_s < now_s - LOST_S:
                 robot.is_lost = True
-                lines += self._tell_loss(robot_id, "hero_%d lost: its pose follows its odometry" % robot_id)
+                lost.append("hero_%d" % robot_id)
+        if lost:
+            text = "its pose follows its odometry" if len(lost) == 1 else "their poses follow their odometry"
+            lines += self._name(f"lost {lost}", f"{list_names(lost)} lost: {text}")
         return lines
 
     def _follow_clock(self, now_s: float) -> List[str]:
@@ -233,15 +227,7 @@ class SwarmLocalizer:
             return []
         self._robots = {robot_id: _Robot() for robot_id in self._robots}
         self.clocks.forget_poses()
-        self._loss_lines = TokenBucket(LOSS_LINES, 1.0 / LOSS_PERIOD_S, 0.0)
         return [f"time jumped back by {back_s:.1f} s: all robots are localized again"]
-
-    def _tell_loss(self, robot_id: int, line: str) -> List[str]:
-        """Return a line on a robot that is lost or found; of many, find_lost() tells how many there were."""
-        if self._loss_lines.take(1.0, self._now_s):
-            return [line]
-        self._summed["hero_%d" % robot_id] += 1
-        return []
 
     def list_robots(self, now_s: float, is_extrapolating: bool = False) -> List[LocalizedRobot]:
         """Return what is known of all robots, in the order of their ids.
