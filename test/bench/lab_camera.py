@@ -6,11 +6,12 @@ exposure; the lens is inverted by a table along the radius. Then, in this order:
 
 import itertools
 import math
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 import cv2
 import numpy as np
 
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.prints.boards import SQUARE_M, draw_board
 from hero_localization.prints.tag_images import draw_tag
 
@@ -47,6 +48,20 @@ LENS_A = LabLens(1391.0, -0.32, 0.11)
 LENS_B = LabLens(900.0, -0.38, 0.16)
 FISHEYE = LabLens(700.0, -0.02, 0.004, is_fisheye=True)
 RATIONAL = LabLens(800.0, -0.1, 0.02, k4=0.2)
+
+
+SETUPS: Dict[str, Tuple[LabLens, float, Dict[str, float]]] = {
+    "f 1391, 2.2 m": (LENS_A, 2.2, {}),
+    "f 1391, 2.2 m, gamma 2.2, blur 1.2 px": (LENS_A, 2.2, {"gamma": 2.2, "blur_px": 1.2}),
+    "f 900, 1.9 m": (LENS_B, 1.9, {}),
+    "f 900, 2.2 m, gamma 2.2": (LENS_B, 2.2, {"gamma": 2.2}),
+}
+"""Lens, height above the floor, and faults of cameras that are calibrated."""
+
+REFERENCES_M = ((-1.15, -0.58), (1.15, -0.58), (1.15, 0.58), (-1.15, 0.58), (0.0, -0.62), (0.0, 0.62))
+REFERENCE_M = 0.1
+TAPE_SD_M = 0.0007
+"""In x and y each, of places that people measured."""
 
 
 class LabTag(NamedTuple):
@@ -227,3 +242,20 @@ def _shade(
         shade = np.where(np.maximum(np.abs(front_m), np.abs(left_m)) < 0.7 * size_m, WHITE, under)
     shade[inside] = np.where(cells[row[inside], column[inside]] > 0, WHITE, BLACK)
     return shade
+
+
+def find_camera(lab: LabCamera) -> Camera:
+    """Return the lab's camera as a perfect calibration would find it."""
+    lens = lab.lens
+    matrix = np.array(((lens.focal_px, 0, lab.center_px[0]), (0, lens.focal_px, lab.center_px[1]), (0, 0, 1.0)))
+    model = Intrinsics(*lens.size_px, matrix, np.array((lens.k1, lens.k2, 0.0, 0.0, 0.0)))
+    return Camera(model, lab.rotation, np.array(lab.position_m))
+
+
+def make_lab(random: np.random.RandomState, lens: LabLens, height_m: float, **faults: float) -> LabCamera:
+    """Return a camera that is tilted by 6 degrees somewhere, and whose middle shows that of the field."""
+    angle_rad, tilt_rad = random.uniform(0.0, math.tau), math.radians(6.0)
+    tilt = (tilt_rad * math.cos(angle_rad), tilt_rad * math.sin(angle_rad), random.uniform(-0.3, 0.3))
+    lab = LabCamera(lens, (0.0, 0.0, height_m), tilt, **faults)
+    aimed_m = lab.find_points(np.array(lens.size_px)[None] / 2.0, 0.0)[0]
+    return lab._replace(position_m=(*-aimed_m, height_m))

@@ -11,15 +11,28 @@ from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Sequenc
 
 import cv2
 import numpy as np
-from lab_camera import LENS_A, LENS_B, LabCamera, LabLens, LabTag
+from lab_camera import (
+    LENS_A,
+    LENS_B,
+    REFERENCE_M,
+    REFERENCES_M,
+    SETUPS,
+    TAPE_SD_M,
+    LabCamera,
+    LabLens,
+    LabTag,
+    find_camera,
+    make_lab,
+)
 from lab_filter import measure_ages, measure_uncertainty
+from lab_heights import measure_heights
 from lab_lenses import measure_models
 from measuring import print_machine
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens, find_board
 from hero_localization.calibration.print_fit import refine_corners
-from hero_localization.camera.camera_model import Camera, Intrinsics
+from hero_localization.camera.camera_model import Camera
 from hero_localization.errors import CalibrationError
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
@@ -42,11 +55,6 @@ TAGS = 50
 WARM_FRAMES, FRAMES, RENDERED = 75, 40, 10
 """Before counting, the whole image has been searched once."""
 
-REFERENCES_M = ((-1.15, -0.58), (1.15, -0.58), (1.15, 0.58), (-1.15, 0.58), (0.0, -0.62), (0.0, 0.62))
-REFERENCE_M = 0.1
-TAPE_SD_M = 0.0007
-"""In x and y each, of places that people measured."""
-
 CAMERAS = {
     "f 1391, k1 -0.32": LabCamera(),
     "f 1391, k1 -0.32, gamma 2.2": LabCamera(gamma=2.2),
@@ -58,14 +66,6 @@ CAMERAS = {
 
 ROBOT_PLACES_M = [(x_m, y_m) for x_m in (-0.8, -0.3, 0.3, 0.8) for y_m in (-0.3, 0.2)]
 HAND_M_S = 0.5
-
-
-def find_camera(lab: LabCamera) -> Camera:
-    """Return the lab's camera as a perfect calibration would find it."""
-    lens = lab.lens
-    matrix = np.array(((lens.focal_px, 0, lab.center_px[0]), (0, lens.focal_px, lab.center_px[1]), (0, 0, 1.0)))
-    model = Intrinsics(*lens.size_px, matrix, np.array((lens.k1, lens.k2, 0.0, 0.0, 0.0)))
-    return Camera(model, lab.rotation, np.array(lab.position_m))
 
 
 def place_tags(lab: LabCamera, random: np.random.RandomState, count: int = TAGS) -> List[LabTag]:
@@ -202,18 +202,10 @@ class Scene(NamedTuple):
     places: Dict[int, Pose]
 
 
-def _make_lab(random: np.random.RandomState, lens: LabLens, height_m: float, **faults: float) -> LabCamera:
-    angle_rad, tilt_rad = random.uniform(0.0, math.tau), math.radians(6.0)
-    tilt = (tilt_rad * math.cos(angle_rad), tilt_rad * math.sin(angle_rad), random.uniform(-0.3, 0.3))
-    lab = LabCamera(lens, (0.0, 0.0, height_m), tilt, **faults)
-    aimed_m = lab.find_points(np.array(lens.size_px)[None] / 2.0, 0.0)[0]
-    return lab._replace(position_m=(*-aimed_m, height_m))  # its middle shows that of the field
-
-
 def see_references(seed: int, lens: LabLens, height_m: float, **faults: float) -> Scene:
     """Render and detect the reference tags."""
     random = np.random.RandomState(seed)
-    lab = _make_lab(random, lens, height_m, **faults)
+    lab = make_lab(random, lens, height_m, **faults)
     tags = [
         LabTag(100 + index, x_m, y_m, random.uniform(-3, 3), REFERENCE_M, 0.0)
         for index, (x_m, y_m) in enumerate(REFERENCES_M)
@@ -253,13 +245,7 @@ def list_mistakes(places: Dict[int, Pose], random: np.random.RandomState) -> Ite
 
 def measure_mistakes(seeds: int) -> None:
     """Print how often each mistake is named."""
-    setups = {
-        "f 1391, 2.2 m": (LENS_A, 2.2, {}),
-        "f 1391, 2.2 m, gamma 2.2, blur 1.2 px": (LENS_A, 2.2, {"gamma": 2.2, "blur_px": 1.2}),
-        "f 900, 1.9 m": (LENS_B, 1.9, {}),
-        "f 900, 2.2 m, gamma 2.2": (LENS_B, 2.2, {"gamma": 2.2}),
-    }
-    for name, (lens, height_m, faults) in setups.items():
+    for name, (lens, height_m, faults) in SETUPS.items():
         counts: Dict[str, List[bool]] = {}
         for seed in range(seeds):
             scene = see_references(seed, lens, height_m, **faults)
@@ -402,6 +388,7 @@ PARTS: Dict[str, Callable[[int], None]] = {
     "shadows": measure_shadows,
     "losses": measure_losses,
     "mistakes": measure_mistakes,
+    "heights": measure_heights,
     "knocks": measure_knocks,
     "hands": measure_hands,
     "ages": lambda seeds: measure_ages(),
