@@ -23,7 +23,7 @@ from .page_requests import PageRequests
 from .parameters import Parameters, list_host_names, load_parameters, read_token
 from .serving.access import Access
 from .serving.client_limits import CONNECTIONS_MAX, ClientLimits
-from .serving.invitation import Invitation, make_link
+from .serving.invitation import describe_invitation, make_link, make_login_link
 from .serving.lesson import TEACHER, Lesson
 
 if TYPE_CHECKING:
@@ -104,8 +104,9 @@ class Monitor:
                 % (wanted.host, wanted.port, getattr(error, "strerror", None) or error)
             ) from None
         if self._lesson is not None:
-            self._invitation = Invitation(wanted.host, port, self._lesson.class_code)
-            rospy.loginfo("class code %s, or %s", self._lesson.class_code, self._invitation.link)
+            place = wanted.host, port, self._lesson.class_code
+            self._invitation = describe_invitation(*place)
+            rospy.loginfo("class code %s, or %s", self._lesson.class_code, make_login_link(*place))
         hint = "" if wanted.control else " (view only; control:=true allows driving)"
         rospy.loginfo("fleet monitor: %s%s", make_link(wanted.host, port), hint)
         self._end_check.start()
@@ -170,7 +171,7 @@ class Monitor:
         if self._lesson is not None:
             users = sorted((page.user.name, page.user.role.title, sorted(page.user.role.robots)) for page in pages)
             drivers = self._lesson.list_drivers()
-            self._feed.page_state.put(LESSON, {**self._invitation.describe(), "drivers": drivers, "users": users})
+            self._feed.page_state.put(LESSON, {**self._invitation, "drivers": drivers, "users": users})
         self._broadcast_updates()
 
     def _step(self) -> None:

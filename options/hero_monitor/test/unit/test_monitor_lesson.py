@@ -13,7 +13,7 @@ from hero_monitor.control.activity import QUIET_S, Activity
 from hero_monitor.control.requests import REQUESTS
 from hero_monitor.serving import invitation as invitation_module
 from hero_monitor.serving.access import TOKEN_KEY, Access
-from hero_monitor.serving.invitation import Invitation, make_qr_rows
+from hero_monitor.serving.invitation import describe_invitation, make_login_link, make_qr_rows
 from hero_monitor.serving.lesson import CODES_MAX, TEACHER, VIEWER, Lesson, Role, User
 
 TOKEN = "a secret of more than sixteen letters"
@@ -126,9 +126,9 @@ def test_a_full_disk_costs_the_file_and_nothing_else(monkeypatch, tmp_path):
 
 def test_phones_find_the_page_by_its_address_and_the_code(monkeypatch):
     monkeypatch.setattr(invitation_module, "find_address", lambda: "10.42.0.1")
-    shown = Invitation("0.0.0.0", 8088, "123456").describe()
+    shown = describe_invitation("0.0.0.0", 8088, "123456")
     assert (shown["code"], shown["link"]) == ("123456", "http://10.42.0.1:8088/")
-    assert Invitation("10.0.0.9", 80, "123456").link == "http://10.0.0.9:80/#123456"
+    assert make_login_link("10.0.0.9", 80, "123456") == "http://10.0.0.9:80/#123456"
 
 
 def test_without_the_library_there_is_no_qr_code_and_with_it_a_square(monkeypatch):

@@ -8,22 +8,14 @@ HOTSPOT_ADDRESS = "10.42.0.1"
 """Address of a PC that shares its network with robots and phones; every PC has a route to it."""
 
 
-class Invitation:
-    """Link and QR code of one lesson.
+def describe_invitation(host: str, port: int, code: str) -> Dict[str, Any]:
+    """Return what pages of teachers show: code, link of the page, and rows of a QR code, of make_login_link()."""
+    return {"code": code, "link": make_link(host, port), "qr": make_qr_rows(make_login_link(host, port, code))}
 
-    Attributes:
-        link: address of the page, with the code that its login fills in.
-    """
 
-    def __init__(self, host: str, port: int, code: str) -> None:
-        self._code = code
-        self._page = make_link(host, port)
-        self.link = f"{self._page}#{code}"
-        self._rows = make_qr_rows(self.link)
-
-    def describe(self) -> Dict[str, Any]:
-        """Return what pages of teachers show."""
-        return {"code": self._code, "link": self._page, "qr": self._rows}
+def make_login_link(host: str, port: int, code: str) -> str:
+    """Return the address of the page with a code, which its login fills in."""
+    return f"{make_link(host, port)}#{code}"
 
 
 def make_link(host: str, port: int) -> str:

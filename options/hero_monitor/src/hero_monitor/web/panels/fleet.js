@@ -135,15 +135,6 @@ export class FleetTable {
     const row = { line, button, chip, targets, texts: [], robot: null };
     const choose = (isAdded) => row.robot.state !== "REFUSED" && this.choose([row.robot.name], isAdded);
     line.addEventListener("click", (event) => choose(this.isAdding() || event.shiftKey || event.ctrlKey || event.metaKey));
-    // The loop of the keyboard: arrows go from row to row, with Shift they add robots on their way.
-    line.addEventListener("keydown", (event) => {
-      const next = { ArrowDown: line.nextElementSibling, ArrowUp: line.previousElementSibling }[event.key];
-      if (!next) return;
-      event.preventDefault();
-      if (event.shiftKey && !isPressed(button)) choose(true);
-      next.querySelector("button").focus();
-      if (event.shiftKey && next.querySelector("[aria-pressed=false]")) next.dispatchEvent(new MouseEvent("click", { shiftKey: true }));
-    });
     return row;
   }
 

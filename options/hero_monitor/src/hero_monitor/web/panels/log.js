@@ -1,4 +1,4 @@
-// Log lines of nodes and robots by their time, newest at the bottom; a message that comes again, for any robot, stays one line.
+// Log lines of nodes and robots, newest at the bottom; a message that comes again, for any robot, stays one line.
 
 import { element, make } from "../dom.js";
 import { colorOf } from "../map/colors.js";
@@ -6,12 +6,9 @@ import { colorOf } from "../map/colors.js";
 const LINES_MAX = 500;
 const LEVELS = { 1: "debug", 2: "info", 4: "warn", 8: "error", 16: "fatal" };
 const AT_END_PX = 30;
-const DELAY_MAX_S = 10; // of lines on their way from other nodes; later, a clock was set back
 const NUMBER = /\d+(\.\d+)?/g;
 
 const cell = (className, text) => make("span", { className }, text);
-
-const isLate = (seconds, entry) => entry && seconds < entry.seconds && seconds > entry.seconds - DELAY_MAX_S;
 
 export class LogView {
   list; level; mine; words;
@@ -47,12 +44,11 @@ export class LogView {
     if (atEnd) this.list.scrollTop = this.list.scrollHeight;
   }
 
-  /** Show a line in its place; what differs from one before only in numbers joins it, unless these tell users apart. */
+  /** Show a line; one before that differs from it only in numbers joins it, unless these tell users apart. */
   add({ seconds, level, node, robot, text }) {
     const key = `${level} ${node} ${node === this.ownNode ? text : text.replace(NUMBER, "#")}`;
     const former = this.groups.get(key);
     former?.remove();
-    if (isLate(seconds, former?.entry)) seconds = former.entry.seconds;
     const robots = new Set(former?.entry.robots).add(robot);
     const count = (former?.entry.count ?? 0) + 1;
     const time = new Date(seconds * 1000).toTimeString().slice(0, 8);
@@ -61,17 +57,11 @@ export class LogView {
     if (robot && robots.size === 1) source.style.color = colorOf(Number(robot.slice(robot.indexOf("_") + 1)));
     const said = cell("text", robot && text.startsWith(`${robot}: `) ? text.slice(robot.length + 2) : text);
     if (count > 1) said.append(cell("count", `${count} times`));
-    const entry = { key, seconds, level, robots, count, words: `${node} ${text}`.toLowerCase() };
+    const entry = { key, level, robots, count, words: `${node} ${text}`.toLowerCase() };
     const line = make("li", { className: LEVELS[level] || "info", entry }, cell("time", time), source, said);
     line.hidden = !this.admits(entry);
     this.groups.set(key, line);
-    this.list.insertBefore(line, this.findNext(seconds));
-  }
-
-  findNext(seconds) {
-    let last = this.list.lastElementChild;
-    while (isLate(seconds, last?.entry)) last = last.previousElementSibling;
-    return last ? last.nextElementSibling : this.list.firstElementChild;
+    this.list.append(line);
   }
 
   admits(entry) {
