@@ -19,7 +19,7 @@ from .fleet.admission import Admission, RateLimit
 from .fleet.namespaces import Identity
 from .fleet.registry import Decision, FleetRegistry, RobotRecord, RobotState, Verdict
 from .peer import Peer
-from .reports.robot_log import RobotLog
+from .reports.robot_log import receive_line
 from .reports.robot_status import RobotStatus, describe_robot
 from .ros.log_relay import LogRelay
 from .ros.raw_publisher import TransformPublisher
@@ -60,7 +60,6 @@ class Gateway(LinkHandler):
         self._stops = StopDelivery(loop.call_later, self)
         self.note_change = on_change
         self.stop_robot = self._stops.begin
-        self._robot_log = RobotLog(log, self._stops.begin, self.warn_late)
         self._transforms = TransformPublisher(loop.call_later)
         self.open = self._transforms.open
         self.peers: Dict[Link, Peer] = {}
@@ -220,7 +219,7 @@ class Gateway(LinkHandler):
         if isinstance(event, Topic):
             self._declare(peer, event, now_s)
         elif isinstance(event, Log):
-            self._robot_log.receive(peer, event, now_s)
+            receive_line(self._log, peer, event, now_s)
         elif isinstance(event, Problem):
             self.warn_robot(peer, event.text)
         elif isinstance(event, SessionEnded):
@@ -285,7 +284,8 @@ class Gateway(LinkHandler):
         peer.record = decision.record
         if decision.verdict is Verdict.REFUSED:
             peer.refused = True
-            self._log.log_throttled("error", "duplicate " + identity.namespace + address.host, decision.reason)
+            key, text = "duplicate " + identity.namespace + address.host, peer.record.refused[str(address)]
+            self._log.log_throttled("error", key, text)
             self.note_change()
             return
         self._join(peer, decision)

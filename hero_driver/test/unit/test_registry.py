@@ -130,10 +130,11 @@ def test_a_second_robot_with_the_same_id_is_refused_and_both_are_named():
     decision = identify(fleet, 2, T0 + 1.0, host="10.0.0.2")
     assert decision.verdict is Verdict.REFUSED
     assert decision.old_link is None
-    assert "10.0.0.1:1 was first and keeps the id, 10.0.0.2:2 is refused" in decision.reason
-    assert "/hero_0" in decision.reason
-    assert "configuration page" in decision.reason
     record = fleet.robots["/hero_0"]
+    text = record.refused["10.0.0.2:2"]
+    assert "10.0.0.1:1 was first and keeps the id, 10.0.0.2:2 is refused" in text
+    assert "/hero_0" in text
+    assert "configuration page" in text
     assert (record.link, record.address, record.reconnects) == (1, "10.0.0.1:1", 0)
     assert list(record.refused) == ["10.0.0.2:2"]
 

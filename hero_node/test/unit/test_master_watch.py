@@ -1,5 +1,6 @@
 """A node at a ROS master that ends and comes back: its registrations are whole again, whatever interrupts them."""
 
+import threading
 from types import SimpleNamespace
 
 import pytest
@@ -140,7 +141,10 @@ def test_the_watch_tells_of_a_loss_once_and_of_the_return(monkeypatch, failure):
     end = LooksThenEnd(monkeypatch, [None, lost, lost, failure, None, None, lost])
     news, losses = [], []
     monkeypatch.setattr(master_watch.rospy, "resolve_name", lambda name: name)
-    MasterWatch()._run(end, news.append, losses.append, 1.5)
+    MasterWatch().start(end, news.append, losses.append, 1.5)
+    for thread in threading.enumerate():
+        if thread.name == "master watch":
+            thread.join()
     assert news == ["the ROS master answers again; 2 topics and 1 services are registered again"]
     assert losses == ["no ROS master: existing connections keep working"] * 2
     assert end.waited_s == 8 * 1.5

@@ -87,7 +87,6 @@ class Decision:
     verdict: Verdict
     record: RobotRecord
     old_link: Optional[Any] = None  # to be closed, when the verdict is TOOK_OVER
-    reason: str = ""  # when REFUSED
 
 
 class FleetRegistry:
@@ -113,14 +112,13 @@ class FleetRegistry:
             self.gone.pop(identity.namespace, None)
             return Decision(Verdict.ARRIVED, record)
         if self._is_duplicate(record, host, opened_s, now_s):
-            reason = (
+            record.refused[address] = (
                 "two robots call themselves %s: %s was first and keeps the id, %s is refused; give one of them"
                 " another id on its configuration page" % (identity.namespace, record.address, address)
             )
-            record.refused[address] = reason
             if len(record.rivals) < RIVALS_MAX:
                 record.rivals.setdefault(host, now_s)
-            return Decision(Verdict.REFUSED, record, reason=reason)
+            return Decision(Verdict.REFUSED, record)
         old_link = record.link
         record.rivals.pop(host, None)
         record.host, record.address, record.link = host, address, link

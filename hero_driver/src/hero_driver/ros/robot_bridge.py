@@ -128,7 +128,8 @@ class RobotBridge:
             replaced = [self._publishers.pop(name)] if known != layout and name in self._publishers else []
             publishers = self._choose_publishers(topic, name, layout)
             if convert:
-                topic.receive = functools.partial(_convert_first, convert, topic.receive)
+                receive, convert_payload = topic.receive, convert
+                topic.receive = lambda payload, arrival_ns: receive(convert_payload(payload), arrival_ns)
             self._submit(lambda: self.endpoints.advertise(name, layout, publishers, replaced))
         elif kind is TopicKind.SUBSCRIBER:
             self._take_input(topic, name, layout, lambda: self._subscribe(name, layout))
@@ -246,12 +247,6 @@ class RobotBridge:
 
         if not self._registrar.submit(run):
             self.endpoints.report_error("registrar", "too many topics wait for the ROS master; is it reachable?")
-
-
-def _convert_first(
-    convert: Callable[[bytes], bytes], receive: Callable[[bytes, int], None], payload: bytes, arrival_ns: int
-) -> None:
-    receive(convert(payload), arrival_ns)
 
 
 def _has_known_layout(layout: Layout) -> bool:

@@ -38,26 +38,20 @@ class MasterWatch:
 
         tell: takes what was registered; tell_loss: that the master was lost, once until it is back; both for users.
         """
-        arguments = has_ended, tell, tell_loss, period_s
-        threading.Thread(target=self._run, args=arguments, name="master watch", daemon=True).start()
 
-    def _run(
-        self,
-        has_ended: threading.Event,
-        tell: Callable[[str], None],
-        tell_loss: Callable[[str], None],
-        period_s: float,
-    ) -> None:
-        while not has_ended.wait(period_s):
-            was_lost = self.is_lost
-            try:
-                news = self.look()
-            except (NodeError, OSError, xmlrpc.client.Error) as error:
-                if not was_lost and not has_ended.is_set():
-                    tell_loss(f"{error}: existing connections keep working")
-            else:
-                if news:
-                    tell(news)
+        def watch() -> None:
+            while not has_ended.wait(period_s):
+                was_lost = self.is_lost
+                try:
+                    news = self.look()
+                except (NodeError, OSError, xmlrpc.client.Error) as error:
+                    if not was_lost and not has_ended.is_set():
+                        tell_loss(f"{error}: existing connections keep working")
+                else:
+                    if news:
+                        tell(news)
+
+        threading.Thread(target=watch, name="master watch", daemon=True).start()
 
     def look(self) -> str:
         """Ask the master, and register with one that was started again; return what was registered, for users.
