@@ -68,9 +68,6 @@ class TestDriverBadInput(OwnDriverCase):
             for text in ("hero_driver cannot start: ", value, part):
                 self.assertIn(text, driver.lines[0])
 
-    def test_an_unknown_parameter_is_named_with_the_one_that_was_meant(self):
-        self.assert_start_fails({"prot": 11411}, "unknown parameter ~prot", "did you mean ~port?")
-
     # Bytes.
 
     def dial_pair(self, number):

@@ -209,17 +209,6 @@ def test_every_behavior_is_tested_and_names_its_units_and_source():
         assert any(sign in source for sign in ("et al.", "Reynolds", "Olfati", "Krick", "Galam")), name
 
 
-@pytest.mark.slow
-def test_a_world_of_a_batch_gives_the_same_bytes_as_alone():
-    together = Trial(find_behavior("voter")(), SQUARE, 6, [3, 4, 5])
-    alone = Trial(find_behavior("voter")(), SQUARE, 6, [4])
-    for trial in (together, alone):
-        for _ in range(60):
-            trial.step()
-    assert together.poses[1].tobytes() == alone.poses[0].tobytes()
-    assert together.poses[0].tobytes() != alone.poses[0].tobytes()
-
-
 @pytest.mark.parametrize(
     ("command", "told"),
     [

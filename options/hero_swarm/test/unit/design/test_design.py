@@ -4,7 +4,6 @@ import os
 import pickle
 import shutil
 import signal
-import sys
 import zlib
 from concurrent.futures import BrokenExecutor, Executor, Future
 from pathlib import Path
