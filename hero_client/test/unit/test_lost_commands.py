@@ -9,6 +9,7 @@ from hero_node.ros import ask_master
 
 TWIST = "geometry_msgs/Twist"
 DRIVER = [["/hero_3/velocity_controller/cmd_vel", ["/hero_driver"]], ["/hero_3/cmd_vel", ["/hero_driver"]]]
+HEARD = [["/clock", ["/simulator"]], ["/hero_3/odom", ["/hero_driver"]]]
 
 
 @pytest.fixture(name="find")
@@ -18,7 +19,7 @@ def fixture_find(monkeypatch):
 
     def find(topic, kind, node="/mine", subscribed=()):
         answers = {
-            "getSystemState": ([[topic, [node]], ["/hero_3/odom", ["/hero_driver"]]], [*DRIVER, *subscribed], []),
+            "getSystemState": ([[topic, [node]], *HEARD], [*DRIVER, ["/clock", ["/rviz"]], *subscribed], []),
             "getTopicTypes": [[topic, kind], ["/hero_3/odom", "nav_msgs/Odometry"]],
         }
         ask = create_autospec(ask_master, side_effect=answers.__getitem__)

@@ -148,6 +148,13 @@ def test_a_robot_that_fails_is_stopped_and_the_others_go_on(capsys):
     assert session.probes[1].failure == "motors: bad data"
     assert session.probes[1].sent == ["stop"] and not session.probes[0].sent
     assert "hero_1 once more: motors: bad data" in capsys.readouterr().out
+
+    def fail_again(probe):
+        raise CalibrationError("silent")
+
+    session.for_each("velocity", fail_again, session.probes[1:2])
+    assert session.probes[1].failure == "motors: bad data", "the first cause"
+    assert session.probes[1].sent == ["stop", "stop"]
     silent = FakeSession(1)
     silent.repeat("motors", 3, move, evaluate)
     silent.probes[0].robot_id = 1
