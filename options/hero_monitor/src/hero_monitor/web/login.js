@@ -30,3 +30,5 @@ form.addEventListener("submit", async (event) => {
     answer.textContent = "The monitor does not answer.";
   }
 });
+
+export {}; // a module: its names are its own
