@@ -5,7 +5,7 @@
 Everything runs on tornado's thread, except what may block (background).
 """
 
-from typing import TYPE_CHECKING, Any, Dict, Set
+from typing import TYPE_CHECKING, Any, Dict
 
 import rospy
 
@@ -90,7 +90,6 @@ class Monitor:
             )
         ]
         self._end_check = tornado.ioloop.PeriodicCallback(self._check_end, 1000.0 * END_CHECK_PERIOD_S)
-        self._present: Set[int] = set()
         self._resting: Any = None
 
     def run(self) -> None:
@@ -139,7 +138,6 @@ class Monitor:
 
     def _enter(self, page: "PageSocket") -> None:
         """A page is there: robots are watched, and stopped when it falls silent."""
-        self._present.add(page.number)
         if self._resting is not None:
             self._loop.remove_timeout(self._resting)
             self._resting = None
@@ -148,9 +146,8 @@ class Monitor:
                 repeated.start()
 
     def _leave(self, number: int) -> None:
-        self._present.discard(number)
         self._commander.dead_man.drop_page(number)
-        if not self._present and self._resting is None:
+        if not self._server.pages and self._resting is None:
             self._resting = self._loop.call_later(LINGER_S, self._rest)
 
     def _rest(self) -> None:

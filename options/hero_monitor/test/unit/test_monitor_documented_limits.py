@@ -109,9 +109,10 @@ def test_an_address_has_the_documented_number_of_wrong_tokens():
 def test_programs_end_the_documented_time_after_the_last_page():
     (linger_s,) = find_limits(MONITOR, r"after (\d+) s without an open page")
     monitor = Monitor.__new__(Monitor)  # without a server and a ROS node
-    monitor._present, monitor._resting = {1, 4}, None
+    monitor._server, monitor._resting = SimpleNamespace(pages=["another"]), None
     monitor._commander, monitor._loop = mock.Mock(), mock.Mock()
     monitor._leave(4)
     assert not monitor._loop.call_later.called
+    monitor._server.pages.clear()
     monitor._leave(1)
     monitor._loop.call_later.assert_called_once_with(pytest.approx(linger_s), monitor._rest)

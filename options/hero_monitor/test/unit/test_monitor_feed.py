@@ -25,7 +25,6 @@ from hero_monitor.fleet_feed.feed import (
     LOG_LINES_PER_READ,
     LOOK_PERIOD_S,
     MARKERS_MAX,
-    REPLAY_KEPT_S,
     ROBOTS_MAX,
     ROW_PERIOD_S,
     FleetFeed,
@@ -355,7 +354,8 @@ def test_a_grid_is_drawn_in_its_frame_and_a_replay_while_it_runs(fleet, monkeypa
     report.header.frame_id = "map"
     fleet.put("/localization/poses", report)
     assert fleet.read()["grid"] is None
-    fleet.now_s += max(FORGOTTEN_S, REPLAY_KEPT_S) + 0.1
+    fleet.now_s += FORGOTTEN_S + 0.1
+    fleet.feed._scene["/hero_sim/replay"].has_publisher = False
     state = fleet.read()
     assert state["grid"]["runs"] == [1, 1, 2, 1] and state["replay"] == {}, "a map_server publishes once"
 

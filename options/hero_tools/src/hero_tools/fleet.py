@@ -46,57 +46,6 @@ KEYS_HELP = "q quit   Enter STOP ALL ROBOTS   r release them"
 MAX_OPTION = 1e6
 
 
-class FleetListener:
-    """The drivers' lists of robots, and a listener for each robot."""
-
-    def __init__(self) -> None:
-        self.report: Optional[RobotArray] = None
-        self.file = load_fleet_file()
-        self.drivers = Drivers()
-        self._listeners: Dict[str, RobotListener] = {}
-        self._asked: Set[str] = set()
-        self._worker = ThreadPoolExecutor(1, "subscriptions")
-
-    def wait_for_driver(self, program: Program, timeout_s: float) -> bool:
-        """Return as soon as every driver has reported, and whether one has within timeout_s."""
-        end_s = time.monotonic() + timeout_s
-        while not (self.drivers.read() and self.drivers.is_settled) and time.monotonic() < end_s:
-            if not program.sleep(0.02):
-                break
-        return self.drivers.read() is not None
-
-    def read_rows(self, now_s: float) -> List[RobotRow]:
-        """Return the robots now; subscribes to topics of robots that are new."""
-        report = self.drivers.read()
-        if report is None:
-            return []
-        self.report = report
-        present = {robot.namespace for robot in report.robots if robot.namespace and robot.state != Robot.REFUSED}
-        if present != self._asked:
-            self._asked = present
-            self._worker.submit(follow, self._listeners, present, RobotListener)
-        return [self._make_row(robot, report.stopped, now_s) for robot in report.robots]
-
-    def dismiss_gone(self) -> None:
-        """Have the drivers list robots that are gone no longer; returns at once."""
-        self._worker.submit(self.drivers.dismiss_gone)
-
-    def _make_row(self, robot: Robot, stopped: bool, now_s: float) -> RobotRow:
-        # Topics under the name of a robot that was refused are those of another robot.
-        listener = None if robot.state == Robot.REFUSED else self._listeners.get(robot.namespace)
-        if listener is not None:
-            listener.read_newest()
-        track = listener.track if listener is not None else RobotTrack()
-        return RobotRow(
-            robot,
-            track,
-            track.odometry.rate_hz(now_s),
-            stopped,
-            self.file.robots.get(robot.id, RobotNotes()),
-            {} if listener is None else listener.values,
-        )
-
-
 @contextlib.contextmanager
 def take_screen(keyboard: Keyboard) -> Iterator[None]:
     """Read keys, and draw on the terminal's other screen, until the context ends."""
@@ -123,7 +72,12 @@ class FleetProgram:
     def __init__(self, program: Program, options: argparse.Namespace) -> None:
         self._program = program
         self._options = options
-        self._fleet = FleetListener()
+        self._file = load_fleet_file()
+        self._drivers = Drivers()
+        self._report: Optional[RobotArray] = None
+        self._listeners: Dict[str, RobotListener] = {}
+        self._asked: Set[str] = set()
+        self._worker = ThreadPoolExecutor(1, "subscriptions")
         self._end_s = math.inf if options.seconds is None else time.monotonic() + options.seconds
         self._rows: List[RobotRow] = []
 
@@ -133,44 +87,69 @@ class FleetProgram:
     def _going(self) -> bool:
         return self._seconds_left() > 0.0 and self._program.running
 
+    def _wait_for_driver(self) -> bool:
+        """Return as soon as every driver has reported, and whether one has within DRIVER_TIMEOUT_S."""
+        end_s = time.monotonic() + DRIVER_TIMEOUT_S
+        while not (self._drivers.read() and self._drivers.is_settled) and time.monotonic() < end_s:
+            if not self._program.sleep(0.02):
+                break
+        return self._drivers.read() is not None
+
     def _read(self) -> None:
-        self._rows = sort_rows(self._fleet.read_rows(time.monotonic()))
+        """Read the robots, and subscribe to topics of those that are new."""
+        report = self._report = self._drivers.read() or self._report
+        if report is None:
+            return
+        present = {robot.namespace for robot in report.robots if robot.namespace and robot.state != Robot.REFUSED}
+        if present != self._asked:
+            self._asked = present
+            self._worker.submit(follow, self._listeners, present, RobotListener)
+        self._rows = sort_rows([self._make_row(robot, report.stopped) for robot in report.robots])
+
+    def _make_row(self, robot: Robot, stopped: bool) -> RobotRow:
+        # Topics under the name of a robot that was refused are those of another robot.
+        listener = None if robot.state == Robot.REFUSED else self._listeners.get(robot.namespace)
+        if listener is not None:
+            listener.read_newest()
+        track = RobotTrack() if listener is None else listener.track
+        notes, values = self._file.robots.get(robot.id, RobotNotes()), {} if listener is None else listener.values
+        return RobotRow(robot, track, track.odometry.rate_hz(time.monotonic()), stopped, notes, values)
 
     def _make_lines(self, width: int, height: int) -> List[str]:
-        if self._fleet.report is None:
+        if self._report is None:
             text = "no driver yet: nothing on /hero_driver/robots (roslaunch hero_bringup hero_bringup.launch)"
             return [text[:width]]
-        silent = self._fleet.drivers.find_silent()
-        title = format_title(self._fleet.report, time.time(), silent)
+        silent = self._drivers.find_silent()
+        title = format_title(self._report, time.time(), silent)
         return [
             *(line[:width] for line in title),
-            *format_table(self._rows, width, max(2, height - len(title)), self._fleet.file.topics),
+            *format_table(self._rows, width, max(2, height - len(title)), self._file.topics),
         ]
 
     def _press(self, key: str) -> None:
         """Execute the command of a key."""
         if key in STOP_KEYS or key == RELEASE_KEY:
-            self._fleet.drivers.request_stop(key in STOP_KEYS)
+            self._drivers.request_stop(key in STOP_KEYS)
         elif key == "d":
-            self._fleet.dismiss_gone()
+            self._worker.submit(self._drivers.dismiss_gone)
 
     def print_fleet(self) -> None:
         """Print the fleet once, as lines or as JSON; or the inventory."""
         if self._options.inventory is not None:
-            file = self._fleet.file
+            file = self._file
             inventory = list_inventory(self._rows, file, read_calibrations(self._options.calibrations).found)
             warnings = list_warnings(inventory, file.run_time_h)
             style = "json" if self._options.json else self._options.inventory
             print(format_inventory(inventory, style, warnings), flush=True)
             return
         if self._options.json:
-            print(format_json(self._rows, self._fleet.report or RobotArray()), flush=True)
+            print(format_json(self._rows, self._report or RobotArray()), flush=True)
         else:
             print("\n".join(self._make_lines(200, 10000)), flush=True)
 
     def run_once(self) -> int:
         """Wait for the driver, listen for a moment, print."""
-        if not self._fleet.wait_for_driver(self._program, DRIVER_TIMEOUT_S):
+        if not self._wait_for_driver():
             if self._program.running:
                 text = "fleet: no driver: nothing on /hero_driver/robots after %.0f s"
                 print(text % DRIVER_TIMEOUT_S, file=sys.stderr)
@@ -201,7 +180,7 @@ class FleetProgram:
         with take_screen(keyboard):
             while self._going():
                 self._read()
-                status = self._fleet.drivers.stop_status()
+                status = self._drivers.stop_status()
                 draw(self._make_screen(status))
                 period_s = DRAW_PERIOD_S if status is None or status.is_final else ASKING_DRAW_PERIOD_S
                 keys: Optional[List[str]] = []
@@ -213,7 +192,7 @@ class FleetProgram:
                     break
         if self._program.end_signal is None:
             self.print_fleet()
-        self._fleet.drivers.check_stop()
+        self._drivers.check_stop()
         return self.check_expected()
 
     def _make_screen(self, status: Optional[StopStatus]) -> List[str]:

@@ -124,7 +124,7 @@ def test_robots_are_listened_to_while_they_are_there_and_not_refused(world):
     assert set(world.listeners) == {"/hero_0", "/hero_2"}
     world.robots = [(2, Robot.READY), (1, Robot.REFUSED)]
     program._read()
-    assert world.closed == ["/hero_0"] and set(program._fleet._listeners) == {"/hero_2"}
+    assert world.closed == ["/hero_0"] and set(program._listeners) == {"/hero_2"}
     refused = next(row for row in program._rows if row.robot.id == 1)
     assert refused.track.pose is None and not refused.is_heard
 
@@ -178,7 +178,7 @@ def test_a_program_that_leaves_robots_driving_ends_with_an_error(world, monkeypa
     def fail():
         raise ProgramError("NOT STOPPED: hero_0 moves")
 
-    program._fleet.drivers.check_stop = fail
+    program._drivers.check_stop = fail
     world.keys = [["q"]]
     with pytest.raises(ProgramError):
         program.run_screen(Keyboard(world))

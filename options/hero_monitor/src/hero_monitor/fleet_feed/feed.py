@@ -63,11 +63,8 @@ ROBOTS_MAX = 1000
 
 PICTURE_TOPICS = {"/track/picture/compressed", "/track/picture/outline"}
 
-SIMULATOR_TOPICS = ("/hero_sim/arena", "/hero_sim/object_markers", "/hero_sim/markers")
-"""When the simulator ends, an empty message takes the place of what it published last."""
-
-REPLAY_KEPT_S = 3.0
-"""Robots of a replay disappear this long after its last message."""
+SIMULATOR_TOPICS = ("/hero_sim/arena", "/hero_sim/object_markers", "/hero_sim/markers", "/hero_sim/replay")
+"""When the simulator, or a replay, ends, an empty message takes the place of what it published last."""
 
 MARKERS_MAX = 2000
 """Markers of the arena, or of ground truth."""
@@ -99,7 +96,7 @@ class FleetFeed:
             "/hero_sim/arena": (MarkerArray, self._receive_arena),
             "/hero_sim/object_markers": (MarkerArray, lambda message, now_s: put("objects", describe_arena(message))),
             "/hero_sim/markers": (MarkerArray, lambda message, now_s: put("ground_truth", find_true_poses(message))),
-            "/hero_sim/replay": (MarkerArray, self._receive_replay),
+            "/hero_sim/replay": (MarkerArray, lambda message, now_s: put("replay", find_true_poses(message))),
             "/track/picture/outline": (PolygonStamped, lambda message, now_s: self.picture.receive_outline(message)),
             "/track/picture/compressed": (CompressedImage, self.picture.receive),
             "/behavior/markers": (MarkerArray, self._drawings.receive),
@@ -110,7 +107,6 @@ class FleetFeed:
         self._localization = LocalizationWatch()
         self._grid: Optional[OccupancyGrid] = None
         self._shown_grid: Tuple[Optional[OccupancyGrid], str] = (None, "")
-        self._replay_s = 0.0
         self._tracked: Set[str] = set()
         self._master = MasterWatch()
         self._master.start(threading.Event(), background.warn, period_s=MASTER_PERIOD_S)
@@ -315,8 +311,6 @@ class FleetFeed:
             put("grid", self._grid and encode_grid(self._grid, frame))
         put("picture", self.picture.describe(frame, now_s))
         put("drawings", self._drawings.describe(frame, now_s))
-        if now_s - self._replay_s > REPLAY_KEPT_S:
-            put("replay", {})
 
     def _receive_transforms(self, message: TFMessage, now_s: float) -> None:
         for transform in message.transforms:
@@ -339,10 +333,6 @@ class FleetFeed:
             for side in (-0.5, 0.5)
         ]
         self._walls = [edge(values) for values in zip(*ends) for edge in (min, max)]
-
-    def _receive_replay(self, message: MarkerArray, now_s: float) -> None:
-        self._replay_s = now_s
-        self.page_state.put("replay", find_true_poses(message))
 
     def _receive_grid(self, message: OccupancyGrid, now_s: float) -> None:
         self._grid = message
