@@ -41,6 +41,8 @@ DELAY_S = OPTIONS.delay_s + OPTIONS.delay_jitter_s / 2.0
 FRAME_S = 1.0 / OPTIONS.rate_hz
 FIELD_M = (2.5, 1.4)
 GRID = (4, 3)
+WALLS_M = (1.6, 0.95)
+"""Half of the arena: no robot comes to a wall."""
 REFERENCES_M = ((-1.3, -0.7), (1.3, -0.7), (1.3, 0.7), (-1.3, 0.7), (0.0, -0.72), (0.0, 0.72))
 BOARD_IMAGES = 24
 CORNER_SD_PX = 0.15
@@ -76,7 +78,7 @@ def _rms(values: np.ndarray) -> float:
 
 def describe_arena() -> str:
     """Return an arena whose robots start on a grid, far enough from each other for what they drive."""
-    x_m, y_m = FIELD_M[0] / 2.0, FIELD_M[1] / 2.0
+    x_m, y_m = WALLS_M
     corners = [[-x_m, -y_m], [x_m, -y_m], [x_m, y_m], [-x_m, y_m], [-x_m, -y_m]]
     lines = [f"walls_m: [{corners}]", "starts_m_deg:"]
     for row_m in np.linspace(-0.4, 0.35, GRID[1]):
@@ -364,7 +366,7 @@ def measure_accuracy(seed: int, tape_m: float) -> None:
     layout, delay_s = find_layout(scene, camera)
     stock = StockMethod(scene, camera, create_detector(decimate=1.0).detect(scene.renderer.render(scene.true)))
     straight = ((1.0, 0.2, 0.0), (1.0, -0.2, 0.0)) * 3
-    circles = ((3.0, 0.2, 2.0), (3.0, 0.2, -2.0))
+    circles = ((3.0, 0.2, 2.5), (3.0, 0.2, -2.5))
     table = {
         "standing, whole field": measure_standing(scene, camera, layout, stock, seed),
         "0.2 m/s to and fro": measure_driving(scene, camera, layout, delay_s, stock, straight),
@@ -375,7 +377,7 @@ def measure_accuracy(seed: int, tape_m: float) -> None:
         for method in METHODS:
             print(f"{name:22} {method:18} {errors[method].describe()}")
     print(f"\ncovered for {COVERED_S:g} s while driving 0.2 m/s")
-    for name, speed in (("straight", (0.2, 0.0)), ("in circles", (0.2, 2.0))):
+    for name, speed in (("straight", (0.2, 0.0)), ("in circles", (0.2, 3.0))):
         covered, after, step_m = measure_occlusion(scene, camera, layout, delay_s, speed)
         print(f"{name:22} {'covered':18} {covered.describe()}")
         print("%-22s %-18s %s" % ("", "from %g s after" % FOUND_AGAIN_S, after.describe()))
