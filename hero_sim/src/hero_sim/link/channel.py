@@ -5,6 +5,7 @@ wait for it at the same time collide as often as Bianchi's model of saturated st
 the same frame is sent up to eight times, then TCP sends it again.
 """
 
+from bisect import bisect_left
 from typing import Dict, Hashable, Tuple
 
 import numpy as np
@@ -44,6 +45,9 @@ def _find_collisions(stations: int) -> float:
 
 _COLLISIONS = [_find_collisions(max(stations, 1)) for stations in range(_MAX_STATIONS)]
 
+_FAILURES = [[-(share**number) for number in range(1, _ATTEMPTS + 1)] for share in _COLLISIONS]
+"""Minus the probability that as many attempts to send a frame collide, for each number of stations; ascending."""
+
 
 class Channel:
     """The airtime of one channel, in the order in which frames are handed over."""
@@ -67,10 +71,11 @@ class Channel:
         late_ms = 0.0
         waiting = min(len(self._ends_ms), _MAX_STATIONS - 1)
         if waiting > 1:
-            attempts = self._rng.geometric(1.0 - _COLLISIONS[waiting], segments)
+            failures = [bisect_left(_FAILURES[waiting], -share) for share in self._rng.random_sample(segments).tolist()]
             # A collision takes a frame's time once, and fails for two stations.
-            airtime_ms += int((np.minimum(attempts, _ATTEMPTS) - 1).sum()) * airtime_ms / segments / 4.0
-            late_ms = _RESEND_MS if attempts.max() > _ATTEMPTS else 0.0
+            repeated = sum(min(failed, _ATTEMPTS - 1) for failed in failures)
+            airtime_ms += repeated * airtime_ms / segments / 4.0
+            late_ms = _RESEND_MS if max(failures) >= _ATTEMPTS else 0.0
         self._busy_ms = max(self._busy_ms, at_ms) + airtime_ms
         self._ends_ms[station] = self._busy_ms
         return self._busy_ms, late_ms
