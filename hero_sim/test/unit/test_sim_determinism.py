@@ -17,7 +17,7 @@ STEPS = 6000
 COMMAND_STEPS = 40
 SCAN_STEPS = 20
 
-HASH = "64204849368c2844f151ccfbb946002dc98f026170da00e3b7f6627befee651d"
+HASH = "476f5f6d3e120d10fdd12e0622f4aa22b7c3a5f55681a1589bf57018e928e7e4"
 """Of seed 7, with numpy 1.17 to 2.2 and with and without AVX2, AVX-512 and FMA."""
 
 

@@ -12,6 +12,8 @@ from hero_sim.world.robot_errors import MASS_KG, draw_errors, set_known
 from hero_sim.world.world import STEP_MS, World
 
 STEP_S = STEP_MS / 1000.0
+FRAME_S = 2.0 * STEP_S
+"""Contacts are solved as often."""
 ACROSS_M = 2.0 * BODY_RADIUS_M
 FIELD = build_rectangle(10.0, 10.0, 1)
 EDGE_M = 5.0 - BODY_RADIUS_M
@@ -41,12 +43,12 @@ def measure_twist(world, settle_s=1.0, row=0):
     Once forces are steady; also its heading (rad) where its wheels took it.
     """
     before = run(world, settle_s)[row]
-    after = run(world, STEP_S)[row]
-    left_m, right_m = world.speeds_m_s[row] * STEP_S
+    after = run(world, FRAME_S)[row]
+    left_m, right_m = world.speeds_m_s[row] * FRAME_S
     travel_m, turn_rad = (left_m + right_m) / 2.0, (right_m - left_m) / WHEEL_SEPARATION_M
     chord_rad = before[2] + turn_rad / 2.0
     free = np.array((travel_m * math.cos(chord_rad), travel_m * math.sin(chord_rad), turn_rad))
-    return (after - before) / STEP_S, (after - before - free) / STEP_S, before[2] + turn_rad
+    return (after - before) / FRAME_S, (after - before - free) / FRAME_S, before[2] + turn_rad
 
 
 def press_at(degrees, friction, speeds_m_s=0.1, others=()):
@@ -97,8 +99,8 @@ def test_what_a_wall_does_to_a_robot_balances_the_floor(speeds_m_s, degrees, fri
     (pressure_n, drag_n), moment = balance(world, slip, yaw_rad)
     slid_m_s = twist[1] + BODY_RADIUS_M * twist[2]
     assert pressure_n > 0.0 and twist[0] == pytest.approx(0.0, abs=1e-3)
-    assert abs(drag_n) <= 1.05 * friction * pressure_n + 0.005
-    assert moment == pytest.approx(BODY_RADIUS_M * drag_n, abs=2e-3), "the drag acts at the rim"
+    assert abs(drag_n) <= 1.1 * friction * pressure_n + 0.005
+    assert moment == pytest.approx(BODY_RADIUS_M * drag_n, abs=3e-3), "the drag acts at the rim"
     if abs(drag_n) < 0.8 * friction * pressure_n - 0.005:
         assert slid_m_s == pytest.approx(0.0, abs=3e-3), "it rolls along the wall"
     elif friction and abs(slid_m_s) > 2e-3:

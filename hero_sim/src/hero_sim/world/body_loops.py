@@ -18,7 +18,7 @@ holds each body to the floor. Nothing has inertia: a robot stops within a step.
   once: a symmetric start stays symmetric.
 
 A body's motion for a force f and a moment m is a f + u s, and its turn s = h (u . f + m): the floor holds it at a point
-beside its center, which u stands for. The world without bodies, the last one, is far too heavy to be moved.
+beside its center, which u stands for. The world without bodies, the last one, is not moved by any force.
 """
 
 import math
@@ -41,7 +41,7 @@ TOUCH_M = 1e-9
 """Bodies that overlap by less do not touch."""
 
 SHIFT_M = 0.006
-"""Largest approach of two robots, or of a robot and an obstacle, while a step's contacts are solved."""
+"""Farthest that a robot moves in a step, or is moved while the step's contacts are solved."""
 
 HELD_N = 1e30
 """Holds what cannot be moved."""
@@ -59,11 +59,14 @@ not reached, radius, and friction on robots and on walls. What contacts move it 
 and when it was moved last (0 between solutions)."""
 
 TOUCHING, FRICTION, ARM_1, LEVER_1, ARM_2, LEVER_2, SHARE, PRESSURE, DRAG, GIVE = range(10)
-GAP, SLIDE, NORMAL_X, NORMAL_Y, DRAG_GIVE, N_1, T_1, N_2, T_2, SEEN = range(10, 20)
-CONTACT_ROWS = 20
+GAP, SLIDE, NORMAL_X, NORMAL_Y, DRAG_GIVE, STIFFNESS, DRAG_STIFFNESS, SEEN = range(10, 18)
+PRESSED_X_1, PRESSED_Y_1, PRESSED_TURN_1, DRAGGED_X_1, DRAGGED_Y_1, DRAGGED_TURN_1 = range(18, 24)
+PRESSED_X_2, PRESSED_Y_2, PRESSED_TURN_2, DRAGGED_X_2, DRAGGED_Y_2, DRAGGED_TURN_2 = range(24, 30)
+CONTACT_ROWS = 30
 """Rows of contacts, lengths in m: distance of the centers that touch, friction, moment arms of a pressure and a drag
 about each body's center, and how many contacts the two bodies have; forces (N) and give (m/N), with which the next step
-starts. What was found in this step; and, of a solution, how it gives, and when it was looked at last."""
+starts. What was found in this step; and, of a solution, how it gives and the inverse, when it was looked at last, and
+how a pressure and a drag of 1 N move the first and the second body."""
 
 START_X, START_Y, ALONG_X, ALONG_Y, LENGTH2, THICKNESS = range(6)
 """Rows of obstacles: segments (see Segments) with a radius."""
@@ -72,9 +75,9 @@ _WALL_PASSES = 50
 
 _FAR_M = 1e6
 
-_SETTLED_M = 4e-5, 1e-7
+_SETTLED_M = 1e-4, 1e-7
 _PASSES = 100, 400
-_ROUNDS = 10, 60
+_ROUNDS = 3, 60
 _SAME_SLIP = 2.0, 1.02
 """Limits for a world where robots alone touch, and for one with things, whose many contacts share a force.
 
@@ -139,7 +142,7 @@ def find_contacts(
         active[found] = k
         found += 1
         # Robots that were placed into each other come apart step by step, never through a wall.
-        gap[k] = max(between, -SHIFT_M) if k < pairs else between
+        gap[k] = max(between, -2.0 * SHIFT_M) if k < pairs else between
         n_x, n_y = (away_x / distance, away_y / distance) if distance > TOUCH_M else (1.0, 0.0)
         normal_x[k], normal_y[k] = n_x, n_y
         slid = n_x * (step_y[j] - step_y[i]) - n_y * (step_x[j] - step_x[i])
@@ -190,18 +193,23 @@ def solve_contacts(
     normal_x, normal_y, gap, slide = contacts[NORMAL_X], contacts[NORMAL_Y], contacts[GAP], contacts[SLIDE]
     arm_1, lever_1, arm_2, lever_2 = contacts[ARM_1], contacts[LEVER_1], contacts[ARM_2], contacts[LEVER_2]
     pressure, drag, give, drag_give = contacts[PRESSURE], contacts[DRAG], contacts[GIVE], contacts[DRAG_GIVE]
-    normal_1, tangent_1, normal_2, tangent_2 = contacts[N_1], contacts[T_1], contacts[N_2], contacts[T_2]
     friction, share, seen = contacts[FRICTION], contacts[SHARE], contacts[SEEN]
+    stiffness, drag_stiffness = contacts[STIFFNESS], contacts[DRAG_STIFFNESS]
+    pressed_x_1, pressed_y_1, pressed_turn_1 = contacts[PRESSED_X_1], contacts[PRESSED_Y_1], contacts[PRESSED_TURN_1]
+    dragged_x_1, dragged_y_1, dragged_turn_1 = contacts[DRAGGED_X_1], contacts[DRAGGED_Y_1], contacts[DRAGGED_TURN_1]
+    pressed_x_2, pressed_y_2, pressed_turn_2 = contacts[PRESSED_X_2], contacts[PRESSED_Y_2], contacts[PRESSED_TURN_2]
+    dragged_x_2, dragged_y_2, dragged_turn_2 = contacts[DRAGGED_X_2], contacts[DRAGGED_Y_2], contacts[DRAGGED_TURN_2]
     kind, static = 1 if has_things else 0, len(half) - 1
     enough, same = _SETTLED_M[kind], _SAME_SLIP[kind]
     count, farthest = 0, 0.0
     for k in active:
         for i in (first[k], second[k]):
-            if stamp[i] == 0.0:
+            if stamp[i] == 0.0 and i != static:
                 stamp[i] = 1.0
                 members[count] = i
                 count += 1
                 farthest = max(farthest, math.sqrt(step_x[i] * step_x[i] + step_y[i] * step_y[i]))
+    a[static] = u_x[static] = u_y[static] = h[static] = 0.0
     for m in range(count):
         i = members[m]
         if left[i] < TOUCH_M and right[i] < TOUCH_M:
@@ -231,21 +239,30 @@ def solve_contacts(
             both = a[i] + a[j]
             give_m = share[k] * (both + h[i] * n_1 * n_1 + h[j] * n_2 * n_2)
             drag_give[k] = share[k] * (both + h[i] * t_1 * t_1 + h[j] * t_2 * t_2)
-            normal_1[k], normal_2[k], tangent_1[k], tangent_2[k], seen[k] = n_1, n_2, t_1, t_2, 0.0
+            stiffness[k], drag_stiffness[k], seen[k] = 1.0 / give_m, 1.0 / drag_give[k], 0.0
+            turn = -h[i] * n_1
+            pressed_x_1[k], pressed_y_1[k] = u_x[i] * turn - a[i] * n_x, u_y[i] * turn - a[i] * n_y
+            pressed_turn_1[k] = turn
+            turn = -h[i] * t_1
+            dragged_x_1[k], dragged_y_1[k] = u_x[i] * turn + a[i] * n_y, u_y[i] * turn - a[i] * n_x
+            dragged_turn_1[k] = turn
+            turn = h[j] * n_2
+            pressed_x_2[k], pressed_y_2[k] = u_x[j] * turn + a[j] * n_x, u_y[j] * turn + a[j] * n_y
+            pressed_turn_2[k] = turn
+            turn = h[j] * t_2
+            dragged_x_2[k], dragged_y_2[k] = u_x[j] * turn - a[j] * n_y, u_y[j] * turn + a[j] * n_x
+            dragged_turn_2[k] = turn
             if pressure[k] != 0.0:
                 # The motion is kept rather than the force: it is what the contacts ask for.
-                scale = give[k] / give_m
-                pressure[k] *= scale
-                drag[k] *= scale
-                force_x, force_y = pressure[k] * n_x - drag[k] * n_y, pressure[k] * n_y + drag[k] * n_x
-                turn = h[j] * (pressure[k] * n_2 + drag[k] * t_2)
-                moved_x[j] += a[j] * force_x + u_x[j] * turn
-                moved_y[j] += a[j] * force_y + u_y[j] * turn
-                turned[j] += turn
-                turn = h[i] * (pressure[k] * n_1 + drag[k] * t_1)
-                moved_x[i] -= a[i] * force_x + u_x[i] * turn
-                moved_y[i] -= a[i] * force_y + u_y[i] * turn
-                turned[i] -= turn
+                scale = give[k] * stiffness[k]
+                more, more_drag = pressure[k] * scale, drag[k] * scale
+                pressure[k], drag[k] = more, more_drag
+                moved_x[i] += more * pressed_x_1[k] + more_drag * dragged_x_1[k]
+                moved_y[i] += more * pressed_y_1[k] + more_drag * dragged_y_1[k]
+                turned[i] += more * pressed_turn_1[k] + more_drag * dragged_turn_1[k]
+                moved_x[j] += more * pressed_x_2[k] + more_drag * dragged_x_2[k]
+                moved_y[j] += more * pressed_y_2[k] + more_drag * dragged_y_2[k]
+                turned[j] += more * pressed_turn_2[k] + more_drag * dragged_turn_2[k]
             give[k] = give_m
         clock = 1.0
         for _ in range(_PASSES[kind]):
@@ -262,35 +279,23 @@ def solve_contacts(
                 clock += 1.0
                 seen[k] = clock
                 n_x, n_y = normal_x[k], normal_y[k]
-                left_m = gap[k] + n_x * apart_x + n_y * apart_y + arm_2[k] * turned_2 - arm_1[k] * turned_1
+                left_m = (gap[k] + n_x * apart_x) + (n_y * apart_y + (arm_2[k] * turned_2 - arm_1[k] * turned_1))
                 old, old_drag = pressure[k], drag[k]
                 if left_m >= 0.0 and old == 0.0:
                     continue
-                give_m, drag_give_m = give[k], drag_give[k]
-                pressed = old - left_m / give_m
-                if pressed < 0.0:
-                    pressed = 0.0
-                dragged, most = 0.0, friction[k] * pressed
-                if most > 0.0:
-                    slid_m = slide[k] + n_x * apart_y - n_y * apart_x + lever_2[k] * turned_2 - lever_1[k] * turned_1
-                    dragged = old_drag - slid_m / drag_give_m
-                    if dragged > most:
-                        dragged = most
-                    elif dragged < -most:
-                        dragged = -most
+                pressed = max(old - left_m * stiffness[k], 0.0)
+                most = friction[k] * pressed
+                slid_m = (slide[k] + n_x * apart_y) - (n_y * apart_x - (lever_2[k] * turned_2 - lever_1[k] * turned_1))
+                dragged = min(max(old_drag - slid_m * drag_stiffness[k], -most), most)
                 more, more_drag = pressed - old, dragged - old_drag
                 pressure[k], drag[k] = pressed, dragged
-                force_x, force_y = more * n_x - more_drag * n_y, more * n_y + more_drag * n_x
-                turn = h[j] * (more * normal_2[k] + more_drag * tangent_2[k])
-                moved_x[j] += a[j] * force_x + u_x[j] * turn
-                moved_y[j] += a[j] * force_y + u_y[j] * turn
-                turned[j] += turn
-                if i != static:
-                    turn = h[i] * (more * normal_1[k] + more_drag * tangent_1[k])
-                    moved_x[i] -= a[i] * force_x + u_x[i] * turn
-                    moved_y[i] -= a[i] * force_y + u_y[i] * turn
-                    turned[i] -= turn
-                if abs(more) * give_m + abs(more_drag) * drag_give_m > enough:
+                moved_x[i] += more * pressed_x_1[k] + more_drag * dragged_x_1[k]
+                moved_y[i] += more * pressed_y_1[k] + more_drag * dragged_y_1[k]
+                turned[i] += more * pressed_turn_1[k] + more_drag * dragged_turn_1[k]
+                moved_x[j] += more * pressed_x_2[k] + more_drag * dragged_x_2[k]
+                moved_y[j] += more * pressed_y_2[k] + more_drag * dragged_y_2[k]
+                turned[j] += more * pressed_turn_2[k] + more_drag * dragged_turn_2[k]
+                if abs(more) * give[k] + abs(more_drag) * drag_give[k] > enough:
                     is_settled = False
                     # Pressure and drag depend on each other: this contact, too, is looked at again.
                     stamp[j] = clock + 0.5 if most > 0.0 else clock

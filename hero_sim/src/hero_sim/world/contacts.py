@@ -36,8 +36,8 @@ from .body_loops import (
     RADIUS,
     SHARE,
     SHIFT_M,
+    SINE,
     STEP_X,
-    THETA,
     THING_CREEP_M_S,
     TOUCH_M,
     TOUCHING,
@@ -92,7 +92,7 @@ class Contacts:
     """The bodies of worlds with the same arena.
 
     Attributes:
-        poses (3, R), headings (2, R): of the robots, x y theta and cosine and sine; changed in place.
+        states: of the robots (5, R), x y theta, and cosine and sine of theta; changed in place.
     """
 
     def __init__(
@@ -108,8 +108,9 @@ class Contacts:
         self._segments, self._free_m = segments.for_each_place(), self._radii_m[:, None] + thickness_m
         obstacles = np.vstack((segments.start_m, segments.along_m, segments.length_m2, thickness_m))
         self._bodies = self._list_bodies(errors, step_s)
-        self.poses, self.headings = self._bodies[X : THETA + 1, :rows], self._bodies[COSINE : COSINE + 2, :rows]
-        self.poses[:], self.headings[:] = poses, find_heading(poses[2])
+        self.states = self._bodies[X : SINE + 1, :rows]
+        self._poses, self._headings = self.states[:3], self.states[3:]
+        self._poses[:], self._headings[:] = poses, find_heading(poses[2])
         compiled = compile_loops(body_loops, rows)
         self._loops: Any = compiled or body_loops
         self._hold = np.ascontiguousarray if compiled else np.ndarray.tolist
@@ -168,7 +169,7 @@ class Contacts:
         """Do what move_worlds() does, with arrays over the robots of all worlds."""
         travels_m, turns_rad = join_wheels(ground_m[:, 0], ground_m[:, 1], self._separations_m)
         fastest_m = np.abs(travels_m).max(axis=1).tolist()
-        (x_m, y_m, theta_rad), (cosine, sine) = self.poses, self.headings
+        (x_m, y_m, theta_rad), (cosine, sine) = self._poses, self._headings
         for moved_m, turn_rad, *arc in zip(fastest_m, turns_rad, *shape_arc(travels_m, turns_rad)):
             step_x_m, step_y_m, cosine[:], sine[:] = follow_arc(cosine, sine, *arc)
             x_m += step_x_m
@@ -230,7 +231,7 @@ class Contacts:
     def _list_robots(self, world: int) -> List[Any]:
         """Return the places, steps and turns of a world's robots."""
         own = slice(world * self._robots, (world + 1) * self._robots)
-        known = self.poses[:2], self._bodies[STEP_X:TURN], self._bodies[TURN]
+        known = self._poses[:2], self._bodies[STEP_X:TURN], self._bodies[TURN]
         return [values[..., own].T.tolist() for values in known]
 
     def _add_things(self, near: _Near, things: List[List[Touch]], worlds: List[List[int]]) -> List[Any]:
@@ -272,7 +273,7 @@ class Contacts:
         self._reach_m[0] = _MARGIN_M
         near_m, rows, radii_m = SHIFT_M + _MARGIN_M, self._rows, self._radii_m
         firsts, seconds = self._find_pairs(2.0 * float(radii_m.max()) + 2.0 * near_m)
-        away_m, free_m = self._segments.point_away(self.poses[:2, :, None]), self._free_m + near_m
+        away_m, free_m = self._segments.point_away(self._poses[:2, :, None]), self._free_m + near_m
         robots, obstacles = (square_length(away_m) < free_m * free_m).nonzero()
         things = self._bodies.shape[1] - 1 - rows
         near = np.arange(rows) if things else np.unique(np.concatenate((firsts, seconds, robots)))
@@ -298,14 +299,14 @@ class Contacts:
 
     def _find_pairs(self, distance_m: float) -> np.ndarray:
         """Return the rows (2, P) of the first and the second of all two robots less than distance_m apart."""
-        places_m, robots = self.poses[:2].reshape(2, -1, self._robots), self._robots
+        places_m, robots = self._poses[:2].reshape(2, -1, self._robots), self._robots
         near = square_length(places_m[..., None] - places_m[:, :, None]) < distance_m * distance_m
         worlds, firsts, seconds = (near & np.triu(np.ones((robots, robots), dtype=bool), k=1)).nonzero()
         return np.array((worlds * robots + firsts, worlds * robots + seconds))
 
     def measure_overlaps(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""
-        places_m = self.poses[:2]
+        places_m = self._poses[:2]
         pairs = self._find_pairs(2.0 * float(self._radii_m.max()))
         distances_m = np.sqrt(square_length(places_m[:, pairs[0]] - places_m[:, pairs[1]]))
         depths_m = self._radii_m[pairs].sum(axis=0) - distances_m

@@ -41,6 +41,9 @@ _BLOCK_STEPS = 32
 _CACHED = 8192
 """Random numbers that are computed at once: they fit the processor's cache."""
 
+_FRAME_STEPS = 2
+"""Steps that bodies take at once, in worlds without objects: solving contacts takes the most time of all."""
+
 _SCAN_ROWS = 20
 """Robots whose sensors are computed at once without compiled loops: what they see fits the processor's cache."""
 
@@ -126,10 +129,11 @@ class World:
             Pushing([thing.put(thing.pose) for thing in things], *obstacles, *own) if things else None
             for things, *own in zip(objects, *of_robots)
         ]
-        self._contacts = Contacts(
-            arena, np.array(poses, dtype=float).reshape(rows, 3).T, self.worlds, errors, _STEP_S, self._pushing
-        )
-        self._shown_poses = self._contacts.poses.T
+        self._frame_steps = 1 if any(self._pushing) else _FRAME_STEPS
+        places = np.array(poses, dtype=float).reshape(rows, 3).T
+        self._contacts = Contacts(arena, places, self.worlds, errors, _STEP_S * self._frame_steps, self._pushing)
+        self._shown = self._contacts.states.copy()
+        self._shown_poses = self._shown[:3].T
         self._shown_poses.flags.writeable = False
         self._commands = np.zeros((2, rows))
         self._wheels = np.zeros((4, rows))
@@ -146,8 +150,9 @@ class World:
         each = errors.ripple_m_s.T, errors.slip.T, errors.wheel_scale.T * _STEP_S, shares
         self._spreads = np.vstack([np.broadcast_to(values, (2, rows)) for values in each])  # see roll_wheels()
         self._loops = compile_loops(wheel_loops, rows)
-        # Of the steps in a block, those that the wheels have taken, and the bodies: these wait until they are read.
-        self._block_step = self._body_step = _BLOCK_STEPS
+        # Of the steps in a block, those that the wheels have taken, and the bodies: these wait until they are read, and
+        # are then shown after the wheels' last step.
+        self._block_step = self._body_step = self._shown_step = _BLOCK_STEPS
         self._ground_m = np.empty((_BLOCK_STEPS, 2, rows))
         self._walls = Segments.from_ends(arena.segments_m)
         if self._loops is not None:
@@ -190,7 +195,7 @@ class World:
     def _begin_block(self) -> None:
         """End the motion of wheels that hardly move, and draw what chance does in the next steps."""
         self._move_bodies()
-        self._block_step = self._body_step = 0
+        self._block_step = self._body_step = self._shown_step = 0
         self._speeds[np.abs(self._speeds) < _REST_M_S] = 0.0
         if self._loops is None:
             noise = _draw_block(self._motion_keys, self.time_ms // STEP_MS, self._robots)
@@ -214,10 +219,31 @@ class World:
             speeds_m_s[:] = drive_wheel(speeds_m_s, self._commands, ripples_m_s, shares)
 
     def _move_bodies(self) -> None:
-        """Move the bodies by the wheels' steps."""
-        if self._body_step < self._block_step:
-            self._contacts.move(self._ground_m[self._body_step : self._block_step])
-            self._body_step = self._block_step
+        """Move the bodies by the wheels' steps, a frame of steps at a time; within a frame they are shown half-way.
+
+        They are the same whenever they are read: the way of a wheel is known when its step begins.
+        """
+        step, frame_steps = self._block_step, self._frame_steps
+        if step == self._shown_step:
+            return
+        self._shown_step = step
+        end = step + step % frame_steps
+        if end > step:
+            wheels = self._wheels.copy()
+            self._roll_wheels(self._ground_m[step:end], step)
+            self._wheels[:] = wheels
+        ground_m = sum(self._ground_m[self._body_step + part : end : frame_steps] for part in range(frame_steps))
+        self._body_step = end
+        if end == step:
+            self._contacts.move(ground_m)
+            self._shown[:] = self._contacts.states
+            return
+        self._contacts.move(ground_m[:-1])
+        self._shown[:] = self._contacts.states
+        self._contacts.move(ground_m[-1:])
+        self._shown += self._contacts.states
+        self._shown[:3] /= 2.0
+        self._shown[3:] /= np.sqrt(self._shown[3] * self._shown[3] + self._shown[4] * self._shown[4])
 
     def measure_overlaps(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return how deep (m) each robot is in another robot at most (R,), and in a wall or obstacle (R,)."""
@@ -234,7 +260,7 @@ class World:
         self._views += 1
         places_m = self.poses[:, :2].copy()
         obstacles = [self._list_obstacles(pushing) for pushing in self._pushing if pushing]
-        return View(self._views, places_m, self._contacts.headings.T.copy(), obstacles)
+        return View(self._views, places_m, self._shown[3:].T.copy(), obstacles)
 
     def _list_obstacles(self, pushing: Pushing) -> Obstacles:
         """Return the walls and the circles of a world, with its objects where they are now."""
