@@ -164,7 +164,7 @@ CASES = {
     "box_pushing": (by_name("object_distance"), 0.1, False, 2, 150, BOX, None),
     "cooperative_transport": (by_name("object_distance"), 0.1, False, 4, 150, BOX, None),
     "voter": (measure_agreement, 0.8, True, 6, 150, SQUARE, None),
-    "majority": (measure_agreement, 0.85, True, 9, 240, SQUARE, None),
+    "majority": (measure_agreement, 0.85, True, 9, 300, SQUARE, None),
 }
 
 
