@@ -119,6 +119,7 @@ def test_the_table_over_time_has_a_row_for_each_run_and_second(folder, tmp_path,
         load(str(folder)).write_table(str(tmp_path / "a.parquet"))
 
 
+@pytest.mark.slow
 def test_figures_are_files_with_the_same_bytes_in_each_report(folder, capsys):
     before = {path.name: path.read_bytes() for path in (folder / "figures").iterdir()}
     report.main([str(folder)])
