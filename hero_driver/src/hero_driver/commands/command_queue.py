@@ -38,9 +38,7 @@ class CommandSettings:
         number(0.25, 0.0, 10.0, "s", "delay before a robot is stopped when the program that drove it ends")
     )
     silent_stop_s: float = declare(
-        number(
-            0.5, 0.0, 10.0, "s", "silence, four periods at least, after which a driven robot is stopped; 0: never"
-        )
+        number(0.5, 0.0, 10.0, "s", "silence, four periods at least, after which a driven robot is stopped; 0: never")
     )
     service_timeout_s: float = declare(number(5.0, 0.1, 600.0, "s", "time for a robot to answer a service call"))
     command_max_age_s: float = declare(

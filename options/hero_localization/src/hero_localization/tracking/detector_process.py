@@ -60,7 +60,9 @@ class DetectorProcess:
             self.close()
             raise DetectorError(problem)
 
-    def search(self, gray: np.ndarray, stamp_s: float, expected: Mapping[int, Tuple[float, float, float]]) -> List[TagCorners]:
+    def search(
+        self, gray: np.ndarray, stamp_s: float, expected: Mapping[int, Tuple[float, float, float]]
+    ) -> List[TagCorners]:
         """Return the tags found in the next frame, as TagSearch.search() does.
 
         Raises: DetectorError if the process ended or does not answer; ValueError for a frame of another size.

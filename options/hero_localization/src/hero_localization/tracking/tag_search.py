@@ -32,7 +32,7 @@ BLIND_COST = 5.0
 """Cost of the last one for any heading, by that."""
 
 FINE_SHARE, MAX_FINE_MS = 0.4, 20.0
-"""Share of a core, and most of an image, ms, that finer detectors may take: then other tags' turn is in the next one."""
+"""Share of a core, and most of an image, ms, that finer detectors take: then other tags' turn is in the next one."""
 
 FINE_S = 2.0
 """Time for which coarser detectors skip a tag that only a finer one found."""

@@ -137,7 +137,7 @@ class Molecules(RandomFields):
 
     After P. Rezeck and L. Chaimowicz, Chemistry-inspired pattern formation with robotic swarms, RA-L 2022. Every
     (bonds + 1)-th robot is a center, which binds hydrogens only; a hydrogen binds one robot, a center rather than
-    another hydrogen. Bound robots attract each other by the product of their charges. The memory holds of each robot its
+    another hydrogen. Bound robots attract each other by the product of their charges. The memory holds each robot's
     velocity, the rows of those that it binds, -1 for none, and its kind; neighbors tell each other theirs.
 
     Attributes:
@@ -169,7 +169,7 @@ class Molecules(RandomFields):
     def bind(self, near: Neighborhood, kind: np.ndarray, bound: np.ndarray) -> np.ndarray:
         """Return which rows robots bind now (R, K), -1 for none, the nearest first; kind: 1 of centers (R,).
 
-        bound: which they bound before. A robot is bound if it bound this one, or has room for it, unless a robot that is
+        bound: which they bound before. A robot is bound if it bound this one, or has room for it, unless one that is
         bound already binds the same one: molecules have no rings.
         """
         rows, room_of = np.arange(len(kind)), np.where(kind, int(self.bonds), 1)

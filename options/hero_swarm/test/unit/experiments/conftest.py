@@ -25,7 +25,7 @@ class InProcess(Executor):
         future = Future()
         try:
             future.set_result(function(*pickle.loads(pickle.dumps(arguments))))
-        except Exception as error:
+        except Exception as error:  # noqa: BLE001 - as an executor does
             future.set_exception(error)
         return future
 
