@@ -309,19 +309,21 @@ def test_lines_of_the_log_are_counted_and_known_by_their_robot(fleet):
     fleet.receive(make_row(0))
     fleet.read()
 
-    def say(node, text, count=1):
-        buffer = BytesIO()
-        Log(name=node, level=2, msg=text).serialize(buffer)
+    def say(node, text, count=1, at_s=9):
+        buffer, line = BytesIO(), Log(name=node, level=2, msg=text)
+        line.header.stamp = rospy.Time(at_s)
+        line.serialize(buffer)
         message = SimpleNamespace(_connection_header={"md5sum": Log._md5sum}, _buff=buffer.getvalue())
         for _ in range(count):
             fleet.feed._keep_log_line(message)
 
     fleet.feed._keep_log_line(SimpleNamespace(_connection_header={"md5sum": "other"}, _buff=b"x"))
-    for text in ("hero_0: voltage low", "hero_0 left (10.0.0.1:1)", "hero_9: voltage low"):
-        say("/hero_driver", text)
+    for at_s, text in ((2, "hero_0 left (10.0.0.1:1)"), (1, "hero_0: voltage low"), (3, "hero_9: voltage low")):
+        say("/hero_driver", text, at_s=at_s)
     say("/other", "hero_0: hello")
     lines = fleet.read()["log"]["lines"]
     assert [line[4] for line in lines] == ["hero_0", "hero_0", "", ""] and lines[0][3] == "hero_driver"
+    assert [line[1] for line in lines] == [1.0, 2.0, 3.0, 9.0], "those that come at once, in the order of their stamps"
     fleet.feed._log_bytes.append(b"no line")
     say("/other", "hello")
     log = json.loads(fleet.feed.read() or fleet.feed.page_state.take_updates({"log": 4}))["log"]

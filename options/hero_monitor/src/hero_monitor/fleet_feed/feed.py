@@ -380,12 +380,14 @@ class FleetFeed:
         for _ in range(waiting - limit):
             self._log_bytes.popleft()
             log.skip(1)
+        lines = []
         for _ in range(min(waiting, limit)):
             try:
-                line = Log().deserialize(self._log_bytes.popleft())
+                lines.append(Log().deserialize(self._log_bytes.popleft()))
             except genpy.DeserializationError:
                 log.skip(1)
-                continue
+        # Nodes that were there before are connected to in any order.
+        for line in sorted(lines, key=lambda line: line.header.stamp):
             label = LABEL.match(line.msg) if line.name in drivers else None
             robot = label.group(1) if label and label.group(1) in self.robots else ""
             log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
