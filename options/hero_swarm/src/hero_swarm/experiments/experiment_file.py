@@ -229,18 +229,16 @@ def read_experiment(path: str, folder: Optional[str] = None) -> Tuple[str, Exper
     return text, parse_experiment(text, path, folder)
 
 
-def parse_experiment(
-    text: str, file: str, folder: Optional[str] = None, sources: Optional[Sources] = None
-) -> Experiment:
+def parse_experiment(text: str, file: str, folder: Optional[str] = None) -> Experiment:
     """Return the experiment in text, the contents of file.
 
-    folder: base of relative paths; None: that of file. sources: contents of the files that runs read; None: each is
-    read when it is needed first. Behavior and parameters are checked when they are loaded.
+    folder: base of relative paths; None: that of file. Files that runs read are read when they are needed first;
+    behavior and parameters are checked when they are loaded.
     Raises: ExperimentError with file and line for whatever is unknown, missing, or of a wrong type or unit.
     """
     try:
         entry = read_entries(text, file, "behavior: aggregation")
-        return check_experiment(entry, os.path.dirname(file) if folder is None else folder, sources or Sources())
+        return check_experiment(entry, os.path.dirname(file) if folder is None else folder, Sources())
     except EntryError as error:
         raise ExperimentError(str(error)) from None
 
