@@ -41,7 +41,7 @@ _HEAD = """\
 
 Written by `rosrun hero_swarm reproduce --page docs/reproduction.md`. **within**: our median is in the published
 interval, or meets a published value without one to 10 %; **open**: only its 95 % interval does, more seeds would tell.
-Those of two or three seeds are their range. In the worlds `points` and `discs` robots are as papers have them."""
+Those of one to three seeds are their range. In the worlds `points` and `discs` robots are as papers have them."""
 
 
 class Figure(NamedTuple):
