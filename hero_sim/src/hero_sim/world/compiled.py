@@ -9,7 +9,7 @@ from functools import lru_cache
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any, Optional
 
-COMPILED_ROWS = 50
+COMPILED_ROWS = 40
 """For fewer robots loading numba, about 0.5 s, takes longer than it saves."""
 
 
