@@ -212,7 +212,7 @@ def test_an_image_is_at_most_five_seconds_old(play, age_s, stamp_s):
 
 @pytest.mark.parametrize(("slow_s", "failures", "opened"), [(0.1, 3, 1), (0.1, 4, 2), (0.9, 3, 1), (1.1, 1, 2)])
 def test_four_failures_or_one_second_end_a_camera(play, slow_s, failures, opened):
-    reads = [(0.1, image(10), 0), *[(slow_s, DAMAGED, 0)] * failures, (0.1, image(20), 0)]
+    reads = [(0.1, DAMAGED, 0), (0.1, image(10), 0), *[(slow_s, DAMAGED, 0)] * failures, (0.1, image(20), 0)]
     recording, _ = play(reads, [(0.1, image(30), 0)])
     assert [shade for _, shade, _ in recording.kept] == ([10, 20, 30] if opened == 1 else [10, 30])
 
