@@ -58,8 +58,12 @@ def roll_wheels(
             scale, share = spreads[4 + wheel, row], spreads[6 + wheel, row]
             for step in range(steps):
                 travel_m += speed_m_s * step_s
-                slips = draw_normal_at(key, find_place(first_step + step, 2 + wheel, robot))
-                ripples = draw_normal_at(key, find_place(first_step + step, wheel, robot))
+                # What is drawn takes most of the time, and matters to wheels that turn.
+                slips = ripples = 0.0
+                if speed_m_s != 0.0:
+                    slips = draw_normal_at(key, find_place(first_step + step, 2 + wheel, robot))
+                if command_m_s != 0.0:
+                    ripples = draw_normal_at(key, find_place(first_step + step, wheel, robot))
                 ground_m[step, wheel, row] = speed_m_s * ((1.0 - abs(slips) * slip) * scale)
                 speed_m_s = drive_wheel(speed_m_s, command_m_s, ripples * ripple, share)
             wheels[wheel, row], wheels[2 + wheel, row] = travel_m, speed_m_s
