@@ -12,7 +12,7 @@ from hero_node.files import read_calibrations
 from hero_node.parameters import robot_ids_option, within
 from hero_node.ros import Program
 
-from .calibration import DEFAULT_PARTS, ENDED, INFRARED, PARTS, calibrate_parts
+from .calibration import DEFAULT_PARTS, ENDED, INFRARED, PARTS, WHEELS, calibrate_parts
 from .errors import CalibrationError, EndedError
 from .robots.ros_probe import RosSession, find_robots
 from .store import describe_status, find_missing, load_calibrations, make_folder, restore
@@ -30,6 +30,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     robots_help = "ids, e.g. '0 1 2' or 0-3 (all that are connected)"
     parser.add_argument("--robots", type=robot_ids_option, default="all", help=robots_help)
     parser.add_argument("--yes", action="store_true", help="ask nothing: the robots are placed already")
+    parser.add_argument("--tape", action="store_true", help="wheels: by a tape measure, without a camera")
     parser.add_argument("--missing", action="store_true", help="only robots whose files lack one of the parts")
     text = "this many robots at a time, such as fit the wall; each batch is saved before the next"
     parser.add_argument("--batch", type=within(1, 500, int), metavar="N", help=text)
@@ -46,6 +47,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
         parser.error("--yes: motors and velocity need room around the robots, infrared a wall: name one or the other")
     if options.yes and options.batch:
         parser.error("--yes: each batch has to be placed; leave --batch or --yes out")
+    if options.tape and WHEELS not in options.parts:
+        parser.error("--tape is for wheels")
     options.folder = os.path.abspath(os.path.expanduser(options.folder))
     return options
 
@@ -83,13 +86,14 @@ def main() -> int:
                 raise EndedError
             return answer
 
+        tape = ask if options.tape else None
         placed, size, status = None if options.yes else ask, options.batch or len(probes), 0
         for first in range(0, len(probes), size):
             batch = probes[first : first + size]
             if len(batch) < len(probes):
                 say("\nrobots %s of %d" % (", ".join(probe.name for probe in batch), len(probes)))
             session = RosSession(program, batch)
-            status = max(status, calibrate_parts(session, options.parts, options.folder, placed))
+            status = max(status, calibrate_parts(session, options.parts, options.folder, placed, tape))
             if status == ENDED:
                 break
         return status

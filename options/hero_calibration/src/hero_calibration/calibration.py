@@ -24,16 +24,19 @@ ENDED = 130
 """Exit status of a program that Ctrl-C or the user ended."""
 
 
-def calibrate_parts(session: Session, parts: Sequence[str], folder: str, ask: Optional[Ask]) -> int:
+def calibrate_parts(
+    session: Session, parts: Sequence[str], folder: str, ask: Optional[Ask], tape: Optional[Ask] = None
+) -> int:
     """Calibrate parts of PARTS, save files in folder, and print a table; return the exit code.
 
-    ask: None if the robots are placed already. Raises: CalibrationError.
+    ask: None if the robots are placed already; tape: asks for what is measured with a tape, None: localize tells where
+    robots are. Raises: CalibrationError.
     """
     results: Dict[str, Dict[int, Any]] = {part: {} for part in PARTS}
     lines: List[str] = []
     ended = False
     try:
-        _calibrate(session, parts, ask, results)
+        _calibrate(session, parts, ask, tape, results)
     except EndedError:
         ended = True
     finally:
@@ -53,7 +56,9 @@ def calibrate_parts(session: Session, parts: Sequence[str], folder: str, ask: Op
     return 1 if any(probe.failure for probe in session.probes) else 0
 
 
-def _calibrate(session: Session, parts: Sequence[str], ask: Optional[Ask], results: Dict[str, Dict[int, Any]]) -> None:
+def _calibrate(
+    session: Session, parts: Sequence[str], ask: Optional[Ask], tape: Optional[Ask], results: Dict[str, Dict[int, Any]]
+) -> None:
     if MOTORS in parts or VELOCITY in parts:
         place_robots(session, at_wall=False, ask=ask)
     if MOTORS in parts and session.active:
@@ -63,7 +68,7 @@ def _calibrate(session: Session, parts: Sequence[str], ask: Optional[Ask], resul
     if WHEELS in parts and session.active:
         say(ROOM)
         place_robots(session, at_wall=False, ask=ask)
-        calibrate_wheels(session, results[WHEELS])
+        calibrate_wheels(session, tape, results[WHEELS])
     if INFRARED in parts and session.active:
         place_robots(session, at_wall=True, ask=ask)
         calibrate_infrared(session, results[INFRARED])

@@ -382,7 +382,7 @@ def test_batches_are_calibrated_one_after_another_until_one_is_ended(statuses, s
     probes = [SimpleNamespace(robot_id=number, name="hero_%d" % number) for number in (0, 3, 4, 8, 9)]
     calibrated, ends = [], iter(statuses)
 
-    def run(session, parts, folder, ask):
+    def run(session, parts, folder, ask, tape):
         calibrated.append([probe.robot_id for probe in session])
         return next(ends)
 

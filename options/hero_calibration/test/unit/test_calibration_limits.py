@@ -26,6 +26,7 @@ COUNT = {6: "six"}
         "their fronts %g cm from a flat white wall" % (100.0 * infrared_model.WALL_M),
         "misalignment above %g degrees is rejected" % round(math.degrees(infrared_model.MAX_MISALIGNMENT_RAD), 6),
         "a square of %g cm to the left" % round(100.0 * SIDE_M, 6),
+        "it drives %g cm straight ahead" % round(100.0 * wheels.SPEED_M_S * wheels.STRAIGHT_S, 6),
     ],
 )
 def test_limits_are_those_of_the_page(limit):

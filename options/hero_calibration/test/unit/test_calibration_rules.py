@@ -364,7 +364,7 @@ def test_wheels_drive_a_square_to_each_side_and_are_looked_at_at_rest(monkeypatc
         pause=lambda duration_s: setattr(session, "now_s", session.now_s + duration_s),
         repeat=lambda title, tries, drive, evaluate, results: drive([probe]),
     )
-    wheels.calibrate_wheels(session, {})
+    wheels.calibrate_wheels(session, None, {})
     turns_rad = [angular_rad_s * duration_s for _, angular_rad_s, duration_s in driven]
     sides_m = [linear_m_s * duration_s for linear_m_s, _, duration_s in driven]
     assert sum(turns_rad[:8]) == pytest.approx(-sum(turns_rad[8:])) and min(turns_rad[:8]) == 0.0 < turns_rad[1]
@@ -404,10 +404,10 @@ def catch_parts(monkeypatch):
 
 
 def test_parts_follow_each_other_and_robots_are_placed_where_they_need_it(calls, tmp_path, capsys):
-    def run(*parts, ask=None):
+    def run(*parts, ask=None, tape=None):
         calls.clear()
         session = FakeSession(1)
-        status = calibrate_parts(session, parts, str(tmp_path), ask)
+        status = calibrate_parts(session, parts, str(tmp_path), ask, tape)
         return status, [call[:2] if call[0] == "place" else call[0] for call in calls]
 
     floor, wall = ("place", False), ("place", True)
@@ -421,6 +421,7 @@ def test_parts_follow_each_other_and_robots_are_placed_where_they_need_it(calls,
         assert run(*parts) == (0, expected)
     assert run(MOTORS, VELOCITY)[0] == 0 and list(calls[2][1]) == [0], "velocity takes the servos' slopes"
     assert wheels.ROOM in capsys.readouterr().out
+    assert run(WHEELS, tape=min)[0] == 0 and calls[1][:2] == ("wheels", min)
     capsys.readouterr()
 
     def lose(session):

@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 from test_calibration_procedures import make_session
+from test_calibration_rules import FakeSession
 
-from hero_calibration.errors import CalibrationError
+from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.models.encoder_readings import TICK_M
+from hero_calibration.procedures import wheels
 from hero_calibration.procedures.wheels import NOMINAL_M, Leg, calibrate_wheels, fit_wheels, follow_ticks
 from hero_client.values import WHEEL_SEPARATION_M
 from hero_node import Pose, invert_pose, transform_pose, wrap_angle
@@ -67,7 +69,7 @@ def measure_drift(session, wheels_m):
 def test_calibrated_wheels_drift_a_third_as_far_on_other_paths(session):
     watch(session)
     results = {}
-    calibrate_wheels(session, results)
+    calibrate_wheels(session, None, results)
     drifts_m = measure_drift(session, [results[row].wheels_m for row in range(4)])
     before_m, after_m = np.sqrt(np.mean(np.square(drifts_m), axis=0))
     assert before_m > 0.03
@@ -76,15 +78,62 @@ def test_calibrated_wheels_drift_a_third_as_far_on_other_paths(session):
 
 
 @pytest.mark.slow
+def test_a_tape_measure_finds_the_wheels_too(session):
+    results, asked = {}, []
+
+    def ask(question):
+        """Place robots on marks, and measure from them with an error of a millimeter."""
+        if question.startswith("Mark"):
+            ask.marks = session.robots.world.poses.copy()
+            return ""
+        row = int(question[len("hero_")])
+        asked.append(row)
+        mark, here = Pose(*ask.marks[row]), Pose(*session.robots.world.poses[row])
+        moved = transform_pose(invert_pose(mark), here)
+        return "%.0f %.0f" % (1e3 * moved.x_m, 1e3 * moved.y_m) if "left" in question else "%.0f" % (1e3 * moved.x_m)
+
+    calibrate_wheels(session, ask, results)
+    assert asked == [0, 1, 2, 3] * 3
+    wheels_m = {row: result.wheels_m for row, result in results.items()}
+    before_m, after_m = np.sqrt(np.mean(np.square(measure_drift(session, wheels_m)), axis=0))
+    assert after_m < before_m / 3.0
+
+
+@pytest.mark.slow
+def test_answers_that_are_no_numbers_are_asked_for_again(session):
+    for probe in session.probes[1:]:
+        probe.failure = "is not there"
+    answers = iter(["", "ten", "590", "", "5", "5 x", "5, -3", "", "0 0"])
+    calibrate_wheels(session, lambda question: next(answers), {})
+    assert list(answers) == []
+
+
+def test_wheels_that_were_measured_are_kept_if_the_next_answer_ends_it(monkeypatch):
+    session, results, answers = FakeSession(2), {}, iter(["", "600", "600", "", "0 0", "0 0", "", "1 2"])
+
+    def ask(question):
+        for answer in answers:
+            return answer
+        raise EndedError
+
+    monkeypatch.setattr(wheels, "_drive", lambda session, probes, part: None)
+    monkeypatch.setattr(wheels, "_take_ticks", lambda probe, start_s, end_s: np.zeros((2, 2)))
+    monkeypatch.setattr(wheels, "fit_wheels", lambda legs: [leg.moved[:2] for leg in legs])
+    with pytest.raises(EndedError):
+        calibrate_wheels(session, ask, results)
+    assert results == {0: [(0.6, 0.0), (0.0, 0.0), (0.001, 0.002)]}
+
+
+@pytest.mark.slow
 def test_robots_that_no_camera_sees_fail_with_the_remedy(session):
     session.robots.on_cycle.append(
         lambda rows: session.now_s < 3.0 and session.probes[1].receive_place(session.now_s, Pose(0.0, 0.0, 0.0))
     )  # the second robot leaves the camera's view on its way
     results = {}
-    calibrate_wheels(session, results)
+    calibrate_wheels(session, None, results)
     assert results == {}
     for probe in nonempty(session.probes[:2]):
-        assert "localize does not track it: is its tag in view?" in probe.failure
+        assert "localize does not track it: is its tag in view? Or measure by --tape" in probe.failure
 
 
 def test_wheels_that_no_robot_has_are_refused():

@@ -1,9 +1,9 @@
 """Procedure wheels: diameters of both wheels and the distance between them, by what the robots drive.
 
 Robots drive a square to the left and one to the right, for errors of diameter and of distance bend one of them more and
-the other one less. Localization tells where a robot is at each corner. Source: J. Borenstein, L. Feng, Measurement and
-Correction of Systematic Odometry Errors in Mobile Robots (UMBmark), IEEE Transactions on Robotics and Automation 12,
-1996; here by least squares.
+the other one less. A camera tells where a robot is at each corner; with a tape measure the user tells where each square
+ends, and how long a straight path is. Source: J. Borenstein, L. Feng, Measurement and Correction of Systematic Odometry
+Errors in Mobile Robots (UMBmark), IEEE Transactions on Robotics and Automation 12, 1996; here by least squares.
 """
 
 import math
@@ -14,20 +14,24 @@ import numpy as np
 from hero_client.values import WHEEL_SEPARATION_M, follow_wheels
 from hero_node import Pose, invert_pose, say, transform_pose, wrap_angle
 
-from ..errors import CalibrationError
+from ..errors import CalibrationError, EndedError
 from ..models.encoder_readings import TICK_M
 from ..robots.probe import Probe
 from ..robots.session import COMMAND_PERIOD_S, Session
+from .placement import Ask
 
 ROOM = "Wheels: each robot drives squares of 30 cm to its left and right: give it 50 cm of room to all sides."
 
 SPEED_M_S, SIDE_S = 0.1, 3.0
 ANGULAR_RAD_S, CORNER_S = 1.5, math.pi / 2.0 / 1.5
+STRAIGHT_S = 6.0
 MEASURE_S = 0.6
 TRIES = 2
 
 CAMERA_SD = (0.001, 0.001, 0.005)
-"""Errors of a measured x, y (m) and yaw (rad)."""
+TAPE_SD = (0.002, 0.002, math.inf)
+STRAIGHT_SD = (0.002, math.inf, math.inf)
+"""Errors of a measured x, y (m) and yaw (rad); inf: not measured."""
 
 MAX_CHANGE = 0.1
 """Wheels that differ more from the nominal ones are implausible: the robot slipped, or was moved by hand."""
@@ -37,6 +41,8 @@ MAX_DEVIATION_SD = 3.0
 
 DIAMETER_M = TICK_M * 288.0 / math.pi
 NOMINAL_M = np.array((DIAMETER_M, DIAMETER_M, WHEEL_SEPARATION_M))
+
+Sd = Tuple[float, float, float]
 
 Drive = Tuple[float, float, float]
 """m/s, rad/s, s."""
@@ -50,6 +56,7 @@ class Leg(NamedTuple):
 
     ticks: np.ndarray
     moved: Pose
+    sd: Sd = CAMERA_SD
 
 
 class WheelResult(NamedTuple):
@@ -84,7 +91,7 @@ def fit_wheels(legs: Sequence[Leg]) -> WheelResult:
         for leg in legs:
             x_m, y_m, yaw_rad = follow_ticks(leg.ticks, NOMINAL_M * scales)
             off = (x_m - leg.moved.x_m, y_m - leg.moved.y_m, wrap_angle(yaw_rad - leg.moved.yaw_rad))
-            deviations.append(np.divide(off, CAMERA_SD))
+            deviations.append(np.divide(off, leg.sd))
         return np.concatenate(deviations)
 
     scales = np.ones(3)
@@ -104,8 +111,14 @@ def fit_wheels(legs: Sequence[Leg]) -> WheelResult:
     return WheelResult(NOMINAL_M * scales, *rms)
 
 
-def calibrate_wheels(session: Session, results: Dict[int, WheelResult]) -> None:
-    """Calibrate all active robots; put the results by robot into results as they are found."""
+def calibrate_wheels(session: Session, ask: Optional[Ask], results: Dict[int, WheelResult]) -> None:
+    """Calibrate all active robots; put the results by robot into results as they are found.
+
+    ask: asks for what the user measures with a tape; None: localize tells where robots are.
+    """
+    if ask is not None:
+        _drive_for_tape(session, ask, results)
+        return
     say("wheels: squares to the left and to the right, about 1 min")
 
     def drive(probes: Sequence[Probe]) -> List[Stop]:
@@ -120,7 +133,7 @@ def calibrate_wheels(session: Session, results: Dict[int, WheelResult]) -> None:
         for (start_s, starts), (end_s, ends) in zip(stops, stops[1:]):
             start, end = starts[probe.robot_id], ends[probe.robot_id]
             if start is None or end is None:
-                raise CalibrationError("localize does not track it: is its tag in view?")
+                raise CalibrationError("localize does not track it: is its tag in view? Or measure by --tape")
             legs.append(Leg(_take_ticks(probe, start_s, end_s), transform_pose(invert_pose(start), end)))
         return fit_wheels(legs)
 
@@ -154,3 +167,42 @@ def _take_ticks(probe: Probe, start_s: float, end_s: float) -> np.ndarray:
     if kept.sum() < 2:
         raise CalibrationError("no encoder readings came: is the network busy? try again")
     return np.column_stack((readings.left_ticks, readings.right_ticks))[kept]
+
+
+def _drive_for_tape(session: Session, ask: Ask, results: Dict[int, WheelResult]) -> None:
+    """Drive robots while the user measures."""
+    legs: Dict[int, List[Leg]] = {probe.robot_id: [] for probe in session.active}
+    parts = (
+        ("straight ahead", [(SPEED_M_S, 0.0, STRAIGHT_S)], STRAIGHT_SD),
+        ("a square to the left", _list_square(1.0), TAPE_SD),
+        ("a square to the right", _list_square(-1.0), TAPE_SD),
+    )
+    for name, drives, sd in parts:
+        if ask(f"Mark center and heading of each robot for {name}; then Enter, q to end: ") == "q":
+            raise EndedError
+        start_s = session.now_s
+        for drive in drives:
+            _drive(session, session.active, drive)
+        session.pause(MEASURE_S)
+        end_s = session.now_s
+
+        def measure(probe: Probe, times_s: Tuple[float, float] = (start_s, end_s), sd: Sd = sd) -> None:
+            legs[probe.robot_id].append(_ask_for_leg(ask, *times_s, sd, probe))
+            if len(legs[probe.robot_id]) == len(parts):
+                results[probe.robot_id] = fit_wheels(legs[probe.robot_id])
+
+        for probe in session.active:  # one after another: there is one terminal
+            session.for_each("wheels", measure, [probe])
+
+
+def _ask_for_leg(ask: Ask, start_s: float, end_s: float, sd: Sd, probe: Probe) -> Leg:
+    wanted = 1 if math.isinf(sd[1]) else 2
+    what = "ahead" if wanted == 1 else "ahead and to the left, such as 12 -5"
+    question = f"{probe.name}: mm from its mark, {what}: "
+    while True:
+        words = ask(question).replace(",", " ").split()
+        try:
+            x_m, y_m, *_ = [float(word) / 1e3 for word in words] + [0.0] * (2 - wanted)
+        except ValueError:
+            continue  # asked again
+        return Leg(_take_ticks(probe, start_s, end_s), Pose(x_m, y_m, 0.0), sd)
