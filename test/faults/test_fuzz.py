@@ -1,13 +1,9 @@
-"""Robots that send garbage to a real driver; in the long form, coverage-guided fuzzing of the code that reads it."""
+"""Robots that send garbage to a real driver."""
 
 import os
 import random
-import re
-import subprocess
 
 import emulated_swarm
-import pytest
-from rig import HERE
 from service_check import ServiceCheck
 
 from hero_test.fake_robot import STOCK_DECLARATIONS, FakeRobot
@@ -55,33 +51,3 @@ def test_garbled_robots_do_not_affect_the_driver_or_other_robots(start_driver, e
     witness.close()
     assert not driver.find_lines("Traceback|made a mistake"), driver.find_lines("Traceback|mistake")[:3]
     record("conversations of garbled robots", conversations, conversations)
-
-
-def test_coverage_guided_fuzzing_finds_no_bytes_that_raise(effort, record, tmp_path):
-    """Only in the long form: it needs atheris, from PyPI, and minutes."""
-    if not effort.is_long:
-        return
-    interpreter = os.environ.get("HERO_FUZZ_PYTHON")
-    if not interpreter:
-        pytest.skip("atheris could not be installed from PyPI; see .work/log/fuzz.log")
-    corpus = tmp_path / "corpus"
-    corpus.mkdir()
-    (corpus / "stock").write_bytes(b"\x60" + emulated_swarm.declare(0))
-    seconds = os.environ.get("HERO_FUZZ_SECONDS", "120")
-    done = subprocess.run(
-        [
-            interpreter,
-            str(HERE / "fuzz_codec.py"),
-            "-max_total_time=" + seconds,
-            "-max_len=8000",
-            str(corpus),
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        cwd=str(tmp_path),
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout[-3000:]
-    runs = int(re.findall(r"Done (\d+) runs", done.stdout)[-1])
-    record("inputs of coverage-guided fuzzing (atheris)", runs, runs)
