@@ -232,7 +232,8 @@ class World:
             wheels = self._wheels.copy()
             self._roll_wheels(self._ground_m[step:end], step)
             self._wheels[:] = wheels
-        ground_m = sum(self._ground_m[self._body_step + part : end : frame_steps] for part in range(frame_steps))
+        steps_m = self._ground_m[self._body_step : end]
+        ground_m = sum((steps_m[part::frame_steps] for part in range(frame_steps)), np.zeros(()))
         self._body_step = end
         if end == step:
             self._contacts.move(ground_m)
