@@ -38,9 +38,6 @@ CAMERA_FILE = {"decimate": 1, "objects": {1: "box"}, "tag_robots": {5: 1}}
 STARTED_TURN_RAD = 0.3
 STOPPED_RAD_S = 0.01
 
-VIDEO_HZ, VIDEO_FRAMES = 30.0, 30
-"""As many images as the calibration needs."""
-
 SHIFT_PX = 12
 """20 mm on the floor."""
 
@@ -86,7 +83,7 @@ class TrackTest(unittest.TestCase):
     def setUpClass(cls):
         directory = tempfile.mkdtemp()
         cls.addClassCleanup(shutil.rmtree, directory)
-        cls.path, cls.video = (os.path.join(directory, name) for name in ("camera.yaml", "arena.avi"))
+        cls.path = os.path.join(directory, "camera.yaml")
         places = {tag.tag_id: [tag.x_m, tag.y_m, 0.0] for tag in list_references(build_default(ROBOTS), "36h11")}
         camera_file.update(cls.path, {**CAMERA_FILE, "references": places})
         cls.true, cls.problems, cls.poses, cls.objects, cls.measured_ids = {}, {}, {}, {}, []
@@ -157,29 +154,10 @@ class TrackTest(unittest.TestCase):
         info = rospy.wait_for_message("/camera/camera_info", CameraInfo, 60.0)
         lens = Intrinsics.from_camera_info(info.width, info.height, info.K, info.distortion_model, info.D)
         camera_file.update(self.path, camera_file.describe_lens(lens))
-        size_px = (info.width, info.height)
-        writer = cv2.VideoWriter(self.video, cv2.VideoWriter_fourcc(*"MJPG"), VIDEO_HZ, size_px, False)
-        for _ in range(VIDEO_FRAMES):
-            writer.write(self.spoiler.newest)
-        writer.release()
-        status, text = self.calibrate("arena", "--device", self.video)
+        status, text = self.calibrate("arena")
         self.assertEqual(status, 0, text)
         self.assertIn("the camera is 2.20 m above the floor", text)
         self.assertIn("good; written to " + self.path, text)
-
-    def test_1b_track_publishes_poses_and_objects_of_a_video_to_its_end(self):
-        reports, objects = [], []
-        rospy.Subscriber("/track_video/measured_poses", RobotPoses, reports.append)
-        rospy.Subscriber("/track_video/objects", ObjectPoses, objects.append)
-        options = ("__name:=track_video", "_device:=" + self.video, "_file:=" + self.path)
-        program = Program(find_program("hero_localization", "track"), *options)
-        self.addCleanup(program.close)
-        self.wait_for_problem("track_video: camera", "arena.avi gives no more images: the video has ended")
-        self.assertEqual([robot.id for robot in reports[-1].robots], [0])
-        self.wait_at_truth(lambda: reports[-1].robots[0], 0)
-        self.wait_at_truth(lambda: objects[-1].objects[0], 1)
-        stamps_s = [report.header.stamp.to_sec() for report in reports]
-        self.assertEqual(stamps_s, sorted(stamps_s))
 
     def test_2_an_interrupted_calibration_stops_the_robot_and_keeps_the_file(self):
         content, start = self.read_file(), self.true[0].pose.pose.orientation
