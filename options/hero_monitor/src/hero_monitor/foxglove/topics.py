@@ -130,5 +130,5 @@ class RosTopics:
         return [content for source, content in self._latched.items() if source.channel is channel]
 
 
-def _is_done(future: Optional[Future[None]]) -> bool:
+def _is_done(future: Optional["Future[None]"]) -> bool:
     return future is None or future.done()
