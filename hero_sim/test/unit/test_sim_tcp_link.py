@@ -5,6 +5,7 @@ import socket
 import struct
 
 import pytest
+from driver_side import parse_options
 
 from hero_sim.link import tcp_link
 from hero_sim.link.tcp_link import LinkHandler, TcpLink
@@ -130,10 +131,24 @@ def test_the_end_of_a_connection_is_told_once_and_nothing_is_sent_after_it(drive
     assert driver.events.seen == ["made", "lost"] and driver.link.count_open() == 0
 
 
-def test_a_reset_while_bytes_wait_is_told_once(driver):
-    driver.fill()
+def reset(driver):
     driver.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     driver.socket.close()
+
+
+def test_a_reset_that_a_robot_meets_when_it_sends_is_told_at_once(driver):
+    reset(driver)
+    driver.link.send(0, b"no peer")
+    assert driver.events.seen == ["made", "lost"]
+
+
+def test_the_driver_is_on_this_pc_unless_robots_are_told():
+    assert (parse_options().host, parse_options("--host", "lab").host) == ("127.0.0.1", "lab")
+
+
+def test_a_reset_while_bytes_wait_is_told_once(driver):
+    driver.fill()
+    reset(driver)
     driver.poll_until(lambda: driver.events.seen[-1] == "lost")
     assert driver.events.seen == ["made", "blocked", "lost"]
 
