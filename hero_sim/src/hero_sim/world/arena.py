@@ -107,10 +107,6 @@ class Segments(NamedTuple):
         along_m = end_m - start_m
         return cls(start_m, along_m, np.maximum(square_length(along_m), 1e-18))
 
-    def take(self, which: np.ndarray) -> "Segments":
-        """Return the segments which, an index array."""
-        return Segments(self.start_m.take(which, axis=1), self.along_m.take(which, axis=1), self.length_m2[which])
-
     def for_each_place(self) -> "Segments":
         """Return the segments for point_away() of places (2, P, 1)."""
         return Segments(self.start_m[:, None], self.along_m[:, None], self.length_m2)
