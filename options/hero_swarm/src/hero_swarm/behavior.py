@@ -3,6 +3,7 @@
 Pure: numpy only. R robots are the rows of all arrays, world after world.
 """
 
+import math
 import zlib
 from typing import Any, Dict, Optional, Sequence, Tuple
 
@@ -40,6 +41,12 @@ SPEED = number(0.1, 0.01, MAX_LINEAR_M_S, "m/s")
 GAIN = number(0.5, 0.0, 5.0, "1/s")
 RANGE = number(0.5, 0.05, 5.0, "m")
 """Settings of many behaviors."""
+
+_FIELDS = {
+    **dict.fromkeys(("error", "dropout", "loss"), (0.0, 1.0)),
+    **dict.fromkeys(("range_m", "field_rad", "half_angle_rad", "range_noise_m", "bearing_noise_rad"), (0.0, math.inf)),
+}
+"""Least and most of sensors' fields: probabilities; lengths, angles and standard deviations."""
 
 Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
@@ -139,11 +146,15 @@ class Behavior:
     def __init__(self, **parameters: Any) -> None:
         """Set parameters by name, and fields of sensors by SENSOR.FIELD.
 
-        Raises: TypeError for one that the behavior does not have; ValueError for rate_hz or drive.
+        Raises: TypeError for one that the behavior does not have; ValueError for rate_hz, drive, or a sensor's field.
         """
         for name, value in parameters.items():
             sensor, dot, field = name.partition(".")
             if dot and name in self.numbers():
+                least, most = _FIELDS.get(field, (-math.inf, math.inf))
+                if not (isinstance(value, (int, float)) and least <= value <= most):
+                    text = "%s: %s is %r, but must be a number from %g to %g"
+                    raise ValueError(text % (type(self).__name__, name, value, least, most))
                 setattr(self, sensor, getattr(self, sensor)._replace(**{field: value}))
                 continue
             if name.startswith("_") or not hasattr(self, name) or callable(getattr(self, name)):

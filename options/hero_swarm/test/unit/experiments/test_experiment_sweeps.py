@@ -84,6 +84,7 @@ def test_runs_of_a_seed_start_alike_whatever_the_behavior(path):
         ("{gain: 0.05}", "{gian: 0.05}", "line 2: gather.py has no parameter 'gian'; there are gain, .*near.range_m"),
         ("dispersal, {g", "{dispersal: {gain: 1}}, {g", "line 2: dispersal has no parameter 'gain'"),
         ("gather.py: {gain: 0.05}", "other.py: {}", "behavior .*other.py: no such file"),
+        ("[0.05, 5]", "[0.05, -5]", "line 3: .*near.range_m is -5.0, but must be a number from 0 to inf"),
         ("{gain: 0.05}", "{gain: far}", "line 2: .*gain is 'far', but must be a number"),
     ],
 )

@@ -66,8 +66,12 @@ def set_up(experiment: Experiment, cell: Cell) -> CellSetup:
     with _at(experiment, "behavior"):
         kind = find_behavior(experiment.locate(cell.behavior), sources)
         known = kind().numbers()
-    with _at(experiment, "rate_hz"):
-        behavior = kind(**{name: value for name, value in cell.parameters.items() if name in known})
+    own = {name: value for name, value in cell.parameters.items() if name in known}
+    for name, value in own.items():
+        with _at(experiment, name):
+            kind(**{name: value})
+    with _at(experiment, "behavior"):
+        behavior = kind(**own)
     with _at(experiment, "arena"):
         chosen = cell.settings.get("arena")
         file = (files["arena"], sources.read) if "arena" in files else (chosen,)
