@@ -3,10 +3,10 @@
 Pure: numbers, and rows of numbers in lists or arrays. numba compiles this file where it is installed (compiled.py) and
 looks for changes in it alone, so what the loops call is here. No operation depends on the machine.
 
-Coulomb friction acts where bodies touch, and wheels and things have limited traction. A step is what bodies take at once,
-one or two steps of their wheels (see World). Its inputs: the contacts (where a body was taken to by its wheels alone, its
-free twist, they overlap by -gap, and slide by so much) and what holds each body to the floor. Nothing has inertia: a
-robot stops within a step.
+Coulomb friction acts where bodies touch, and wheels and things have limited traction. A step is what bodies take at
+once, one or two steps of their wheels (see World). Its inputs: the contacts (where a body was taken to by its wheels
+alone, its free twist, they overlap by -gap, and slide by so much) and what holds each body to the floor. Nothing has
+inertia: a robot stops within a step.
 
 - A body that is moved slips over the floor. Its wheels, the caster of a robot, and the whole of a thing (limit surface:
   see PushedBody) resist with friction times load, whatever the speed. This is linear for given slips, force = load *
