@@ -35,7 +35,7 @@ class LabLens(NamedTuple):
     k2: float
     size_px: Tuple[int, int] = (1920, 1080)
     k4: float = 0.0
-    """Of the denominator: a rational lens."""
+    """First coefficient of the denominator of a rational lens; 0: it has none."""
     is_fisheye: bool = False
 
     def bend(self, radius: np.ndarray) -> np.ndarray:

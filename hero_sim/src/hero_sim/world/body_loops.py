@@ -44,9 +44,6 @@ TOUCH_M = 1e-9
 SHIFT_M = 0.006
 """Farthest that a robot moves in a step, or is moved while the step's contacts are solved."""
 
-HELD_N = 1e30
-"""Holds what cannot be moved."""
-
 IDLE, STARTS, CONTINUES = 0, 1, 2
 """States of a contact: it does not matter in this step, is the first one of its two bodies, or is behind it."""
 

@@ -23,7 +23,6 @@ from .body_loops import (
     GIVE,
     GRAVITY_M_S2,
     HALF,
-    HELD_N,
     KEPT_ROWS,
     LEFT,
     LEVER_1,
@@ -53,9 +52,6 @@ from .kinematics import find_heading, join_wheels
 from .pushing.pushing import Pushing, Touch
 from .pushing.shapes import PushedBody
 from .robot_errors import RobotErrors
-
-_STATIC_CREEP_M_S = 1e3
-"""Faster than anything: what holds walls does not depend on what happened in another world."""
 
 _MARGIN_M = 0.03
 """Distance that bodies may move until their neighbors are listed again; a larger margin makes each step slower."""
@@ -137,9 +133,9 @@ class Contacts:
         bodies[CASTER_N, :rows] = errors.friction[:, 2] * weights_n * (1.0 - loads)
         bodies[CREEP, :rows] = errors.creep_m_s[:, 0]
         bodies[RADIUS, :rows], bodies[[ON_ROBOT, ON_WALL], :rows] = self._radii_m, errors.friction[:, :2].T
-        bodies[HALF, rows:] = [thing.shape.friction_radius_m for thing in things] + [1.0]
-        bodies[WHEEL_N, rows:] = [thing.friction_n / 2.0 for thing in things] + [HELD_N]
-        bodies[CREEP, rows:] = [THING_CREEP_M_S] * len(things) + [_STATIC_CREEP_M_S]
+        bodies[HALF, rows:-1] = [thing.shape.friction_radius_m for thing in things]
+        bodies[WHEEL_N, rows:-1] = [thing.friction_n / 2.0 for thing in things]
+        bodies[CREEP, rows:-1] = THING_CREEP_M_S
         bodies[CREEP] *= step_s
         bodies[COSINE, rows:] = 1.0
         return bodies

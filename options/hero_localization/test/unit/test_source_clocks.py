@@ -188,7 +188,7 @@ def add_drive(clocks, begin_s, duration_s, delay_s, robots):
 
 @pytest.mark.parametrize(("robots", "set_clock"), [(1, lambda clocks: None), (20, SourceClocks.forget_poses)])
 def test_poses_from_before_a_clock_was_set_back_are_not_waited_for(robots, set_clock):
-    """The clock of the camera, or that of this PC, which compares many robots by turns."""
+    """One robot: the clock of the camera was set; twenty, of which some wait for their turn: that of this PC."""
     clocks = SourceClocks(True)
     add_drive(clocks, 1000.0, 2.0, 0.0, robots)
     set_clock(clocks)

@@ -204,9 +204,8 @@ def test_a_tag_that_is_missed_is_found_by_a_finer_detector_at_once(side_px, monk
     assert all(watch.see(tags) == [1] for _ in range(70))
 
 
-@pytest.mark.slow
-def test_a_tag_is_looked_for_by_its_print_with_the_heading_that_it_had():
-    made, tags, expected = [], [(1, (800.0, 500.0))], {1: (801.0, 502.0, SIDE_PX)}
+def note_prints(made):
+    """Return a detector by a tag's print that finds nothing, and notes in made what it was asked for."""
 
     class Prints(NamedTuple):
         tag_id: int
@@ -218,8 +217,14 @@ def test_a_tag_is_looked_for_by_its_print_with_the_heading_that_it_had():
             made.append(self)
             return []
 
+    return Prints
+
+
+@pytest.mark.slow
+def test_a_tag_is_looked_for_by_its_print_with_the_heading_that_it_had():
+    made, tags, expected = [], [(1, (800.0, 500.0))], {1: (801.0, 502.0, SIDE_PX)}
     detector = SeenTags()
-    search = TagSearch(detector, WIDTH_PX, HEIGHT_PX, [SeenTags(), Prints], 20.0)
+    search = TagSearch(detector, WIDTH_PX, HEIGHT_PX, [SeenTags(), note_prints(made)], 20.0)
     detector.place(tags)
     search.search(FRAME, 0.0, expected)
     (corners,) = [tag.corners for tag in search.search(FRAME, FRAME_S, expected)]
@@ -264,18 +269,7 @@ def test_many_tags_that_are_missed_take_turns_within_a_bounded_time():
 @pytest.mark.slow
 def test_a_tag_is_looked_for_by_its_print_in_the_size_that_is_expected():
     made = []
-
-    class Prints(NamedTuple):
-        tag_id: int
-        center: np.ndarray
-        side_px: float
-        corners: Optional[np.ndarray]
-
-        def detect(self, gray, origin=(0, 0)):
-            made.append(self)
-            return []
-
-    search = TagSearch(SeenTags(), WIDTH_PX, HEIGHT_PX, [SeenTags(), Prints], 20.0)
+    search = TagSearch(SeenTags(), WIDTH_PX, HEIGHT_PX, [SeenTags(), note_prints(made)], 20.0)
     for index in range(60):
         search.search(FRAME, index * FRAME_S, {1: (801.0, 502.0, 31.0)})
     assert {(print_.side_px, print_.corners) for print_ in made} == {(31.0, None)}
