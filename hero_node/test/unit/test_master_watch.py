@@ -18,12 +18,15 @@ class Master:
 
     Attributes:
         failures: raised by the next registrations of a subscriber.
+        node_ends: rospy has begun to take the node's registrations back.
+        ends_after: number of registrations after which it begins.
     """
 
     def __init__(self):
         self.answers = True
         self.known = list(OWN)
         self.failures = []
+        self.node_ends, self.ends_after = False, 100
         self.updates = []
         self.calls = 0
 
@@ -37,6 +40,7 @@ class Master:
         if method.startswith("register"):
             self.calls += 1
             self.known.append((method, arguments[0]))
+            self.node_ends = self.node_ends or self.calls == self.ends_after
         return ["http://publisher"]
 
     def restart(self):
@@ -68,6 +72,7 @@ def master(monkeypatch):
     monkeypatch.setattr(master_watch, "get_topic_manager", lambda: topics)
     monkeypatch.setattr(master_watch, "get_service_manager", lambda: services)
     monkeypatch.setattr(master_watch.xmlrpc.client, "ServerProxy", made.connect)
+    monkeypatch.setattr(master_watch.rospy, "is_shutdown", lambda: made.node_ends)
     monkeypatch.setattr(master_watch.rospy, "get_node_uri", lambda: "http://node")
     monkeypatch.setattr(master_watch.rospy, "resolve_name", lambda name: name.replace("~", "/node/"))
     return made
@@ -112,6 +117,24 @@ def test_everything_is_registered_again_after_a_master_that_hung(master):
     master.answers = True  # registrations may have been cut off meanwhile
     assert watch.look() == "the ROS master answers again; 2 topics and 1 services are registered again"
     assert [watch.is_lost, watch.look()] == [False, ""]
+
+
+def test_a_node_that_ends_is_not_registered_again(master):
+    watch = MasterWatch()
+    master.restart()
+    master.node_ends = True  # rospy unregisters: the master no longer knows the node
+    assert [watch.look(), master.known] == ["", []]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_an_end_while_the_node_is_registered_again_leaves_the_rest(master, count):
+    watch = MasterWatch()
+    master.restart()
+    master.ends_after = count
+    with pytest.raises(NodeError, match="ends"):
+        watch.look()
+    assert master.known == OWN[:count]
+    assert watch.look() == ""
 
 
 class LooksThenEnd:

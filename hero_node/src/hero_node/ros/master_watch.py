@@ -5,7 +5,7 @@ Programs that start after that would not find this node; open connections are no
 
 import threading
 import xmlrpc.client
-from typing import Callable, Tuple
+from typing import Any, Callable, Tuple
 
 import rospy
 from rospy.impl.registration import get_service_manager, get_topic_manager
@@ -45,7 +45,7 @@ class MasterWatch:
                 try:
                     news = self.look()
                 except (NodeError, OSError, xmlrpc.client.Error) as error:
-                    if not was_lost and not has_ended.is_set():
+                    if not was_lost and not has_ended.is_set() and not rospy.is_shutdown():
                         tell_loss(f"{error}: existing connections keep working")
                 else:
                     if news:
@@ -56,7 +56,8 @@ class MasterWatch:
     def look(self) -> str:
         """Ask the master, and register with one that was started again; return what was registered, for users.
 
-        Registering is repeated by the next look() until it has succeeded as a whole.
+        Registering is repeated by the next look() until it has succeeded as a whole. A node that ends takes its
+        registrations back itself: it is never registered again.
         Raises: NodeError, OSError or xmlrpc.client.Error if the master or this node does not answer in time.
         """
         was_restarted = False
@@ -67,7 +68,7 @@ class MasterWatch:
         except NodeError:
             self.is_lost = True
             raise
-        if not was_restarted and not self.is_lost:
+        if rospy.is_shutdown() or not (was_restarted or self.is_lost):
             return ""
         self.is_lost = True
         counts = _register_again()
@@ -82,12 +83,18 @@ def _register_again() -> Tuple[int, int]:
     uri = rospy.get_node_uri()
     publications, subscriptions = get_topic_manager().get_publications(), get_topic_manager().get_subscriptions()
     services = get_service_manager().get_services()
+
+    def register(method: str, name: str, value: str) -> Any:
+        if rospy.is_shutdown():
+            raise NodeError("this node ends while it is registered again")
+        return ask_master(method, name, value, uri)
+
     for topic, kind in publications:
-        ask_master("registerPublisher", topic, kind, uri)
+        register("registerPublisher", topic, kind)
     with xmlrpc.client.ServerProxy(uri, transport=LimitedTransport()) as own:
         for topic, kind in subscriptions:
             # What the master tells a node when publishers come; rospy connects to those it lacks.
-            own.publisherUpdate("/master", topic, ask_master("registerSubscriber", topic, kind, uri))
+            own.publisherUpdate("/master", topic, register("registerSubscriber", topic, kind))
     for service, service_uri in services:
-        ask_master("registerService", service, service_uri, uri)
+        register("registerService", service, service_uri)
     return len(publications) + len(subscriptions), len(services)
