@@ -1,4 +1,4 @@
-"""Arenas from YAML files, ours and those of maps; a wrong file is refused with its name and the reason.
+"""Arenas from YAML files; a wrong file is refused with its name and the reason.
 
 The README has the format.
 """
@@ -17,7 +17,6 @@ from hero_node.files import Entry, EntryError, load_entries, read_file
 from ..errors import OptionError
 from ..robot_constants import BODY_RADIUS_M
 from .arena import Area, Arena, is_free, outline
-from .map_file import build_map_arena, check_size
 from .pushing.shapes import Disc, Polygon, PushedBody, Shape
 
 SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
@@ -25,6 +24,7 @@ SHIPPED = ("empty", "obstacles", "maze", "box", "discs")
 
 _MAX_COORDINATE_M = 1000.0
 _MAX_STARTS = 1000
+_MAX_PIXELS = 4_000_000
 _KEYS = ("name", "bounds_m", "walls_m", "circles_m", "polygons_m", "objects", "starts_m_deg", "areas", "lamps_m")
 _AREA_KEYS = ("name", "circle_m", "rectangle_m", "color", "picture")
 _OBJECT_KEYS = ("circle_m", "polygon_m", "mass_kg", "friction")
@@ -45,20 +45,12 @@ def load_arena(name: str, read: Callable[[str], bytes] = read_file) -> Arena:
         path = os.path.join(os.path.dirname(os.path.abspath(__file__)), "arenas", name + ".yaml")
     try:
         # Numbers stay texts: what YAML takes for dates, booleans or objects has no meaning here.
-        root = load_entries(path, "bounds_m: [-1, -1, 1, 1]", as_texts=True, read=read)
-        if "image" in root.value:
-            return _build_from_map(root.value, path, read)
-        return _build_arena(root, path, read)
+        return _build_arena(load_entries(path, "bounds_m: [-1, -1, 1, 1]", as_texts=True, read=read), path, read)
     except EntryError as error:
         hint = f"; shipped are {', '.join(SHIPPED)}" if isinstance(error.__cause__, OSError) else ""
         raise OptionError(f"arena {error}{hint}") from error
     except ValueError as error:
         raise OptionError(f"arena {path}: {error}") from error
-
-
-def _build_from_map(content: Dict[str, Entry], path: str, read: Callable[[str], bytes]) -> Arena:
-    """Return the arena of a map of map_server. Raises: EntryError, ValueError."""
-    return build_map_arena(os.path.basename(path), content, _read_picture(content["image"], path, read))
 
 
 def _read_picture(entry: Entry, path: str, read: Callable[[str], bytes]) -> np.ndarray:
@@ -73,9 +65,11 @@ def _read_picture(entry: Entry, path: str, read: Callable[[str], bytes]) -> np.n
     picture = os.path.join(os.path.dirname(path), entry.text())
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # check_size() refuses it
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # it is refused below
             image = Image.open(io.BytesIO(read(picture)))
-        check_size(*image.size)  # by its header: nothing is decoded yet
+        if image.width * image.height > _MAX_PIXELS:  # by its header: nothing is decoded yet
+            text = "it has %d x %d pixels, more than %d in all"
+            raise ValueError(text % (*image.size, _MAX_PIXELS))
         if image.mode.startswith("I"):
             return np.asarray(image, dtype=float) / 65535.0
         return np.asarray(image.convert("L"), dtype=float) / 255.0

@@ -10,7 +10,6 @@ from PIL import Image
 from hero_localization.mapping.occupancy_grid import OccupancyGrid, SwarmMap
 from hero_localization.nodes.map_arena import save_map
 from hero_node import Pose
-from hero_sim.world import load_arena, measure_clearance
 
 AHEAD = [0.1, *[math.inf] * 7]
 """Something 0.1 m in front of the robot."""
@@ -61,19 +60,6 @@ def test_robots_do_not_map_each_other():
         swarm_map.add_ranges(0, 0.2 * step, AHEAD)
     assert swarm_map.update() == 10
     assert not swarm_map.grid.occupied.any()
-
-
-def test_a_saved_map_is_an_arena_of_the_simulator(tmp_path):
-    grid = OccupancyGrid((-0.5, -0.4, 0.5, 0.6))
-    grid.log_odds[:] = 0.0
-    grid.log_odds[20:80, 10:90] = -3.0
-    grid.log_odds[40:50, 40:50] = 3.0
-    save_map(str(tmp_path / "arena.yaml"), grid)
-    arena = load_arena(str(tmp_path / "arena.yaml"))
-    points_m = np.array([(0.0, 0.3), (-0.05, 0.05), (-0.45, 0.0)])
-    clearance_m = measure_clearance(points_m, arena)
-    assert clearance_m[0] == pytest.approx(0.1, abs=1e-6)
-    assert clearance_m[1] < 0.0 and clearance_m[2] < 0.0
 
 
 def test_a_map_that_cannot_be_written_is_an_error(tmp_path):

@@ -1,5 +1,9 @@
 """Pictures on the floor: gray levels in their places, as viewers see them, in packed experiments, and bad files."""
 
+import os
+import struct
+import zlib
+
 import numpy as np
 import pytest
 
@@ -93,6 +97,24 @@ def test_viewers_see_a_picture_as_rectangles_of_gray_below_what_follows(write_ar
 def test_a_bad_picture_is_refused_with_file_line_and_remedy(write_arena, old, new, words):
     with pytest.raises(OptionError, match=r"arena\.yaml, " + words):
         load_arena(write_arena(text=ARENA.replace(old, new)))
+
+
+def test_a_large_picture_is_refused_by_its_header(write_arena, tmp_path):
+    path = write_arena()
+    header = b"IHDR" + struct.pack(">2I5B", 13000, 13000, 8, 0, 0, 0, 0)
+    chunks = struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header))
+    # Decoding it would say that the file is cut off.
+    (tmp_path / "ramp.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunks + struct.pack(">I", 100) + b"IDAT")
+    with pytest.raises(OptionError, match="it has 13000 x 13000 pixels, more than 4000000"):
+        load_arena(path)
+
+
+def test_a_pipe_as_picture_is_refused(write_arena, tmp_path):
+    path = write_arena()
+    (tmp_path / "ramp.png").unlink()
+    os.mkfifo(str(tmp_path / "ramp.png"))
+    with pytest.raises(OptionError, match="ramp.png cannot be read: it is a pipe, device or socket"):
+        load_arena(path)
 
 
 def test_the_pack_of_an_experiment_holds_its_picture(write_arena, tmp_path):

@@ -2,7 +2,7 @@
 
 rosrun hero_localization map_arena
 rosrun hero_localization map_arena _bounds_m:="-1.5 -1 1.5 1"
-rosservice call /map_arena/save                            writes ~file: map_server and hero_sim read it
+rosservice call /map_arena/save                            writes ~file, which map_server reads
 """
 
 import os
@@ -156,7 +156,7 @@ PARAMETERS = {
     "poses_topic": string("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
     "file": string(
         "~/hero_maps/arena.yaml",
-        "written by the service `~save`, with an image: map_server reads it, and `hero_sim arena:=FILE`",
+        "written by the service `~save`, with an image, for map_server",
     ),
 }
 
