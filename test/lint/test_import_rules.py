@@ -16,8 +16,6 @@ SOCKET_OWNERS = (
     "hero_tools.checkup.network",
     "hero_monitor.serving.server",
     "hero_monitor.serving.invitation",
-    "hero_monitor.foxglove.endpoint",
-    "hero_monitor.foxglove.streams",
     "hero_monitor.serving.fair_stream",
     "hero_monitor.program",
 )

@@ -4,15 +4,7 @@ from threading import Thread
 
 from .connections import limit_xmlrpc_connections, open_tcpros_server
 from .handshakes import HANDSHAKE
-from .master import (
-    MASTER_TIMEOUT_S,
-    SUCCESS,
-    LimitedTransport,
-    ask_master,
-    check_master,
-    find_running_node,
-    read_master_uri,
-)
+from .master import ask_master, check_master, find_running_node, read_master_uri
 from .master_watch import MasterWatch
 from .private_parameters import read_given, read_parameters
 from .program import Program

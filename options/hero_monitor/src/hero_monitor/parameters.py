@@ -42,7 +42,6 @@ class Parameters:
     map_frame: str = declare(string("world"))
     record_folder: str = declare(string("~/hero_recordings"))
     behavior_folder: str = declare(string("~/hero_behaviors"))
-    foxglove_origins: Sequence[str] = declare(Parameter("", _read_words))
     classroom: bool = declare(flag(False))
 
 

@@ -45,8 +45,6 @@ class Monitor:
         # Here, so that a machine without tornado gets a line that says what to do: see main().
         import tornado.ioloop
 
-        from .foxglove.endpoint import FoxgloveEndpoint
-        from .foxglove.topics import RosTopics
         from .serving.server import Actions, MonotonicLoop, Server
 
         self._parameters = parameters
@@ -77,10 +75,9 @@ class Monitor:
         )
         # The other half of the files is for ROS: some per robot.
         limits = ClientLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
-        self._foxglove = FoxgloveEndpoint(RosTopics(self._background), parameters.foxglove_origins)
         token = read_token(parameters.host, parameters.token_file)
         access = Access(token, list_host_names(parameters), self._lesson)
-        self._server = Server(access, limits, actions, self._foxglove.route)
+        self._server = Server(access, limits, actions)
         self._repeated = [
             tornado.ioloop.PeriodicCallback(call, 1000.0 * period_s)
             for call, period_s in (
@@ -117,7 +114,6 @@ class Monitor:
         finally:
             self._programs.close()
             self._commander.close()
-            self._foxglove.close()
             self._server.close()
             self._background.shutdown(wait=False)
 

@@ -51,14 +51,12 @@ def make_frame(kind, content):
 
 
 class PageClient:
-    """The socket of a page, or of another client, without a browser: sends requests, and reads nothing."""
+    """The socket of a page, without a browser: sends requests, and reads nothing."""
 
-    def __init__(self, host, cookie="", path="/live", protocol=""):
+    def __init__(self, host, cookie=""):
         address, _, port = host.rpartition(":")
         self.socket = socket.create_connection((address, int(port)), TIMEOUT_S)
-        lines = ["GET %s HTTP/1.1" % path, "Host: " + host, "Origin: http://" + host, "Cookie: " + cookie]
-        if protocol:
-            lines.append("Sec-WebSocket-Protocol: " + protocol)
+        lines = ["GET /live HTTP/1.1", "Host: " + host, "Origin: http://" + host, "Cookie: " + cookie]
         lines += ["%s: %s" % item for item in UPGRADE.items()]
         self.socket.sendall("\r\n".join([*lines, "", ""]).encode())
         assert b"101" in self.socket.recv(12), "no socket for this page"

@@ -1,14 +1,11 @@
 #!/usr/bin/env python3
 """Who the fleet monitor lets in, asked over HTTP: names, origins, tokens, files, and how it refuses to start."""
 
-import json
 import tempfile
 import unittest
 from pathlib import Path
 
 import rostest
-import tornado.ioloop
-import tornado.websocket
 from monitor_process import (
     HOST,
     OTHER_HOST,
@@ -20,29 +17,10 @@ from monitor_process import (
     start_monitor,
     wait_until_it_answers,
 )
-from nav_msgs.msg import Odometry
 
 from hero_test.nonempty import nonempty
 
 TOKEN = "correct-horse-battery-staple"
-
-FOXGLOVE = "foxglove.websocket.v1"
-
-
-async def read_message(topic):
-    """Return the schema's name and the first message of a topic, received as a Foxglove client."""
-    client = await tornado.websocket.websocket_connect("ws://%s/foxglove" % HOST, subprotocols=[FOXGLOVE])
-    offers = {}
-    while topic not in offers:
-        text = json.loads(await client.read_message())
-        offers.update({offer["topic"]: offer for offer in text.get("channels", [])})
-    subscription = {"id": 3, "channelId": offers[topic]["id"]}
-    await client.write_message(json.dumps({"op": "subscribe", "subscriptions": [subscription]}))
-    message = await client.read_message()
-    while isinstance(message, str):
-        message = await client.read_message()
-    client.close()
-    return offers[topic]["schemaName"], message
 
 
 class AccessTest(unittest.TestCase):
@@ -65,19 +43,6 @@ class AccessTest(unittest.TestCase):
         self.assertEqual(self.open_socket(Origin="http://evil.example"), 403)
         self.assertEqual(self.open_socket(Origin="null"), 403)
         self.assertEqual(self.open_socket(), 403)
-
-    def test_foxglove_clients_read_a_topic_but_foreign_pages_do_not(self):
-        headers = {**UPGRADE, "Sec-WebSocket-Protocol": FOXGLOVE}
-        self.assertEqual(ask(HOST, "/foxglove", {**headers, "Origin": "http://evil.example"})[0], 403)
-        self.assertEqual(ask(HOST, "/foxglove", {**headers, "Origin": "http://" + HOST})[0], 101)
-        self.assertEqual(ask(HOST, "/foxglove", UPGRADE)[0], 400)
-        loop = tornado.ioloop.IOLoop(make_current=False)
-        schema, message = loop.run_sync(lambda: read_message("/hero_0/odom"), TIMEOUT_S)
-        loop.close()
-        self.assertEqual(schema, "nav_msgs/Odometry")
-        # Opcode, subscription, time of arrival.
-        self.assertEqual(message[:5], b"\x01\x03\0\0\0")
-        self.assertEqual(Odometry().deserialize(message[13:]).child_frame_id, "hero_0/base_link")
 
     def test_the_page_may_load_nothing_from_elsewhere_and_run_no_inline_script(self):
         _, headers, _ = ask(HOST)
@@ -129,9 +94,6 @@ class AccessTest(unittest.TestCase):
                 self.assertIn("login.js", ask(host)[2])
                 self.assertEqual(self.open_socket(host, **own), 403)
                 self.assertEqual(ask(host, "/picture/1", own)[0], 403)
-                topics = {**UPGRADE, "Sec-WebSocket-Protocol": FOXGLOVE}
-                self.assertEqual(ask(host, "/foxglove", topics)[0], 403)
-                self.assertEqual(ask(host, "/foxglove?token=" + TOKEN, topics)[0], 101)
                 wrong = ask(host, "/login", own, "POST", '{"token": "wrong"}')
                 self.assertEqual((wrong[0], wrong[1]["Set-Cookie"]), (403, None))
                 self.assertEqual(ask(host, "/login", (), "POST", '{"token": "%s"}' % TOKEN)[0], 403)

@@ -50,14 +50,11 @@ def test_parameters_are_checked_and_name_this_pc(monkeypatch):
     defaults = load_parameters()
     assert (defaults.host, defaults.port, defaults.token_file, defaults.control) == ("127.0.0.1", 8088, "", False)
     assert list_host_names(defaults) == ["pc.lab", "pc.local", "127.0.0.1"]
-    assert (defaults.map_frame, defaults.foxglove_origins) == ("world", [])
-    given.update(
-        host_names=" a, b c", map_frame="/map", foxglove_origins="https://a.example, https://b.example", control=True
-    )
+    assert defaults.map_frame == "world"
+    given.update(host_names=" a, b c", map_frame="/map", control=True)
     loaded = load_parameters()
     assert list_host_names(loaded)[:4] == ["a", "b", "c", "pc.lab"]
     assert loaded.map_frame == "/map" and loaded.control and loaded.record_folder == "~/hero_recordings"
-    assert loaded.foxglove_origins == ["https://a.example", "https://b.example"]
     for wrong in ({"port": 65536}, {"rate_hz": 0.5}, {"rate_hz": 31.0}, {"host": ""}):
         given.clear()
         given.update(wrong)

@@ -22,8 +22,7 @@ REST_MAX_S = 0.05
 UNREAD_WRITES_MAX = 1000
 """Writes that wait for a client; beyond them it is closed.
 
-Few wait for one that reads: updates of pages and messages of topics are written one at a time, only answers and pongs
-whenever the client asks for them.
+Few wait for one that reads: updates are written one at a time, only answers and pongs whenever the client asks.
 """
 
 

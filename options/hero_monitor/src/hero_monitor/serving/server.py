@@ -4,6 +4,7 @@ One thread owns all connections. No page can delay another: a slow page misses u
 itself), and what cannot be sent at once takes 64 kB at most; what pages send is read in turns (FairStream).
 """
 
+import contextlib
 import itertools
 import json
 import logging
@@ -80,10 +81,6 @@ class Actions(NamedTuple):
     find_picture: Callable[[], bytes]
 
 
-Route = Tuple[str, Any, Dict[str, Any]]
-"""Pattern of a path, handler, and what it gets in addition to what all share."""
-
-
 class BaseHandler(tornado.web.RequestHandler):
     """A request whose Host names this PC; every answer has headers that keep foreign content out."""
 
@@ -130,17 +127,6 @@ class BaseHandler(tornado.web.RequestHandler):
     def is_own_page(self) -> bool:
         """Return whether a page of this server makes the request; every browser sends Origin."""
         return self.access.admits_origin(self.request.headers.get("Origin"), self.request.host)
-
-    def check_token(self, token: Any) -> str:
-        """Return the key for the cookie; refuse a wrong token or code, rate-limited per address. Raises: HTTPError."""
-        address, now_s = group_address(self.request.remote_ip or ""), time.monotonic()
-        if self.wrong_tokens.count(address, now_s) < 1.0:
-            raise tornado.web.HTTPError(429)
-        key = self.access.find_key(token) if isinstance(token, str) else ""
-        if not key:
-            self.wrong_tokens.take(address, 1.0, now_s)
-            raise tornado.web.HTTPError(403)
-        return key
 
     def write_error(self, status_code: int, **others: Any) -> None:
         """Send one line that says what is wrong."""
@@ -195,19 +181,20 @@ class LoginHandler(BaseHandler):
             token, name = fields["token"], str(fields.get("name", ""))
         except (ValueError, TypeError, KeyError, RecursionError):
             token = name = ""
-        cookie = f"{self.check_token(token)} {make_printable(name)[:NAME_LENGTH_MAX].strip()}"
+        cookie = f"{self._find_key(token)} {make_printable(name)[:NAME_LENGTH_MAX].strip()}"
         self.set_secure_cookie(COOKIE, cookie, expires_days=None, httponly=True, samesite="Strict", path="/")
         self.set_status(204)
 
-
-def send_text(handler: tornado.websocket.WebSocketHandler, text: str) -> Any:
-    """Return a future that is done when the text has left, or the client has; None if it left before."""
-    try:
-        sending: Any = handler.write_message(text)
-    except tornado.websocket.WebSocketClosedError:
-        return None
-    sending.add_done_callback(lambda sent: sent.cancelled() or sent.exception())  # else asyncio logs it
-    return sending
+    def _find_key(self, token: Any) -> str:
+        """Return the key for the cookie; refuse a wrong token or code, rate-limited per address. Raises: HTTPError."""
+        address, now_s = group_address(self.request.remote_ip or ""), time.monotonic()
+        if self.wrong_tokens.count(address, now_s) < 1.0:
+            raise tornado.web.HTTPError(429)
+        key = self.access.find_key(token) if isinstance(token, str) else ""
+        if not key:
+            self.wrong_tokens.take(address, 1.0, now_s)
+            raise tornado.web.HTTPError(403)
+        return key
 
 
 class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
@@ -270,7 +257,9 @@ class PageSocket(tornado.websocket.WebSocketHandler, BaseHandler):
 
     def send(self, text: str) -> None:
         """Send a text to this page."""
-        self._sending = send_text(self, text) or self._sending
+        with contextlib.suppress(tornado.websocket.WebSocketClosedError):
+            self._sending = self.write_message(text)
+            self._sending.add_done_callback(lambda sent: sent.cancelled() or sent.exception())  # else asyncio logs it
 
     def tell(self, level: str, text: str) -> None:
         """Show a notice on this page."""
@@ -319,7 +308,7 @@ class LimitedServer(tornado.httpserver.HTTPServer):
 class Server:
     """The server, from its start to its end."""
 
-    def __init__(self, access: Access, limits: ClientLimits, actions: Actions, *routes: Route) -> None:
+    def __init__(self, access: Access, limits: ClientLimits, actions: Actions) -> None:
         # tornado logs each invalid request and cookie: any client could fill the disk.
         logging.getLogger("tornado.general").setLevel(logging.ERROR)
         self.pages: List[PageSocket] = []
@@ -330,15 +319,13 @@ class Server:
             "actions": actions,
             "pages": self.pages,
         }
-        served: List[Route] = [
-            *routes,
-            (r"/live", PageSocket, {}),
-            (r"/login", LoginHandler, {}),
-            (r"/picture/[0-9]{1,9}", PictureHandler, {}),
-            (r"/(.*)", FileHandler, {}),
-        ]
         application = tornado.web.Application(
-            [(pattern, handler, {**shared, **values}) for pattern, handler, values in served],
+            [
+                (r"/live", PageSocket, shared),
+                (r"/login", LoginHandler, shared),
+                (r"/picture/[0-9]{1,9}", PictureHandler, shared),
+                (r"/(.*)", FileHandler, shared),
+            ],
             log_function=lambda handler: None,  # logs no request: a URL may contain a secret by mistake
             cookie_secret=secrets.token_urlsafe(32),
             websocket_ping_interval=PING_INTERVAL_S,

@@ -1,1 +1,0 @@
-"""Live topics for Foxglove, Lichtblick and PlotJuggler, over their WebSocket protocol."""
