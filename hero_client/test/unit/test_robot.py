@@ -127,7 +127,7 @@ def test_topics_that_few_read_are_subscribed_to_and_waited_for():
         assert link.subscribed[-1] == topic
     assert robot.distance == 0.7 and robot.neighbors == ["neighbor"]
     link.silent_s["neighbors"] = 1.1
-    with pytest.raises(StaleDataError, match="came 1.1 s ago: does `rosrun hero_swarm neighbors` run"):
+    with pytest.raises(StaleDataError, match="came 1.1 s ago: does `rosrun hero_swarm virtual_sensors` run"):
         assert robot.neighbors
     link.silent_s["laser"] = 1.1
     with pytest.raises(StaleDataError, match="the last message on /hero_3/laser came 1.1 s ago"):

@@ -130,14 +130,14 @@ class RobotReadings(Group):
 
     @property
     def neighbors(self) -> List[Neighbor]:
-        """Robots around, nearest first, which `rosrun hero_swarm neighbors` computes; in process, all of the world.
+        """Robots around, nearest first, by `rosrun hero_swarm virtual_sensors`; in process, all of the world.
 
         The first use waits up to 5 s. Raises: StaleDataError if they are older than 1 s, or the own pose is not known.
         """
         try:
             self._check_asked("neighbors")
         except StaleDataError as error:
-            raise StaleDataError(f"{str(error).split(':')[0]}: does `rosrun hero_swarm neighbors` run?") from None
+            raise StaleDataError(f"{str(error).split(':')[0]}: does `rosrun hero_swarm virtual_sensors` run?") from None
         return self._link.read_neighbors()
 
     def wait_for_scan(self, timeout_s: float = 2.0) -> List[float]:

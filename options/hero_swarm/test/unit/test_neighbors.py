@@ -1,4 +1,4 @@
-"""What the program neighbors tells robots of each other, and what a Robot makes of it."""
+"""What the program virtual_sensors tells robots of each other, and what a Robot makes of it."""
 
 import math
 
@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rospy", reason="messages and the program need ROS")
+import rospy
+
 from hero_client import Robot, StaleDataError
 from hero_client.ros.ros_link import MESSAGE_CLASSES, RosLink
-from hero_client.values import Neighbors
+from hero_client.values import Neighbors, sense_neighbors
 from hero_sim.stepped import StepSwarm
-from hero_swarm.behavior import Random
-from hero_swarm.ros.neighbors_node import make_messages
+from hero_swarm.ros.virtual_sensors_node import describe_neighbors
 from hero_test.nonempty import nonempty
 
 IDS = (7, 3, 5)
@@ -19,8 +20,15 @@ POSES = np.array([(0.0, 0.0, math.pi / 2), (0.0, 0.4, 0.0), (0.3, 0.0, -1.5)])
 AGES_S = np.array([0.01, 0.2, 0.05])
 
 
-def make(poses=POSES, **limits):
-    return make_messages(IDS, poses, AGES_S, Neighbors(**limits), Random([1], len(IDS)))
+def make(poses=POSES, ids=IDS, **limits):
+    """Return the message of each robot."""
+    near = sense_neighbors(poses[None], Neighbors(**limits))
+    return [describe_neighbors(near, row, ids, poses, AGES_S) for row in range(len(ids))]
+
+
+@pytest.fixture(autouse=True)
+def fixture_ros_time(monkeypatch):
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(12))
 
 
 class Received:
@@ -52,6 +60,7 @@ def make_robot(message):
 def test_neighbors_come_nearest_first_with_range_bearing_heading_and_age():
     message = make()[0]
     assert message.is_known and message.header.frame_id == "hero_7/base_link"
+    assert message.header.stamp.to_sec() == 12.0
     found = [(near.id, near.range, near.bearing, near.heading, near.age) for near in message.neighbors]
     assert [near[0] for near in found] == [5, 3]
     assert found[0][1:] == pytest.approx((0.3, -math.pi / 2, -1.5 - math.pi / 2, 0.05))
@@ -74,7 +83,7 @@ def test_robot_neighbors_over_ros_and_in_process_are_the_same():
     swarm = StepSwarm(3, seed=2, first_id=4)
     swarm.sleep(0.5)
     poses = swarm.rows.world.poses
-    message = make_messages([4, 5, 6], poses, AGES_S, Neighbors(), Random([1], 3))[1]
+    message = make(poses, (4, 5, 6))[1]
     over_ros = make_robot(message).neighbors
     in_process = swarm[5].neighbors
     assert [near.robot_id for near in over_ros] == [near.robot_id for near in in_process]

@@ -172,12 +172,16 @@ def test_the_program_publishes_what_each_robot_senses(tmp_path, monkeypatch):
 
     sent, receivers, clock = {}, {}, [0.0]
     monkeypatch.setattr(
-        rospy, "Publisher", lambda topic, kind, **_: SimpleNamespace(publish=sent.setdefault(topic, []).append)
-    )
+        rospy, "Publisher",
+        lambda topic, kind, **_: SimpleNamespace(
+            publish=sent.setdefault(topic, []).append, get_num_connections=lambda: int(topic == "/hero_3/neighbors")
+        ),
+    )  # fmt: skip
     monkeypatch.setattr(rospy, "Subscriber", lambda topic, kind, receive, **_: receivers.update({topic: receive}))
     monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: clock[0]))
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(3))
     (tmp_path / "arena.yaml").write_text(ARENA)
-    given = {"arena": str(tmp_path / "arena.yaml"), "robots": "7 3 9", "frame": "world", "range_m": 0.6}
+    given = {"arena": str(tmp_path / "arena.yaml"), "robots": "7 3 9", "frame": "world", "message_range_m": 0.6}
     node = module.VirtualSensorsNode(check_parameters(module.PARAMETERS, given))
     poses = np.array([(0.5, 0.0, 0.0), (0.0, 0.0, math.pi / 2.0), (math.nan,) * 3])
     monkeypatch.setattr(node._source, "read", lambda: (poses, np.zeros(3)))
@@ -193,6 +197,8 @@ def test_the_program_publishes_what_each_robot_senses(tmp_path, monkeypatch):
     assert sent["/hero_7/pheromone"][-1].x == pytest.approx(1.0) and sent["/hero_3/pheromone"][-1].x == 0.0
     heard = sent["/hero_3/messages"][-1]
     assert heard.data == pytest.approx([7.0, 0.5, -math.pi / 2.0, 1.5, 2.5]) and heard.layout.dim[0].size == 1
+    assert [near.id for near in sent["/hero_3/neighbors"][-1].neighbors] == [7]
+    assert sent["/hero_7/neighbors"] == [], "none listens"
     assert sent["/hero_7/messages"][-1].data == [] and sent["/hero_9/floor"] == []
     clock[0] = 5.0
     node.step()
