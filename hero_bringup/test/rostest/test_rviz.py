@@ -10,10 +10,9 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
-from geometry_msgs.msg import PointStamped, PoseStamped, Twist
+from geometry_msgs.msg import Twist
 from std_msgs.msg import ColorRGBA
 
-from hero_description.goal_choice import GOAL_TOPIC, POINT_TOPIC
 from hero_test.screens.virtual_screen import MISSING, VirtualScreen
 from hero_test.waiting import wait_for
 from hero_test.watches.swarm_watch import SwarmWatch
@@ -131,32 +130,6 @@ class RvizTest(unittest.TestCase):
         wait_for(has_driven, "robot 0 to drive")
         drive.publish(Twist())
         self.wait_until_drawn_in_place("rviz_driven.png")
-
-    def test_a_click_on_a_robot_chooses_it_for_the_next_goal(self):
-        goals = {robot_id: [] for robot_id in LIGHTS}
-        for robot_id in LIGHTS:
-            rospy.Subscriber("/hero_%d/goal" % robot_id, PoseStamped, goals[robot_id].append, queue_size=5)
-        point = rospy.Publisher(POINT_TOPIC, PointStamped, queue_size=1)
-        goal = rospy.Publisher(GOAL_TOPIC, PoseStamped, queue_size=1)
-        clicked = PointStamped()
-        clicked.header.frame_id = "world"
-
-        def goes_to_the_chosen_one():
-            clicked.point.x, clicked.point.y, _ = self.watch.pose(2)
-            point.publish(clicked)
-            goal.publish(PoseStamped())
-            return goals[2]
-
-        wait_for(goes_to_the_chosen_one, "a goal for robot 2")
-        self.assertEqual(goals[1], [])
-
-        def send_until(count):
-            wait_for(lambda: goal.publish(PoseStamped()) or len(goals[2]) >= count, "more goals")
-
-        send_until(5)
-        first = len(goals[0])
-        send_until(10)
-        self.assertEqual(len(goals[0]), first)
 
 
 if __name__ == "__main__":

@@ -45,7 +45,7 @@ def make_config(
     view: one of FRAMES, which holds the fixed frame if none is given; picture: with that of the overhead camera.
     """
     common, own = TEMPLATE.read_text(encoding="utf-8").split("\n---\n")
-    config = yaml.safe_load(common)
+    config = yaml.safe_load(Template(common).substitute(name=names[0]))
     manager = config["Visualization Manager"]
     *displays, odometry, localization, image = manager["Displays"]
     for name in names:

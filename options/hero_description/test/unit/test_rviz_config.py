@@ -124,13 +124,11 @@ def test_rviz_displays_a_hero_plus_by_its_own_model_with_its_range():
     assert [one["Topic"] for one in displays if one["Class"] == "rviz/Range"] == ["/hero_7/range"]
 
 
-def test_rviz_has_tools_to_choose_a_robot_and_send_it_a_goal():
-    goal_choice = pytest.importorskip("hero_description.goal_choice", reason="imports rospy")
-    manager = yaml.safe_load(make_config(["hero_0"], "world"))["Visualization Manager"]
-    topics = {tool["Class"]: tool.get("Topic") for tool in manager["Tools"]}
-    assert topics["rviz/PublishPoint"] == goal_choice.POINT_TOPIC
-    assert topics["rviz/SetGoal"] == goal_choice.GOAL_TOPIC
-    assert goal_choice.CHOICE_TOPIC in {display.get("Marker Topic") for display in manager["Displays"]}
+def test_rviz_sends_goals_to_the_first_robot_until_told_another_topic():
+    config = yaml.safe_load(make_config(["hero_4", "hero_0"], "world"))
+    tools = config["Visualization Manager"]["Tools"]
+    assert [tool["Topic"] for tool in tools if tool["Class"] == "rviz/SetGoal"] == ["/hero_4/goal"]
+    assert "rviz/Tool Properties" in {panel["Class"] for panel in config["Panels"]}
 
 
 def test_the_view_above_looks_straight_down():
@@ -192,5 +190,3 @@ def test_only_errors_of_localized_places_are_drawn_around_robots():
     }
     (path,) = [display for display in manager["Displays"] if display["Name"] == "hero_0 path"]
     assert path["Unreliable"] is False and path["Keep"] > 100 > path["Position Tolerance"] > 0
-    (click,) = [tool for tool in manager["Tools"] if tool["Class"] == "rviz/PublishPoint"]
-    assert click["Single click"] is True
