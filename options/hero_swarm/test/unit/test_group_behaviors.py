@@ -74,7 +74,7 @@ def find_energies(groups, apart_m, velocities):
     poses = np.array([[(0.0, 0.0, 0.7), (apart_m, 0.0, -2.0)]])
     behavior = RandomFields()
     near = sense_neighbors(poses, Neighbors(range_m=behavior.near.range_m))
-    given = np.repeat(np.array(velocities, dtype=float)[:, None], 2, axis=1)
+    given = np.repeat(np.array(velocities, dtype=float).T[:, :, None], 2, axis=2)
     signs = {}
     behavior.choose = lambda sensed, memory, found, *rest: signs.update(found=found) or np.zeros((3, 2))
     sensed = SimpleNamespace(near=near, numbers=np.array(groups))
@@ -97,15 +97,26 @@ def test_a_velocity_is_the_likelier_the_nearer_it_leads_to_the_own_group():
 
 
 def test_the_chain_takes_what_is_likelier_and_leaves_out_its_beginning():
-    velocities = np.zeros((SAMPLES + 1, 1, 2))
-    velocities[:, 0, 0] = np.arange(SAMPLES + 1)
-    chances, same = np.full((1, SAMPLES), 0.99), np.zeros((SAMPLES + 1, 1))
+    velocities = np.zeros((2, SAMPLES + 1, 1))
+    velocities[0, :, 0] = np.arange(SAMPLES + 1)
+    chances, same = np.full((SAMPLES, 1), 0.99), np.zeros((SAMPLES + 1, 1))
     all_taken = RandomFields._draw(velocities, same, chances)
     assert all_taken[0, 0] == pytest.approx(np.mean(range(BURNED + 1, SAMPLES + 1)))
     same[5:] = 20.0
     assert RandomFields._draw(velocities, same, chances)[0, 0] == 4.0, "those that cost much are not taken"
     likely = RandomFields._draw(velocities, same, np.zeros_like(chances))
     assert likely[0, 0] == all_taken[0, 0], "but for the rare chance"
+
+
+@pytest.mark.parametrize("kind", [RandomFields, Molecules])
+def test_robots_move_alike_whatever_worlds_are_beside_theirs(kind):
+    poses = []
+    for seeds in ([1], [2, 1]):
+        trial = Trial(kind(), OPEN, 12, seeds, size_m=(0.6, 0.6), is_point=True)
+        for _ in range(5):
+            trial.step()
+        poses.append(trial.poses[-1])
+    assert (poses[0] == poses[1]).all()
 
 
 def test_clusters_are_chains_of_nearest_robots_of_a_group():

@@ -30,7 +30,8 @@ def find_potential(apart: np.ndarray, sign: np.ndarray) -> np.ndarray:
     Its constants are those of the paper's program: well depth 0.04, radius 0.8, steepness 1, charges 16 and 1.
     """
     share = 0.8 / apart
-    energy: np.ndarray = 0.04 * (0.2 * share**6 - 1.2 * np.e * (1.0 - 1.0 / share)) - sign * 100.0 / (np.pi * apart)
+    cube = share * share * share  # which numpy computes 20 times as fast as a power
+    energy: np.ndarray = 0.04 * (0.2 * cube * cube - 1.2 * np.e * (1.0 - 1.25 * apart)) - sign * 125.0 / np.pi * share
     return energy
 
 
@@ -76,17 +77,19 @@ class RandomFields(Segregation):
 
         signs: how strongly each neighbor attracts, as in find_potential(); 0: it does not count. mass: (R,) or one.
         """
-        own = np.zeros((len(signs), 2)) if memory is None else memory[:, :2]
-        drawn = random.normal(2 * SAMPLES).reshape(-1, SAMPLES, 2).transpose(1, 0, 2)
-        velocities = np.concatenate((own[None], own + self.spread * drawn))
-        velocities /= np.maximum(np.hypot(*velocities.T).T, 1.0)[..., None]
+        own = np.zeros((2, len(signs))) if memory is None else memory[:, :2].T
+        velocities = np.empty((2, SAMPLES + 1, len(signs)))
+        velocities[:, 0] = own
+        drawn = random.normal(2 * SAMPLES).T.reshape(SAMPLES, 2, -1)
+        velocities[:, 1:] = own[:, None] + self.spread * drawn.swapaxes(0, 1)
+        velocities /= np.maximum(np.hypot(*velocities), 1.0)
         energies = self.find_energies(sensed.near, sensed.poses[:, 2], own, signs, mass, velocities)
-        wanted = self._draw(velocities, energies, random.random(SAMPLES))
-        command = self.max_linear_m_s * turn(wanted.T, -sensed.poses[:, 2]) + keep_clear(
+        wanted = self._draw(velocities, energies, random.random(SAMPLES).T)
+        command = self.max_linear_m_s * turn(wanted, -sensed.poses[:, 2]) + keep_clear(
             sensed.infrared.ranges_m, self.clear_m, 2.0
         )
         return (
-            wanted,
+            wanted.T,
             *steer(command[0], command[1], self.max_linear_m_s, max_angular_rad_s=self.max_angular_rad_s),
         )
 
@@ -99,36 +102,42 @@ class RandomFields(Segregation):
         mass: Any,
         velocities: np.ndarray,
     ) -> np.ndarray:
-        """Return the energies (S, R) of velocities (S, R, 2); own: those of now (R, 2); signs, mass: see choose()."""
-        counts = signs != 0.0
-        nearest = np.argsort(~counts, axis=1, kind="stable")[:, : max(1, int(counts.sum(axis=1).max()))]
-        rows = np.arange(len(own))[:, None]
-        counts, signs, others = counts[rows, nearest], signs[rows, nearest], own[near.rows[rows, nearest]]
-        length_m, angle_rad = near.range_m[rows, nearest], near.bearing_rad[rows, nearest] + yaw_rad[:, None]
+        """Return the energies (S, R) of velocities (2, S, R); own: those of now (2, R); signs, mass: see choose()."""
         reach = self.max_linear_m_s / self.rate_hz  # m in a step at full speed
-        to_m = np.stack((length_m * np.cos(angle_rad), length_m * np.sin(angle_rad)), axis=2) + reach * others
-        apart_m = np.hypot(*np.moveaxis(to_m - reach * velocities[:, :, None], -1, 0)) + 1e-6
-        pairs = find_potential(self.nearness * apart_m / self.unit_m, signs)
-        is_own = signs > 0.0
-        pairs = np.where(is_own & (apart_m > self.near.range_m), LOST, pairs) * counts
-        flock = is_own[None] & (apart_m > self.safe_m)
-        relative = ((others - velocities[:, :, None]) * flock[..., None]).sum(axis=2)
-        speeds = np.minimum((relative**2).sum(axis=2), 1.0), (velocities**2).sum(axis=2)
-        moving = 0.5 * mass * (1.0 + flock.sum(axis=2)) * (speeds[0] + 1.0 - speeds[1])
-        energies: np.ndarray = pairs.sum(axis=2) + moving
-        return energies
+        energies, relative = np.zeros(velocities.shape[1:]), np.zeros_like(velocities)
+        flock = np.ones_like(energies)
+        for is_own, counts in ((True, signs > 0.0), (False, signs < 0.0)):
+            # One neighbor of each robot at a time, and only of robots that have so many: arrays stay in the cache.
+            neighbors, total = np.argsort(~counts, axis=1, kind="stable"), counts.sum(axis=1)
+            for place in range(total.max()):
+                rows = np.flatnonzero(total > place)
+                pairs = rows, neighbors[rows, place]
+                other, drawn = own[:, near.rows[pairs]], velocities[..., rows]
+                to_m = turn((near.forward_m[pairs], near.left_m[pairs]), yaw_rad[rows]) + reach * other
+                x_m, y_m = to_m[:, None] - reach * drawn
+                apart_m = np.sqrt(x_m * x_m + y_m * y_m) + 1e-6
+                energy = find_potential(self.nearness / self.unit_m * apart_m, signs[pairs])
+                if is_own:
+                    energy[apart_m > self.near.range_m] = LOST
+                    is_flock = apart_m > self.safe_m
+                    flock[:, rows] += is_flock
+                    relative[..., rows] += (other[:, None] - drawn) * is_flock
+                energies[:, rows] += energy
+        speeds = np.minimum((relative**2).sum(axis=0), 1.0), (velocities**2).sum(axis=0)
+        return energies + 0.5 * mass * flock * (speeds[0] + 1.0 - speeds[1])
 
     @staticmethod
     def _draw(velocities: np.ndarray, energies: np.ndarray, chances: np.ndarray) -> np.ndarray:
-        """Return the mean of a chain of velocities (R, 2) by Metropolis and Hastings, without those that are burned."""
-        robots, total = np.arange(len(chances)), np.zeros(velocities.shape[1:])
-        chosen = np.zeros(len(chances), dtype=int)
+        """Return the mean of a chain of velocities (2, R) by Metropolis and Hastings, without those that are burned.
+
+        velocities (2, S, R), energies (S, R); chances: numbers from 0 to 1 (S - 1, R).
+        """
+        robots, chosen = np.arange(energies.shape[1]), np.zeros(energies.shape, dtype=int)
         for sample in range(1, SAMPLES + 1):
-            gain = energies[chosen, robots] - energies[sample]
-            chosen = np.where(chances[:, sample - 1] < np.exp(np.minimum(gain, 0.0)), sample, chosen)
-            if sample > BURNED:
-                total += velocities[chosen, robots]
-        mean: np.ndarray = total / (SAMPLES - BURNED)
+            before = chosen[sample - 1]
+            gain = energies[before, robots] - energies[sample]
+            chosen[sample] = np.where(chances[sample - 1] < np.exp(np.minimum(gain, 0.0)), sample, before)
+        mean: np.ndarray = velocities[:, chosen[BURNED + 1 :], robots].mean(axis=1)
         return mean
 
 
@@ -159,10 +168,12 @@ class Molecules(RandomFields):
         kind = (sensed.numbers % (int(self.bonds) + 1) == 0).astype(int)
         bound = np.full((robots, int(self.bonds)), -1) if memory is None else memory[:, 2:-1].astype(int)
         bound = self.bind(near, kind, bound)
-        is_bound = (near.rows[:, :, None] == bound[:, None]).any(axis=2) & near.seen
+        is_bound, (rows, places) = np.zeros_like(near.seen), np.nonzero(bound >= 0)
+        is_bound[rows, bound[rows, places] % sensed.count] = True
         charges = np.where(kind, self.center_charge, self.charge)
         product = charges[:, None] * charges[near.rows] / UNIT_CHARGE
-        signs, mass = np.where(is_bound, product, UNBOUND * near.seen), np.where(kind, self.center_mass, self.mass)
+        signs = np.where(is_bound & near.seen, product, UNBOUND * near.seen)
+        mass = np.where(kind, self.center_mass, self.mass)
         wanted, *speeds = self.choose(sensed, memory, signs, mass, random)
         return speeds[0], speeds[1], np.column_stack((wanted, bound, kind))
 

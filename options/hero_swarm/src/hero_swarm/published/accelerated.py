@@ -32,7 +32,8 @@ class Accelerated(PotentialSegregation):
         pull_1_s2 = (range_m - rest_m + 1.0 / range_m - rest_m / square_m2) * near.seen / range_m
         velocity = np.zeros((2, len(group))) if memory is None else memory[:, :2].T
         force = np.array([(pull_1_s2 * part).sum(axis=1) for part in (near.forward_m, near.left_m)])
-        damping = (velocity[:, near.rows] - velocity[:, :, None]).sum(axis=2)
+        of_worlds = velocity.reshape(2, -1, sensed.count).sum(axis=2)
+        damping = np.repeat(of_worlds, sensed.count, axis=1) - sensed.count * velocity
         acceleration = turn(force, sensed.poses[:, 2]) + damping
         driven = turn(velocity + 0.5 * acceleration / self.rate_hz, -sensed.poses[:, 2])
         velocity = velocity + acceleration / self.rate_hz
