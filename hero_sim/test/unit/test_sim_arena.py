@@ -228,3 +228,12 @@ def test_more_starts_than_robots_can_be_are_refused(tmp_path):
     rows = ", ".join("[%d, %d, 0]" % (number % 100, number // 100) for number in range(1001))
     with pytest.raises(OptionError, match="starts_m_deg has 1001 starts, more than 1000"):
         load_arena(write(tmp_path, "bounds_m: [-1, -1, 101, 101]\nstarts_m_deg: [%s]\n" % rows))
+
+
+def test_an_area_covers_its_border_and_nothing_beyond():
+    rectangle = arenas.Area("nest", (-0.5, 0.25, 0.5, 1.0), (0.0, 0.0, 0.0))
+    x_m, y_m = np.array([(-0.5, 0.25), (0.5, 1.0), (0.0, 0.5), (-0.51, 0.5), (0.51, 0.5), (0.0, 0.24), (0.0, 1.01)]).T
+    assert rectangle.covers(x_m, y_m).tolist() == [True] * 3 + [False] * 4
+    circle = arenas.Area("source", (1.0, -1.0, 0.25), (0.0, 0.0, 0.0))
+    x_m, y_m = np.array([(1.25, -1.0), (1.0, -0.75), (1.2, -0.8)]).T
+    assert circle.covers(x_m, y_m).tolist() == [True, True, False]

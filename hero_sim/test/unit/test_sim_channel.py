@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from driver_side import RECEIVED, SENT, VELOCITY, DriverSide
 
+from hero_driver.rosserial import packets
 from hero_sim.errors import OptionError
 from hero_sim.link.channel import Channel
 from hero_sim.link.wifi import MAX_CHANNELS, build_network, parse_wifi
+from hero_sim.stepped.rules import radio_rows, readings
 from hero_sim.stepped.swarm import StepSwarm
 from hero_test.nonempty import nonempty
 
@@ -109,3 +112,20 @@ def test_a_network_that_is_not_known_is_refused(text, told):
     with pytest.raises(OptionError, match=told) as refused:
         StepSwarm(2, wifi=text)
     assert str(refused.value).startswith(f"--wifi '{text}'")
+
+
+def test_stepped_robots_send_and_are_sent_as_many_bytes_as_others():
+    driver = DriverSide("--count", "1")
+    driver.start_streaming()
+    driver.send(0, RECEIVED["laser_enable"], b"\1")
+    driver.run(500)
+
+    def measure(names):
+        arrivals = driver.list_packets(0, SENT[names[0]])
+        cycle = [packet for packet in driver.arrivals[0] if packet.at_ms == arrivals[-1].at_ms]
+        sent = [packet for packet in cycle if packet.topic_id in [SENT[name] for name in names]]
+        return sum(len(packets.encode_packet(packet.topic_id, packet.payload)) for packet in sent)
+
+    assert measure(["odom", "tf", "encoder"]) == radio_rows.LENGTHS[readings.WHEELS]
+    assert measure(["laser"]) == radio_rows.LENGTHS[readings.SCAN]
+    assert len(packets.encode_packet(VELOCITY, bytes(6 * 8))) == radio_rows.COMMAND_LENGTH

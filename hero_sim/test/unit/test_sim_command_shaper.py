@@ -5,7 +5,7 @@ import struct
 import numpy as np
 import pytest
 
-from hero_driver.commands import velocity_shaper
+from hero_driver.commands import STOP_REPEATS, velocity_shaper
 from hero_driver.commands.velocity_shaper import VelocityShaper
 from hero_sim.stepped.rules.command_shaper import INTERVAL_MS, MAX_AGE_MS, CommandShaper
 
@@ -92,3 +92,12 @@ def test_motion_that_waits_too_long_is_dropped_but_a_stop_is_sent():
     shaper.offer(10, [0, 1], [0.2, 0.0], 0.0)
     sent = shaper.take(10 + MAX_AGE_MS + 1)
     assert sent.rows.tolist() == [1] and not sent.values.any()
+
+
+def test_motion_that_grew_old_behind_a_stop_is_not_sent_as_its_repeat():
+    shaper = CommandShaper(1, 0.0)
+    shaper.delay_until(np.array([0]), np.array([MAX_AGE_MS + 1]))
+    shaper.offer(0, 0, 0.0, 0.0)
+    shaper.offer(0, 0, 0.2, 0.0)
+    sent = [shaper.take(MAX_AGE_MS + 1 + index * INTERVAL_MS).values.tolist() for index in range(STOP_REPEATS + 2)]
+    assert sent == [[[0.0], [0.0]]] * (STOP_REPEATS + 1) + [[[], []]]

@@ -167,6 +167,20 @@ def test_a_full_receive_window_leaves_the_rest_with_the_sender(bench):
     assert ("pause", 0, False) in link.calls, "read again when the robot has taken them"
 
 
+def test_commands_reach_a_robot_when_its_radio_has_carried_them(bench):
+    simulator, _, _, _ = bench("--wifi", "router")
+    taken, sent_ms = [], simulator.swarm.now_ms
+    simulator.swarm.robots[0].receive_bytes = lambda now_ms, data: taken.append((now_ms, data))
+    simulator.receive_bytes(0, b"first, ")
+    simulator.receive_bytes(0, b"second")
+    assert taken == [], "the radio needs its time"
+    while len(b"".join(data for _, data in taken)) < len(b"first, second") and simulator.swarm.now_ms < sent_ms + 60000:
+        simulator.swarm.now_ms += 1
+        simulator._carry(simulator.swarm.now_ms)
+    assert b"".join(data for _, data in taken) == b"first, second"
+    assert all(now_ms > sent_ms for now_ms, _ in taken)
+
+
 def test_a_robot_that_crashed_restarts_and_is_named(bench):
     simulator, lines, link, _ = bench()
     robot = simulator.swarm.robots[0]

@@ -54,8 +54,11 @@ class Driver:
         assert self.events.seen == ["made"] and not self.link.is_connecting(0) and self.link.count_open() == 1
 
     def poll_until(self, is_done):
-        while not is_done():
-            self.link.poll(1.0)
+        for _ in range(100):
+            if is_done():
+                return
+            self.link.poll(0.2)
+        pytest.fail("the link is idle; it told of %s and gave %r" % (self.events.seen, self.events.received))
 
     def fill(self):
         """Send numbered pieces until the link is full; return all that was sent."""
@@ -83,6 +86,15 @@ def driver():
     yield made
     made.link.close_all()
     made.socket.close()
+
+
+def test_bytes_of_a_driver_reach_the_robot_and_its_end_is_told(driver):
+    driver.socket.sendall(b"bytes")
+    driver.poll_until(lambda: driver.events.received)
+    assert (driver.events.received, driver.events.seen) == (b"bytes", ["made"])
+    driver.socket.close()
+    driver.poll_until(lambda: driver.events.seen[-1] == "lost")
+    assert driver.events.received == b"bytes"
 
 
 def test_what_a_driver_does_not_read_waits_and_is_sent_when_it_does(driver):
