@@ -77,9 +77,9 @@ def find_energies(groups, apart_m, velocities):
     given = np.repeat(np.array(velocities, dtype=float).T[:, :, None], 2, axis=2)
     signs = {}
     behavior.choose = lambda sensed, memory, found, *rest: signs.update(found=found) or np.zeros((3, 2))
-    sensed = SimpleNamespace(near=near, numbers=np.array(groups))
+    sensed = SimpleNamespace(near=near, numbers=np.array(groups), poses=poses[0])
     behavior.step(sensed, None, None)
-    return behavior.find_energies(near, poses[0, :, 2], np.zeros((2, 2)), signs["found"], behavior.mass, given)[:, 0]
+    return behavior.find_energies(sensed, np.zeros((2, 2)), signs["found"], behavior.mass, given)[:, 0]
 
 
 def test_a_velocity_is_the_likelier_the_nearer_it_leads_to_the_own_group():

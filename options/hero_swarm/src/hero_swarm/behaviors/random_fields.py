@@ -83,7 +83,7 @@ class RandomFields(Segregation):
         drawn = random.normal(2 * SAMPLES).T.reshape(SAMPLES, 2, -1)
         velocities[:, 1:] = own[:, None] + self.spread * drawn.swapaxes(0, 1)
         velocities /= np.maximum(np.hypot(*velocities), 1.0)
-        energies = self.find_energies(sensed.near, sensed.poses[:, 2], own, signs, mass, velocities)
+        energies = self.find_energies(sensed, own, signs, mass, velocities)
         wanted = self._draw(velocities, energies, random.random(SAMPLES).T)
         command = self.max_linear_m_s * turn(wanted, -sensed.poses[:, 2]) + keep_clear(
             sensed.infrared.ranges_m, self.clear_m, 2.0
@@ -94,15 +94,10 @@ class RandomFields(Segregation):
         )
 
     def find_energies(
-        self,
-        near: Neighborhood,
-        yaw_rad: np.ndarray,
-        own: np.ndarray,
-        signs: np.ndarray,
-        mass: Any,
-        velocities: np.ndarray,
+        self, sensed: Sensed, own: np.ndarray, signs: np.ndarray, mass: Any, velocities: np.ndarray
     ) -> np.ndarray:
         """Return the energies (S, R) of velocities (2, S, R); own: those of now (2, R); signs, mass: see choose()."""
+        near, yaw_rad = sensed.near, sensed.poses[:, 2]
         reach = self.max_linear_m_s / self.rate_hz  # m in a step at full speed
         energies, relative = np.zeros(velocities.shape[1:]), np.zeros_like(velocities)
         flock = np.ones_like(energies)

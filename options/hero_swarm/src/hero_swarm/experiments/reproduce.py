@@ -6,9 +6,7 @@ published ones is shown beside the verdict. Published figures and their sources:
 
 import argparse
 import difflib
-import hashlib
 import io
-import json
 import os
 import shutil
 from pathlib import Path
@@ -30,9 +28,6 @@ from .results import Results, load
 
 SHIPPED = Path(__file__).resolve().parents[1] / "published"
 FIGURES = "published.yaml"
-COPIED = "copied.json"
-"""File beside the user's copies: their digests as they were copied."""
-
 WITHIN, OPEN, OUTSIDE, NO_FIGURE = "within", "open", "no", "no published figure"
 """Verdicts."""
 
@@ -120,43 +115,20 @@ def _parse_figure(entry: Entry) -> Figure:
 def copy_files(folder: str) -> None:
     """Copy the experiments, and what they need, to a folder; files that are there stay as they are."""
     os.makedirs(folder, exist_ok=True)
-    copied = _read_copied(Path(folder))
     for path in SHIPPED.iterdir():
         own = Path(folder) / path.name
         if path.is_file() and path.name != FIGURES and not own.exists():
             shutil.copyfile(str(path), str(own))
-            copied[path.name] = _digest(own)
-    write_file(os.path.join(folder, COPIED), (json.dumps(copied, indent=1, sort_keys=True) + "\n").encode())
-
-
-def _read_copied(folder: Path) -> Dict[str, Any]:
-    """Return the digests of files as they were copied to a folder, by name; none of a folder without them."""
-    try:
-        copied = json.loads((folder / COPIED).read_text())
-    except (OSError, ValueError):
-        return {}
-    return copied if isinstance(copied, dict) else {}
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def list_changes(file: str) -> List[str]:
-    """Return what the user's file, and those beside it that it names, have else than what is published.
-
-    The lines that differ, and which files are as they were copied, but from an earlier version of the suite.
-    """
-    changes, shipped, copied = [], SHIPPED / os.path.basename(file), _read_copied(Path(file).parent)
+    """Return the lines in which the user's file, and those beside it that it names, differ from what is published."""
+    changes, shipped = [], SHIPPED / os.path.basename(file)
     for path in sorted(SHIPPED.iterdir()):
         own = Path(file).parent / path.name
-        if not own.is_file() or not (path == shipped or path.name in shipped.read_text()):
-            continue
-        if _digest(own) == copied.get(path.name) != _digest(path):
-            changes.append(f"{own} is of an earlier version of the suite: delete it, and run with --fresh")
-            continue
-        lines = difflib.ndiff(path.read_text().splitlines(), own.read_text(errors="replace").splitlines())
-        changes += [f"{path.name}: {line}" for line in lines if line[0] in "-+"]
+        if own.is_file() and (path == shipped or path.name in shipped.read_text()):
+            lines = difflib.ndiff(path.read_text().splitlines(), own.read_text(errors="replace").splitlines())
+            changes += [f"{path.name}: {line}" for line in lines if line[0] in "-+"]
     return changes
 
 

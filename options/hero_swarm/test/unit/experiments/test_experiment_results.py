@@ -334,6 +334,7 @@ def test_what_runs_record_is_found_by_cell_and_seed(tmp_path):
 
 
 def test_code_is_the_files_of_all_packages_and_the_users_modules(tmp_path, monkeypatch):
+    tmp_path /= "published"  # left out inside of packages, while a checkout may lie in any folder
     for package in code_version.PACKAGES:
         (tmp_path / package / "deep" / "__pycache__").mkdir(parents=True)
         for name in ("__init__.py", "module.py"):
@@ -356,6 +357,8 @@ def test_code_is_the_files_of_all_packages_and_the_users_modules(tmp_path, monke
     assert change(inner / "arena.yaml")
     assert not change(tmp_path / "devel" / "hero_sim" / "__init__.py"), "of a devel space, which names the others"
     assert not change(inner / "notes.txt") and not change(inner / "__pycache__" / "c.py")
+    (inner / "published").mkdir()
+    assert not change(inner / "published" / "own.py"), "runs read what they need of these as files of the user"
     before = code_version.hash_code({})
     (inner / "new.py").rename(inner / "other.py")
     assert len(before) == 16 and code_version.hash_code({}) != before

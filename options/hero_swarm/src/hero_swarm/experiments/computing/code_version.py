@@ -48,8 +48,9 @@ def list_suite() -> Dict[str, bytes]:
         # In a devel space of catkin, the first folder holds but an __init__.py that leads to the second one.
         folder = next(folder for folder in folders if {path.name for path in folder.glob("*.py")} > {"__init__.py"})
         for path in sorted(folder.rglob("*")):
-            if path.suffix in _SUFFIXES and not {"__pycache__", "published"}.intersection(path.parts):
-                contents[f"{package}/{path.relative_to(folder)}"] = path.read_bytes()
+            own = path.relative_to(folder)
+            if path.suffix in _SUFFIXES and not {"__pycache__", "published"}.intersection(own.parts):
+                contents[f"{package}/{own}"] = path.read_bytes()
     return contents
 
 

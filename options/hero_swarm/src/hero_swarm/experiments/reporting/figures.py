@@ -22,14 +22,11 @@ _POINT_SPREAD = 0.12
 # Okabe and Ito's palette (2008) without its yellow, which is hard to see on white.
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
-_DASHES = (1.0, 1.5, 3.0, 5.0)
-
 
 def _choose_style(index: int) -> Dict[str, Any]:
     """Return a color and a line style that no other index has."""
-    dashes = index // len(_COLORS)
-    lengths = [length for dash in range(dashes) for length in (_DASHES[dash % len(_DASHES)], 1.5)]
-    return {"color": _COLORS[index % len(_COLORS)], "linestyle": (0, lengths) if lengths else "-"}
+    dash = 2.0 * (index // len(_COLORS))
+    return {"color": _COLORS[index % len(_COLORS)], "linestyle": (0, (dash, 1.5)) if dash else "-"}
 
 
 def draw_all(report: Report, results: Results) -> Dict[str, Figure]:
