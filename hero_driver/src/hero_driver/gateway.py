@@ -84,8 +84,7 @@ class Gateway(LinkHandler):
             return refusal
         now_s = time.monotonic()
         session = Session(self._config, now_s)
-        rate_limit = RateLimit(self._config.max_packets_per_s, self._config.max_bytes_per_s, now_s)
-        peer = Peer(link, session, rate_limit, self, self._loop.call_later)
+        peer = Peer(link, session, RateLimit(self._config, now_s), self, self._loop.call_later)
         self.peers[link] = peer
         self.poll_link(link, now_s)
         return None

@@ -6,7 +6,6 @@ rosrun hero_driver hero_driver _port:=11412
 import errno
 import functools
 import io
-import logging
 import os
 import queue
 import signal
@@ -263,14 +262,12 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     if running:
         text = "a driver already runs as %s: end it, or start this one with another name:= and port:= (simulated robots"
         raise ProgramError(text % running + " alone: roslaunch hero_sim hero_sim.launch)")
-    # A log line that cannot be written must not become a dozen lines of traceback.
-    logging.raiseExceptions = False
+    report_dropped_log_lines()
     limit_xmlrpc_connections()
     open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
     rospy_internals.keep_publishers_connected()
     init_ros_node(NODE_NAME, arguments=argv)
     rospy_internals.leave_topics_out_of_rosout()
-    report_dropped_log_lines()
 
 
 def _wait_for_master(uri: str) -> None:

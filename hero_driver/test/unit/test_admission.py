@@ -128,7 +128,7 @@ def test_a_refused_connection_counts_nowhere():
 
 
 def make_rate_limit(max_packets_per_s, max_bytes_per_s):
-    return RateLimit(max_packets_per_s, max_bytes_per_s, 0.0)
+    return RateLimit(AdmissionLimits(max_packets_per_s=max_packets_per_s, max_bytes_per_s=max_bytes_per_s), 0.0)
 
 
 def test_a_stock_robot_stays_far_below_the_rate_limits():

@@ -11,7 +11,7 @@ class TokenBucket:
 
     def __init__(self, burst: float, per_s: float, now_s: float) -> None:
         """Begin full: burst tokens may be taken at once, and per_s more in each second after that."""
-        self._burst = burst
+        self.burst = burst
         self._per_s = per_s
         self._tokens = burst
         self._filled_s = now_s
@@ -27,7 +27,7 @@ class TokenBucket:
 
     def count(self, now_s: float) -> float:
         """Return how many tokens there are."""
-        return min(self._burst, self._tokens + self._per_s * (now_s - self._filled_s))
+        return min(self.burst, self._tokens + self._per_s * (now_s - self._filled_s))
 
 
 class TokenBuckets:

@@ -4,7 +4,7 @@ import ipaddress
 from dataclasses import dataclass
 from typing import Any, Optional, Tuple, Union
 
-from hero_node import ConnectionTable, TokenBuckets
+from hero_node import ConnectionTable, TokenBucket, TokenBuckets
 from hero_node.parameters import Parameter, declare, make_error, whole_number
 
 Network = Union[ipaddress.IPv4Network, ipaddress.IPv6Network]
@@ -129,25 +129,17 @@ class Admission:
 
 
 class RateLimit:
-    """Limits of one connection's packets and bytes per second: the times up to which the rates are used."""
+    """Limits of one connection's packets and bytes per second; at once it may use those of one second."""
 
-    def __init__(self, max_packets_per_s: int, max_bytes_per_s: int, now_s: float) -> None:
+    def __init__(self, limits: AdmissionLimits, now_s: float) -> None:
         """Begin at now_s (monotonic) with nothing counted."""
-        self._max_packets_per_s = max_packets_per_s
-        self._max_bytes_per_s = max_bytes_per_s
-        self._packets_until_s = self._bytes_until_s = now_s
+        self._packets = TokenBucket(limits.max_packets_per_s, limits.max_packets_per_s, now_s)
+        self._bytes = TokenBucket(limits.max_bytes_per_s, limits.max_bytes_per_s, now_s)
 
     def admit(self, packets: int, length: int, now_s: float) -> Optional[str]:
         """Count what one read brought; return why it is too much, None if it is not."""
-        # max() costs more than all else here.
-        if self._packets_until_s < now_s:
-            self._packets_until_s = now_s
-        if self._bytes_until_s < now_s:
-            self._bytes_until_s = now_s
-        self._packets_until_s += packets / self._max_packets_per_s
-        self._bytes_until_s += length / self._max_bytes_per_s
-        if self._packets_until_s > now_s + 1.0:
-            return "more than %d packets per second (~max_packets_per_s)" % self._max_packets_per_s
-        if self._bytes_until_s > now_s + 1.0:
-            return "more than %d bytes per second (~max_bytes_per_s)" % self._max_bytes_per_s
+        if not self._packets.take(packets, now_s):
+            return "more than %d packets per second (~max_packets_per_s)" % self._packets.burst
+        if not self._bytes.take(length, now_s):
+            return "more than %d bytes per second (~max_bytes_per_s)" % self._bytes.burst
         return None

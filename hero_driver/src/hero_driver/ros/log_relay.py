@@ -8,7 +8,7 @@ from typing import Dict, List, Tuple
 from hero_node import TokenBuckets, print_error
 
 from ..transport.call_queue import Worker
-from .rospy_internals import ROSOUT_LOGGER, list_log_handlers
+from .rospy_internals import ROSOUT_LOGGER
 
 QUEUE_LENGTH = 2000
 THROTTLE_S = 10.0
@@ -68,10 +68,10 @@ class LogRelay:
 
 
 def report_dropped_log_lines() -> None:
-    """After rospy has set its logging up: say once, on stderr, what keeps lines out of the log file."""
+    """Say once, on stderr, what keeps lines out of the log file; Python would print a traceback for each."""
     told: List[BaseException] = []
 
-    def tell(record: logging.LogRecord) -> None:
+    def tell(handler: logging.Handler, record: logging.LogRecord) -> None:
         error = sys.exc_info()[1]
         if error is not None and not told:
             told.append(error)
@@ -80,5 +80,4 @@ def report_dropped_log_lines() -> None:
                 " ~/.ros/log" % error
             )
 
-    for handler in list_log_handlers():
-        handler.handleError = tell  # type: ignore[method-assign]
+    logging.Handler.handleError = tell  # type: ignore[method-assign, assignment]

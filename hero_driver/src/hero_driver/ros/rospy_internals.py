@@ -3,11 +3,10 @@
 Sources: rospy 1.15 to 1.17 (impl/tcpros_base.py, impl/rosout.py, topics.py).
 """
 
-import logging
 import socket
 import time
 from types import SimpleNamespace
-from typing import Any, Callable, FrozenSet, List, Optional, Tuple
+from typing import Any, Callable, FrozenSet, Optional, Tuple
 
 import rosgraph
 import rospy
@@ -156,11 +155,6 @@ def leave_topics_out_of_rosout() -> None:
     """
     rosout.rospy = SimpleNamespace(names=rospy.names, get_param_cached=lambda *_: False, has_param=lambda _: False)
     rosout.get_topic_manager = lambda: SimpleNamespace(get_topics=list)
-
-
-def list_log_handlers() -> List[logging.Handler]:
-    """Return what rospy writes log lines with: to /rosout, the terminal and the log file."""
-    return [handler for name in ("", ROSOUT_LOGGER, "rospy") for handler in logging.getLogger(name).handlers]
 
 
 # The end.

@@ -1,11 +1,11 @@
 """Encodes and decodes the payloads of rosserial's own packets, little endian, in the order of their definitions."""
 
 import struct
-from typing import NamedTuple
+from typing import List, NamedTuple, Tuple
 
 from hero_node import LENGTH, encode_text
 
-from .packets import Bytes, RosserialError
+from .packets import RosserialError
 
 _UINT16 = struct.Struct("<H")
 _INT32 = struct.Struct("<i")
@@ -46,35 +46,17 @@ class WireTime(NamedTuple):
     nsecs: int
 
 
-class _Cursor:
-    """Reads fields one after another; every short or odd field is a PayloadError that names it."""
-
-    def __init__(self, data: Bytes, what: str) -> None:
-        self._data = bytes(data)
-        self._what = what
-        self._position = 0
-
-    def read_bytes(self, length: int, field: str) -> bytes:
-        start, end = self._position, self._position + length
-        if end > len(self._data):
-            raise PayloadError(
-                "%s: field %s needs %d bytes, %d are left" % (self._what, field, length, len(self._data) - start)
-            )
-        self._position = end
-        return self._data[start:end]
-
-    def read_number(self, layout: struct.Struct, field: str) -> int:
-        value: int = layout.unpack(self.read_bytes(layout.size, field))[0]
-        return value
-
-    def read_text(self, field: str) -> str:
+def _read_texts(payload: bytes, start: int, count: int, what: str) -> Tuple[List[str], bytes]:
+    """Return the texts from start on, and what follows them. Raises: PayloadError if payload is too short for them."""
+    texts = []
+    for _ in range(count):
+        begin = start + LENGTH.size
+        start = begin + int.from_bytes(payload[start:begin], "little")
+        if max(begin, start) > len(payload):
+            raise PayloadError(f"{what}: its texts need more than {len(payload)} bytes")
         # Peers are not trusted to send UTF-8: what cannot be read stays visible as an escape.
-        return self.read_bytes(self.read_number(LENGTH, field), field).decode("utf-8", "backslashreplace")
-
-    def finish(self) -> None:
-        left = len(self._data) - self._position
-        if left:
-            raise PayloadError("%s: %d bytes follow its last field" % (self._what, left))
+        texts.append(payload[begin:start].decode("utf-8", "backslashreplace"))
+    return texts, payload[start:]
 
 
 def encode_topic_info(info: TopicInfo) -> bytes:
@@ -83,18 +65,12 @@ def encode_topic_info(info: TopicInfo) -> bytes:
     return b"".join((_UINT16.pack(info.topic_id), *texts, _INT32.pack(info.buffer_length)))
 
 
-def decode_topic_info(payload: Bytes) -> TopicInfo:
+def decode_topic_info(payload: bytes) -> TopicInfo:
     """Return what payload declares. Raises: PayloadError if it is cut short or longer than its fields."""
-    cursor = _Cursor(payload, "TopicInfo")
-    info = TopicInfo(
-        cursor.read_number(_UINT16, "topic_id"),
-        cursor.read_text("topic_name"),
-        cursor.read_text("message_type"),
-        cursor.read_text("md5sum"),
-        cursor.read_number(_INT32, "buffer_size"),
-    )
-    cursor.finish()
-    return info
+    texts, remainder = _read_texts(payload, _UINT16.size, 3, "TopicInfo")
+    if len(remainder) != _INT32.size:
+        raise PayloadError(f"TopicInfo: {len(remainder)} bytes follow its texts instead of {_INT32.size}")
+    return TopicInfo(*_UINT16.unpack_from(payload), *texts, *_INT32.unpack(remainder))
 
 
 def encode_log(log: Log) -> bytes:
@@ -102,13 +78,12 @@ def encode_log(log: Log) -> bytes:
     return bytes((log.level,)) + encode_text(log.text)
 
 
-def decode_log(payload: Bytes) -> Log:
+def decode_log(payload: bytes) -> Log:
     """Return the log line in payload, color codes and all. Raises: PayloadError as decode_topic_info()."""
-    cursor = _Cursor(payload, "Log")
-    level = cursor.read_bytes(1, "level")[0]
-    log = Log(level, cursor.read_text("msg"))
-    cursor.finish()
-    return log
+    texts, remainder = _read_texts(payload, 1, 1, "Log")
+    if remainder:
+        raise PayloadError(f"Log: {len(remainder)} bytes follow its text")
+    return Log(payload[0], texts[0])
 
 
 def encode_time(time: WireTime) -> bytes:
@@ -119,7 +94,7 @@ def encode_time(time: WireTime) -> bytes:
         raise PayloadError(f"Time: {time!r} does not fit two 32-bit numbers ({error})") from error
 
 
-def decode_time(payload: Bytes) -> WireTime:
+def decode_time(payload: bytes) -> WireTime:
     """Return the time in payload. Raises: PayloadError unless payload has eight bytes."""
     if len(payload) != _TIME.size:
         raise PayloadError(f"Time: has {len(payload)} bytes instead of 8")

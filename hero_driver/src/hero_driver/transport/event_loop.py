@@ -372,15 +372,9 @@ def _listen(host: str, port: int) -> socket.socket:
         # What is no name at all ("10.42.0..1") is a UnicodeError of the codec for names.
         reason = describe_error(error) if isinstance(error, OSError) else "not a host's name"
         raise HostNotFoundError(f"{host!a} cannot be found ({reason})") from error
-    family, kind, protocol, _, target = found[0]
-    sock = socket.socket(family, kind, protocol)
-    try:
-        # A driver that starts again must not wait for the old one's connections to time out.
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        sock.bind(target)
-        sock.listen(LISTEN_BACKLOG)
-        sock.setblocking(False)
-    except OSError:
-        sock.close()
-        raise
-    return sock
+    family, _, _, _, target = found[0]
+    # SO_REUSEADDR is set: a driver that starts again need not wait for the old one's connections to time out.
+    dualstack = family == socket.AF_INET6 and socket.has_dualstack_ipv6()
+    listener = socket.create_server(target, family=family, backlog=LISTEN_BACKLOG, dualstack_ipv6=dualstack)
+    listener.setblocking(False)
+    return listener
