@@ -51,7 +51,7 @@ def make_folder(folder: str) -> None:
 
 
 def save(path: str, calibration: KeptCalibration) -> None:
-    """Write a file; the previous one is kept beside it. Its comments and values that were not measured again stay.
+    """Write a file; the previous one is kept beside it. Values that were not measured again stay, with their comments.
 
     A damaged previous file, or one of another robot or model, does not prevent the new one. Raises: CalibrationError.
     """

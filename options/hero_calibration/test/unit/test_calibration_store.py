@@ -77,7 +77,7 @@ def test_comments_stay_when_a_robot_is_calibrated_again(tmp_path):
     path = store.name_file(str(tmp_path), 3)
     store.save(path, KeptCalibration(3, "2026-11-01", {"motor_centers_us": [1500.0, 1510.0]}))
     with open(path, encoding="utf-8") as file:
-        text = "# new servos\n" + file.read().replace("1510.0]", "1510.0]  # by hand")
+        text = "# new servos\n" + file.read().replace("robot: hero_3", "robot: hero_3  # Ada")
     with open(path, "w", encoding="utf-8") as file:
         file.write(text)
     store.save(path, KeptCalibration(3, "2026-11-02", {"motor_centers_us": [1505.0, 1510.0]}))
