@@ -8,19 +8,12 @@ import math
 from collections import deque
 from typing import Deque, Optional, Tuple
 
-from hero_node import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
+from hero_node import Pose, measure_distance, wrap_angle
 
-DRIVE_M = 0.04
-"""Headings are compared over drives of this length: measured poses are a few millimeters off."""
-
-MAX_TURN_RAD = 0.3
-"""A drive that bends by more shows no direction."""
-
-MIN_SHARE = 0.7
-"""A robot that came less far than this share of what odometry counted was blocked, and shows no direction."""
+from .heading_check import HeadingCheck
 
 WRONG_HEADING_RAD = math.pi / 4.0
-"""Controllers reach goals with smaller errors; a robot that slides along a wall by MIN_SHARE is off by this at most."""
+"""Controllers reach goals with smaller errors; one that slides along a wall (MIN_SHARE) is off by less."""
 
 WRONG_DRIVES = 2
 """Number of drives in a row: a single one may be a correction of the pose."""
@@ -30,7 +23,6 @@ JUMP_M = 0.1
 
 JUMPS, JUMP_WINDOW_S = 3, 10.0
 """Number of jumps within this time: a robot that is moved by hand, or found again, jumps once."""
-
 
 FROZEN_S = 3.0
 FROZEN_M, FROZEN_RAD = 0.1, 1.0
@@ -67,39 +59,24 @@ class PoseCheck:
 
     def __init__(self) -> None:
         self._last: Optional[Tuple[Pose, Pose]] = None
-        self._start: Optional[Tuple[Pose, Pose]] = None
-        self._wrong_drives = 0
+        self._heading = HeadingCheck(WRONG_DRIVES)
         self._jumps_s: Deque[float] = deque(maxlen=JUMPS)
 
     def add(self, pose: Pose, odometry: Pose, now_s: float) -> str:
         """Take both poses, each in its own frame, at every step; return what is wrong, for users, else nothing."""
-        last, self._last = self._last, (pose, odometry)
-        if last is None or self._start is None:
-            self._start = self._last
-            return ""
+        last, self._last = self._last or (pose, odometry), (pose, odometry)
         jump_m = abs(measure_distance(last[0], pose) - measure_distance(last[1], odometry))
         if jump_m > JUMP_M:
-            self._start = self._last
+            self._heading = HeadingCheck(WRONG_DRIVES)
             self._jumps_s.append(now_s)
             if len(self._jumps_s) == JUMPS and now_s - self._jumps_s[0] <= JUMP_WINDOW_S:
                 text = "its pose jumps, the last time by %.2f m: is its tag there twice, or is the robot moved by hand?"
                 return text % jump_m
-            return ""
-        start_pose, start_odometry = self._start
-        drive = transform_pose(invert_pose(start_odometry), odometry)
-        is_bent = abs(wrap_angle(drive.yaw_rad)) > MAX_TURN_RAD
-        driven_m = math.hypot(drive.x_m, drive.y_m)
-        if driven_m < DRIVE_M and not is_bent:
-            return ""
-        self._start = self._last
-        moved = transform_pose(invert_pose(start_pose), pose)
-        if is_bent or math.hypot(moved.x_m, moved.y_m) < MIN_SHARE * driven_m:
-            return ""
-        error_rad = wrap_angle(math.atan2(drive.y_m, drive.x_m) - math.atan2(moved.y_m, moved.x_m))
-        self._wrong_drives = self._wrong_drives + 1 if abs(error_rad) > WRONG_HEADING_RAD else 0
-        if self._wrong_drives < WRONG_DRIVES:
+        self._heading.add(pose, odometry)
+        errors_rad = self._heading.errors_rad
+        if len(errors_rad) < WRONG_DRIVES or min(map(abs, errors_rad)) <= WRONG_HEADING_RAD:
             return ""
         return (
             "the heading of its pose is about %.0f degrees off the direction in which it drives: is its tag on upside"
-            " down? `rosrun hero_localization calibrate_camera robots` measures it" % math.degrees(error_rad)
+            " down? `rosrun hero_localization calibrate_camera robots` measures it" % math.degrees(errors_rad[-1])
         )

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from hero_client.controllers import HeadingCheck, is_upside_down
 from hero_localization.camera.camera_model import Camera, Intrinsics
-from hero_localization.filter.heading_check import HeadingCheck, is_upside_down
 from hero_localization.tracking.tag_pose import (
     SYSTEMATIC_M,
     SYSTEMATIC_RAD,

@@ -9,10 +9,10 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from hero_client.controllers import is_upside_down
 from hero_node import Pose, wrap_angle
 
 from ..errors import CalibrationError
-from ..filter.heading_check import is_upside_down
 
 CALIBRATION_DRIVE = (
     (0.5, 0.0, 0.0),

@@ -9,9 +9,9 @@ from typing import Dict, Iterable, List, NamedTuple, Optional
 
 import numpy as np
 
+from hero_client.controllers import HeadingCheck, is_upside_down
 from hero_node import Pose, list_names, measure_distance, transform_pose, wrap_angle
 
-from .heading_check import HeadingCheck, is_upside_down
 from .pose_filter import Outcome, PoseFilter, is_near
 from .pose_hypothesis import StampedPose
 from .pose_sources import DISAGREEING_S, NO_OFFSET, PoseSources

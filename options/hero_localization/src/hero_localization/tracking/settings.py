@@ -79,7 +79,7 @@ def find_change_s(path: str) -> float:
 
 
 def update(path: str, parts: Mapping[str, Any]) -> None:
-    """Write these parts into a file, or begin it; entries that stay equal keep their comments. Raises: SettingsError."""
+    """Write these parts into a file, or begin it; entries that stay keep their comments. Raises: SettingsError."""
     path = os.path.expanduser(path)
     try:
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)

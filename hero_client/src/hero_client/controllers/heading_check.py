@@ -1,4 +1,4 @@
-"""Checks tags' headings: where a robot goes by the camera when it drives forward by its odometry. Pure."""
+"""Checks headings measured from outside: where a robot goes by them when it drives forward by its odometry. Pure."""
 
 import math
 from collections import deque
@@ -8,8 +8,11 @@ from hero_node import Pose, invert_pose, transform_pose, wrap_angle
 
 MIN_DRIVE_M = 0.04
 """Poses are a millimeter off: over this distance, a direction is right to 2 degrees."""
-MAX_TURN_RAD = 0.15
-MIN_SHARE = 0.5
+
+MAX_TURN_RAD = 0.3
+"""A drive that bends by more shows no direction."""
+
+MIN_SHARE = 0.7
 """A robot that came less far than this share of what odometry counted was blocked, and shows no direction."""
 
 DRIVES = 3
@@ -17,14 +20,14 @@ DRIVES = 3
 
 
 class HeadingCheck:
-    """Compares headings and drives of one robot."""
+    """Compares headings and drives of one robot; errors_rad: by each of the last drives."""
 
-    def __init__(self) -> None:
+    def __init__(self, drives: int = DRIVES) -> None:
+        self.errors_rad: Deque[float] = deque(maxlen=drives)
         self._start: Optional[Tuple[Pose, Pose]] = None
-        self._errors_rad: Deque[float] = deque(maxlen=DRIVES)
 
     def add(self, seen: Pose, odometry: Pose) -> None:
-        """Take a pose by the camera, of any frame, and that by odometry at the same time, of any frame."""
+        """Take a measured pose, and that by odometry at the same time, each in any frame."""
         if self._start is not None:
             start_seen, start = self._start
             drive = transform_pose(invert_pose(start), odometry)
@@ -36,15 +39,15 @@ class HeadingCheck:
                 if math.hypot(moved.x_m, moved.y_m) >= MIN_SHARE * driven_m:
                     # Of a heading that exceeds the true one, the same drive leads to the right.
                     error_rad = math.atan2(drive.y_m, drive.x_m) - math.atan2(moved.y_m, moved.x_m)
-                    self._errors_rad.append(error_rad)
+                    self.errors_rad.append(wrap_angle(error_rad))
         self._start = seen, odometry
 
     @property
     def error_rad(self) -> Optional[float]:
         """By how much the headings seen exceed the robot's own; None if it did not drive straight far enough yet."""
-        if len(self._errors_rad) < DRIVES:
+        if len(self.errors_rad) < DRIVES:
             return None
-        return math.atan2(sum(map(math.sin, self._errors_rad)), sum(map(math.cos, self._errors_rad)))
+        return math.atan2(sum(map(math.sin, self.errors_rad)), sum(map(math.cos, self.errors_rad)))
 
 
 def is_upside_down(heading_error_rad: float) -> bool:
