@@ -53,8 +53,10 @@ def make_robot(robot_id, **changes):
 
 def make_fleet(*robots, **changes):
     """Return the updates of a driver with these robots; changes: of the fleet's fields."""
-    fleet = {"driver": True, "listening": "10.42.0.1:11411", "stopped": False, "gone": [], "robots": list(robots)}
-    return {**fleet, "frame": "world", "localized": False, **changes}
+    ready = sum(robot["state"] == "READY" for robot in robots)
+    fleet = {"driver": True, "listening": "10.42.0.1:11411", "stopped": False, "robots": list(robots)}
+    counts = "%d of %d robots ready" % (ready, len(robots))
+    return {**fleet, "counts": counts, "frame": "world", "localized": False, **changes}
 
 
 def make_program(number, **changes):

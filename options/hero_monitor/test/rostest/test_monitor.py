@@ -60,7 +60,7 @@ class PageTest(unittest.TestCase):
 
     def setUp(self):
         self.page.open()
-        self.page.wait_for_text("#ready", "3 of 3 ready")
+        self.page.wait_for_text("#ready", "3 of 3 robots ready")
 
     def speed_of(self, robot_id):
         """Return the true speed over the last 0.2 s, m/s."""
@@ -88,7 +88,7 @@ class PageTest(unittest.TestCase):
                 # It booted, and told its versions, before the driver listened.
                 rospy.ServiceProxy("/hero_sim/fault", InjectFault)("reboot:robot=" + row["Robot"][len("hero_") :])
         wait_for(lambda: all(row["Versions"].startswith("v3.8") for row in nonempty(self.page.rows())), self.page.rows)
-        self.page.wait_for_text("#ready", "3 of 3 ready")
+        self.page.wait_for_text("#ready", "3 of 3 robots ready")
         rows = self.page.rows()
         self.assertEqual([row["Robot"] for row in rows], ["hero_0", "hero_1", "hero_2"])
         for row in rows:

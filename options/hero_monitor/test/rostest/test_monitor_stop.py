@@ -275,15 +275,15 @@ class StopTest(unittest.TestCase):
             start(start_monitor, prefix=prefix)
             wait_until_it_answers(OTHER_HOST)
             self.page.browser.get("http://%s/" % OTHER_HOST)
-            self.page.wait_for_text("#ready", "2 of 2 ready")
+            self.page.wait_for_text("#ready", "2 of 2 robots ready")
             end(master)
             end(driver)
             self.page.wait_for_text("#losses", "No answer from hero_driver")
             self.page.wait_for_text("#losses", "No ROS master")
-            self.page.wait_for_text("#ready", "2 of 2 unknown")
+            self.page.wait_for_text("#ready", "2 of 2 robots unknown")
             start(start_master, port)
             start(start_scripted_driver, "hero_driver", [0, 1, 2], prefix=prefix)
-            self.page.wait_for_text("#ready", "3 of 3 ready")
+            self.page.wait_for_text("#ready", "3 of 3 robots ready")
             wait_for(lambda: self.page.text("#losses") == "", "no loss")
 
     def states(self, *robots):

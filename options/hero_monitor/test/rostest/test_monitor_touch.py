@@ -90,7 +90,7 @@ class TouchTest(unittest.TestCase):
         self.show("empty")
         self.show("live")
         self.page.open()
-        self.page.wait_for_text("#ready", "3 of 3 ready")
+        self.page.wait_for_text("#ready", "3 of 3 robots ready")
         self.monitor.requests.clear()
 
     def tearDown(self):
@@ -196,7 +196,7 @@ class TouchTest(unittest.TestCase):
     def test_three_quick_taps_on_stop_all_or_release_never_release(self):
         for size in (SIZES[0], SIZES[4], SIZES[-1]):  # the buttons keep their places at all sizes
             self.page.resize(*size)
-            for state, ready in ("empty", "0 of 0 ready"), ("live", "3 of 3 ready"):
+            for state, ready in ("empty", "0 of 0 robots ready"), ("live", "3 of 3 robots ready"):
                 self.show(state)
                 self.page.wait_for_text("#ready", ready)
             self.page.wait_for_text("#stop", "STOP ALL")
@@ -274,10 +274,10 @@ class TouchTest(unittest.TestCase):
         self.page.wait_for_text("#losses", "No answer from the monitor since")
         self.assertEqual({row["State"] for row in self.page.rows()}, {"UNKNOWN"})
         self.assertIn("roslaunch hero_bringup monitor.launch", self.page.text("#losses"))
-        self.assertEqual((self.page.text("#link"), self.page.text("#ready")), ("unknown", "3 of 3 unknown"))
+        self.assertEqual((self.page.text("#link"), self.page.text("#ready")), ("unknown", "robots unknown"))
         self.assertEqual(self.page.run("return document.querySelectorAll('.good').length"), 0)
         self.monitor.is_silent = False
-        self.page.wait_for_text("#ready", "3 of 3 ready")
+        self.page.wait_for_text("#ready", "3 of 3 robots ready")
 
     def test_who_presses_stop_all_again_and_again_reads_that_nothing_answers(self):
         self.silence_monitor()
@@ -295,7 +295,7 @@ class TouchTest(unittest.TestCase):
         self.silence_monitor()
         self.suspend(3000)
         self.monitor.wait_for_request("end_drive")
-        self.page.wait_for_text("#ready", "3 of 3 unknown")
+        self.page.wait_for_text("#ready", "robots unknown")
         self.assertEqual(self.monitor.requests[-1]["do"], "end_drive")
         self.touch("touchEnd")
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the page shows, in a real browser: summary, charts, table, map, projector, and contrast by axe; without ROS."""
+"""What the page shows, in a real browser: charts, table, map, projector, and contrast by axe; without ROS."""
 
 import math
 import time
@@ -101,7 +101,7 @@ class ViewTest(unittest.TestCase):
         self.monitor.show(programs=[])
         self.monitor.requests.clear()
         self.page.open()
-        self.page.wait_for_text("#ready", "4 of 4 ready")
+        self.page.wait_for_text("#ready", "4 of 4 robots ready")
 
     def tearDown(self):
         self.assertEqual(self.page.errors(), [])
@@ -124,19 +124,15 @@ class ViewTest(unittest.TestCase):
 
         wait_for(is_true, "the page to show it")
 
-    def test_the_summary_counts_each_robot_once(self):
-        others = [{"state": state} for state in ("AWAY", "REFUSED", "JOINING")]
-        robots = [make_robot(number, **more) for number, more in enumerate([{}, {}, {"known": False}, *others])]
-        self.show(robots, gone=[[7, "hero_7"], [9, "hero_9"]])
-        for text in ("#ready", "#summary"):
-            self.page.wait_for_text(text, "1 of 7 unknown")
-        self.show(robots[:2] + robots[3:], stopped=True, gone=[[7, "hero_7"]])
-        for text in ("#ready", "#summary"):
-            self.page.wait_for_text(text, "0 of 5 ready, 2 stopped, 1 joining, 2 lost")
-        self.assertEqual([row["State"] for row in self.page.rows()][:2], ["STOPPED", "STOPPED"])
+    def test_head_panel_and_table_tell_of_robots_in_the_same_words(self):
+        robots = [make_robot(0), make_robot(1), make_robot(2, state="AWAY")]
+        self.show(robots, stopped=True, counts="0 of 3 robots ready, 2 stopped, 1 lost")
+        for text in ("#ready", "#state"):
+            self.page.wait_for_text(text, "0 of 3 robots ready, 2 stopped, 1 lost")
+        self.assertEqual([row["State"] for row in self.page.rows()], ["STOPPED", "STOPPED", "AWAY"])
 
     def test_robots_that_are_gone_are_named_until_a_user_dismisses_them(self):
-        self.show([make_robot(0)], gone=[[7, "hero_7"]])
+        self.show([make_robot(0)])
         loss = {"source": "robots", "cause": "7 gone since 18:43", "remedy": "Switch them on, or dismiss this"}
         self.monitor.show(losses=[loss])
         self.page.wait_for_text("#losses", "7 gone since 18:43. Switch them on")
@@ -144,10 +140,9 @@ class ViewTest(unittest.TestCase):
         self.page.click("#losses button")
         self.monitor.wait_for_request("dismiss")
 
-    def test_robots_that_move_count_as_driving_at_their_mean_speed(self):
+    def test_speeds_are_in_the_table_and_their_mean_beside_the_chart(self):
         robots = [make_robot(number, speed=speed) for number, speed in enumerate((0.05, 0.10, 0.0, None))]
-        self.show(robots)
-        self.page.wait_for_text("#summary", "4 of 4 ready; 2 driving, mean speed 0.05 m/s")
+        self.drive(robots, lambda: self.page.text("#chart_now") == "now 0.05 m/s")
         self.assertEqual([row["Speed"] for row in self.page.rows()], ["0.05 m/s", "0.10 m/s", "0.00 m/s", "-"])
 
     def test_a_chart_shows_the_chosen_quantity_of_all_robots_or_one(self):
@@ -159,7 +154,6 @@ class ViewTest(unittest.TestCase):
         label = self.page.find("#chart").get_attribute("aria-label")
         self.assertEqual(label, "nearest obstacle over the last minute, m")
         self.page.choose("hero_1")
-        self.assertFalse(self.page.find("#summary").is_displayed())
         self.assertEqual(self.page.run(count), 1)
 
     def test_a_line_of_a_chart_is_interrupted_where_nothing_was_known(self):
@@ -240,8 +234,8 @@ class ViewTest(unittest.TestCase):
         walls = [[*side, 1800, 20, None] for side in sides]
         lesson = {"code": "123456", "link": "http://lab:8088/", "qr": ["10" * 12] * 25, "drivers": [], "users": []}
         self.addCleanup(self.page.resize, 1440, 900)
-        self.addCleanup(self.monitor.show, lesson=None, arena={"boxes": [], "circles": []})
-        self.monitor.show(lesson=lesson, arena={"boxes": walls, "circles": []})
+        self.addCleanup(self.monitor.show, lesson=None, arena={"boxes": [], "circles": [], "extent": None})
+        self.monitor.show(lesson=lesson, arena={"boxes": walls, "circles": [], "extent": [-900, 0, 900, 1800]})
         for size in ((768, 1024), (320, 640), (1280, 800)):
             self.page.resize(*size)
             self.page.run("document.getElementById('projector').click()")  # phones show the button on request
@@ -401,16 +395,23 @@ class ViewTest(unittest.TestCase):
         def find_faults(only=ALL_RULES):
             return self.page.browser.execute_async_script(RUN_AXE, only)
 
-        stopped = {"fleet": make_fleet(*robots, stopped=True), "stop": {**status, "level": "info"}}
-        disturbed = {"fleet": make_fleet(*robots, *bad), "stop": status, "losses": [loss]}
+        stopped = {
+            "fleet": make_fleet(*robots, stopped=True, counts="0 of 3 robots ready"),
+            "stop": {**status, "level": "info"},
+        }
+        disturbed = {
+            "fleet": make_fleet(*robots, *bad, counts="1 of 6 robots unknown"),
+            "stop": status,
+            "losses": [loss],
+        }
         self.page.run(AXE)
         self.addCleanup(self.page.browser.execute_cdp_cmd, "Emulation.setEmulatedMedia", {"features": []})
         for theme, only, updates, ready, shown in (
-            ("light", ALL_RULES, {"fleet": make_fleet()}, "0 of 0 ready", []),
-            ("light", ALL_RULES, stopped, "0 of 3 ready, 3 stopped", ["#release_bar", "#stopping"]),
-            ("light", ALL_RULES, disturbed, "1 of 6 unknown", ["#losses", "#stopping"]),
-            ("dark", COLORS_ALONE, stopped, "0 of 3 ready, 3 stopped", ["#release_bar", "#stopping"]),
-            ("dark", COLORS_ALONE, disturbed, "1 of 6 unknown", ["#losses", "#stopping"]),
+            ("light", ALL_RULES, {"fleet": make_fleet()}, "0 of 0 robots ready", []),
+            ("light", ALL_RULES, stopped, "0 of 3 robots ready", ["#release_bar", "#stopping"]),
+            ("light", ALL_RULES, disturbed, "1 of 6 robots unknown", ["#losses", "#stopping"]),
+            ("dark", COLORS_ALONE, stopped, "0 of 3 robots ready", ["#release_bar", "#stopping"]),
+            ("dark", COLORS_ALONE, disturbed, "1 of 6 robots unknown", ["#losses", "#stopping"]),
         ):
             media = {"features": [{"name": "prefers-color-scheme", "value": theme}]}
             self.page.browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)

@@ -31,6 +31,7 @@ from hero_monitor.fleet_feed.feed import (
     describe_arena,
     describe_stop_of_others,
     find_true_poses,
+    measure_extent,
 )
 from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S
 from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH, encode_range, shorten
@@ -193,9 +194,11 @@ def test_all_is_stopped_only_while_every_driver_says_so(fleet):
     fleet.answering, fleet.found = {"/hero_driver": True, "/lab": False}, "/lab"
     state = fleet.read()["fleet"]
     assert (state["driver"], state["stopped"], state["robots"][0]["known"]) == (True, False, False)
+    assert state["counts"] == "1 of 1 robots unknown"
     fleet.found = "/hero_driver"
     fleet.now_s += 1.0
-    assert fleet.read()["fleet"]["robots"][0]["known"]
+    state = fleet.read()["fleet"]
+    assert state["robots"][0]["known"] and state["counts"] == "0 of 1 robots ready, 1 stopped"
     fleet.answering = {"/hero_driver": False, "/lab": False}
     state = fleet.read()["fleet"]
     assert not state["driver"] and not state["robots"][0]["known"]
@@ -387,8 +390,9 @@ def test_walls_objects_and_places_go_when_the_simulator_has_ended(fleet):
     robot = [make_marker(Marker.ARROW, 1, 1, 1, ns=name, text="hero_0") for name in ("headings", "names")]
     message = MarkerArray([make_marker(Marker.CUBE, 0.5, 0.02, 0.1), *robot])
     nothing = {"boxes": [], "circles": []}
+    no_arena = {**nothing, "extent": None}
     for part, topic, empty in (
-        ("arena", "/hero_sim/arena", nothing),
+        ("arena", "/hero_sim/arena", no_arena),
         ("objects", "/hero_sim/object_markers", nothing),
         ("ground_truth", "/hero_sim/markers", {}),
     ):
@@ -442,6 +446,8 @@ def test_arena_and_ground_truth_are_drawn_in_millimeters():
         marker.color.r, marker.color.g, marker.color.b = 1.0, 0.5, 0.0
     areas = describe_arena(MarkerArray(painted))
     assert areas == {"boxes": [[1000, 0, 0, 500, 200, "#ff8000"]], "circles": [[1000, 0, 250, "#ff8000"]]}
+    walls = [[0, -900, 0, 1800, 20, None], [900, 0, 1571, 1800, 20, None]]
+    assert measure_extent(walls, [[-500, 950, 100, None]]) == [-900, -900, 900, 1050]
     assert len(describe_arena(MarkerArray([box] * (MARKERS_MAX + 1)))["boxes"]) == MARKERS_MAX
     heading, name = (
         make_marker(Marker.ARROW, 1, 1, 1, ns="headings", id=3),

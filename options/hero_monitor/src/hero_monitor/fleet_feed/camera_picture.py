@@ -1,6 +1,6 @@
 """The camera's picture as the tracker of hero_localization publishes it, from straight above. Pure.
 
-It lies under the robots if the map is in its frame; otherwise the page shows it beside them.
+It lies under the robots while the map is in its frame.
 """
 
 import math
@@ -48,11 +48,9 @@ class CameraPicture:
         self._frame = outline.header.frame_id.lstrip("/")
 
     def describe(self, map_frame: str, now_s: float) -> Optional[Dict[str, Any]]:
-        """Return the picture's number and box; None without a picture.
-
-        box: x min, y min, x max, y max in mm; None if its place on this map is unknown.
-        """
+        """Return the picture's number and box (x min, y min, x max, y max in mm); None without one for this map."""
         if now_s > self._received_s + SILENT_S:
             self.jpeg = b""
+        if not self.jpeg or self._box_mm is None or self._frame != map_frame:
             return None
-        return {"number": self._number, "box": self._box_mm if self._frame == map_frame else None}
+        return {"number": self._number, "box": self._box_mm}

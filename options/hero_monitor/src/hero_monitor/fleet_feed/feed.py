@@ -27,6 +27,7 @@ from hero_client.ros import Drivers, NewestMessage, StopStatus, find_lost_comman
 from hero_client.values import (
     STATES,
     STOP_STATES,
+    describe_counts,
     describe_gone,
     describe_stop_origin,
     finite,
@@ -115,7 +116,7 @@ class FleetFeed:
         self._report = RobotArray()
         self._looked_s = 0.0
         self._lost_commands: List[str] = []
-        self._walls: List[float] = []  # left, right, low and high of the arena's, mm; empty without one
+        self._extent: Optional[List[float]] = None
         self._goals_outside: List[str] = []
         self.stopper = ""
         """User who stopped the robots on a page."""
@@ -190,12 +191,17 @@ class FleetFeed:
             "driver": has_driver,
             "listening": make_printable(self._report.listening),
             "stopped": self.stopped,
-            "gone": [[robot.id, shorten(robot.namespace.strip("/"))] for robot in self._report.gone],
+            "counts": self._describe_counts(),
             "frame": shorten(self.placement.frame),
             "localized": self.placement.is_localized,
             "robots": [self._make_row(row) for row in self._rows],
         }
         self.page_state.put("fleet", fleet)
+
+    def _describe_counts(self) -> str:
+        """Return how many robots are in which state; only how many are unknown, while some are."""
+        unknown = sum(not self._is_known(row.namespace) for row in self.robots.values())
+        return f"{unknown} of {len(self.robots)} robots unknown" if unknown else describe_counts(self._report)
 
     def _list_losses(self) -> None:
         losses = list_losses(self._answering, self._master.is_lost, self._localization, time.monotonic())
@@ -326,13 +332,8 @@ class FleetFeed:
 
     def _receive_arena(self, message: MarkerArray, now_s: float) -> None:
         arena = describe_arena(message)
-        self.page_state.put("arena", arena)
-        ends = [
-            (x + side * length * math.cos(yaw / 1e3), y + side * length * math.sin(yaw / 1e3))
-            for x, y, yaw, length, *_ in arena["boxes"]
-            for side in (-0.5, 0.5)
-        ]
-        self._walls = [edge(values) for values in zip(*ends) for edge in (min, max)]
+        self._extent = measure_extent(**arena)
+        self.page_state.put("arena", {**arena, "extent": self._extent})
 
     def _receive_grid(self, message: OccupancyGrid, now_s: float) -> None:
         self._grid = message
@@ -368,9 +369,9 @@ class FleetFeed:
             self.page_state.put(name, value)
 
     def _is_within_walls(self, pose: Optional[List[int]]) -> bool:
-        if pose is None or not self._walls:
+        if pose is None or self._extent is None:
             return False
-        left, right, low, high = self._walls
+        left, low, right, high = self._extent
         return left <= pose[0] <= right and low <= pose[1] <= high
 
     def _read_log(self) -> None:
@@ -427,6 +428,17 @@ def describe_arena(message: MarkerArray) -> Dict[str, List[List[Any]]]:
         elif marker.type == Marker.CYLINDER:
             circles.append([pose[0], pose[1], size[0] // 2, color])
     return {"boxes": boxes, "circles": circles}
+
+
+def measure_extent(boxes: Sequence[Sequence[Any]], circles: Sequence[Sequence[Any]]) -> Optional[List[float]]:
+    """Return left, low, right and high of what describe_arena() gives, mm; None of nothing."""
+    places = [
+        (x + side * length * math.cos(yaw / 1e3), y + side * length * math.sin(yaw / 1e3))
+        for x, y, yaw, length, *_ in boxes
+        for side in (-0.5, 0.5)
+    ]
+    places += [(x + side * radius, y + side * radius) for x, y, radius, _ in circles for side in (-1, 1)]
+    return [round(edge(values)) for edge in (min, max) for values in zip(*places)] or None
 
 
 def find_true_poses(message: MarkerArray) -> Dict[str, Optional[List[int]]]:

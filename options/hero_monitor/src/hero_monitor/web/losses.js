@@ -13,17 +13,8 @@ export function wordOf(robot, state) {
   return shown === "READY" && state.fleet.stopped ? "STOPPED" : shown;
 }
 
-const COUNTED_AS = { READY: "ready", STOPPED: "stopped", JOINING: "joining", AWAY: "lost", UNKNOWN: "unknown" };
-
-/** How many robots are ready, stopped, joining, lost and unknown: each counts once; those that are gone are lost. */
-export function describeCounts(robots, state, gone) {
-  const counts = { ready: 0, stopped: 0, joining: 0, lost: gone, unknown: 0 };
-  for (const robot of robots) if (robot.state !== "REFUSED") counts[COUNTED_AS[wordOf(robot, state)]] += 1;
-  const total = Object.values(counts).reduce((sum, count) => sum + count, 0);
-  if (counts.unknown) return `${counts.unknown} of ${total} unknown`;
-  const others = Object.entries(counts).filter(([name, count]) => count && name !== "ready");
-  return [`${counts.ready} of ${total} ready`, ...others.map(([name, count]) => `${count} ${name}`)].join(", ");
-}
+/** How many robots are ready, stopped, joining, lost or unknown. */
+export const countsOf = (state) => (state.isFresh ? state.fleet.counts : "robots unknown");
 
 /** What a robot's place on the map is known by. */
 export function sourceOf(robot, state) {

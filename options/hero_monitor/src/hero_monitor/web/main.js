@@ -4,16 +4,15 @@
 
 import { element, make, setPressed, setText } from "./dom.js";
 import { Connection } from "./connection.js";
-import { onTheme } from "./theme.js";
+import { onTheme } from "./map/colors.js";
 import { FleetTable } from "./panels/fleet.js";
 import { History, addTopics } from "./history.js";
-import { describeCounts, showLosses } from "./losses.js";
+import { countsOf, showLosses } from "./losses.js";
 import { FleetMap } from "./map/map.js";
 import { LogView } from "./panels/log.js";
 import { RobotPanel } from "./panels/robot.js";
 import { ProgramPanel } from "./panels/programs.js";
 import { Chart } from "./panels/chart.js";
-import { showSummary } from "./panels/summary.js";
 import { LessonPanel } from "./panels/lesson.js";
 import { Projector } from "./projector.js";
 import { StopPanel } from "./stop.js";
@@ -23,7 +22,7 @@ const NOTICE_MS = 6000;
 /** As received, whether it is up to date, and the names of the chosen robots. */
 const state = {
   hello: { control: false },
-  fleet: { driver: false, listening: "", stopped: false, frame: "", localized: false, robots: [], gone: [] },
+  fleet: { driver: false, listening: "", stopped: false, counts: "", frame: "", localized: false, robots: [] },
   losses: [],
   poses: {},
   ranges: {},
@@ -32,7 +31,7 @@ const state = {
   ground_truth: {},
   replay: {},
   picture: null,
-  arena: { boxes: [], circles: [] },
+  arena: { boxes: [], circles: [], extent: null },
   grid: null,
   objects: { boxes: [], circles: [] },
   drawings: [],
@@ -101,17 +100,14 @@ const stop = new StopPanel({ connection, endDrive: () => panel.endDrive(), notic
 
 const listPresent = () => state.fleet.robots.filter((robot) => robot.state !== "REFUSED");
 
-/** The chosen robot, or several of them, without a choice all, in numbers; and their chart. */
+/** The chosen robot, or several of them; and their chart, without a choice that of all. */
 function showPanel() {
   const present = listPresent();
   const chosen = present.filter((robot) => state.chosen.has(robot.name));
-  const robots = chosen.length ? chosen : present;
   panel.show(state, chosen);
   programs.show(state, [...state.chosen]);
   lesson.show(state, [...state.chosen]);
-  element("summary").hidden = chosen.length === 1;
-  showSummary(robots, state, chosen.length ? 0 : state.fleet.gone.length);
-  chart.show(robots);
+  chart.show(chosen.length ? chosen : present);
 }
 
 function showHead() {
@@ -120,7 +116,7 @@ function showHead() {
   const link = element("link");
   link.textContent = isLive && state.losses.length === 0 ? "live" : isLive ? state.losses[0].source + " lost" : "unknown";
   link.className = "pill " + (isLive && state.losses.length === 0 ? "good" : "quiet");
-  element("ready").textContent = describeCounts(robots, state, state.fleet.gone.length);
+  element("ready").textContent = countsOf(state);
   element("listening").textContent = isLive && listening ? `driver on ${listening}` : "";
   const source = localized ? "localized" : "odometry drifts";
   element("frame").textContent = robots.length ? `frame ${frame}, ${source}` : "";

@@ -12,13 +12,6 @@ const LABEL_PX = 28; // of the frame's distance from the edge, and of the name b
 const MARGIN = 0.05; // of the map's size, around what Fit shows
 const EDGE_PX = 36; // covered by tools above and hints below
 
-/** Return the corners of a box on the map: left, low, right, high as seen from a pose. */
-function listCorners([x, y, yaw], [left, low, right, high]) {
-  const [cosine, sine] = [Math.cos(yaw / 1000), Math.sin(yaw / 1000)];
-  const corners = [[left, low], [right, low], [right, high], [left, high]];
-  return corners.map(([ahead, aside]) => [x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine]);
-}
-
 export class FleetMap {
   state; choose; connection;
 
@@ -26,7 +19,7 @@ export class FleetMap {
     Object.assign(this, { state, choose, connection });
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
-    this.shows = { trails: true, beams: true, names: true, ghosts: false, picture: false };
+    this.shows = { trails: true, beams: true, names: true, picture: false };
     this.picture = new CameraPicture(() => this.update({}));
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
@@ -61,7 +54,6 @@ export class FleetMap {
     setPressed(element(name), this.shows[name]);
     this.requestShown();
     this.picture.show(this.shows.picture, this.state.picture);
-    if (name === "ghosts" && !this.pinned) this.fit();
     this.draw();
   }
 
@@ -222,17 +214,15 @@ export class FleetMap {
   }
 
   fit() {
-    const { poses, replay, arena, grid, drawings } = this.state;
+    const { replay, arena, grid, drawings } = this.state;
     const places = []; // that are to be seen
-    const add = (pose, box) => places.push(...listCorners(pose, box));
+    const add = ([left, low, right, high]) => places.push([left, low], [right, high]);
     const surround = ([x, y], reach) => places.push([x - reach, y - reach], [x + reach, y + reach]);
-    const drawn = [replay, this.poses, this.shows.ghosts ? poses : {}].flatMap((shown) => Object.values(shown));
-    for (const pose of drawn) if (pose) surround(pose, 150);
-    for (const [x, y, yaw, length, width] of arena.boxes) add([x, y, yaw], [-length / 2, -width / 2, length / 2, width / 2]);
-    for (const [x, y, radius] of arena.circles) surround([x, y], radius);
+    for (const pose of Object.values({ ...replay, ...this.poses })) if (pose) surround(pose, 150);
+    if (arena.extent) add(arena.extent);
     for (const { lines = [], isBeam } of drawings) if (!isBeam) for (const place of lines.flat()) surround(place, 60);
-    if (grid) add(grid.pose, [0, 0, grid.columns * grid.cell, grid.rows * grid.cell]);
-    if (this.picture.box) add([0, 0, 0], this.picture.box);
+    if (grid) add([grid.pose[0], grid.pose[1], grid.pose[0] + grid.columns * grid.cell, grid.pose[1] + grid.rows * grid.cell]);
+    if (this.picture.shown) add(this.picture.shown.box);
     if (!places.length) return false;
     const [xs, ys] = [0, 1].map((axis) => places.map((place) => place[axis]));
     const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
@@ -281,7 +271,7 @@ export class FleetMap {
     const count = Object.keys({ ...poses, ...replay }).length + Object.keys(ground_truth).length;
     const placed = fleet.robots.filter((robot) => robot.source).length;
     // When there is something else to see, the view fits it again.
-    const scene = String([count, fleet.frame, this.picture.box, grid?.columns, arena.boxes.length, drawings.length > 0, placed]);
+    const scene = String([count, fleet.frame, this.picture.shown?.box, grid?.columns, arena.boxes.length, drawings.length > 0, placed]);
     if (!this.pinned && this.fittedFor !== scene && this.fit()) this.fittedFor = scene;
     this.draw();
   }

@@ -1,10 +1,9 @@
 // Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
-import { colorOf } from "./colors.js";
+import { colorOf, isDark } from "./colors.js";
 import { placeLabels } from "./labels.js";
 import { Occupancy } from "./occupancy.js";
 import { sourceOf, stateOf } from "../losses.js";
-import { isDark } from "../theme.js";
 
 export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;
@@ -42,13 +41,12 @@ export class MapPainter {
     context.scale(view.scale, -view.scale);
     context.translate(-view.x, -view.y);
     if (state.grid) this.paintOccupancy(state.grid);
-    if (map.picture.box) this.paintPicture(map.picture);
+    if (map.picture.shown) this.paintPicture(map.picture.shown);
     this.paintGrid();
     this.paintShapes(state.arena, "--wall");
     this.paintShapes(state.objects, "--object");
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
     if (shows.trails) for (const robot of robots) this.paintTrail(robot);
-    if (shows.ghosts) for (const robot of robots) this.paintGhost(robot);
     this.paintPlaces();
     for (const robot of robots) this.paintGoal(robot);
     for (const drawing of state.drawings) if (shows.beams || !drawing.isBeam) this.paintDrawing(drawing);
@@ -166,20 +164,6 @@ export class MapPainter {
       this.pen(colorOf(robot.id, TRAIL_INKS[index]), 1.5, 5);
       context.stroke(piece);
     });
-  }
-
-  /** Where odometry or localization has a robot that is drawn where it is. */
-  paintGhost(robot) {
-    const pose = this.map.state.poses[robot.name];
-    if (!this.state.ground_truth[robot.name]) return;
-    const { scale } = this.view;
-    this.pen(colorOf(robot.id), 1.5);
-    this.at(pose, () =>
-      this.dashed([4 / scale, 3 / scale], () => {
-        this.circle(0, 0, BODY_MM).stroke();
-        this.path([0, 0], [BODY_MM * 1.35, 0]).stroke();
-      }),
-    );
   }
 
   paintGoal(robot) {

@@ -1,24 +1,11 @@
-// A chart of one quantity over the last minute (uPlot, in vendor/): a line for each robot, or mean and extremes of many.
+// A chart of one quantity over the last minute (uPlot, in vendor/): a line for each robot.
 
 import { element } from "../dom.js";
 import { KEPT_MS, QUANTITIES } from "../history.js";
-import { colorOf } from "../map/colors.js";
-import { isDark } from "../theme.js";
+import { colorOf, isDark } from "../map/colors.js";
 
-const LINES_MAX = 12; // more cannot be told apart
 const PERIOD_MS = 500;
 const HEIGHT_PX = 170;
-
-/** Mean, least and greatest of the values that are known at each time. */
-function summarize(values) {
-  const columns = values[0].map((_, index) => values.map((line) => line[index]).filter((value) => value !== null));
-  const reduce = (find) => columns.map((known) => (known.length ? find(known) : null));
-  return [
-    reduce((known) => known.reduce((sum, value) => sum + value, 0) / known.length),
-    reduce((known) => Math.min(...known)),
-    reduce((known) => Math.max(...known)),
-  ];
-}
 
 export class Chart {
   constructor(history) {
@@ -49,9 +36,8 @@ export class Chart {
     element("charts").hidden = names.length === 0;
     if (names.length === 0 || element("chart").clientWidth === 0) return;
     const quantity = QUANTITIES[this.select.value];
-    let [times, ...values] = this.history.listSeries(names, this.select.value);
-    if (names.length > LINES_MAX && times.length) values = summarize(values);
-    const key = `${this.select.value} ${isDark()} ${names.slice(0, LINES_MAX + 1)}`;
+    const [times, ...values] = this.history.listSeries(names, this.select.value);
+    const key = `${this.select.value} ${isDark()} ${names}`;
     if (key !== this.key) this.rebuild(key, quantity);
     const width = element("chart").clientWidth;
     if (this.plot.width !== width) this.plot.setSize({ width, height: HEIGHT_PX });
@@ -65,10 +51,7 @@ export class Chart {
     this.key = key;
     this.plot?.destroy();
     const style = getComputedStyle(document.documentElement);
-    const [ink, grid, accent] = ["--quiet", "--line", "--accent"].map((name) => style.getPropertyValue(name).trim());
-    const lines = this.robots.length > LINES_MAX
-      ? [["mean", accent, 2], ["least", ink, 1], ["greatest", ink, 1]]
-      : this.robots.map((robot) => [robot.name, colorOf(robot.id), 1.5]);
+    const [ink, grid] = ["--quiet", "--line"].map((name) => style.getPropertyValue(name).trim());
     const axis = { stroke: ink, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: "12px system-ui, sans-serif" };
     this.plot = new uPlot(
       {
@@ -81,7 +64,7 @@ export class Chart {
           { ...axis, size: 26, values: (plot, ticks) => ticks.map((tick) => (tick === 0 ? "now" : `${tick} s`)) },
           { ...axis, size: 44 },
         ],
-        series: [{}, ...lines.map(([label, stroke, width]) => ({ label, stroke, width, points: { show: false } }))],
+        series: [{}, ...this.robots.map(({ name, id }) => ({ label: name, stroke: colorOf(id), width: 1.5, points: { show: false } }))],
       },
       [[]],
       element("chart"),

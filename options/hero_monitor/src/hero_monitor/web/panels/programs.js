@@ -69,11 +69,11 @@ export class ProgramPanel {
 
   /** The greatest spacing of a circle of so many robots that fits the arena, m; the usual one without an arena. */
   fitSpacing(usual, least) {
-    const { boxes } = this.map.state.arena;
+    const { extent } = this.map.state.arena;
     const count = this.names.length;
-    if (count < 2 || boxes.length === 0) return usual;
-    const reach = (axis) => Math.min(...[-1, 1].map((side) => Math.max(...boxes.map((box) => side * box[axis]))));
-    const radius = (Math.min(reach(0), reach(1)) - WALL_GAP_MM) / 1000;
+    if (count < 2 || extent === null) return usual;
+    const [left, low, right, high] = extent;
+    const radius = (Math.min(-left, -low, right, high) - WALL_GAP_MM) / 1000;
     const fitting = Math.floor(200 * Math.sin(Math.PI / count) * radius) / 100;
     return Math.max(least, Math.min(usual, fitting));
   }

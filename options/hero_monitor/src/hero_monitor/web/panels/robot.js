@@ -11,7 +11,7 @@ import { isLate } from "../connection.js";
 import { listenToHold } from "../hold.js";
 import { healthOf, listFacts } from "./fleet.js";
 import { mayDrive, roleOf } from "./lesson.js";
-import { stateOf, wordOf } from "../losses.js";
+import { countsOf, stateOf, wordOf } from "../losses.js";
 
 const VIEW_ONLY = "View only. control:=true lets the monitor drive robots.";
 const HOLD_MS = 100;
@@ -155,7 +155,7 @@ export class RobotPanel {
     chip.hidden = robot === null;
     if (robot) chip.style.background = colorOf(robot.id);
     element("name").textContent = robot ? robot.name : robots.length ? `${robots.length} robots` : "All robots";
-    const shown = robot ? wordOf(robot, state) : "";
+    const shown = robot ? wordOf(robot, state) : robots.length ? "" : countsOf(state);
     element("state").textContent = shown;
     element("state").dataset.state = shown;
     const isKnown = robots.some((one) => stateOf(one, state) !== "UNKNOWN");
