@@ -11,11 +11,11 @@ SOCKET_OWNERS = (
     "hero_driver.transport",
     "hero_driver.ros.rospy_internals",
     "hero_driver.ros.raw_subscriber",
+    "hero_node.addresses",
     "hero_node.ros",
     "hero_sim.link.tcp_link",
     "hero_tools.checkup.network",
     "hero_monitor.serving.server",
-    "hero_monitor.serving.invitation",
     "hero_monitor.serving.fair_stream",
     "hero_monitor.program",
 )

@@ -1,6 +1,6 @@
 """Common parts of all nodes and programs of the suite. Only modules in `ros` import ROS."""
 
-from .addresses import is_loopback
+from .addresses import find_source_address, is_loopback
 from .clock import Clock
 from .command_line import WRONG_ARGUMENTS, call, find_line, print_error, run, run_named, say
 from .connection_table import ConnectionTable

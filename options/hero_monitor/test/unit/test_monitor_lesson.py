@@ -3,6 +3,7 @@
 import csv
 import time
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 import rospkg
@@ -15,6 +16,7 @@ from hero_monitor.serving import invitation as invitation_module
 from hero_monitor.serving.access import TOKEN_KEY, Access
 from hero_monitor.serving.invitation import describe_invitation, make_login_link, make_qr_rows
 from hero_monitor.serving.lesson import CODES_MAX, TEACHER, VIEWER, Lesson, Role, User
+from hero_node import find_source_address
 
 TOKEN = "a secret of more than sixteen letters"
 DRIVER = Role("driver", frozenset({"hero_3", "hero_4"}))
@@ -125,9 +127,13 @@ def test_a_full_disk_costs_the_file_and_nothing_else(monkeypatch, tmp_path):
 
 
 def test_phones_find_the_page_by_its_address_and_the_code(monkeypatch):
-    monkeypatch.setattr(invitation_module, "find_address", lambda: "10.42.0.1")
-    shown = describe_invitation("0.0.0.0", 8088, "123456")
-    assert (shown["code"], shown["link"]) == ("123456", "http://10.42.0.1:8088/")
+    for address, name in (("10.42.0.7", "10.42.0.7"), ("", "lab-pc")):
+        find = create_autospec(find_source_address, return_value=address)
+        monkeypatch.setattr(invitation_module, "find_source_address", find)
+        monkeypatch.setattr(invitation_module.platform, "node", lambda: "lab-pc")
+        shown = describe_invitation("0.0.0.0", 8088, "123456")
+        assert (shown["code"], shown["link"]) == ("123456", f"http://{name}:8088/")
+        find.assert_called_with("10.42.0.1")
     assert make_login_link("10.0.0.9", 80, "123456") == "http://10.0.0.9:80/#123456"
 
 

@@ -41,7 +41,7 @@ def run_check(port: int) -> Dict[str, Finding]:
         "ros_environment": lambda: graph.check_variables(addresses),
         "own_name": lambda: graph.check_own_name(own),
         "port": lambda: network.check_port(port, listeners),
-        "addresses": lambda: network.check_addresses(addresses, port, list(listeners)),
+        "addresses": lambda: network.check_addresses(addresses, port, list(listeners or ())),
         "master": lambda: graph.check_master(own),
     }
     node = graph.OwnNode()

@@ -5,6 +5,7 @@ import threading
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -73,20 +74,20 @@ def test_a_port_held_on_ipv6_is_seen_too():
 
 
 def test_the_socket_of_another_users_program_leads_to_how_to_find_it(monkeypatch):
-    with socket.socket() as holder:
-        holder.bind(("127.0.0.1", 0))
-        holder.listen()
-        port = holder.getsockname()[1]
-
-        def refuse(path):  # what other users may not read
-            raise PermissionError(path)
-
-        monkeypatch.setattr(network.os, "readlink", refuse)
-        listeners = network.find_listeners(port)
-    assert listeners == {"127.0.0.1": None}
-    finding = network.check_port(port, listeners)
+    # ss names processes of this user alone.
+    lines = "LISTEN 0 128 *:11411 *:*\nLISTEN 0 128 127.0.0.53%lo:11411 0.0.0.0:*\n"
+    monkeypatch.setattr(network, "ask_system", create_autospec(network.ask_system, return_value=lines))
+    listeners = network.find_listeners(11411)
+    assert listeners == {"*": None, "127.0.0.53": None}
+    finding = network.check_port(11411, listeners)
     assert finding.state == WARN
-    assert "sudo lsof -i tcp:%d" % port in finding.remedy[0]
+    assert "sudo lsof -i tcp:11411" in finding.remedy[0]
+
+
+def test_a_port_is_not_called_free_where_ss_is_missing(monkeypatch):
+    monkeypatch.setattr(network, "ask_system", create_autospec(network.ask_system, return_value=None))
+    finding = network.check_port(11411, network.find_listeners(11411))
+    assert finding == (WARN, "unknown: the command ss is missing", ("sudo apt install iproute2",))
 
 
 def test_a_connection_on_the_port_is_no_listener():

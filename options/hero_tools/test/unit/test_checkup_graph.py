@@ -220,7 +220,7 @@ def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
     assert "several versions are mixed: 1, 2" in computer.check_packages().text
 
 
-def test_addresses_and_routes_are_read_from_ip(monkeypatch):
+def test_addresses_are_read_from_ip(monkeypatch):
     link = {
         "ifname": "wlan0",
         "addr_info": [{"family": "inet", "local": "10.42.0.1"}, {"family": "inet6", "local": "fe80::1"}],
@@ -229,9 +229,6 @@ def test_addresses_and_routes_are_read_from_ip(monkeypatch):
     for answer, expected in ((json.dumps([link, loop]), OWN), ("", []), (None, None)):
         monkeypatch.setattr(network, "ask_system", lambda command, answer=answer: answer)
         assert network.read_addresses() == expected
-    for answer, expected in (('[{"prefsrc": "10.42.0.1"}]', "10.42.0.1"), ("[{}]", None), (None, None)):
-        monkeypatch.setattr(network, "ask_system", lambda command, answer=answer: answer)
-        assert network.find_source_address("10.42.0.9") == expected
 
 
 def test_passwords_and_names_of_networks_end_at_their_limits(monkeypatch):

@@ -1,37 +1,3 @@
-"""Services of hero_msgs that the stock package has, too."""
+"""Services of hero_msgs: those that the stock package has."""
 
-from hero_msgs.srv import (
-    SetFrequency,
-    SetFrequencyRequest,
-    SetFrequencyResponse,
-    SetIRCalibration,
-    SetIRCalibrationRequest,
-    SetIRCalibrationResponse,
-    SetMotor,
-    SetMotorRequest,
-    SetMotorResponse,
-    SetOdom,
-    SetOdomRequest,
-    SetOdomResponse,
-    SetPID,
-    SetPIDRequest,
-    SetPIDResponse,
-)
-
-__all__ = [
-    "SetFrequency",
-    "SetFrequencyRequest",
-    "SetFrequencyResponse",
-    "SetIRCalibration",
-    "SetIRCalibrationRequest",
-    "SetIRCalibrationResponse",
-    "SetMotor",
-    "SetMotorRequest",
-    "SetMotorResponse",
-    "SetOdom",
-    "SetOdomRequest",
-    "SetOdomResponse",
-    "SetPID",
-    "SetPIDRequest",
-    "SetPIDResponse",
-]
+from hero_msgs.srv import *  # noqa: F403 - with a class for each request and each response

@@ -1,8 +1,9 @@
 """Leads phones to the page of a lesson: its link, the class code, and both as a QR code (python3-qrcode, optional)."""
 
 import platform
-import socket
 from typing import Any, Dict, List
+
+from hero_node import find_source_address
 
 HOTSPOT_ADDRESS = "10.42.0.1"
 """Address of a PC that shares its network with robots and phones; every PC has a route to it."""
@@ -20,18 +21,9 @@ def make_login_link(host: str, port: int, code: str) -> str:
 
 def make_link(host: str, port: int) -> str:
     """Return the address of the page of a server that listens on a host's address."""
-    name = find_address() if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+    own = find_source_address(HOTSPOT_ADDRESS) or platform.node()
+    name = own if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
     return f"http://{name}:{port}/"
-
-
-def find_address() -> str:
-    """Return this PC's address in the robots' network, else in that of its default route, else its name."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:  # sends nothing
-        try:
-            probe.connect((HOTSPOT_ADDRESS, 9))
-            return str(probe.getsockname()[0])
-        except OSError:
-            return platform.node()
 
 
 def make_qr_rows(text: str) -> List[str]:

@@ -17,11 +17,11 @@ from rosgraph_msgs.msg import Log
 from hero_client.ros import Drivers, find_lost_commands
 from hero_client.values import STATES, describe_counts, describe_gone, describe_stop_origin
 from hero_msgs.msg import Robot, RobotArray
-from hero_node import NodeError, is_loopback
+from hero_node import NodeError, find_source_address, is_loopback
 from hero_node.ros import ask_master, read_master_uri
 
 from ..inventory import VERSIONS, list_differences
-from .network import HOST_REMEDY, Address, find_source_address, is_own, resolve
+from .network import HOST_REMEDY, Address, is_own, resolve
 from .points import Finding, fail, ok, wait_until, warn
 
 CONNECT_TIMEOUT_S = 3.0
@@ -66,7 +66,7 @@ def check_own_name(own: Sequence[Address]) -> Finding:
     found = resolve(name)
     master = resolve(read_master_host() or "localhost")
     is_remote = bool(master) and not any(is_own(address, own) for address in master)
-    address = find_source_address(next(iter(master))) if is_remote else None
+    address = find_source_address(next(iter(master))) if is_remote else ""
     export = "export ROS_IP=%s" % (address or (own[0].address if own else "127.0.0.1"))
     remedy = [export] if is_remote else ["one PC: export ROS_HOSTNAME=localhost", "several PCs: " + export]
     source = "ROS_IP or ROS_HOSTNAME" if rosgraph.network.get_address_override() else "the host name"

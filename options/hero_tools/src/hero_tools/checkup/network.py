@@ -1,12 +1,11 @@
 """Addresses that robots can connect to, the program on the driver's port, names that resolve.
 
-Read by ip(8) of iproute2 and from /proc: nothing is bound or connected.
+Read by ip(8) and ss(8) of iproute2: nothing is bound or connected.
 """
 
 import json
-import os
+import re
 import socket
-import struct
 from pathlib import Path
 from typing import Dict, List, NamedTuple, Optional, Sequence, Set
 
@@ -67,44 +66,25 @@ def check_addresses(addresses: Optional[Sequence[Address]], port: int, listening
     )
 
 
-def find_listeners(port: int) -> Dict[str, Optional[int]]:
-    """Return the address of each listener on a TCP port, and its process; None: it belongs to another user."""
-    sockets = {}
-    for table in ("tcp", "tcp6"):
-        for line in Path("/proc/net", table).read_text().splitlines()[1:]:
-            fields = line.split()
-            words, _, own_port = fields[1].partition(":")
-            if fields[3] == _LISTENING and int(own_port, 16) == port:
-                sockets[f"socket:[{fields[9]}]"] = _decode_address(words)
-    owners = _find_owners(set(sockets))
-    return {address: owners.get(name) for name, address in sockets.items()}
+def find_listeners(port: int) -> Optional[Dict[str, Optional[int]]]:
+    """Return the address of each listener on a TCP port, and its process (None: another user's).
+
+    None if the command ss is missing.
+    """
+    answer = ask_system(["ss", "-Hltnp", f"sport = :{port}"])
+    if answer is None:
+        return None
+    listeners: Dict[str, Optional[int]] = {}
+    for line in answer.splitlines():
+        address, process = line.split()[3].rpartition(":")[0], re.search(r"\bpid=(\d+)", line)
+        listeners[address.partition("%")[0].strip("[]")] = int(process.group(1)) if process else None
+    return listeners
 
 
-_LISTENING = "0A"
-"""TCP_LISTEN in the tables of proc(5)."""
-
-
-def _decode_address(words: str) -> str:
-    """Return an address that stands in hexadecimal words of this machine's byte order."""
-    raw = b"".join(struct.pack("=I", int(words[start : start + 8], 16)) for start in range(0, len(words), 8))
-    return socket.inet_ntop(socket.AF_INET if len(raw) == 4 else socket.AF_INET6, raw)
-
-
-def _find_owners(sockets: Set[str]) -> Dict[str, int]:
-    """Return the process that holds each of these sockets, of those that this user may look into."""
-    owners = {}
-    for link in Path("/proc").glob("[0-9]*/fd/*"):
-        try:
-            target = os.readlink(str(link))
-        except OSError:  # it has ended meanwhile, or belongs to another user
-            continue
-        if target in sockets:
-            owners[target] = int(link.parts[2])
-    return owners
-
-
-def check_port(port: int, listeners: Dict[str, Optional[int]]) -> Finding:
+def check_port(port: int, listeners: Optional[Dict[str, Optional[int]]]) -> Finding:
     """Check whether the port is free, held by our driver, or by another program."""
+    if listeners is None:
+        return warn("unknown: the command ss is missing", "sudo apt install iproute2")
     if not listeners:
         return ok("TCP port %d is free" % port)
     address, process = next(iter(listeners.items()))
@@ -138,9 +118,3 @@ def resolve(name: str) -> Set[str]:
 def is_own(address: str, own: Sequence[Address]) -> bool:
     """Return whether an IPv4 address leads to this PC."""
     return is_loopback(address) or address in {found.address for found in own}
-
-
-def find_source_address(target: str) -> Optional[str]:
-    """Return the own address from which packets to target leave."""
-    answer = ask_system(["ip", "-j", "route", "get", target])
-    return str(json.loads(answer)[0].get("prefsrc") or "") or None if answer else None
