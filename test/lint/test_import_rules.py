@@ -29,9 +29,9 @@ ROOMS = {
     "hero_driver.rosserial": set(),
     "hero_driver.transport": set(),
     "hero_driver.fleet": set(),
-    "hero_driver.corrections": {"robot_constants"},
-    "hero_driver.commands": {"corrections", "robot_constants"},
-    "hero_driver.ros": {"rosserial", "transport", "fleet", "corrections", "commands", "robot_constants"},
+    "hero_driver.corrections": set(),
+    "hero_driver.commands": {"corrections"},
+    "hero_driver.ros": {"rosserial", "transport", "fleet", "corrections", "commands"},
     "hero_driver.stops": {"commands", "corrections", "peer", "ros", "rosserial", "transport"},
     "hero_driver.reports": {"commands", "corrections", "fleet", "peer", "ros", "rosserial", "transport"},
     "hero_node.files": {"errors", "parameters", "texts"},
@@ -222,7 +222,7 @@ def test_the_simulator_shares_only_packets_and_payloads_with_the_driver():
     for name in modules_below("hero_sim"):
         shared = [f"{core}.{module}" for module in ("errors", "packets", "payloads")]
         if part_of(name, "hero_sim") == "stepped":  # stands in for the driver, too: its pure rules, never its protocol
-            shared += ["hero_driver.commands", "hero_driver.corrections", "hero_driver.robot_constants"]
+            shared += ["hero_driver.commands", "hero_driver.corrections"]
         for found in imports_of(name):
             if found.top == "hero_driver" and found.module != core:  # `from hero_driver.rosserial import ...`
                 allowed = any(found.module == module or found.module.startswith(module + ".") for module in shared)

@@ -100,17 +100,6 @@ def test_names_of_bounds_begin_with_min_or_max():
                 assert not private.match(node.id), f"{sources.name_of(path)}: {node.id}: MIN_ or MAX_"
 
 
-def test_constants_of_the_robot_are_equal_in_all_packages():
-    """Driver, programs and simulator know the robot independently: a mistake in one must not hide in the others."""
-    known = {}
-    for path in [path for path in sources.list_python_files() if path.name == "robot_constants.py"]:
-        for node in sources.parse(path).body:
-            if isinstance(node, ast.Assign) and isinstance(node.value, (ast.Constant, ast.Tuple)):
-                (name,), value = [target.id for target in node.targets], ast.literal_eval(node.value)
-                assert known.setdefault(name, value) == value, f"{sources.name_of(path)}: {name}"
-    assert known
-
-
 def test_texts_of_programs_name_whom_they_mean():
     private = re.compile(r"\b(nobody|somebody|anybody|everybody|whoever)\b", re.IGNORECASE)
     for path in [*sources.list_source_modules().values(), *sources.list_files(".md")]:

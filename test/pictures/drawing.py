@@ -6,7 +6,7 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
 
 DPI = 90
 

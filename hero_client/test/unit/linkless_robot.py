@@ -6,8 +6,8 @@ from hero_client.robots.robot_base import BaseRobot
 from hero_client.robots.swarm_base import BaseSwarm
 from hero_client.values.background_motion import BackgroundMotion
 from hero_client.values.errors import StaleDataError
-from hero_client.values.robot_constants import HERO
 from hero_node import Clock, HeroError, Pose, Velocity, wrap_angle
+from hero_node.robot_constants import HERO
 
 STEP_S = 0.01
 

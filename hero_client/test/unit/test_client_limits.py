@@ -11,7 +11,7 @@ from hero_client.robots.group import REPEAT_PERIOD_S
 from hero_client.robots.robot_base import COMMAND_S, BaseRobot
 from hero_client.robots.swarm_base import REPORT_PERIOD_S, BaseSwarm
 from hero_client.values.readings import FRESH_S
-from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, MODELS
+from hero_node.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, MODELS
 from hero_test.nonempty import nonempty
 
 ROOT = Path(__file__).resolve().parents[3]

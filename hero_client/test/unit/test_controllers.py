@@ -8,8 +8,8 @@ import pytest
 
 from hero_client.controllers.avoidance import WanderMemory, find_in_path, split_sectors, wander
 from hero_client.controllers.unicycle import FollowLaw, GoToLaw, follow, go_to_point, go_to_pose
-from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose, wrap_angle
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_test.nonempty import nonempty
 
 INF = math.inf

@@ -17,8 +17,8 @@ from hero_client.controllers.motion import (
 )
 from hero_client.controllers.pose_check import FROZEN_S
 from hero_client.controllers.straight_and_turn import ForwardController, TurnController
-from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose, Velocity, transform_pose
+from hero_node.robot_constants import BODY_RADIUS_M
 
 HERE = Pose(0.0, 0.0, 0.0)
 FREE = [math.inf] * 8

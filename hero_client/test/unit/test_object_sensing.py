@@ -16,7 +16,7 @@ from hero_client.values.object_sensing import (
     sense_objects,
     sense_sight,
 )  # fmt: skip
-from hero_client.values.robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
 
 
 def sense(robots, objects, sensor=None, radius_m=0.05):

@@ -9,8 +9,8 @@ from test_controllers import STEP_S, Body
 from hero_client.controllers.half_planes import nearest_allowed, steer
 from hero_client.controllers.orca import AvoidanceLaw, avoid_sensed, keep_apart
 from hero_client.controllers.swarm_go_to import SwarmGoToController
-from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_test.nonempty import nonempty
 
 

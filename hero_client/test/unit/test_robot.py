@@ -9,8 +9,8 @@ from hero_client.robots.group import READY_TIMEOUT_S
 from hero_client.robots.robot_base import WARNING_PERIOD_S
 from hero_client.values.errors import GoalError, NotCalibratedError, RobotNotReadyError, StaleDataError, StoppedError
 from hero_client.values.readings import FRESH_S, NOT_CALIBRATED
-from hero_client.values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, MODELS
 from hero_node import Pose, Velocity
+from hero_node.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, MODELS
 
 
 def test_data_count_until_they_are_a_second_old():

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_client.values.sensing import Binary, Neighbors, list_neighbors, sense_binary, sense_neighbors
+from hero_node.robot_constants import BODY_RADIUS_M
 
 
 class Fixed:

@@ -12,8 +12,8 @@ from hero_client.robots.group import wait_for_all
 from hero_client.robots.swarm_base import FIRST_REPORT_S, POLL_HZ, REPORT_PERIOD_S
 from hero_client.values.errors import FrameError, GoalError, RobotNotReadyError, StaleDataError, StoppedError
 from hero_client.values.readings import NOT_CALIBRATED
-from hero_client.values.robot_constants import MODELS
 from hero_node import Pose, ProgramError, Velocity
+from hero_node.robot_constants import MODELS
 from hero_node.texts import NAMES_SHOWN
 from hero_test.nonempty import nonempty
 

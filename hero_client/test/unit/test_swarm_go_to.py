@@ -15,8 +15,8 @@ from hero_client.controllers.swarm_go_to import (
     PROGRESS_M,
     SwarmGoToController,
 )
-from hero_client.values.robot_constants import BODY_RADIUS_M
 from hero_node import STOP, Pose
+from hero_node.robot_constants import BODY_RADIUS_M
 
 LAW = AvoidanceLaw()
 STEP_S = 0.1

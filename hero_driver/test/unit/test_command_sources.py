@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hero_driver.commands.command_sources import RATE_MAX_HZ, STUCK_READINGS, CommandSource, CommandSources
 from hero_driver.commands.velocity_shaper import STOPPED_MOTORS, ZERO_TWIST
 from hero_driver.corrections.wheel_motion import WheelMotion
-from hero_driver.robot_constants import MAX_WATCHDOG_S
 from hero_driver.transport.event_loop import POLL_INTERVAL_S
+from hero_node.robot_constants import MAX_WATCHDOG_S
 from hero_test.fake_motors import LAG_S, FakeMotors
 
 NAN_TWIST = bytes(6) + b"\xf8\x7f" + bytes(40)

@@ -9,14 +9,9 @@ from hero_driver.commands.velocity_shaper import COMMAND_INTERVAL_S
 from hero_driver.corrections import wheel_motion
 from hero_driver.corrections.tick_odometry import TWIST_WINDOW
 from hero_driver.gateway import STOP_LIMIT_S
-from hero_driver.robot_constants import (
-    BODY_RADIUS_M,
-    MAX_RIM_RANGE_M,
-    MAX_WATCHDOG_S,
-    MIN_RIM_RANGE_M,
-)
 from hero_driver.ros import robot_commands, services
 from hero_driver.transport import event_loop
+from hero_node.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MAX_WATCHDOG_S, MIN_RIM_RANGE_M
 
 PACKAGE = Path(__file__).resolve().parents[2]
 README, INTERFACE = PACKAGE / "README.md", PACKAGE.parent / "docs" / "robot_interface.md"

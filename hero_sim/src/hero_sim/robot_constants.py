@@ -1,25 +1,14 @@
-"""The robot in numbers: its body, its limits and its watchdogs. Source: the firmware (config.h and the files named)."""
+"""The firmware's own limits and watchdogs, beside hero_node.robot_constants. Source: config.h and the files named."""
 
 import math
+
+from hero_node.robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M
 
 MAX_ID = 2**31 - 1
 """Largest id of hero_msgs/Robot."""
 
-WHEEL_DIAMETER_M = 0.0492
-WHEEL_SEPARATION_M = 0.063
-BODY_RADIUS_M = 0.036835
-"""Radius of the round body; also what the firmware adds to each infrared distance."""
-
-TICKS_PER_TURN = 288
 TICK_M = math.pi * WHEEL_DIAMETER_M / TICKS_PER_TURN
 """Travel of a wheel's rim per encoder tick, about 0.537 mm."""
-
-MAX_LINEAR_M_S = 0.20
-MAX_ANGULAR_RAD_S = 8.0
-"""Limits of a commanded Twist (config.h)."""
-
-PULSE_RANGE_US = (1000, 2000)
-"""Servo pulses."""
 
 VELOCITY_LIMIT_US = 250.0
 POSITION_LIMIT_US = 130.0

@@ -8,8 +8,8 @@ from typing import Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from hero_node import Pose, encode_header, encode_list, encode_pose, encode_text
+from hero_node.robot_constants import BODY_RADIUS_M
 
-from .robot_constants import BODY_RADIUS_M
 from .world.arena import Area, Arena
 from .world.pushing.shapes import PushedBody, list_outlines
 from .world.world import World

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from hero_node import Pose
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim.errors import OptionError
-from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.world.arena import Arena
 from hero_sim.world.arena_file import load_arena

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from hero_node import Pose
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim import scene
 from hero_sim.errors import OptionError
-from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import arena as arenas
 from hero_sim.world.arena_file import SHIPPED, load_arena
 from hero_sim.world.robot_errors import draw_errors

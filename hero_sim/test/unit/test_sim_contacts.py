@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim.world import body_loops, compiled, contacts
 from hero_sim.world.arena import build_default, build_rectangle, place_robots
 from hero_sim.world.arena_file import SHIPPED, load_arena

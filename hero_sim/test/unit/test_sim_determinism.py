@@ -5,7 +5,7 @@ import hashlib
 import numpy as np
 import pytest
 
-from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim.world import contacts
 from hero_sim.world.arena import place_robots
 from hero_sim.world.arena_file import load_arena

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_sim.robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
+from hero_node.robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
 from hero_sim.world.arena import Arena, build_rectangle
 from hero_sim.world.body_loops import CASTER_M, CREEP_M_S, GRAVITY_M_S2
 from hero_sim.world.robot_errors import MASS_KG, draw_errors, set_known

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from driver_side import DriverSide
 
-from hero_client.values import MODELS as DIMENSIONS
 from hero_driver.corrections import PLUS_WHEELS, WheelGeometry
 from hero_driver.corrections.message_layouts import drop_tick_difference, read_encoder
 from hero_driver.corrections.tick_odometry import TickOdometry
@@ -65,14 +64,6 @@ def test_the_drivers_odometry_of_a_model_is_right_within_one_percent(name):
     assert path_m > 0.2
     assert math.hypot(odometry.x_m, odometry.y_m) == pytest.approx(path_m, rel=0.01)
     assert odometry.yaw_rad == pytest.approx(yaw_rad - start[2], rel=0.01)
-
-
-def test_models_have_the_same_dimensions_for_programs_driver_and_simulator():
-    for name, wheels in (("hero", WheelGeometry()), ("hero_plus", PLUS_WHEELS)):
-        seen, simulated = DIMENSIONS[name], MODELS[name]
-        assert seen == (simulated.radius_m, simulated.wheel_separation_m)
-        assert wheels.wheel_diameter_m == simulated.wheel_diameter_m
-        assert wheels.wheel_separation_m == simulated.wheel_separation_m
 
 
 @pytest.mark.slow

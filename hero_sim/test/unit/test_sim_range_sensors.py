@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from driver_side import SENT, DriverSide
 
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim.robot import ranges
-from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import compiled, range_sensors
 from hero_sim.world.arena import Segments, build_default, build_rectangle
 from hero_sim.world.body import Body, SharedReadings

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hero_client import FrameError, GoalError, StoppedError
-from hero_sim.robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim.stepped.swarm import StepSwarm
 from hero_test.nonempty import nonempty
 

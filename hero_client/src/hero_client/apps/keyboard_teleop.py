@@ -12,13 +12,13 @@ import time
 from typing import Dict, List, Optional, Tuple
 
 from hero_node import STOP, Velocity
+from hero_node.robot_constants import MAX_LINEAR_M_S
 from hero_node.ros import Program
 
 from ..robot import Robot
 from ..ros.stop_status import paint
 from ..swarm import Swarm
 from ..values.errors import NotCalibratedError, StaleDataError
-from ..values.robot_constants import MAX_LINEAR_M_S
 from ..values.robot_states import describe_stop_origin
 from .keyboard import RELEASE_KEY, STOP_ALL_KEYS, Keyboard
 from .teleop_output import PauseDetector, TeleopOutput

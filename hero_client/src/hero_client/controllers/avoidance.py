@@ -8,9 +8,9 @@ import math
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 from hero_node import STOP, Velocity, clamp, wrap_angle
+from hero_node.robot_constants import BODY_RADIUS_M, MIN_RANGE_M
 
 from ..values.readings import Obstacle
-from ..values.robot_constants import BODY_RADIUS_M, MIN_RANGE_M
 
 
 def shorten_for_body(ranges: Sequence[float], body_radius_m: float) -> List[float]:

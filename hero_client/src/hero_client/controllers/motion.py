@@ -9,9 +9,9 @@ import math
 from typing import Optional, Sequence
 
 from hero_node import STOP, Pose, Velocity
+from hero_node.robot_constants import BODY_RADIUS_M
 
 from ..values.readings import Obstacle
-from ..values.robot_constants import BODY_RADIUS_M
 from .avoidance import find_in_path, shorten_for_body
 from .lateness import Lateness
 from .pose_check import SAME_M, SAME_RAD, FrozenCheck, PoseCheck, is_apart

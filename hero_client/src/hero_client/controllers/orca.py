@@ -15,7 +15,8 @@ from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from ..values.robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
+
 from .half_planes import LOOKAHEAD_M, MARGIN_M, NEIGHBORS
 
 HalfPlanes = Tuple[np.ndarray, np.ndarray]

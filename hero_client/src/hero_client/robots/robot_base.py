@@ -11,6 +11,7 @@ from typing import Callable, Generator, Optional
 
 from hero_node import Pose, clamp, transform_pose
 from hero_node.parameters import check_finite, check_speed
+from hero_node.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 
 from ..controllers.go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController, make_goal
 from ..controllers.motion import DEFAULT_TIMEOUT_S, MotionController, State
@@ -19,7 +20,6 @@ from ..values.background_motion import BackgroundMotion, Sleep, Steps
 from ..values.colors import Color
 from ..values.errors import GoalError, StaleDataError, StoppedError
 from ..values.readings import FRESH_S, NOT_CALIBRATED, is_blind
-from ..values.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from ..values.robot_link import RobotLink
 from .group import POLL_PERIOD_S, READY_TIMEOUT_S, REPEAT_PERIOD_S, carry_out, wait_for_all
 from .light import Light

@@ -8,10 +8,10 @@ from contextlib import suppress
 from typing import List, Optional, Tuple
 
 from hero_node import Pose, Velocity, transform_pose, wrap_angle
+from hero_node.robot_constants import RobotModel
 
 from ..values.errors import NotCalibratedError, StaleDataError
 from ..values.readings import FRESH_S, NOT_CALIBRATED, Obstacle, find_nearest, is_blind, is_free
-from ..values.robot_constants import RobotModel
 from ..values.robot_link import RobotLink
 from ..values.sensing import Neighbor
 from .group import Group

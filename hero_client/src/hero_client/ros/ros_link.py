@@ -15,12 +15,12 @@ from hero_msgs.msg import Encoder, Neighbors
 from hero_msgs.srv import SetOdom
 from hero_node import HeroError, Pose, Velocity, one_line, pose_of
 from hero_node.files import name_fleet_file
+from hero_node.robot_constants import HERO, MODELS, RobotModel
 from hero_node.ros import ROS_CLOCK
 
 from ..values.background_motion import BackgroundMotion, Steps, run_steps
 from ..values.errors import RobotError, StaleDataError
 from ..values.readings import FRESH_S, front_first
-from ..values.robot_constants import HERO, MODELS, RobotModel
 from ..values.robot_link import RobotLink
 from ..values.sensing import Neighbor
 from .drivers import share_drivers

@@ -1,5 +1,17 @@
 """Values of programs: poses, readings, colors, errors, times. Pure."""
 
+from hero_node.robot_constants import (
+    BODY_RADIUS_M,
+    HERO,
+    MAX_ANGULAR_RAD_S,
+    MAX_LINEAR_M_S,
+    MAX_WHEEL_M_S,
+    MIN_RANGE_M,
+    MODELS,
+    WHEEL_SEPARATION_M,
+    RobotModel,
+)
+
 from .background_motion import SEND_TIME_S, BackgroundMotion, FullWait, Steps
 from .errors import FrameError, RobotNotReadyError, StaleDataError
 from .object_sensing import (
@@ -23,17 +35,6 @@ from .readings import (
     is_plausible,
     read_pose,
     read_ranges,
-)
-from .robot_constants import (
-    BODY_RADIUS_M,
-    HERO,
-    MAX_ANGULAR_RAD_S,
-    MAX_LINEAR_M_S,
-    MAX_WHEEL_M_S,
-    MIN_RANGE_M,
-    MODELS,
-    WHEEL_SEPARATION_M,
-    RobotModel,
 )
 from .robot_link import MAP, RobotLink
 from .robot_states import STATES, STOP_STATES, describe_counts, describe_gone, describe_stop_origin, name_state

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
+
 from .sensing import look_at
 
 NOTHING, OBJECT, ROBOT = 0, 1, 2

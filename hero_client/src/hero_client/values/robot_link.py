@@ -3,9 +3,9 @@
 from typing import List, Optional, Protocol, Tuple
 
 from hero_node import Clock, Pose, Velocity
+from hero_node.robot_constants import RobotModel
 
 from .background_motion import BackgroundMotion, Steps
-from .robot_constants import RobotModel
 from .sensing import Neighbor
 
 MAP = "map"

@@ -10,7 +10,7 @@ from typing import Any, Callable, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from .robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
 
 _CACHED_PAIRS = 16384
 """Pairs of robots that are computed at once: they fit the processor's cache."""

@@ -4,8 +4,9 @@ import collections
 import math
 from typing import Deque, Dict, NamedTuple, Optional
 
+from hero_node.robot_constants import MAX_WATCHDOG_S
+
 from ..corrections.wheel_motion import WheelMotion
-from ..robot_constants import MAX_WATCHDOG_S
 
 REGULAR_INTERVALS = 5
 """Intervals from which on a program commands regularly; fewer may be single commands, or a short burst."""

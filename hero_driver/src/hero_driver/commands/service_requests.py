@@ -8,8 +8,7 @@ import struct
 from typing import NamedTuple, Optional
 
 from hero_node import Pose
-
-from ..robot_constants import PULSE_RANGE_US
+from hero_node.robot_constants import PULSE_RANGE_US
 
 _SET_ODOM = struct.Struct("<3d")
 

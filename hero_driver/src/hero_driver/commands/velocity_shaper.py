@@ -10,8 +10,7 @@ import struct
 from typing import Optional
 
 from hero_node import TWIST_FORM
-
-from ..robot_constants import SERVO_CENTER_US
+from hero_node.robot_constants import SERVO_CENTER_US
 
 COMMAND_INTERVAL_S = 0.06
 """Time between two commands to one controller: the firmware drops one within 50 ms of the last accepted one."""

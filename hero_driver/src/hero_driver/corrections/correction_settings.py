@@ -5,8 +5,8 @@ from typing import Any, Mapping, Tuple
 
 from hero_node.files import STOCK, KeptCalibration
 from hero_node.parameters import Parameter, declare, is_number, make_error, number, string
+from hero_node.robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 
-from ..robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 from .tick_odometry import PLUS_WHEELS, WheelGeometry
 
 

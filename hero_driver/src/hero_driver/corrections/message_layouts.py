@@ -16,18 +16,18 @@ from hero_node import (
     encode_header,
     encode_turn_scan,
 )
-
-from ..robot_constants import (
+from hero_node.robot_constants import (
     BODY_RADIUS_M,
     DISTANCE_CONE_RAD,
     MAX_DISTANCE_M,
     MAX_RIM_RANGE_M,
-    MAX_WHEEL_SPEED_M_S,
     MIN_DISTANCE_M,
     MIN_RIM_RANGE_M,
     STOCK_BEAMS,
 )
+
 from .stamps import NS_PER_S
+from .tick_odometry import MAX_WHEEL_SPEED_M_S
 
 _SEQ_AND_STAMP = struct.Struct("<III")
 _ENCODER_TICKS = struct.Struct("<2d")

@@ -10,8 +10,8 @@ from typing import Callable, Deque, Dict, NamedTuple, Optional, Sequence, Tuple
 
 from hero_node import PLUS_ENCODER_MD5
 from hero_node.files import HERO_PLUS, STOCK
+from hero_node.robot_constants import SCAN_TIME_S
 
-from ..robot_constants import SCAN_TIME_S
 from . import message_layouts
 from .correction_settings import CorrectionSettings
 from .odometry_corrections import OdometryCorrector, Sink

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 from typing import Deque, Optional, Tuple
 
 from hero_node import Pose
+from hero_node.robot_constants import MODELS, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 
-from ..robot_constants import MAX_WHEEL_SPEED_M_S, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
+MAX_WHEEL_SPEED_M_S = 1.0
+"""Faster than any servo of the robot."""
 
 TWIST_WINDOW = 6
 """Readings over which the velocity is taken: one tick per reading would be 16 mm/s of noise, six make 3 mm/s."""
@@ -47,7 +49,8 @@ class WheelGeometry:
         return left_m, left_m * self.diameter_ratio
 
 
-PLUS_WHEELS = WheelGeometry(wheel_diameter_m=0.050, wheel_separation_m=0.065, ticks_per_turn=TICKS_PER_TURN / 3.0)
+_PLUS = MODELS["hero_plus"]
+PLUS_WHEELS = WheelGeometry(_PLUS.wheel_diameter_m, _PLUS.wheel_separation_m, TICKS_PER_TURN / 3.0)
 """HeRo+'s; the firmware's config.h divides the circumference by 96."""
 
 

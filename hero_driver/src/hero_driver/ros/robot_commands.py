@@ -8,13 +8,14 @@ import math
 import time
 from typing import Any, Callable, Dict, List, Optional, Protocol
 
+from hero_node.robot_constants import MAX_WATCHDOG_S
+
 from ..commands.command_queue import CommandQueue, CommandSettings
 from ..commands.command_sources import CommandSources
 from ..commands.service_requests import find_request_error
 from ..commands.stop_progress import StopState
 from ..commands.velocity_shaper import STOP_PAYLOADS, check_motor_pulses, check_twist
 from ..corrections.wheel_motion import WheelMotion
-from ..robot_constants import MAX_WATCHDOG_S
 from ..transport.event_loop import EventLoop
 from .log_relay import LogRelay
 from .raw_subscriber import RawSubscriber

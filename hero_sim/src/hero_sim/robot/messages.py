@@ -23,8 +23,8 @@ from hero_node import (
     encode_text,
     encode_transforms,
 )
+from hero_node.robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 
-from ..robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 from .models import HERO, RobotModel
 
 SEQ_NEVER_COUNTED = 0xFFFFFFFF

@@ -8,10 +8,12 @@ is as in the stock robot; HeRo+'s own law for its motors, too, is that of the st
 from typing import Dict, List, NamedTuple, Tuple
 
 from hero_node import MD5SUMS, PLUS_ENCODER_MD5
+from hero_node import robot_constants
+from hero_node.robot_constants import TICKS_PER_TURN
 
 from ..errors import OptionError
 from ..key_values import parse_values
-from ..robot_constants import BODY_RADIUS_M, TICK_M, TICKS_PER_TURN, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
+from ..robot_constants import TICK_M
 from ..world.robot_errors import RobotErrors
 from .declarations import PUB, STOCK_TOPICS, Topic, assign_ids
 
@@ -24,9 +26,7 @@ class RobotModel(NamedTuple):
     topics: Tuple[Topic, ...] = STOCK_TOPICS
     tick_m: float = TICK_M
     """Travel per tick as the firmware computes it."""
-    wheel_diameter_m: float = WHEEL_DIAMETER_M
-    wheel_separation_m: float = WHEEL_SEPARATION_M
-    radius_m: float = BODY_RADIUS_M
+    dimensions: robot_constants.RobotModel = robot_constants.HERO
     is_plus: bool = False
     """HeRo+: it has the distance sensor and no IMU, and its Encoder says how far the counters are apart, too."""
 
@@ -58,9 +58,7 @@ MODELS: Dict[str, RobotModel] = {
         HERO.versions,
         tuple(_PLUS_TOPICS.get(topic.key, topic) for topic in STOCK_TOPICS),
         tick_m=TICK_M * TICKS_PER_TURN / 96.0,
-        wheel_diameter_m=0.050,
-        wheel_separation_m=0.065,
-        radius_m=0.060,
+        dimensions=robot_constants.MODELS["hero_plus"],
         is_plus=True,
     ),
 }
@@ -86,6 +84,7 @@ def build_body(model: RobotModel, errors: RobotErrors, row: int) -> None:
     """Give the body in a row of errors, which is drawn as a stock robot's, the wheels and the radius of its model."""
     if model is HERO:
         return
-    errors.wheel_scale[row] *= model.wheel_diameter_m / WHEEL_DIAMETER_M
-    errors.wheel_separation_m[row] *= model.wheel_separation_m / WHEEL_SEPARATION_M
-    errors.radius_m[row] = model.radius_m
+    stock = HERO.dimensions
+    errors.wheel_scale[row] *= model.dimensions.wheel_diameter_m / stock.wheel_diameter_m
+    errors.wheel_separation_m[row] *= model.dimensions.wheel_separation_m / stock.wheel_separation_m
+    errors.radius_m[row] = model.dimensions.body_radius_m

@@ -10,15 +10,13 @@ from typing import Callable, List, Sequence
 import numpy as np
 
 from hero_node import clamp
+from hero_node.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, PULSE_RANGE_US
 
 from ..robot_constants import (
     COMMAND_GAP_MS,
-    MAX_ANGULAR_RAD_S,
-    MAX_LINEAR_M_S,
     MOTOR_WATCHDOG_MS,
     POSITION_LIMIT_US,
     POSITION_WATCHDOG_MS,
-    PULSE_RANGE_US,
     VELOCITY_LIMIT_US,
     VELOCITY_WATCHDOG_MS,
 )

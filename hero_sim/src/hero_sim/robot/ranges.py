@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
 
 FACTORY_CALIBRATION_COUNTS_M2 = 0.5
 """The firmware's calibration of every sensor until the robot is calibrated."""

@@ -62,8 +62,7 @@ class StepLink(RobotLink):
 
     @property
     def model(self) -> RobotModel:
-        model = self._rows.models[self.row]
-        return RobotModel(model.radius_m, model.wheel_separation_m)
+        return self._rows.models[self.row].dimensions
 
     def missing(self) -> Optional[str]:
         for topic in ("odom", "proximity"):

@@ -12,7 +12,14 @@ from typing import Callable, Collection, List, Optional, Sequence, Tuple
 import numpy as np
 
 from hero_driver.corrections import CLAMP_TOLERANCE_M, PLUS_WHEELS, WheelGeometry
-from hero_driver.robot_constants import MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, SERVO_CENTER_US
+from hero_node.robot_constants import (
+    BODY_RADIUS_M,
+    MAX_ANGULAR_RAD_S,
+    MAX_LINEAR_M_S,
+    MAX_RIM_RANGE_M,
+    MIN_RIM_RANGE_M,
+    SERVO_CENTER_US,
+)
 
 from ..link.wifi import Radio
 from ..robot.clock import NEVER_MS
@@ -23,10 +30,7 @@ from ..robot.motor_pid import POSITION_GAINS, VELOCITY_GAINS
 from ..robot.ranges import calibrate, convert_to_ranges
 from ..robot.sensing import CYCLE_MS, DISTANCE_MS, LASER_GATE_MS, LASER_READ_MS
 from ..robot_constants import (
-    BODY_RADIUS_M,
     LED_WATCHDOG_MS,
-    MAX_ANGULAR_RAD_S,
-    MAX_LINEAR_M_S,
     POSITION_LIMIT_US,
     POSITION_WATCHDOG_MS,
     VELOCITY_LIMIT_US,

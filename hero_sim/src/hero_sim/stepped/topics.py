@@ -9,7 +9,6 @@ from typing import Callable, Dict, List, Sequence, Tuple
 
 import numpy as np
 
-from hero_driver.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, SCAN_TIME_S
 from hero_node import (
     Pose,
     encode_header,
@@ -19,6 +18,7 @@ from hero_node import (
     encode_twist,
     find_frame,
 )
+from hero_node.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, SCAN_TIME_S
 
 from ..scene import FRAME, START_S, draw_arena, draw_objects, draw_robots, encode_markers
 from .robot_rows import RobotRows

@@ -9,9 +9,9 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from hero_node import Pose
+from hero_node.robot_constants import BODY_RADIUS_M
 
 from ..errors import OptionError
-from ..robot_constants import BODY_RADIUS_M
 from .pushing.shapes import PushedBody, touch_circle
 
 START_GAP_M = 0.05

@@ -13,9 +13,9 @@ import numpy as np
 
 from hero_node import Pose
 from hero_node.files import Entry, EntryError, load_entries, read_file
+from hero_node.robot_constants import BODY_RADIUS_M
 
 from ..errors import OptionError
-from ..robot_constants import BODY_RADIUS_M
 from .arena import Area, Arena, is_free, outline
 from .pushing.shapes import Disc, Polygon, PushedBody, Shape
 

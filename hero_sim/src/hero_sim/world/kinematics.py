@@ -10,7 +10,8 @@ from typing import Any, Sequence, Tuple
 
 import numpy as np
 
-from ..robot_constants import WHEEL_SEPARATION_M
+from hero_node.robot_constants import WHEEL_SEPARATION_M
+
 from .body_loops import follow_arc, shape_arc
 
 # Half pi in two parts, of which the first, with 33 bits, gives exact products with small whole numbers.

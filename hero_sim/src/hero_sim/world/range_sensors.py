@@ -9,7 +9,8 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from ..robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BODY_RADIUS_M
+
 from . import ray_loops
 from .arena import Segments
 from .compiled import compile_loops

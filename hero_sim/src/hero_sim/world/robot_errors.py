@@ -9,10 +9,10 @@ from typing import Callable, Collection, Dict, Iterable, List, NamedTuple
 import numpy as np
 
 from hero_node.files import read_file
+from hero_node.robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
 
 from ..errors import OptionError
 from ..key_values import parse_values
-from ..robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
 from .body_loops import CREEP_M_S
 from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
 

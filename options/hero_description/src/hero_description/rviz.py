@@ -15,16 +15,15 @@ import rospy
 
 from hero_node import ProgramError
 from hero_node.parameters import Parameter, choice, flag, parse_explicit_ids
+from hero_node.robot_constants import HERO, MODELS
 from hero_node.ros import Program, read_parameters
 
 from .rviz_config import FRAMES, PLUS_DESCRIPTION, make_config, read_ids
 
-# Of HeRo+, as in docs/robot_interface.md; the shield's height is chosen for the eye.
-WHEEL_RADIUS_M = 0.025
-STOCK_WHEEL_RADIUS_M = "0.0246"
-WHEEL_Y_M = 0.0325
-SHIELD_RADIUS_M = 0.060
+PLUS = MODELS["hero_plus"]
+
 SHIELD_HEIGHT_M = 0.004
+"""Height of HeRo+'s bump shield, chosen for the eye."""
 
 
 def make_hero_plus(urdf: str) -> str:
@@ -32,19 +31,19 @@ def make_hero_plus(urdf: str) -> str:
     robot = ElementTree.fromstring(urdf)  # noqa: S314 - this package's own file
     robot.set("name", "hero_plus")
     for cylinder in robot.iter("cylinder"):
-        if cylinder.get("radius") == STOCK_WHEEL_RADIUS_M:
-            cylinder.set("radius", f"{WHEEL_RADIUS_M:g}")
+        if cylinder.get("radius") == f"{HERO.wheel_diameter_m / 2.0:g}":
+            cylinder.set("radius", f"{PLUS.wheel_diameter_m / 2.0:g}")
     for joint in robot.iter("joint"):
         origin, side = joint.find("origin"), {"left_wheel_joint": 1, "right_wheel_joint": -1}.get(joint.get("name", ""))
         if origin is not None and side is not None:
             _, _, z_m = origin.get("xyz", "").split()
-            origin.set("xyz", f"0 {side * WHEEL_Y_M:g} {z_m}")
+            origin.set("xyz", f"0 {side * PLUS.wheel_separation_m / 2.0:g} {z_m}")
     base = robot.find("link[@name='base_link']")
     if base is not None:
         for kind in ("collision", "visual"):
             shape = ElementTree.SubElement(base, kind)
             ElementTree.SubElement(shape, "origin", xyz="0 0 0.02", rpy="0 0 0")
-            size = {"radius": f"{SHIELD_RADIUS_M:g}", "length": f"{SHIELD_HEIGHT_M:g}"}
+            size = {"radius": f"{PLUS.body_radius_m:g}", "length": f"{SHIELD_HEIGHT_M:g}"}
             ElementTree.SubElement(ElementTree.SubElement(shape, "geometry"), "cylinder", size)
         ElementTree.SubElement(shape, "material", name="rim")
     return ElementTree.tostring(robot, encoding="unicode")

@@ -7,8 +7,8 @@ import pytest
 
 from hero_localization.mapping.occupancy_grid import BEAMS, OccupancyGrid
 from hero_node import Pose
+from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim.robot.ranges import calibrate, convert_to_ranges
-from hero_sim.robot_constants import BODY_RADIUS_M
 from hero_sim.world import Segments, range_sensors
 from hero_sim.world.arena import build_rectangle
 

@@ -7,8 +7,10 @@ from typing import Union
 
 import numpy as np
 
+from hero_node.robot_constants import PULSE_RANGE_US
+
 from ...robot.clock import NEVER_MS
-from ...robot_constants import MOTOR_WATCHDOG_MS, PULSE_RANGE_US
+from ...robot_constants import MOTOR_WATCHDOG_MS
 from ...world.world import World
 from .robot_mask import RobotMask, assign
 

@@ -5,7 +5,7 @@ from typing import Any, Dict, NamedTuple, Tuple
 import numpy as np
 
 from hero_client.values import BODY_RADIUS_M, MAX_LINEAR_M_S, Neighbors
-from hero_driver.robot_constants import MAX_RIM_RANGE_M
+from hero_node.robot_constants import MAX_RIM_RANGE_M
 
 from ..behavior import Odometry, Proximity, Sensed
 
