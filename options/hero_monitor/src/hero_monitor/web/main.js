@@ -89,7 +89,7 @@ function notice(level, text) {
 
 const history = new History();
 const map = new FleetMap(state, { choose, connection });
-const table = new FleetTable({ choose, isAdding: () => map.selecting });
+const table = new FleetTable({ choose, isAdding: () => map.shows.select });
 const log = new LogView();
 const chart = new Chart(history);
 new Projector(() => map.draw());

@@ -8,7 +8,7 @@ import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 const TRAIL_STEP_MM = 8;
 const CLICK_PX = 6;
 const PIXELS_PER_MM = { least: 0.01, most: 8 };
-const LABEL_PX = 28; // of the frame's distance from the edge, and of the name below a robot
+const LABEL_PX = 28; // of the frame's distance from the edge, and of a robot's radius
 const MARGIN = 0.05; // of the map's size, around what Fit shows
 const EDGE_PX = 36; // covered by tools above and hints below
 
@@ -19,7 +19,8 @@ export class FleetMap {
     Object.assign(this, { state, choose, connection });
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
-    this.shows = { trails: true, beams: true, names: true, picture: false };
+    // With select, clicks and drags choose robots in addition, as with Shift.
+    this.shows = { trails: true, beams: true, numbers: true, picture: false, select: false };
     this.picture = new CameraPicture(() => this.update({}));
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
@@ -28,7 +29,6 @@ export class FleetMap {
     this.pointers = new Map();
     this.onPlace = null; // while a place is asked for
     this.aim = null;
-    this.selecting = false; // then clicks and drags choose robots in addition, as with Shift
     this.lasso = null;
     this.waiting = false;
     for (const name of Object.keys(this.shows)) {
@@ -38,10 +38,6 @@ export class FleetMap {
     element("fit").addEventListener("click", () => {
       this.pinned = false;
       this.fit();
-    });
-    element("select").addEventListener("click", () => {
-      this.selecting = !this.selecting;
-      setPressed(element("select"), this.selecting);
     });
     element("zoomin").addEventListener("click", () => this.zoom(1.4));
     element("zoomout").addEventListener("click", () => this.zoom(1 / 1.4));
@@ -90,7 +86,7 @@ export class FleetMap {
       const here = this.toMap(event.offsetX, event.offsetY);
       this.lasso = null;
       if (this.onPlace) this.aim = { from: here, to: null };
-      else if (!this.moved && (this.selecting || event.shiftKey)) this.lasso = [here];
+      else if (!this.moved && (this.shows.select || event.shiftKey)) this.lasso = [here];
     });
     canvas.addEventListener("pointermove", (event) => this.move(event));
     canvas.addEventListener("pointerup", (event) => {
@@ -252,14 +248,6 @@ export class FleetMap {
     this.painter.context.setTransform(ratio, 0, 0, ratio, 0, 0);
     if (!this.pinned) this.fit();
     this.draw();
-  }
-
-  /** Return [left, top, width, height] of the buttons and texts before the map, px. */
-  listCovered() {
-    const { left, top } = this.canvas.getBoundingClientRect();
-    return [...element("map").querySelectorAll(".tools button, .place span")]
-      .map((one) => one.getBoundingClientRect())
-      .map((box) => [box.left - left, box.top - top, box.width, box.height]);
   }
 
   // ------------------------------------------------------------ updates

@@ -1,7 +1,6 @@
 // Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
 import { colorOf, isDark } from "./colors.js";
-import { placeLabels } from "./labels.js";
 import { Occupancy } from "./occupancy.js";
 import { sourceOf, stateOf } from "../losses.js";
 
@@ -9,8 +8,9 @@ export const BODY_MM = 36.85;
 export const TRAIL_MS = 60000;
 const WHEEL_MM = [24.6, 6, 31.5]; // radius, width, distance from the middle
 const SHIELD_MM = 60; // radius of a HeRo+'s bump shield
-const MIN_RADIUS_PX = 9; // radius of a robot, however far the view is
+const MIN_RADIUS_PX = 10; // radius of a robot, however far the view is
 const PROJECTED_PX = 26;
+const MIN_DIGIT_PX = 11;
 const SENSOR_REACH_MM = 236.8;
 const UNKNOWN_ALPHA = 70;
 const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
@@ -57,7 +57,7 @@ export class MapPainter {
     else if (map.onPlace && map.canvas.matches(":focus-visible")) this.paintAim({ from: [view.x, view.y], to: null }); // where Enter puts it
     if (map.lasso) this.paintLasso(map.lasso);
     context.restore();
-    if (shows.names) this.paintNames(robots);
+    if (shows.numbers) this.paintNumbers(robots);
     this.paintScale();
   }
 
@@ -264,7 +264,7 @@ export class MapPainter {
       context.fillStyle = ink;
       this.path([BODY_MM * 1.38, 0], [BODY_MM * 0.92, BODY_MM * 0.4], [BODY_MM * 0.92, -BODY_MM * 0.4]).fill();
       context.fillStyle = light || this.ink("--dark-light");
-      this.circle(0, 0, BODY_MM * (light ? 0.58 : 0.3)).fill();
+      this.circle(0, 0, BODY_MM * (light ? 0.7 : 0.3)).fill();
       context.globalAlpha = 1;
       if (isChosen) {
         this.pen(this.ink("--accent"), 2.5 / this.enlarged);
@@ -279,46 +279,22 @@ export class MapPainter {
     if (to) this.path(from, to).stroke();
   }
 
-  paintNames(robots) {
+  /** Write each robot's number into it, where it covers no other. */
+  paintNumbers(robots) {
     const { context, state } = this;
     const radius = BODY_MM * this.view.scale * this.enlarged;
-    const isCrowded = robots.length > 12 && radius < 22;
-    const size = this.isProjected ? 26 : 12;
-    context.font = `600 ${size}px system-ui, sans-serif`;
-    // For an audience numbers are inside the robots; there they cover no other.
-    const inside = this.isProjected ? robots.filter((robot) => robot.id >= 0) : [];
     context.textAlign = "center";
     context.textBaseline = "middle";
-    for (const robot of inside) {
+    context.lineWidth = 2;
+    context.strokeStyle = "#000";
+    for (const robot of robots) {
+      const text = robot.id < 0 ? robot.name : String(robot.id);
       const [x, y] = this.map.toScreen(...state.poses[robot.name]);
-      context.font = `700 ${Math.round(radius * (robot.id < 100 ? 0.95 : 0.7))}px system-ui, sans-serif`;
-      context.lineWidth = 4;
-      context.strokeStyle = "#000";
-      context.strokeText(String(robot.id), x, y);
+      context.font = `700 ${Math.max(MIN_DIGIT_PX, Math.round(radius * (text.length < 3 ? 0.95 : 0.7)))}px system-ui, sans-serif`;
+      context.strokeText(text, x, y);
       context.fillStyle = stateOf(robot, state) === "READY" ? "#fff" : "#ff9d9d";
-      context.fillText(String(robot.id), x, y);
+      context.fillText(text, x, y);
     }
-    context.font = `600 ${size}px system-ui, sans-serif`;
-    context.textAlign = "left";
-    context.textBaseline = "top";
-    context.lineWidth = 3;
-    context.strokeStyle = this.ink("--floor");
-    const labels = robots.filter((robot) => !inside.includes(robot)).map((robot) => {
-      const [x, y] = this.map.toScreen(...state.poses[robot.name]);
-      // Numbers alone where names would be too many.
-      const isChosen = state.chosen.has(robot.name);
-      const isShort = robot.id >= 0 && !(isChosen && state.chosen.size === 1) && isCrowded;
-      const text = isShort ? String(robot.id) : robot.name;
-      const isNeeded = isChosen || stateOf(robot, state) !== "READY";
-      return { x, y, radius: isChosen ? radius * 1.5 + 6 : radius * 1.15, width: context.measureText(text).width, height: size, isNeeded, text, robot };
-    });
-    placeLabels(labels, this.map.listCovered()).forEach((corner, index) => {
-      if (!corner) return;
-      const { text, robot } = labels[index];
-      context.strokeText(text, ...corner);
-      context.fillStyle = this.ink({ READY: "--ink", UNKNOWN: "--quiet" }[stateOf(robot, state)] || "--bad");
-      context.fillText(text, ...corner);
-    });
   }
 
   paintScale() {
