@@ -7,6 +7,7 @@
     set_aside/N/       batches that --fresh does not delete: damaged ones, and trials on robots
     *.lock             held while a program adds runs of this kind
     runs.csv           all runs, sorted; the same bytes however they were computed
+    series.csv         where the series of each run are: files, and the place of the run in them
 
 A batch is written to a temporary file, which is renamed when the disk has it; no two writers' files have one name.
 A folder is ours by its about.json; of others nothing is written, and in ours no file of another name is touched.
@@ -160,8 +161,9 @@ class ResultsFolder:
                 aside.append(name)
         if kind == SIMULATED:
             self._remove_series(lambda name: True)
-        with suppress(FileNotFoundError):
-            os.remove(os.path.join(self.path, "runs.csv"))
+        for name in ("runs.csv", "series.csv"):
+            with suppress(FileNotFoundError):
+                os.remove(os.path.join(self.path, name))
         return self._set_aside(aside)
 
     def _remove_series(self, is_wanted: Callable[[str], bool]) -> None:
@@ -268,7 +270,20 @@ class ResultsFolder:
         """Write runs.csv and return its path."""
         path = os.path.join(self.path, "runs.csv")
         write_file(path, format_table(self._experiment, runs).encode())
+        write_file(os.path.join(self.path, "series.csv"), format_csv(self._index_series()).encode())
         return path
+
+    def _index_series(self) -> List[List[Any]]:
+        """Return the rows of series.csv, sorted; cells are numbered from 1."""
+        rows: List[List[Any]] = []
+        for name in self._list_batches():
+            files = [os.path.join("series", name[: -len(".jsonl")] + end) for end in (METRICS_ENDING, POSES_ENDING)]
+            present = [file if os.path.isfile(os.path.join(self.path, file)) else "" for file in files]
+            if any(present):
+                own = ((place, run, self._experiment.cells[run.cell]) for place, run in self._list_runs(name))
+                rows += [[run.cell + 1, *cell.varied.values(), run.seed, place, *present] for place, run, cell in own]
+        varied = self._experiment.cells[0].varied
+        return [["cell", *varied, "seed", "run", "metrics", "poses"], *sorted(rows, key=lambda row: (row[0], row[-4]))]
 
 
 def _list_names(folder: str) -> List[str]:

@@ -86,6 +86,17 @@ def test_series_and_poses_end_with_their_runs(folder):
         assert np.nanmax(np.hypot(*poses[cell, seed, 0, :, :2].T)) == pytest.approx(farthest[cell, seed, 0], rel=1e-6)
 
 
+def test_the_index_names_the_file_and_place_of_each_run(folder):
+    rows = read(folder / "series.csv")
+    named = [(int(row["cell"]), int(row["seed"])) for row in rows]
+    assert named == list(itertools.product(range(1, 5), (5, 6, 7)))
+    results = load(str(folder))
+    for row in nonempty(rows):
+        own = np.load(str(folder / row["metrics"]))[:, int(row["run"]), 1]
+        np.testing.assert_array_equal(own, results.series["farthest"][int(row["cell"]) - 1, int(row["seed"]) - 5])
+        assert np.load(str(folder / row["poses"])).shape[1] in (1, 2)
+
+
 @pytest.mark.slow
 def test_the_table_over_time_has_a_row_for_each_run_and_second(folder, tmp_path, monkeypatch):
     rows = read(folder.parent.parent / "series.csv")
