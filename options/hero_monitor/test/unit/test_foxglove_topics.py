@@ -1,0 +1,165 @@
+"""The program foxglove: topics that come and go, types that differ, latched messages, a client of the real server."""
+
+import asyncio
+import json
+import struct
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("rospy", reason="the program needs ROS")
+from std_msgs.msg import ColorRGBA, String
+
+from hero_monitor import foxglove as module
+from hero_node import NodeError
+
+
+class FakeSdk:
+    """Stands for the SDK: channels that keep what is logged; clients want those of `wanted`."""
+
+    def __init__(self):
+        self.wanted, self.logged, self.open = set(), [], {}
+
+    @staticmethod
+    def Schema(*, name, encoding, data):  # noqa: N802 - the SDK's name
+        assert encoding == "ros1msg" and isinstance(data, bytes)
+        return name, data
+
+    def Channel(self, topic, *, schema, message_encoding):  # noqa: N802
+        assert message_encoding == "ros1" and topic not in self.open
+        self.open[topic] = schema
+        return SimpleNamespace(
+            has_sinks=lambda: topic in self.wanted,
+            log=lambda data: self.logged.append((topic, data)),
+            close=lambda: self.open.pop(topic),
+        )
+
+
+@pytest.fixture(name="ros")
+def fixture_ros(monkeypatch):
+    """A ROS master with `published` topics, and the `callbacks` of what is subscribed."""
+    ros = SimpleNamespace(published=[], callbacks={}, warnings=[])
+
+    def ask(method, subgraph):
+        assert (method, subgraph) == ("getPublishedTopics", "")
+        if ros.published is None:
+            raise NodeError("no ROS master")
+        return ros.published
+
+    def subscribe(topic, kind, receive, argument, queue_size, tcp_nodelay):
+        assert kind is module.rospy.AnyMsg and topic not in ros.callbacks and queue_size > 1 and tcp_nodelay
+        ros.callbacks[topic] = lambda message: receive(message, argument)
+        return SimpleNamespace(unregister=lambda: ros.callbacks.pop(topic))
+
+    monkeypatch.setattr(module, "ask_master", ask)
+    monkeypatch.setattr(module.rospy, "Subscriber", subscribe)
+    monkeypatch.setattr(module.rospy, "logwarn_throttle_identical", lambda period_s, text: ros.warnings.append(text))
+    return ros
+
+
+def make_message(data, kind=String, **header):
+    return SimpleNamespace(_buff=data, _connection_header={"md5sum": kind._md5sum, **header})
+
+
+def test_topics_are_subscribed_to_while_a_client_wants_them(ros):
+    sdk = FakeSdk()
+    topics = module.TopicServer(sdk)
+    ros.published = [["/a", "std_msgs/String"], ["/b", "std_msgs/String"], ["/c", "no_package/Thing"]]
+    topics.look()
+    assert sdk.open == {topic: ("std_msgs/String", String._full_text.encode()) for topic in ("/a", "/b")}
+    assert ros.callbacks == {}
+    sdk.wanted = {"/a"}
+    topics.look()
+    topics.look()
+    ros.callbacks["/a"](make_message(b"text"))
+    assert sdk.logged == [("/a", b"text")] and list(ros.callbacks) == ["/a"]
+    sdk.wanted = set()
+    topics.look()
+    assert ros.callbacks == {} and set(sdk.open) == {"/a", "/b"}
+
+
+def test_a_topic_that_ends_or_changes_its_type_is_offered_anew(ros):
+    sdk = FakeSdk()
+    topics = module.TopicServer(sdk)
+    ros.published = [["/a", "std_msgs/String"], ["/b", "std_msgs/String"]]
+    sdk.wanted = {"/a", "/b"}
+    topics.look()
+    late = ros.callbacks["/b"]
+    ros.published = [["/a", "std_msgs/ColorRGBA"]]
+    topics.look()
+    assert sdk.open == {"/a": ("std_msgs/ColorRGBA", ColorRGBA._full_text.encode())}
+    late(make_message(b"late"))
+    ros.callbacks["/a"](make_message(b"color", ColorRGBA))
+    assert sdk.logged == [("/a", b"color")]
+
+
+def test_topics_stay_while_the_master_is_away(ros):
+    sdk = FakeSdk()
+    topics = module.TopicServer(sdk)
+    ros.published, sdk.wanted = [["/a", "std_msgs/String"]], {"/a"}
+    topics.look()
+    ros.published = None
+    topics.look()
+    assert list(sdk.open) == ["/a"] and list(ros.callbacks) == ["/a"]
+
+
+def test_a_message_of_another_definition_is_named_and_not_shown(ros):
+    sdk = FakeSdk()
+    topics = module.TopicServer(sdk)
+    ros.published, sdk.wanted = [["/a", "std_msgs/String"]], {"/a"}
+    topics.look()
+    ros.callbacks["/a"](make_message(b"other", ColorRGBA))
+    ros.callbacks["/a"](make_message(b"text"))
+    assert sdk.logged == [("/a", b"text")]
+    assert ros.warnings == ["/a has another std_msgs/String than this machine: it is not shown"]
+
+
+def test_a_client_that_comes_later_gets_what_is_latched(ros):
+    sdk = FakeSdk()
+    topics = module.TopicServer(sdk)
+    ros.published, sdk.wanted = [["/a", "std_msgs/String"], ["/b", "std_msgs/String"]], {"/a", "/b"}
+    topics.look()
+    ros.callbacks["/a"](make_message(b"kept", latching="1"))
+    ros.callbacks["/b"](make_message(b"passing", latching="0"))
+    for topic in ("/a", "/b"):
+        topics.on_subscribe(SimpleNamespace(id=2), SimpleNamespace(topic=topic))
+    topics.look()
+    topics.look()
+    assert sdk.logged == [("/a", b"kept"), ("/b", b"passing"), ("/a", b"kept")]
+
+
+@pytest.mark.option("foxglove")
+def test_a_client_of_the_server_reads_the_bytes_of_a_topic(ros):
+    import foxglove as sdk
+    import tornado.websocket
+
+    topics = module.TopicServer(sdk)
+    server = sdk.start_server(name="topics", host="127.0.0.1", port=0, server_listener=topics)
+    ros.published = [["/option/a", "std_msgs/String"]]
+    topics.look()
+
+    async def read():
+        url = "ws://127.0.0.1:%d" % server.port
+        socket = await tornado.websocket.websocket_connect(url, subprotocols=["foxglove.sdk.v1"])
+        while True:
+            message = json.loads(await socket.read_message())
+            if message["op"] == "advertise":
+                break
+        (channel,) = message["channels"]
+        wish = {"op": "subscribe", "subscriptions": [{"id": 7, "channelId": channel["id"]}]}
+        await socket.write_message(json.dumps(wish))
+        while "/option/a" not in ros.callbacks:
+            await asyncio.sleep(0)
+            topics.look()
+        sender = threading.Thread(target=ros.callbacks["/option/a"], args=(make_message(b"bytes"),))
+        sender.start()
+        return channel, await socket.read_message()
+
+    try:
+        channel, data = asyncio.run(asyncio.wait_for(read(), 30.0))
+    finally:
+        server.stop()
+    assert (channel["encoding"], channel["schemaEncoding"]) == ("ros1", "ros1msg")
+    assert (channel["schemaName"], channel["schema"]) == ("std_msgs/String", String._full_text)
+    assert struct.unpack("<BI", data[:5]) == (1, 7) and data[13:] == b"bytes"
