@@ -124,3 +124,16 @@ def test_loops_over_nothing_are_found(tmp_path, code, is_known):
     path = tmp_path / "test_x.py"
     path.write_text(f"def test_x():\n    {code}\n")
     assert (list(find_empty(path)) == []) == is_known
+
+
+def test_marks_are_of_tests():
+    """One of a helper marks nothing: pytest takes it, and the test that it was for runs without."""
+    definitions = (ast.FunctionDef, ast.ClassDef)
+    helpers = [
+        (path.name, node.name)
+        for path in TESTS
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, definitions) and not node.name.lower().startswith("test")
+        if any("pytest.mark." in ast.unparse(decorator) for decorator in node.decorator_list)
+    ]
+    assert not helpers

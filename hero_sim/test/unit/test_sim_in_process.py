@@ -24,7 +24,6 @@ with Swarm.discover() as swarm, Swarm([0, 1]) as pair:
 """
 
 
-@pytest.mark.slow
 def run(tmp_path, text, *options, arguments=("argument",)):
     script = tmp_path / "script.py"
     script.write_text(text)

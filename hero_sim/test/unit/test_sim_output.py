@@ -33,6 +33,7 @@ def test_a_closed_pipe_ends_it_silently(arguments):
         assert run_simulator(*arguments, stdout=pipe) == (141, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", PRINTING)
 def test_a_full_disk_is_reported_in_one_line(arguments):
     with open("/dev/full", "wb") as full:

@@ -7,6 +7,7 @@ import sys
 import threading
 import unittest
 
+import cv2
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,9 +18,9 @@ from std_msgs.msg import Float32
 from std_srvs.srv import Trigger
 
 from hero_client import FrameError, Robot, StaleDataError, Swarm
+from hero_localization.nodes.map_arena import OCCUPIED
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import yaw_of
-from hero_sim.world import load_arena
 from hero_test.nonempty import nonempty
 from hero_test.waiting import wait_for
 
@@ -161,8 +162,8 @@ class LocalizationTest(unittest.TestCase):
         self.assertTrue(0.0 < rospy.wait_for_message("/map_arena/known_share", Float32, 30.0).data < 0.5)
         answer = rospy.ServiceProxy("/map_arena/save", Trigger)()
         self.assertTrue(answer.success, answer.message)
-        arena = load_arena(rospy.get_param("/map_arena/file"))
-        self.assertTrue(len(arena.segments_m))
+        saved = cv2.imread(answer.message.partition(" and ")[2], cv2.IMREAD_GRAYSCALE)
+        self.assertTrue((saved == OCCUPIED).any(), "the wall")
 
     def list_occupied(self):
         """Return x, y of the occupied cells of /map."""

@@ -73,6 +73,7 @@ def test_detector_that_cannot_be_made_is_named(tmp_path, monkeypatch):
         DetectorProcess("apriltag", "36h11", 2.0, WIDTH_PX, HEIGHT_PX)
 
 
+@pytest.mark.slow
 def test_process_that_died_is_named(process):
     process._process.kill()
     with pytest.raises(DetectorError, match="ended with status -9"):

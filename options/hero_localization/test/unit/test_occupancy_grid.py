@@ -69,6 +69,7 @@ def test_all_of_the_walls_is_mapped(grid):
             assert np.hypot(*(occupied_m - wall_m).T).min() < 0.02, wall_m
 
 
+@pytest.mark.slow
 def test_free_cells_are_free(grid):
     free_m = grid.centers_of(grid.free)
     inside = (np.abs(free_m).max(axis=1) < ROOM_M + 0.01) & (np.hypot(*(free_m - POST_M[:2]).T) > POST_M[2] - 0.01)

@@ -282,6 +282,7 @@ def test_robots_are_listed_by_id_each_with_the_origin_of_its_odometry():
     assert swarm[2].state is RobotState.TRACKED, "one that is expected already goes on"
 
 
+@pytest.mark.slow
 def test_robots_that_are_lost_together_have_one_line_and_at_times_only():
     robots = range(16)
     places = {robot_id: (0.1 * robot_id, 0.0, 0.0) for robot_id in robots}

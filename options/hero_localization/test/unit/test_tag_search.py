@@ -254,6 +254,7 @@ def test_a_tag_that_is_gone_is_looked_for_by_one_finer_detector_at_times():
     assert turns > 3 and searched_px < 60 * len(tags) * window_px / 10.0
 
 
+@pytest.mark.slow
 def test_many_tags_that_are_missed_take_turns_within_a_bounded_time():
     """Each costs 1.5 ms by the third detector; 0.4 of a core is 13 ms of an image."""
     watch, tags = Watch(with_fine=True), everywhere()[:400:8]

@@ -1,6 +1,8 @@
 """Which programs pages may start, with what, and how they end: with the monitor, by a stop, or by themselves."""
 
+import contextlib
 import os
+import queue
 import select
 import signal
 import subprocess
@@ -21,6 +23,7 @@ from hero_swarm.behaviors import list_names
 from hero_test.waiting import wait_for
 
 DEADLINE_S = 300.0
+BEAT_S = 0.1
 
 CIRCLE = {"shape": "circle", "spacing_m": 0.3, "turn_deg": 90.0, "x_m": 1.0, "y_m": -0.5, "linear_m_s": 0.08}
 
@@ -61,6 +64,7 @@ class Dance(Behavior):
 """
 
 
+@pytest.mark.slow
 def test_behaviors_of_users_are_offered_and_a_broken_file_is_left_out(tmp_path, capfd):
     (tmp_path / "dance.py").write_text(OWN)
     (tmp_path / "broken.py").write_text("import nothing_of_this_name")
@@ -126,13 +130,9 @@ class Started:
     """Programs whose guards run Python code."""
 
     def __init__(self):
-        self.ended, self._is_ended = [], threading.Event()
-        self.programs = Programs("/hero_monitor", self.hand_over, self.ended.append)
+        self.ended, self._calls = [], queue.Queue()
+        self.programs = Programs("/hero_monitor", lambda *call: self._calls.put(call), self.ended.append)
         self.programs.paths = {name: sys.executable for name in (*OFFERS, "record")}
-
-    def hand_over(self, function, *arguments):
-        function(*arguments)
-        self._is_ended.set()
 
     def start(self, code, program="random_walk", robots=("hero_0", "hero_1"), folder=None):
         child = ChildProcess(program, robots, folder=folder)
@@ -140,8 +140,12 @@ class Started:
         return child
 
     def wait(self):
-        assert self._is_ended.wait(DEADLINE_S)
-        self._is_ended.clear()
+        """Wait for the end of a program as the monitor does, which beats: a busy PC starts a Python for seconds."""
+        while True:
+            with contextlib.suppress(queue.Empty):
+                function, *arguments = self._calls.get(timeout=BEAT_S)
+                return function(*arguments)
+            self.programs.beat()
 
 
 @pytest.fixture()
@@ -152,34 +156,43 @@ def started():
 
 
 def wait_for_output(monkeypatch):
-    """Let the test see when a program runs: its output is a pipe's."""
-    read, write = os.pipe()
+    """Return a function that reads a line of what programs print, into a pipe, and beats until there is one."""
+    descriptor, write = os.pipe()
+    output = os.fdopen(descriptor, "rb", buffering=0)
     real = subprocess.Popen
 
     def start(command, **options):
         return real(command, **{**options, "stdout": write} if "stdout" in options else options)
 
     monkeypatch.setattr(programs_module.subprocess, "Popen", start)
-    return os.fdopen(read, "rb").readline
+
+    def read(programs):
+        while not select.select([output], [], [], BEAT_S)[0]:
+            programs.beat()
+        return output.readline()
+
+    return read
 
 
+@pytest.mark.slow
 def test_a_program_that_a_page_ends_gets_sigint_and_its_robots_are_stopped(started, monkeypatch):
     read = wait_for_output(monkeypatch)
     child = started.start(OBEDIENT)
-    assert read() == b"runs\n"
+    assert read(started.programs) == b"runs\n"
     assert started.programs.find_driver(["hero_1"]) == "random walk drives hero_1: end it first"
     started.programs.end(1)
     started.wait()
-    assert read() == b"robots are stopped\n"
+    assert read(started.programs) == b"robots are stopped\n"
     assert (started.ended, child.driven, child.failure) == ([child], ["hero_0", "hero_1"], "")
     assert started.programs.describe() == []
 
 
+@pytest.mark.slow
 def test_a_program_that_ignores_sigint_is_ended_by_force(started, monkeypatch):
     read = wait_for_output(monkeypatch)
     monkeypatch.setattr(programs_module, "PATIENCE_S", 0.1)
     started.start(DEAF)
-    assert read() == b"deaf\n"
+    assert read(started.programs) == b"deaf\n"
     started.programs.end_those_of(["hero_0"])
     started.wait()
     assert started.programs.count == 0
@@ -193,16 +206,18 @@ def is_alive(pid):
     return state != "Z"
 
 
+@pytest.mark.slow
 def test_a_program_whose_guard_is_killed_ends_too(started, monkeypatch):
     read = wait_for_output(monkeypatch)
     started.start("import os; print(os.getppid(), os.getpid(), flush=True); import signal; signal.pause()")
-    guard, program = map(int, read().split())
+    guard, program = map(int, read(started.programs).split())
     os.kill(guard, signal.SIGKILL)
     started.wait()
     wait_for(lambda: not is_alive(program), "the end of the program")
     assert started.programs.describe()[0]["failure"]
 
 
+@pytest.mark.slow
 def test_why_a_program_failed_is_shown_until_another_one_starts(started):
     started.start("import sys; sys.exit('swarm_go_to: no way')")
     started.wait()
@@ -212,6 +227,7 @@ def test_why_a_program_failed_is_shown_until_another_one_starts(started):
     assert started.programs.describe() == []
 
 
+@pytest.mark.slow
 def test_the_node_of_a_behavior_of_a_file_has_the_name_of_the_file(started, monkeypatch):
     name = "behavior_/home/a/own-1/design-1_1.controller"
     monkeypatch.setitem(OFFERS, name, OFFERS["random_walk"])
@@ -221,36 +237,38 @@ def test_the_node_of_a_behavior_of_a_file_has_the_name_of_the_file(started, monk
     assert [row["failure"] for row in started.programs.describe()] == ["__name:=hero_monitor_design_1_1_1"]
 
 
+@pytest.mark.slow
 def test_all_programs_are_told_to_end_before_one_is_waited_for(started, monkeypatch):
     read = wait_for_output(monkeypatch)
     children = [started.start(OBEDIENT, robots=["hero_%d" % number]) for number in range(2)]
-    assert [read(), read()] == [b"runs\n"] * 2
+    assert [read(started.programs), read(started.programs)] == [b"runs\n"] * 2
     told = []
-    started.programs._hand_over = lambda *_: None  # as in a monitor, whose thread is in close()
     started.programs._on_end = lambda _: told.append([child.is_ending for child in children])
     started.programs.close(DEADLINE_S)
     assert told[0] == [True, True]
 
 
+@pytest.mark.slow
 def test_the_end_of_the_monitor_ends_the_program(monkeypatch):
     # As the kernel does with the pipe of a monitor that was killed.
     read = wait_for_output(monkeypatch)
     child = ChildProcess("random_walk", ["hero_0"])
     thread = threading.Thread(target=child.run, args=([sys.executable, "-c", OBEDIENT],))
     thread.start()
-    assert read() == b"runs\n"
+    assert read(child) == b"runs\n"
     os.close(child._monitor_end)
     child.is_ending = True
     thread.join(DEADLINE_S)
-    assert read() == b"robots are stopped\n"
+    assert read(child) == b"robots are stopped\n"
 
 
+@pytest.mark.slow
 def test_a_stop_of_all_robots_ends_programs_but_not_the_recording(started, monkeypatch, tmp_path):
     read = wait_for_output(monkeypatch)
     (tmp_path / "hero_0.bag").write_bytes(b"x" * 7)
     monkeypatch.setattr(programs_module, "SIZE_PERIOD_S", 0.01)
     recording = started.start(OBEDIENT, "record", robots=(), folder=tmp_path)
-    assert read() == b"runs\n"
+    assert read(started.programs) == b"runs\n"
     assert not started.programs.end_all()
     assert started.programs.find_recording() is recording
     recording.end()
@@ -259,6 +277,7 @@ def test_a_stop_of_all_robots_ends_programs_but_not_the_recording(started, monke
     assert started.programs.find_recording() is None
 
 
+@pytest.mark.slow
 def test_the_length_of_a_recording_counts_from_its_file_on(started, monkeypatch, tmp_path):
     read = wait_for_output(monkeypatch)
     starts_s = []
@@ -270,7 +289,7 @@ def test_the_length_of_a_recording_counts_from_its_file_on(started, monkeypatch,
     monkeypatch.setattr(programs_module, "measure", measure)
     monkeypatch.setattr(programs_module, "SIZE_PERIOD_S", 0.01)
     recording = started.start(OBEDIENT, "record", robots=(), folder=tmp_path)
-    assert read() == b"runs\n"
+    assert read(started.programs) == b"runs\n"
     wait_for(lambda: len(starts_s) >= 4, "four looks at the folder")
     recording.end()
     started.wait()

@@ -100,7 +100,6 @@ class Stage:
         return self.swarm.rows.world.poses[None, :, :2].copy()
 
 
-@pytest.mark.slow
 @pytest.fixture(name="stage")
 def make_stage(monkeypatch):
     return Stage(monkeypatch)

@@ -228,7 +228,6 @@ def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
         assert ends_m == pytest.approx(np.full((2, paths), 0.2), abs=1e-6)
 
 
-@pytest.mark.slow
 @functools.lru_cache(maxsize=None)
 def drive_in_square(side_m, avoids, time_s=60.0):
     """Return the recording of a robot that wanders in a square, with or without a look at its walls."""

@@ -117,6 +117,7 @@ def test_a_pipe_as_picture_is_refused(write_arena, tmp_path):
         load_arena(path)
 
 
+@pytest.mark.slow
 def test_the_pack_of_an_experiment_holds_its_picture(write_arena, tmp_path):
     write_arena()
     (tmp_path / "e.yaml").write_text(EXPERIMENT)

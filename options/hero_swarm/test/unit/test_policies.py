@@ -73,6 +73,7 @@ def test_a_saved_policy_drives_as_it_did_in_its_environment(arena, tmp_path):
     assert np.abs(trial.rows.commands[:, 0]).max() <= MAX_LINEAR_M_S
 
 
+@pytest.mark.slow
 def test_an_experiment_takes_a_policy_and_hashes_it(arena, tmp_path):
     observation = Observation((-1.0, -1.0, 1.0, 1.0))
     save_policy(str(tmp_path / "p.npz"), make_layers(24), observation)

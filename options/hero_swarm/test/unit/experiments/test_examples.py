@@ -36,7 +36,6 @@ def test_an_example_is_an_experiment_that_runs(folder, name):
     assert len(experiment.cells) >= 2 and experiment.compare is not None
 
 
-@pytest.mark.slow
 def run_and_measure(trial, score, seconds):
     """Return the score of a mission, as it is measured each second, at the end."""
     sources = Sources()

@@ -55,12 +55,12 @@ def run_experiment(tmp_path_factory):
     return base / "work" / "e"
 
 
-@pytest.mark.slow
 def read(path):
     with open(str(path), newline="") as file:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_arrays_hold_what_the_table_says(folder):
     results = load(str(folder))
     assert results.cells[1] == {"speed_m_s": 0.02, "robots": 3} and results.labels[1] == "speed_m_s 0.02, robots 3"
@@ -72,6 +72,7 @@ def test_arrays_hold_what_the_table_says(folder):
             assert values[cell, int(row["seed"]) - 5] == float(row[name])
 
 
+@pytest.mark.slow
 def test_series_and_poses_end_with_their_runs(folder):
     results = load(str(folder))
     farthest, poses = results.series["farthest"], results.read_poses()
@@ -176,6 +177,7 @@ def test_what_is_no_pack_is_refused_and_writes_nowhere_else(tmp_path):
             verify.main([str(wrong)])
 
 
+@pytest.mark.slow
 def test_only_whole_results_of_this_code_are_packed(folder, tmp_path):
     own = folder.parent / "lib" / "own.py"
     own.write_text(OWN + "# edited\n")

@@ -33,7 +33,6 @@ def die(number):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-@pytest.mark.slow
 def fail(number):
     raise ValueError("of number %d" % number)
 
@@ -43,6 +42,7 @@ def compute(open_executor, workers, function, tasks):
         return list(engine.compute(function, tasks))
 
 
+@pytest.mark.slow
 def test_tasks_of_a_killed_worker_run_again_and_all_run_once(tmp_path):
     tasks = [(number, str(tmp_path)) for number in range(8)]
     done = compute(open_one, 1, square_but_die_once, tasks)
@@ -80,6 +80,7 @@ def test_a_task_that_always_kills_its_worker_ends_with_an_error(monkeypatch):
         compute(open_one, 1, die, [(1,)])
 
 
+@pytest.mark.slow
 def test_an_error_of_the_users_code_reaches_the_program():
     with pytest.raises(ValueError, match="of number 4"):
         compute(open_one, 1, fail, [(4,)])

@@ -272,7 +272,7 @@ OWN_FILES = {
     "own.py": "import helper\nfrom hero_swarm.behavior import Behavior\n\n\nclass Own(Behavior):\n"
     "    def step(self, sensed, memory, random):\n        return helper.V_M_S, 0.0, None\n",
     "helper.py": "V_M_S = 0.1\n",
-    "own.yaml": "image: own.png\nresolution: 0.1\norigin: [-2, -2, 0]\n",
+    "own.yaml": "bounds_m: [-2, -2, 2, 2]\nareas: [{name: floor, rectangle_m: [-1, -1, 1, 1], picture: own.png}]\n",
     "own.errors": "left_gain=0.9\n",
     "own.csv": "0,0,0\n0,0.5,1\n",
     "e.yaml": "behavior: own.py\nrobots: 2\narena: own.yaml\nerrors: own.errors\nstart: {kind: file, file: own.csv}\n"
@@ -310,7 +310,7 @@ def test_files_that_are_edited_during_a_run_change_none_of_its_rows(tmp_path, mo
         ("helper.py", "0.1", "0.2", "computed by other code"),
         ("own.errors", "0.9", "0.8", "other parameters"),
         ("own.csv", "0.5", "0.6", "other parameters"),
-        ("own.yaml", "0.1", "0.2", "other parameters"),
+        ("own.yaml", "-1, -1", "-1, -2", "other parameters"),
         ("own.png", "", "", "computed by other code"),
     ],
 )

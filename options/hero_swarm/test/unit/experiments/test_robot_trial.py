@@ -25,7 +25,6 @@ metrics: [consensus_error, {time_until: {consensus_error: 0.25}}]
 STARTS = np.array([(0.0, 0.0, 0.0), (0.6, 0.0, 2.0), (0.0, 0.6, -1.0)])
 
 
-@pytest.mark.slow
 def drive(text=FILE, lost_s=math.inf, found_s=math.inf):
     """Return the trial, when it ended, and the poses then; robot 1 has no pose from lost_s to found_s."""
     experiment = parse_experiment(text, "e.yaml")
@@ -96,7 +95,6 @@ def test_a_trial_with_objects_needs_the_poses_of_all():
     assert trial.remark == "poses of 0 of the arena's 1 objects" and end_s == 0.0
 
 
-@pytest.mark.slow
 def drive_to(places, lost_s=(0.0, 0.0)):
     """Return where robots that began at STARTS are, and when; robot 1 has no pose between two times."""
     start_drive = StartDrive(places)
