@@ -1,6 +1,8 @@
 """Corrects stamps (ns) of robots: not in the future, never backwards, not uptime. Pure: time of arrival comes in.
 
-The robot's clock is set anew every 2.5 s and jumps then (node_handle.h:361); before that it counts from boot.
+The robot's clock is set anew every 2.5 s and jumps then (node_handle.h:361); before that it counts from boot. It takes
+the time at which its request came as that at which it was sent: until the next one it is ahead by as long as that was
+under way, or waited for a busy computer. No message comes before its time, so arrival is nearer to the truth then.
 """
 
 import collections
@@ -11,7 +13,7 @@ NS_PER_S = 10**9
 
 MAX_FUTURE_NS = NS_PER_S // 20
 MAX_AGE_NS = 5 * NS_PER_S
-"""Stamps further in the future, or in the past, are replaced by the time of arrival."""
+"""Stamps further in the future, or in the past, are of a clock that was not set: their corrections are counted."""
 
 STEP_NS = 1000
 """Distance of a stamp from the one before it while the robot's clock has gone back: 1 us keeps them distinct."""
@@ -24,7 +26,7 @@ Topic = Union[str, bytes]
 
 
 class StampFilter:
-    """Corrects the stamps of all topics of one robot, and counts their messages; corrected: stamps that were replaced.
+    """Corrects the stamps of all topics of one robot, and counts their messages; corrected: stamps that were wrong.
 
     last_ns: the newest stamp of each topic. One that correct() has let through unchanged may be written here for other
     topics with older ones, at the same time of arrival.
@@ -42,7 +44,7 @@ class StampFilter:
     def correct(self, topic: Topic, stamp_ns: int, arrival_ns: int) -> int:
         """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
         last_ns = self.last_ns.get(topic)
-        result_ns = stamp_ns
+        result_ns = min(stamp_ns, arrival_ns)
         if not -MAX_AGE_NS <= stamp_ns - arrival_ns <= MAX_FUTURE_NS:
             result_ns = arrival_ns
             self.corrected += 1
