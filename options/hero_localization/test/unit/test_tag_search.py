@@ -363,13 +363,17 @@ def window_round(center, half_px):
 
 @pytest.mark.parametrize("center", [(900.3, 500.6), (20.0, 500.0), (900.0, 1060.0), (1900.0, 20.0)])
 def test_windows_grow_with_the_time_since_a_tag_was_seen(center, monkeypatch):
+    guess = window_round(center, (0.9 + 6.0 * 0.008) * SIDE_PX + 3.0)
+    for elapsed_s in (0.01, 0.03, 0.06):
+        search, detector, windows = make_logged_search(center, monkeypatch)
+        search.search(FRAME, elapsed_s)
+        assert windows == [guess], elapsed_s
+        detector.place([])
+        search.search(FRAME, 2.0 * elapsed_s)
+        wide = window_round(center, (0.9 + 6.0 * elapsed_s) * SIDE_PX + 3.0)
+        assert windows[:3] == [guess, guess, wide], elapsed_s
     search, detector, windows = make_logged_search(center, monkeypatch)
     stamp_s = 0.0
-    for elapsed_s in (0.01, 0.03, 0.06):
-        stamp_s += elapsed_s
-        search.search(FRAME, stamp_s)
-        assert windows == [window_round(center, (0.9 + 6.0 * elapsed_s) * SIDE_PX + 3.0)], elapsed_s
-        windows.clear()
     # After a longer gap a narrow window comes first, and one of the whole gap where that shows nothing.
     search.search(FRAME, stamp_s + 0.09)
     narrow = window_round(center, (0.9 + 6.0 * 0.08) * SIDE_PX + 3.0)
@@ -379,6 +383,16 @@ def test_windows_grow_with_the_time_since_a_tag_was_seen(center, monkeypatch):
         windows.clear()
         search.search(FRAME, stamp_s + 0.09 + gap_s)
         assert windows[0] == narrow and window_round(center, sides * SIDE_PX + 3.0) in windows, gap_s
+
+
+def test_a_moving_tag_is_looked_for_where_it_is_if_it_moves_on(monkeypatch):
+    search, detector, windows = make_logged_search((900.0, 500.0), monkeypatch)
+    for step in (1, 2, 3):
+        windows.clear()
+        center = (900.0 + 10.0 * step, 500.0 - 4.0 * step)
+        detector.place([(1, center)])
+        assert [tag.tag_id for tag in search.search(FRAME, 0.03 * step)] == [1]
+    assert windows == [window_round(center, (0.9 + 6.0 * 0.008) * SIDE_PX + 3.0)], "as wide as for one that stands"
 
 
 def test_tiles_cover_the_image_with_room_for_a_tag_on_each_border():

@@ -5,7 +5,7 @@ is continuous.
 """
 
 import math
-from typing import NamedTuple, Optional
+from typing import NamedTuple, Optional, Tuple
 
 from hero_client.values import StampedHistory, interpolate_pose
 from hero_node import Pose, find_frame, invert_pose, measure_distance, transform_pose, wrap_angle
@@ -59,6 +59,8 @@ class OdometryHistory:
         self.jumps = 0
         self.raw_pose: Optional[Pose] = None
         self._readings: StampedHistory[Odometry] = StampedHistory(KEPT_S, _interpolate)
+        self._found: Tuple[float, Optional[Odometry]] = (math.nan, None)
+        """The last that was asked for: all that a measured pose goes through asks for the same."""
         self._offset = Pose(0.0, 0.0, 0.0)
         self._counted = self._offset
         """Up to where the length of the path is counted."""
@@ -91,7 +93,7 @@ class OdometryHistory:
             distance_m, self._counted = distance_m + counted_m, pose
         turned_rad += abs(step_rad)
         heading_rad += step_rad
-        self.raw_pose = raw
+        self.raw_pose, self._found = raw, (math.nan, None)
         self._readings.add(stamp_s, Odometry(pose, distance_m, turned_rad, heading_rad, unobserved_s))
 
     def find_motion(self, duration_s: float) -> Pose:
@@ -108,7 +110,11 @@ class OdometryHistory:
 
     def find(self, stamp_s: float) -> Optional[Odometry]:
         """Return the odometry at stamp_s, interpolated; after the newest reading that one, None before the history."""
-        return self._readings.newest if stamp_s >= self._readings.newest_s else self._readings.find(stamp_s)
+        if stamp_s >= self._readings.newest_s:
+            return self._readings.newest
+        if stamp_s != self._found[0]:
+            self._found = stamp_s, self._readings.find(stamp_s)
+        return self._found[1]
 
 
 def _interpolate(start: Odometry, end: Odometry, share: float) -> Odometry:

@@ -149,7 +149,8 @@ class PoseFilter:
         if self._main is None:
             return None
         estimate = self._main.estimate()
-        return estimate._replace(covariance=estimate.covariance + np.diag(self._systematic))
+        estimate.covariance.ravel()[::4] += self._systematic
+        return estimate
 
     def find_odom_origin(self, pose: Pose) -> Pose:
         """Return where the frame hero_N/odom is in `map` if the robot is at pose, that of estimate()."""
@@ -169,11 +170,11 @@ def is_near(one: Pose, other: Pose) -> bool:
 
 
 def _check(measurement: StampedPose) -> None:
-    covariance = np.asarray(measurement.covariance, dtype=float)
     if not all(map(math.isfinite, (measurement.stamp_s, *measurement.pose))):
         raise ValueError(f"a measured pose must be finite, not {measurement.pose!r}")
-    if covariance.shape != (3, 3) or not np.isfinite(covariance).all() or not (covariance.diagonal() > 0.0).all():
+    entries = measurement.covariance.ravel().tolist()
+    if measurement.covariance.shape != (3, 3) or not all(map(math.isfinite, entries)) or min(entries[::4]) <= 0.0:
         raise ValueError("a covariance of x, y and yaw must be 3 by 3 with variances above 0")
-    (a, b, c), (_, d, e), (_, _, f) = covariance.tolist()
+    a, b, c, _, d, e, _, _, f = entries
     if a * d <= b * b or a * (d * f - e * e) <= b * (b * f - c * e) - c * (b * e - c * d):
-        raise ValueError(f"a covariance must be positive definite, not {covariance.tolist()}")
+        raise ValueError(f"a covariance must be positive definite, not {measurement.covariance.tolist()}")

@@ -6,13 +6,22 @@ from typing import Dict, Iterable, List, Mapping, Sequence
 import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped
+from geometry_msgs.msg import (
+    Point,
+    PoseWithCovariance,
+    PoseWithCovarianceStamped,
+    Quaternion,
+    Transform,
+    TransformStamped,
+    Vector3,
+)
+from geometry_msgs.msg import Pose as PoseMessage
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
 
-from ..filter.pose_hypothesis import StampedPose
 from ..filter.swarm_localizer import LocalizedRobot
 
 IN_PLANE = np.ix_((0, 1, 5), (0, 1, 5))
@@ -37,43 +46,28 @@ class Outputs:
 
     def publish(self, robots: Sequence[LocalizedRobot]) -> None:
         """Publish where the robots are. A transform is sent once for each reading of odometry."""
-        now = rospy.get_rostime()
         report = RobotPoses(robots=[_describe_robot(robot) for robot in robots])
-        report.header.stamp, report.header.frame_id = now, self._frame
+        report.header.stamp, report.header.frame_id = rospy.get_rostime(), self._frame
         self._poses.publish(report)
         transforms = []
-        for robot in robots:
+        for robot, described in zip(robots, report.robots):
             if robot.estimate is None or robot.odom_origin is None:
                 continue
-            stamp_s = robot.estimate.stamp_s
-            if self._stamps.get(robot.robot_id) == stamp_s:
+            if self._stamps.get(robot.robot_id) == robot.estimate.stamp_s:
                 continue  # tf warns of transforms that come twice with one stamp
-            self._stamps[robot.robot_id] = stamp_s
-            transforms.append(self._make_transform(robot.robot_id, stamp_s, robot.odom_origin))
+            self._stamps[robot.robot_id] = robot.estimate.stamp_s
+            header, (x_m, y_m, yaw_rad) = Header(0, described.stamp, self._frame), robot.odom_origin
+            transform = Transform(Vector3(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
+            transforms.append(TransformStamped(header, "hero_%d/odom" % robot.robot_id, transform))
             publisher = self._robots[robot.robot_id]
             if publisher.get_num_connections():
-                publisher.publish(self._make_message(robot.estimate))
+                (x_m, y_m, yaw_rad), entries = robot.estimate.pose, np.zeros((6, 6))
+                entries[IN_PLANE] = robot.estimate.covariance
+                pose = PoseMessage(Point(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
+                message = PoseWithCovariance(pose, entries.ravel().tolist())
+                publisher.publish(PoseWithCovarianceStamped(header, message))
         if transforms:
             self._tf.publish(TFMessage(transforms))
-
-    def _make_transform(self, robot_id: int, stamp_s: float, origin: Pose) -> TransformStamped:
-        transform = TransformStamped(child_frame_id="hero_%d/odom" % robot_id)
-        transform.header.stamp, transform.header.frame_id = rospy.Time.from_sec(stamp_s), self._frame
-        transform.transform.translation.x = origin.x_m
-        transform.transform.translation.y = origin.y_m
-        transform.transform.rotation = _make_quaternion(origin.yaw_rad)
-        return transform
-
-    def _make_message(self, estimate: StampedPose) -> PoseWithCovarianceStamped:
-        stamp_s, pose, covariance = estimate[:3]
-        message = PoseWithCovarianceStamped()
-        message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp_s), self._frame
-        message.pose.pose.position.x, message.pose.pose.position.y = pose.x_m, pose.y_m
-        message.pose.pose.orientation = _make_quaternion(pose.yaw_rad)
-        entries = np.zeros((6, 6))
-        entries[IN_PLANE] = covariance
-        message.pose.covariance = entries.ravel().tolist()
-        return message
 
     def publish_diagnostics(
         self, robots: Iterable[LocalizedRobot], unknown: Iterable[int], clocks: Mapping[str, str]
@@ -103,19 +97,15 @@ def publish_statuses(publisher: rospy.Publisher, statuses: List[DiagnosticStatus
 
 def make_robot_pose(robot_id: int, state: int, stamp: rospy.Time, pose: Pose, covariance: np.ndarray) -> RobotPose:
     """Return the message; covariance: of x, y and yaw, (3, 3), m and rad."""
-    message = RobotPose(id=robot_id, state=state, stamp=stamp, x=pose.x_m, y=pose.y_m, yaw=pose.yaw_rad)
-    message.position_sd = math.sqrt(max(0.0, float(covariance[0, 0] + covariance[1, 1]) / 2.0))
-    message.yaw_sd = math.sqrt(max(0.0, float(covariance[2, 2])))
-    return message
+    position_m2, yaw_rad2 = (covariance.item(0) + covariance.item(4)) / 2.0, covariance.item(8)
+    return RobotPose(robot_id, state, stamp, *pose, math.sqrt(max(0.0, position_m2)), math.sqrt(max(0.0, yaw_rad2)))
 
 
 def _describe_robot(robot: LocalizedRobot) -> RobotPose:
     if robot.estimate is not None:
         stamp_s, pose, covariance = robot.estimate[:3]
         return make_robot_pose(robot.robot_id, int(robot.state), rospy.Time.from_sec(stamp_s), pose, covariance)
-    message = RobotPose(id=robot.robot_id, state=int(robot.state))
-    message.x = message.y = message.yaw = message.position_sd = message.yaw_sd = math.nan
-    return message
+    return RobotPose(robot.robot_id, int(robot.state), rospy.Time(), *[math.nan] * 5)
 
 
 def _make_quaternion(yaw_rad: float) -> Quaternion:

@@ -133,14 +133,15 @@ def fit_squares(
     square = np.array((1.0 + 1.0j, 1.0 - 1.0j, -1.0 - 1.0j, -1.0 + 1.0j))
     centers, turns = places.mean(axis=1), places @ square.conj() / 8.0
     sides_px = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
-    poses = []
-    for tag, center, turn, side_px in zip(tags, centers, turns, sides_px):
-        pose = Pose(float(center.real), float(center.imag), math.atan2(turn.imag, turn.real))
-        size_m, corner_share = 2.0 * float(abs(turn)), CORNER_PX / max(float(side_px), CORNER_PX)
-        place_m2 = (corner_share * size_m) ** 2 / 4.0 + SYSTEMATIC_M**2 + calibration_sd_m**2
-        yaw_rad2 = corner_share**2 / 2.0 + SYSTEMATIC_RAD**2
-        poses.append(TagPose(tag.tag_id, pose, size_m, np.diag((place_m2, place_m2, yaw_rad2))))
-    return poses
+    sizes_m, corner_shares = 2.0 * np.abs(turns), CORNER_PX / np.maximum(sides_px, CORNER_PX)
+    covariances = np.zeros((len(tags), 9))
+    covariances[:, :5:4] = (corner_shares * sizes_m)[:, None] ** 2 / 4.0 + SYSTEMATIC_M**2 + calibration_sd_m**2
+    covariances[:, 8] = corner_shares**2 / 2.0 + SYSTEMATIC_RAD**2
+    found = np.column_stack((centers.real, centers.imag, np.angle(turns), sizes_m)).tolist()
+    return [
+        TagPose(tag.tag_id, Pose(x_m, y_m, yaw_rad), size_m, covariance.reshape(3, 3))
+        for tag, (x_m, y_m, yaw_rad, size_m), covariance in zip(tags, found, covariances)
+    ]
 
 
 def find_smallest_side(camera: Camera, size_m: float, height_m: float) -> float:
@@ -188,6 +189,7 @@ def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout, calibr
 def _find_base(tag: TagPose, mount: Pose) -> TagPose:
     pose = find_frame(tag.pose, mount)
     # A wrong heading moves the robot's center round the tag's.
-    jacobian = np.eye(3)
-    jacobian[0, 2], jacobian[1, 2] = tag.pose.y_m - pose.y_m, pose.x_m - tag.pose.x_m
-    return tag._replace(pose=pose, covariance=jacobian @ tag.covariance @ jacobian.T)
+    round_tag = np.array((tag.pose.y_m - pose.y_m, pose.x_m - tag.pose.x_m, 1.0))
+    covariance = tag.covariance.item(8) * (round_tag[:, None] * round_tag)
+    covariance.ravel()[:5:4] += tag.covariance.item(0)
+    return tag._replace(pose=pose, covariance=covariance)
