@@ -395,6 +395,8 @@ def main() -> None:
     text = "width of the nodes' images, px (%(default)s); 3840 takes 1 GB of memory"
     parser.add_argument("--width", type=int, default=1920, help=text)
     parser.add_argument("--rate", type=float, default=30.0, help="of the nodes' images, Hz (%(default)s)")
+    text = "speed of the nodes' time, by that of the clock (%(default)s)"
+    parser.add_argument("--speed", type=float, default=1.0, help=text)
     parser.add_argument("--seconds", type=float, default=20.0, help="for so long (%(default)s)")
     parser.add_argument("--rounds", type=int, default=1, help="of the nodes (%(default)s)")
     options = parser.parse_args()
@@ -404,7 +406,7 @@ def main() -> None:
         measure_accuracy(options.seed, options.tape_mm / 1e3)
     if "nodes" in options.only:
         camera = scale(OPTIONS, options.width, options.width * 9 // 16)._replace(rate_hz=options.rate)
-        measure_nodes(camera, options.count, options.seconds, options.rounds)
+        measure_nodes(camera, options.count, options.seconds, options.rounds, options.speed)
 
 
 if __name__ == "__main__":
