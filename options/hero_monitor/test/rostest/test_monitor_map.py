@@ -218,18 +218,18 @@ class MapTest(unittest.TestCase):
         return self.page.browser.execute_script(MEASURE_COLOR, WALL, STEP_PX)
 
     def test_simulated_robots_are_drawn_where_they_are(self):
+        self.page.click("#ghosts")
         place = PoseMessage(Point(2.0, 0.0, 0.0), Quaternion(w=1.0))
         markers = [Marker(ns=name, text="hero_0", pose=place) for name in ("headings", "names")]
-        for _ in range(8):
-            self.page.click("#zoomout")  # from then on the view stays
-        self.addCleanup(self.page.click, "#fit")
-        wait_for(lambda: 0.4 < self.measure_robot() < 0.6, self.measure_robot)
         simulator = Repeater("/hero_sim/markers", MarkerArray(markers))
         self.addCleanup(simulator.close)
+        # The view fits the robot and, to its left, its ghost.
         wait_for(lambda: self.measure_robot() > 0.6, self.measure_robot)
+        self.page.save("monitor_ghost.png")
         wait_for(lambda: self.page.facts().get("odometry error") == "2250 mm", self.page.facts)
         simulator.close()
         wait_for(lambda: 0.4 < self.measure_robot() < 0.6, self.measure_robot)
+        self.page.click("#ghosts")
 
     def measure_robot(self):
         """Return where hero_0 is, by the map's width; 0 if it is not drawn."""

@@ -20,7 +20,7 @@ export class FleetMap {
     this.canvas = element("canvas");
     this.painter = new MapPainter(this);
     // With select, clicks and drags choose robots in addition, as with Shift.
-    this.shows = { trails: true, beams: true, numbers: true, picture: false, select: false };
+    this.shows = { trails: true, beams: true, numbers: true, ghosts: false, picture: false, select: false };
     this.picture = new CameraPicture(() => this.update({}));
     this.view = { x: 0, y: 0, scale: 0.3 };
     this.pinned = false; // then the view stays until Fit is pressed
@@ -50,6 +50,7 @@ export class FleetMap {
     setPressed(element(name), this.shows[name]);
     this.requestShown();
     this.picture.show(this.shows.picture, this.state.picture);
+    if (name === "ghosts" && !this.pinned) this.fit();
     this.draw();
   }
 
@@ -210,11 +211,12 @@ export class FleetMap {
   }
 
   fit() {
-    const { replay, arena, grid, drawings } = this.state;
+    const { poses, replay, arena, grid, drawings } = this.state;
     const places = []; // that are to be seen
     const add = ([left, low, right, high]) => places.push([left, low], [right, high]);
     const surround = ([x, y], reach) => places.push([x - reach, y - reach], [x + reach, y + reach]);
-    for (const pose of Object.values({ ...replay, ...this.poses })) if (pose) surround(pose, 150);
+    const drawn = [replay, this.poses, this.shows.ghosts ? poses : {}].flatMap((shown) => Object.values(shown));
+    for (const pose of drawn) if (pose) surround(pose, 150);
     if (arena.extent) add(arena.extent);
     for (const { lines = [], isBeam } of drawings) if (!isBeam) for (const place of lines.flat()) surround(place, 60);
     if (grid) add([grid.pose[0], grid.pose[1], grid.pose[0] + grid.columns * grid.cell, grid.pose[1] + grid.rows * grid.cell]);

@@ -47,6 +47,7 @@ export class MapPainter {
     this.paintShapes(state.objects, "--object");
     const robots = state.fleet.robots.filter((robot) => robot.state !== "REFUSED" && state.poses[robot.name]);
     if (shows.trails) for (const robot of robots) this.paintTrail(robot);
+    if (shows.ghosts) for (const robot of robots) this.paintGhost(robot);
     this.paintPlaces();
     for (const robot of robots) this.paintGoal(robot);
     for (const drawing of state.drawings) if (shows.beams || !drawing.isBeam) this.paintDrawing(drawing);
@@ -164,6 +165,20 @@ export class MapPainter {
       this.pen(colorOf(robot.id, TRAIL_INKS[index]), 1.5, 5);
       context.stroke(piece);
     });
+  }
+
+  /** Where odometry or localization has a robot that is drawn where it is. */
+  paintGhost(robot) {
+    const pose = this.map.state.poses[robot.name];
+    if (!this.state.ground_truth[robot.name]) return;
+    const { scale } = this.view;
+    this.pen(colorOf(robot.id), 1.5);
+    this.at(pose, () =>
+      this.dashed([4 / scale, 3 / scale], () => {
+        this.circle(0, 0, BODY_MM).stroke();
+        this.path([0, 0], [BODY_MM * 1.35, 0]).stroke();
+      }),
+    );
   }
 
   paintGoal(robot) {
