@@ -41,6 +41,7 @@ def make_robot(robot_id, **changes):
         "speed": 0.05,
         "turn": -0.5,
         "distance": 1.25,
+        "nearest": 0.0,
         "dropped": 0,
         "bad": 0,
         "clock": 0.0012,

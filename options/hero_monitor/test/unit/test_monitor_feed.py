@@ -138,6 +138,7 @@ def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
     for pose in (Pose(0.0, 0.0, 0.0), Pose(0.3, 0.4, 0.0)):
         track.receive_pose(pose)
     track.velocity = Velocity(-0.1234, 1.23456)
+    track.receive_proximity([math.inf, 0.25], 0.0, 1.0)
     fleet.now_s += ROW_PERIOD_S
     (before,) = fleet.read()["fleet"]["robots"]
     assert (before["odom"], before["speed"], before["turn"]) == (0.0, None, None), "not measured yet"
@@ -154,7 +155,7 @@ def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
     expected = {
         "name": "hero_3", "id": 3, "state": "READY", "known": True, "stop": "at rest", "since": 60, "uptime": 61,
         "reconnects": 2, "speed": 0.123, "turn": 1.235, "bytes": 4001, "distance": 0.5, "dropped": 5, "bad": 6,
-        "clock": -0.0123, "source": "", "health": [0, ""],
+        "clock": -0.0123, "source": "", "health": [0, ""], "nearest": 0.25,
     }  # fmt: skip
     assert {name: shown[name] for name in expected} == expected and len(shown["error"]) == MAX_LINE_LENGTH
 

@@ -10,9 +10,11 @@ from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from hero_client.ros import RobotTrack
 from hero_monitor.control.requests import RequestError, read_request
 from hero_monitor.fleet_feed import drawings
 from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
+from hero_monitor.fleet_feed.feed import encode_nearest
 from hero_monitor.fleet_feed.occupancy import MAX_CELLS, encode_grid
 from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_AT_ONCE,
@@ -150,6 +152,22 @@ def test_without_localization_the_map_is_as_before_it(placement):
     placement.localize("", {})
     assert (placement.frame, placement.is_localized) == ("world", False)
     assert placement.knows("hero_0") and not placement.knows("hero_1")
+
+
+@pytest.mark.parametrize(
+    "ranges_m, shown",
+    [
+        ((), "-"),
+        ((math.inf, math.inf), "free"),
+        ((math.inf, math.nan), "not calibrated"),
+        ((0.12345, math.inf), 0.123),
+        ((0.1, -math.inf), 0.0),
+    ],
+)
+def test_the_nearest_obstacle_is_a_distance_or_a_word(ranges_m, shown):
+    track = RobotTrack()
+    track.receive_proximity(ranges_m, -math.pi, math.pi / 4.0)
+    assert encode_nearest(track) == shown
 
 
 JPEG = b"\xff\xd8picture"

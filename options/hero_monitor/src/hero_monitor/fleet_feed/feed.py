@@ -23,7 +23,7 @@ from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.ros import Drivers, NewestMessage, StopStatus, find_lost_commands, follow, load_fleet_file
+from hero_client.ros import Drivers, NewestMessage, RobotTrack, StopStatus, find_lost_commands, follow, load_fleet_file
 from hero_client.values import (
     STATES,
     STOP_STATES,
@@ -246,6 +246,7 @@ class FleetFeed:
             "speed": velocity and finite(round(abs(velocity.linear_m_s), 3)),
             "turn": velocity and finite(round(velocity.angular_rad_s, 3)),
             "distance": None if track is None else finite(round(track.distance_m, 2)),
+            "nearest": "-" if track is None else encode_nearest(track),
             "dropped": row.dropped_messages,
             "bad": row.bad_packets,
             "clock": finite(round(row.clock_offset, 4)),
@@ -392,6 +393,13 @@ class FleetFeed:
             label = LABEL.match(line.msg) if line.name in drivers else None
             robot = label.group(1) if label and label.group(1) in self.robots else ""
             log.append(line.header.stamp.to_sec(), line.level, line.name.lstrip("/"), robot, line.msg)
+
+
+def encode_nearest(track: RobotTrack) -> Any:
+    """Return the distance of the nearest obstacle, m; a word where there is none."""
+    if track.nearest is not None:
+        return max(0.0, round(track.nearest.range_m, 3))
+    return "-" if not track.proximity_seen else "free" if track.is_free else "not calibrated"
 
 
 def _encode_value(value: Any) -> Any:

@@ -4,40 +4,20 @@ export const KEPT_MS = 60000;
 const STEP_MS = 500;
 const GAP_MS = 3500; // after a longer pause of the page a line is interrupted
 
-const isRange = (range) => Number.isFinite(range) && range >= 0;
-
-/** Nearest range in mm; Infinity: nothing in range; -1: not known, a sensor is not calibrated; null without data. */
-export function nearestOf(ranges) {
-  if (!ranges || !ranges.length) return null;
-  const valid = ranges.filter(isRange);
-  if (valid.length) return Math.min(...valid);
-  return ranges.includes(-1) ? -1 : Infinity;
-}
-
-/** What users read of nearestOf(). */
-export function nearestText(mm, digits) {
-  if (mm === null) return "-";
-  if (mm < 0) return "not calibrated";
-  return isRange(mm) ? `${(mm / 1000).toFixed(digits)} m` : "free";
-}
-
-function nearestIn({ ranges }, name) {
-  const mm = nearestOf(ranges[name]);
-  return mm !== null && isRange(mm) ? mm / 1000 : null;
-}
+const finite = (value) => (Number.isFinite(value) ? value : null);
 
 /** Quantities of a robot; null: not known. */
 export const QUANTITIES = {
   speed: { title: "speed", unit: "m/s", of: (robot) => robot.speed },
   turn: { title: "turn rate", unit: "rad/s", of: (robot) => robot.turn },
-  nearest: { title: "nearest obstacle", unit: "m", of: (robot, state) => nearestIn(state, robot.name) },
+  nearest: { title: "nearest obstacle", unit: "m", of: ({ nearest }) => finite(nearest) },
   odometry: { title: "odometry rate", unit: "Hz", of: (robot) => robot.odom },
 };
 
 /** Keep a quantity for each topic [name, unit] of fleet.yaml. */
 export function addTopics(topics) {
   for (const [name, unit] of topics) {
-    QUANTITIES[name] = { title: name, unit, of: (robot) => (Number.isFinite(robot.values?.[name]) ? robot.values[name] : null) };
+    QUANTITIES[name] = { title: name, unit, of: ({ values }) => finite(values?.[name]) };
   }
 }
 
@@ -55,7 +35,7 @@ export class History {
     const samples = {};
     for (const robot of state.fleet.robots) {
       if (!robot.known || !robot.odom || robot.state !== "READY") continue;
-      samples[robot.name] = Object.fromEntries(Object.entries(QUANTITIES).map(([name, { of }]) => [name, of(robot, state)]));
+      samples[robot.name] = Object.fromEntries(Object.entries(QUANTITIES).map(([name, { of }]) => [name, of(robot)]));
     }
     this.steps.push({ ms, samples });
     while (ms - this.steps[0].ms > KEPT_MS) this.steps.shift();

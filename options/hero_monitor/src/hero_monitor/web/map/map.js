@@ -2,6 +2,7 @@
 
 import { element, make, setPressed } from "../dom.js";
 import { isLate } from "../connection.js";
+import { drawGrid } from "./occupancy.js";
 import { CameraPicture } from "./picture.js";
 import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
@@ -256,6 +257,7 @@ export class FleetMap {
 
   update(updates) {
     if ("poses" in updates || "ground_truth" in updates) this.keepTrails();
+    if (updates.grid) this.gridImage = drawGrid(updates.grid);
     if ("picture" in updates) this.picture.show(this.shows.picture, this.state.picture);
     const { poses, ground_truth, replay, fleet, grid, arena, drawings } = this.state;
     const count = Object.keys({ ...poses, ...replay }).length + Object.keys(ground_truth).length;

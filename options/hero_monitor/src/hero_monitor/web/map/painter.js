@@ -1,7 +1,6 @@
 // Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
 import { colorOf, isDark } from "./colors.js";
-import { Occupancy } from "./occupancy.js";
 import { sourceOf, stateOf } from "../losses.js";
 
 export const BODY_MM = 36.85;
@@ -12,7 +11,6 @@ const MIN_RADIUS_PX = 10; // radius of a robot, however far the view is
 const PROJECTED_PX = 26;
 const MIN_DIGIT_PX = 11;
 const SENSOR_REACH_MM = 236.8;
-const UNKNOWN_ALPHA = 70;
 const TRAIL_INKS = [0.15, 0.28, 0.42, 0.6];
 
 export class MapPainter {
@@ -21,7 +19,6 @@ export class MapPainter {
   constructor(map) {
     this.map = map;
     this.context = map.canvas.getContext("2d");
-    this.occupancy = new Occupancy();
   }
 
   paint() {
@@ -40,7 +37,7 @@ export class MapPainter {
     context.translate(this.width / 2, this.height / 2);
     context.scale(view.scale, -view.scale);
     context.translate(-view.x, -view.y);
-    if (state.grid) this.paintOccupancy(state.grid);
+    if (state.grid) this.paintOccupancy(state.grid, map.gridImage);
     if (map.picture.shown) this.paintPicture(map.picture.shown);
     this.paintGrid();
     this.paintShapes(state.arena, "--wall");
@@ -97,13 +94,10 @@ export class MapPainter {
     this.context.setLineDash([]);
   }
 
-  paintOccupancy(grid) {
-    const { context } = this;
-    const read = (name, alpha) => [...this.ink(name).match(/[0-9a-f]{2}/gi).map((part) => parseInt(part, 16)), alpha];
-    const colors = { unknown: read("--wall", UNKNOWN_ALPHA), free: [0, 0, 0, 0], occupied: read("--wall", 255) };
-    this.at(grid.pose, () => {
-      context.imageSmoothingEnabled = false;
-      context.drawImage(this.occupancy.find(grid, colors), 0, 0, grid.columns * grid.cell, grid.rows * grid.cell);
+  paintOccupancy({ pose, columns, rows, cell }, image) {
+    this.at(pose, () => {
+      this.context.imageSmoothingEnabled = false;
+      this.context.drawImage(image, 0, 0, columns * cell, rows * cell);
     });
   }
 

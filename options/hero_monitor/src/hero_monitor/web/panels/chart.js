@@ -6,6 +6,8 @@ import { colorOf, isDark } from "../map/colors.js";
 
 const PERIOD_MS = 500;
 const HEIGHT_PX = 170;
+// From zero, and never so narrow that noise fills the chart.
+const RANGE = { min: { soft: 0, mode: 1, pad: 0 }, max: { soft: 0.05, mode: 1, pad: 0.05 } };
 
 export class Chart {
   constructor(history) {
@@ -59,7 +61,7 @@ export class Chart {
         height: HEIGHT_PX,
         legend: { show: false },
         cursor: { show: false },
-        scales: { x: { time: false, range: [-KEPT_MS / 1000, 0] }, y: { range: (plot, low, high) => rangeOf(low, high) } },
+        scales: { x: { time: false, range: [-KEPT_MS / 1000, 0] }, y: { range: RANGE } },
         axes: [
           { ...axis, size: 26, values: (plot, ticks) => ticks.map((tick) => (tick === 0 ? "now" : `${tick} s`)) },
           { ...axis, size: 44 },
@@ -71,10 +73,4 @@ export class Chart {
     );
     element("chart").setAttribute("aria-label", `${quantity.title} over the last minute, ${quantity.unit}`);
   }
-}
-
-/** From zero, and never so narrow that noise fills the chart. */
-function rangeOf(low, high) {
-  const [least, most] = [Math.min(0, low ?? 0), Math.max(0.05, high ?? 0)];
-  return [least, most + 0.05 * (most - least)];
 }

@@ -2,7 +2,6 @@
 
 import { Lines, element, isPressed, make, setPressed } from "../dom.js";
 import { colorOf } from "../map/colors.js";
-import { nearestOf, nearestText } from "../history.js";
 import { sourceOf, stateOf, wordOf } from "../losses.js";
 
 function spanOf(seconds) {
@@ -48,7 +47,7 @@ const COLUMNS = [
   { title: "State", text: stateText, tag: "state", lasting: true },
   { title: "Stop", text: (robot, state) => (stateOf(robot, state) === "UNKNOWN" ? "" : robot.stop), tag: "stop", className: "stop", lasting: true },
   { title: "Light", text: lightText, byName: true },
-  { title: "Nearest", text: (robot, state) => nearestText(nearestOf(state.ranges[robot.name]), 2), className: "number", byName: true },
+  { title: "Nearest", text: ({ nearest }) => (Number.isFinite(nearest) ? number(nearest, 2, " m") : nearest), className: "number", byName: true },
   { title: "Speed", text: ({ speed }) => number(speed, 2, " m/s"), className: "number", byName: true },
   { title: "Pose", text: poseText, className: "pose", lasting: true, byName: true },
   { title: "Note", text: ({ note }) => note, className: "details", lasting: true },
