@@ -56,4 +56,4 @@ def test_the_package_takes_scripts_from_pages_that_have_them_written():
     made = re.findall(
         r"hero_add_page_script\(\.\./docs/tutorial/(\S+) (\S+)\)", (PACKAGE / "CMakeLists.txt").read_text()
     )
-    assert set(made) <= shown and len(made) == 9
+    assert set(made) <= shown and len(made) == 17
