@@ -1,96 +1,101 @@
-"""Reading a joystick: a named pipe sends what the kernel's device would."""
+"""Reading a joystick: records as the kernel sends them, and a device that is not there, or goes."""
 
-import contextlib
 import os
 import struct
+from types import SimpleNamespace
+from unittest import mock
 
 import pytest
 
-from hero_client import ProgramError
-from hero_examples.driving.joy_driver import JoystickDevice
+joy_driver = pytest.importorskip("hero_examples.driving.joy_driver", reason="imports rospy")
+from sensor_msgs.msg import Joy  # noqa: E402
+
+from hero_client import Program, ProgramError  # noqa: E402
 
 BUTTON, AXIS, INITIAL = 1, 2, 0x80
 
 
-@contextlib.contextmanager
-def plug_in(folder, deadzone=0.0):
-    """Yield a joystick, and a function that sends a record of kind, number and value."""
-    path = str(folder / "js0")
-    os.mkfifo(path)
-    keep = os.open(path, os.O_RDWR)
-    with contextlib.closing(JoystickDevice(path, deadzone)) as device:
-
-        def send(*records):
-            os.write(keep, b"".join(struct.pack("=IhBB", 7, value, kind, number) for kind, number, value in records))
-            device.read(1.0)
-
-        yield device, send
-    os.close(keep)
+def pack(*records):
+    """Return records of kind, number and value."""
+    return b"".join(struct.pack("=IhBB", 7, value, kind, number) for kind, number, value in records)
 
 
-def test_axes_are_positive_to_the_left_and_up_and_full_at_one(tmp_path):
-    with plug_in(tmp_path) as (device, send):
-        send((AXIS | INITIAL, 0, 0), (AXIS | INITIAL, 1, 0), (BUTTON | INITIAL, 0, 0))
-        assert device.axes == [0.0, 0.0] and device.buttons == [0]
-        send((AXIS, 1, -32767), (AXIS, 0, 32767))
-        assert device.axes == [-1.0, 1.0]
-        send((AXIS, 0, -32768))  # one more than full
-        assert device.axes == [1.0, 1.0]
+def note(joy, *records, deadzone=0.0):
+    joy_driver.note_changes(joy, pack(*records), deadzone)
+    return joy.axes, joy.buttons
 
 
-def test_buttons_are_pressed_and_released(tmp_path):
-    with plug_in(tmp_path) as (device, send):
-        send((BUTTON | INITIAL, 4, 0))
-        assert device.buttons == [0, 0, 0, 0, 0]
-        send((BUTTON, 4, 1), (BUTTON, 1, 1))
-        assert device.buttons == [0, 1, 0, 0, 1]
-        send((BUTTON, 4, 0))
-        assert device.buttons == [0, 1, 0, 0, 0]
+@pytest.fixture(name="joy")
+def make_joy():
+    return Joy(axes=[], buttons=[])
 
 
-def test_a_stick_that_rests_off_its_center_does_not_drive(tmp_path):
-    with plug_in(tmp_path, deadzone=0.1) as (device, send):
-        send((AXIS, 0, 3000), (AXIS, 1, -16384))
-        assert device.axes[0] == 0.0
-        assert device.axes[1] == pytest.approx((0.5 - 0.1) / 0.9, abs=0.001)
+def test_axes_are_positive_to_the_left_and_up_and_full_at_one(joy):
+    initial = [(AXIS | INITIAL, 0, 0), (AXIS | INITIAL, 1, 0), (BUTTON | INITIAL, 0, 0)]
+    assert note(joy, *initial) == ([0.0, 0.0], [0])
+    assert note(joy, (AXIS, 1, -32767), (AXIS, 0, 32767))[0] == [-1.0, 1.0]
+    assert note(joy, (AXIS, 0, -32768))[0] == [1.0, 1.0], "one more than full"
 
 
-def test_what_is_neither_axis_nor_button_is_left_out(tmp_path):
-    with plug_in(tmp_path) as (device, send):
-        send((0x10, 0, 5), (AXIS, 0, 0))
-        assert device.axes == [0.0] and device.buttons == []
+def test_buttons_are_pressed_and_released(joy):
+    assert note(joy, (BUTTON | INITIAL, 4, 0))[1] == [0, 0, 0, 0, 0]
+    assert note(joy, (BUTTON, 4, 1), (BUTTON, 1, 1))[1] == [0, 1, 0, 0, 1]
+    assert note(joy, (BUTTON, 4, 0))[1] == [0, 1, 0, 0, 0]
 
 
-def test_without_a_change_the_state_stays(tmp_path):
-    with plug_in(tmp_path) as (device, send):
-        send((AXIS, 0, -32767))
-        device.read(0.0)
-        assert device.axes == [1.0]
+def test_a_stick_that_rests_off_its_center_does_not_drive(joy):
+    axes, _ = note(joy, (AXIS, 0, 3000), (AXIS, 1, -16384), deadzone=0.1)
+    assert axes[0] == 0.0
+    assert axes[1] == pytest.approx((0.5 - 0.1) / 0.9, abs=0.001)
 
 
-def test_a_joystick_that_is_unplugged_ends_the_program_with_its_name(tmp_path):
-    path = tmp_path / "js0"
-    os.mkfifo(str(path))
-    keep = os.open(str(path), os.O_RDWR)
-    with contextlib.closing(JoystickDevice(str(path))) as device:
-        os.close(keep)
-        with pytest.raises(ProgramError, match="js0 has gone: plug it in"):
-            device.read(1.0)
+def test_what_is_neither_axis_nor_button_is_left_out(joy):
+    assert note(joy, (0x10, 0, 5), (AXIS, 0, 0)) == ([0.0], [])
 
 
-@pytest.mark.parametrize(
-    "error, told", [(PermissionError, "usermod -a -G input"), (OSError(5, "Input/output error"), "Input/output error")]
-)
-def test_a_device_that_cannot_be_opened_names_the_remedy(monkeypatch, error, told):
-    def refuse(path, flags):
-        assert path == "/dev/input/js1"
-        raise error
+class Stage:
+    """A program that reads the named pipe at path, in place of a device; sent: the axes of each message."""
 
-    monkeypatch.setattr("hero_examples.driving.joy_driver.os.open", refuse)
-    with pytest.raises(ProgramError, match=told):
-        JoystickDevice("/dev/input/js1")
+    def __init__(self, monkeypatch, path):
+        self.path, self.sent, self.ends = str(path), [], []
+        os.mkfifo(self.path)
+        self.kernel = os.open(self.path, os.O_RDWR)
+        publisher = SimpleNamespace(publish=lambda joy: self.sent.append(list(joy.axes)))
+        monkeypatch.setattr(joy_driver.rospy, "Publisher", lambda topic, kind, queue_size: publisher)
+        monkeypatch.setattr(joy_driver.rospy.Time, "now", joy_driver.rospy.Time)
+        self.program = mock.create_autospec(Program, instance=True, running=True)
+        self.program.wait_readable.side_effect = self.wait
+
+    def wait(self, fds, timeout_s):
+        """Take the next of what happens."""
+        assert timeout_s == pytest.approx(0.05)
+        return fds if self.ends.pop(0)() else []
+
+    def run(self, *ends):
+        self.ends = list(ends)
+        joy_driver.publish(self.program, self.path, 0.0, 20.0)
+
+    def stop(self):
+        self.program.running = False
 
 
-def test_a_joystick_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(ProgramError, match="no joystick .*js9: plug it in; ls /dev/input/js"):
-        JoystickDevice(str(tmp_path / "js9"))
+def test_a_device_is_published_at_each_change_and_again_without_one(monkeypatch, tmp_path):
+    stage = Stage(monkeypatch, tmp_path / "js0")
+    stage.run(lambda: os.write(stage.kernel, pack((AXIS, 0, -32767))), lambda: False, stage.stop)
+    assert stage.sent == [[1.0]] * 3
+    os.close(stage.kernel)
+
+
+def test_a_joystick_that_is_unplugged_ends_the_program_with_its_name(monkeypatch, tmp_path):
+    stage = Stage(monkeypatch, tmp_path / "js0")
+    with pytest.raises(ProgramError, match=r"no joystick .*/js0 \(No such device\): plug it in"):
+        stage.run(lambda: os.close(stage.kernel) is None)
+
+
+@pytest.mark.parametrize("error", [FileNotFoundError(2, "No such file"), PermissionError(13, "Permission denied")])
+def test_a_device_that_cannot_be_opened_is_named_with_the_remedy(monkeypatch, tmp_path, error):
+    stage = Stage(monkeypatch, tmp_path / "js1")
+    os.close(stage.kernel)
+    monkeypatch.setattr(joy_driver.os, "open", mock.create_autospec(os.open, side_effect=error))
+    with pytest.raises(ProgramError, match=r"no joystick .*/js1 \(%s\): .*usermod -a -G input" % error.strerror):
+        stage.run()
