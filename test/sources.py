@@ -67,9 +67,8 @@ PACKAGES: Dict[str, Path] = {path.parent.name: path.parent for path in find("pac
 
 
 def list_programs(package: str) -> List[str]:
-    """Programs of a package that rosrun finds: those that CMake makes, and scripts in nodes/ and on pages."""
-    scripts = [path.name for path in sorted((PACKAGES[package] / "nodes").glob("*"))]
-    scripts += re.findall(r"hero_add_page_script\(\S+ (\w+\.py)", read_cmake(package))
+    """Programs of a package that rosrun finds: those that CMake makes, and scripts on pages."""
+    scripts = re.findall(r"hero_add_page_script\(\S+ (\w+\.py)", read_cmake(package))
     return re.findall(r"hero_add_(?:program|node)\((\w+)", read_cmake(package)) + scripts
 
 

@@ -3,8 +3,8 @@
 # hero_add_program(NAME [MODULE]): a program NAME for rosrun that calls main() of a module of the package (default: NAME).
 # What main() returns is the exit status; an error of ours becomes one line: see hero_node.command_line.
 # hero_add_node(NAME [MODULE]): one that takes ROS parameters only; --help prints the docstring of its module.
-# hero_add_script(FILE [ARGUMENT ...]): one that runs a script of plain rospy, as students write it; without arguments of
-# its own the script is a node. --help prints its docstring.
+# hero_add_page_script(PAGE NAME [ARGUMENT ...]): one that runs a script of plain rospy, as students write it, which a page
+# of a course holds; without arguments of its own the script is a node. --help prints its docstring.
 #
 # Its first line names the interpreter of the build, in the devel and the install space: catkin_install_python() would
 # write "env python3" for the install space, and the first python3 on PATH (pyenv, conda) may have no rospy. A module that is
@@ -25,16 +25,6 @@ check_node_arguments('${PROJECT_NAME}', '${name}', sys.modules[main.__module__].
 run(main)")
 endfunction()
 
-function(hero_add_script file)
-  get_filename_component(name ${file} NAME)
-  get_filename_component(folder ${file} DIRECTORY)
-  string(REPLACE ";" " " arguments "${ARGN}")
-  _hero_write_program(${name} "from hero_node.ros.script import run_script" "\
-run_script('${PROJECT_NAME}', '${file}', '${arguments}'.split())")
-  install(FILES ${file} DESTINATION ${CATKIN_PACKAGE_SHARE_DESTINATION}/${folder})
-endfunction()
-
-# hero_add_page_script(PAGE NAME): the same of a script that readers of a page write to scripts/NAME; the page holds it.
 function(hero_add_page_script page name)
   get_filename_component(page ${page} ABSOLUTE)
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${page})
@@ -49,13 +39,14 @@ function(hero_add_page_script page name)
   string(SUBSTRING "${text}" ${start} -1 text)
   string(FIND "${text}" "```" length)
   string(SUBSTRING "${text}" 0 ${length} text)
+  string(REPLACE ";" " " arguments "${ARGN}")
   set(file ${CATKIN_PACKAGE_BIN_DESTINATION}/scripts/${name})
   file(WRITE ${CATKIN_DEVEL_PREFIX}/${file} "${text}")
   install(FILES ${CATKIN_DEVEL_PREFIX}/${file} DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION}/scripts)
   _hero_write_program(${name} "import os
     from hero_node.ros.script import run_script" "\
 file = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'scripts', '${name}')
-run_script('${PROJECT_NAME}', file, [])")
+run_script('${PROJECT_NAME}', file, '${arguments}'.split())")
 endfunction()
 
 function(_hero_write_program name import call)

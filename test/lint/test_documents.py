@@ -53,8 +53,10 @@ def read_arguments(package, name):
 
 @lru_cache(maxsize=None)
 def read_package_text(package):
-    """All of the Python sources of a package."""
+    """All of the Python sources of a package, and the pages that it takes scripts from."""
     files = [path for path in sources.list_python_files() if sources.package_of(path) == package]
+    pages = re.findall(r"hero_add_page_script\((\S+)", sources.read_cmake(package))
+    files += [(PACKAGES[package] / page).resolve() for page in pages]
     return "\n".join(path.read_text(encoding="utf-8") for path in files if "test" not in path.parts)
 
 

@@ -75,14 +75,14 @@ def find_needs(package, in_tests):
                 if needed:
                     needs.setdefault(needed, f"{sources.name_of(path)}:{found.line}")
     build = PACKAGES[package] / "CMakeLists.txt"
-    for page, name in re.findall(r"hero_add_page_script\((\S+) (\S+)\)", build.read_text(encoding="utf-8")):
+    for page, name in re.findall(r"hero_add_page_script\((\S+) (\w+\.py)", build.read_text(encoding="utf-8")):
         text = (build.parent / page).read_text(encoding="utf-8")
         (script,) = re.findall(f"/scripts/{name} -->\n```python\n(.*?)```", text, re.DOTALL)
         for module in re.findall(r"^(?:import|from) (\S+)", script, re.MULTILINE) if not in_tests else ():
             needed = needed_package(module, package)
             if needed:
                 needs.setdefault(needed, page)
-    if not in_tests and re.search(r"^hero_add_(node|script)\(", build.read_text(encoding="utf-8"), re.MULTILINE):
+    if not in_tests and re.search(r"^hero_add_(node|page_script)\(", build.read_text(encoding="utf-8"), re.MULTILINE):
         needs.setdefault("hero_node", sources.name_of(build))  # reads their arguments
     return needs
 

@@ -85,11 +85,11 @@ def test_an_error_that_ends_a_thread_is_one_line(monkeypatch, capsys):
 
 def run_lesson(monkeypatch, capsys, tmp_path, *words, arguments=()):
     """Run a script that prints what it is started with; return its exit status, output and errors."""
-    (tmp_path / "lesson.py").write_text('"""Counts to three."""\nimport sys\nprint(__name__, sys.argv[1:])\n')
-    monkeypatch.setattr(script.rospkg.RosPack, "get_path", lambda self, package: str(tmp_path))
+    path = tmp_path / "lesson.py"
+    path.write_text('"""Counts to three."""\nimport sys\nprint(__name__, sys.argv[1:])\n')
     monkeypatch.setattr(sys, "argv", ["lesson.py", *words])
     with pytest.raises(SystemExit) as end:
-        script.run_script("hero_tutorial", "lesson.py", arguments)
+        script.run_script("hero_tutorial", str(path), arguments)
     return (end.value.code, *capsys.readouterr())
 
 

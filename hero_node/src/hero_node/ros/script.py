@@ -9,7 +9,6 @@ import threading
 from types import FrameType
 from typing import Any, NoReturn, Optional, Sequence, Type
 
-import rospkg
 import rospy
 
 from ..command_line import check_node_arguments, find_line, print_error, run
@@ -44,20 +43,19 @@ def start_node(name: str = "hero_program") -> None:
 
 
 def run_script(package: str, file: str, arguments: Sequence[str]) -> NoReturn:
-    """Run a script of plain rospy, and end the process; file: in the package's folder, or an absolute path.
+    """Run a script of plain rospy, and end the process; package: its own, for the usage; file: its path.
 
     arguments: names of those that it takes; a script without any is a node, and needs a master.
     """
-    path = os.path.join(rospkg.RosPack().get_path(package), file)
 
     def main() -> None:
-        with open(path, encoding="utf-8") as script:
+        with open(file, encoding="utf-8") as script:
             text = ast.get_docstring(ast.parse(script.read()))
         check_node_arguments(package, os.path.basename(file), text, arguments)
         if not arguments:
             check_master()
         try:
-            runpy.run_path(path, run_name="__main__")
+            runpy.run_path(file, run_name="__main__")
         except ModuleNotFoundError as error:
             raise ProgramError(f"{error}; script/bootstrap (or rosdep) installs what all programs need") from error
 
