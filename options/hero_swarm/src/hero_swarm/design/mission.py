@@ -54,15 +54,10 @@ def read_mission(path: str) -> Mission:
         entry = Entry({**others, **kept, "metrics": metrics}, "", root.place)
         experiment = check_experiment(entry, os.path.abspath(os.path.dirname(path)), Sources())
         if "baseline" in given:
-            _check_baseline(given["baseline"], experiment)
+            try:  # it runs last, perhaps hours later
+                find_behavior(experiment.locate(given["baseline"].text()))
+            except ValueError as error:
+                raise ExperimentError(f"{given['baseline'].place}: baseline: {error}") from None
         return Mission(experiment, root.plain(), -1.0 if experiment.metrics[0].falls else 1.0)
     except EntryError as error:
         raise ExperimentError(str(error)) from None
-
-
-def _check_baseline(given: Entry, experiment: Experiment) -> None:
-    """Load the behavior, which runs last, perhaps hours later. Raises: ExperimentError with file and line."""
-    try:
-        find_behavior(experiment.locate(given.text()))
-    except ValueError as error:
-        raise ExperimentError(f"{given.place}: baseline: {error}") from None

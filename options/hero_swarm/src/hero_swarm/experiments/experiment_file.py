@@ -207,14 +207,8 @@ class Experiment(NamedTuple):
 
     def describe_cell(self, cell: Cell) -> str:
         """Return all that a run of cell depends on besides its seed and the code, as JSON."""
-        description = {
-            "cell": cell._asdict(),
-            "time_s": self.time_s,
-            "until": self.until,
-            "metrics": self.metrics,
-            "record_hz": self.record_hz,
-        }
-        return json.dumps(description, sort_keys=True)
+        of_all = {name: getattr(self, name) for name in ("time_s", "until", "metrics", "record_hz")}
+        return json.dumps({"cell": cell._asdict(), **of_all}, sort_keys=True)
 
 
 def read_experiment(path: str, folder: Optional[str] = None) -> Tuple[str, Experiment]:

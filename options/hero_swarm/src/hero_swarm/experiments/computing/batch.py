@@ -79,7 +79,9 @@ def compute_batch(experiment: Experiment, suite: str, cell: int, seeds: Sequence
         place = report_place(label, experiment.sources)
         with _record_poses(experiment, trial, stem + POSES_ENDING) as poses, place:
             series, ends = run_trial(experiment, trial, poses)
-        _write_metrics(stem + METRICS_ENDING, series, ends)
+        content, is_sample = io.BytesIO(), np.arange(len(series))[:, None] <= np.array(ends)
+        np.save(content, np.where(is_sample[..., None], series, np.nan).astype(np.float32))
+        write_file(stem + METRICS_ENDING, content.getvalue())  # to a file, numpy does not say that the disk is full
     return [
         Run(cell, seed, take_values(experiment, series[: ends[world] + 1, world])) for world, seed in enumerate(seeds)
     ]
@@ -152,14 +154,6 @@ def run_trial(experiment: Experiment, trial: Trial, poses: Any = None) -> Tuple[
     if poses is not None:
         poses[recorded:] = np.nan
     return series, ends.tolist()
-
-
-def _write_metrics(path: str, series: np.ndarray, ends: List[int]) -> None:
-    """Write the samples (T, W, metrics) of each world up to its last one."""
-    is_sample = np.arange(len(series))[:, None] <= np.array(ends)
-    content = io.BytesIO()  # to a file, numpy does not say that the disk is full
-    np.save(content, np.where(is_sample[..., None], series, np.nan).astype(np.float32))
-    write_file(path, content.getvalue())
 
 
 def take_values(experiment: Experiment, series: np.ndarray) -> Tuple[float, ...]:

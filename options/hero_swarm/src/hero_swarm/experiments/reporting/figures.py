@@ -93,10 +93,7 @@ def _begin(height_in: float) -> Tuple[Figure, Any]:
 
 
 def draw_runs(
-    metric: str,
-    labels: Sequence[str],
-    values: Sequence[Sequence[float]],
-    intervals: Sequence[Interval],
+    metric: str, labels: Sequence[str], values: Sequence[Sequence[float]], intervals: Sequence[Interval]
 ) -> Figure:
     """Draw every run of each cell beside its median and interval; infinite values are counted in words."""
     figure, axes = _begin(1.2 + 0.45 * len(labels))

@@ -100,9 +100,7 @@ def compare_pairs(first: Sequence[float], second: Sequence[float]) -> Comparison
 
 def correct_by_holm(p_values: Sequence[float]) -> Tuple[float, ...]:
     """Return the p-values (in their order) of several tests of one question, corrected for their number."""
-    order = sorted(range(len(p_values)), key=lambda index: p_values[index])
-    corrected, largest = [0.0] * len(p_values), 0.0
-    for rank, index in enumerate(order):
-        largest = max(largest, min(1.0, (len(order) - rank) * p_values[index]))
-        corrected[index] = largest
-    return tuple(corrected)
+    ordered, order = np.sort(p_values), np.argsort(p_values, kind="stable")
+    factors, corrected = len(ordered) - np.arange(len(ordered)), np.empty(len(ordered))
+    corrected[order] = np.maximum.accumulate(np.minimum(1.0, factors * ordered))
+    return tuple(corrected.tolist())
