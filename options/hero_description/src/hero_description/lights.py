@@ -14,6 +14,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from hero_node.parameters import Parameter, parse_explicit_ids
+from hero_node.robot_constants import HERO, MODELS, RobotModel
 from hero_node.ros import Program, read_parameters
 
 from .rviz_config import TRUE, color_of, read_ids
@@ -30,7 +31,9 @@ LIT_DIAMETER_M = 0.019
 
 NAME_Z_M = 0.11
 NAME_SIZE_M = 0.045
-RING_RADIUS_M = 0.045
+RING_GAP_M = 0.008
+"""Gap between the body and the middle of its ring."""
+
 RING_WIDTH_M = 0.006
 RING_POINTS = 25
 REPEAT_S = 2.0
@@ -57,7 +60,7 @@ def make_light(robot_id: int, color: ColorRGBA, place: str = "") -> Marker:
     return marker
 
 
-def make_identity(robot_id: int, place: str = "") -> List[Marker]:
+def make_identity(robot_id: int, place: str = "", model: RobotModel = HERO) -> List[Marker]:
     """Return the name above one robot, and the ring around it."""
     name = make_marker(robot_id, Marker.TEXT_VIEW_FACING, "names", place + "base_link", ColorRGBA(0.1, 0.1, 0.1, 1.0))
     name.text = "hero_%d" % robot_id
@@ -65,7 +68,8 @@ def make_identity(robot_id: int, place: str = "") -> List[Marker]:
     name.scale.z = NAME_SIZE_M
     ring = make_marker(robot_id, Marker.LINE_STRIP, "rings", place + "base_link", ColorRGBA(*color_of(robot_id), 1.0))
     angles_rad = [math.tau * index / (RING_POINTS - 1) for index in range(RING_POINTS)]
-    ring.points = [Point(RING_RADIUS_M * math.cos(angle), RING_RADIUS_M * math.sin(angle), 0.0) for angle in angles_rad]
+    radius_m = model.body_radius_m + RING_GAP_M
+    ring.points = [Point(radius_m * math.cos(angle), radius_m * math.sin(angle), 0.0) for angle in angles_rad]
     ring.scale.x = RING_WIDTH_M
     return [name, ring]
 
@@ -73,9 +77,8 @@ def make_identity(robot_id: int, place: str = "") -> List[Marker]:
 def main() -> None:
     """Publish names and rings again and again, and a sphere for each color."""
     with Program("hero_lights") as program:
-        parameters = read_parameters(
-            {"robots": Parameter("0", parse_explicit_ids), "simulated": Parameter((), read_ids)}
-        )
+        groups = {group: Parameter((), read_ids) for group in ("hero_plus", "simulated")}
+        parameters = read_parameters({"robots": Parameter("0", parse_explicit_ids), **groups})
         robots = parameters["robots"]
         places = {robot_id: TRUE + "/" for robot_id in parameters["simulated"]}
         publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(robots) + 10)
@@ -85,8 +88,9 @@ def main() -> None:
 
         for robot_id in robots:
             rospy.Subscriber("/hero_%d/led" % robot_id, ColorRGBA, show, robot_id, queue_size=5)
-        identities = MarkerArray(
-            [marker for robot_id in robots for marker in make_identity(robot_id, places.get(robot_id, ""))]
-        )
+        models = {robot_id: MODELS["hero_plus"] for robot_id in parameters["hero_plus"]}
+        identities = MarkerArray()
+        for robot_id in robots:
+            identities.markers += make_identity(robot_id, places.get(robot_id, ""), models.get(robot_id, HERO))
         for _ in program.rate(1.0 / REPEAT_S):
             publisher.publish(identities)

@@ -14,9 +14,6 @@ TEMPLATE = Path(__file__).with_name("displays.yaml")
 TRUE = "true"
 """Part of the names of frames and topics of simulated robots where they truly are: see true_poses."""
 
-PLUS_DESCRIPTION = "hero_plus_description"
-"""Parameter that holds the URDF of HeRo+."""
-
 FRAMES = {"orbit": "world", "close": "world", "above": "world", "map": "map"}
 """Fixed frame of each view, unless another is given."""
 
@@ -53,7 +50,6 @@ def make_config(
             Template(own).substitute(
                 name=name,
                 place=f"{name}/{TRUE}" if name in simulated else name,
-                description=PLUS_DESCRIPTION if name in hero_plus else "robot_description",
                 color="; ".join("%d" % (255 * part) for part in color_of(int(name.rpartition("_")[2]))),
             )
         )

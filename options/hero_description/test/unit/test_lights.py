@@ -16,15 +16,21 @@ URDF = ElementTree.parse(str(Path(__file__).resolve().parents[2] / "urdf" / "her
 
 def test_a_ring_is_closed_and_lies_around_the_body():
     _, ring = lights.make_identity(7)
+    ring_m = lights.HERO.body_radius_m + lights.RING_GAP_M
     angles_rad = [math.atan2(point.y, point.x) % math.tau for point in ring.points]
     radii_m = [math.hypot(point.x, point.y) for point in ring.points]
-    assert radii_m == pytest.approx([lights.RING_RADIUS_M] * len(radii_m))
-    assert BODY_RADIUS_M + 0.004 < lights.RING_RADIUS_M - ring.scale.x / 2 < lights.RING_RADIUS_M < 2 * BODY_RADIUS_M
+    assert radii_m == pytest.approx([ring_m] * len(radii_m))
+    assert BODY_RADIUS_M + 0.004 < ring_m - ring.scale.x / 2 < ring_m < 2 * BODY_RADIUS_M
     steps_rad = {round((after - before) % math.tau, 6) for before, after in zip(angles_rad, angles_rad[1:])}
     assert steps_rad == {round(math.tau / (len(radii_m) - 1), 6)}
     assert math.degrees(steps_rad.pop()) == pytest.approx(15.0, abs=1e-3)
     assert {point.z for point in ring.points} == {0.0} and ring.type == Marker.LINE_STRIP
     assert (ring.color.a, ring.pose.orientation.w, ring.frame_locked) == (1.0, 1.0, True)
+
+
+def test_the_ring_of_a_hero_plus_lies_around_its_bump_shield():
+    _, ring = lights.make_identity(7, model=lights.MODELS["hero_plus"])
+    assert math.hypot(ring.points[0].x, ring.points[0].y) == pytest.approx(0.060 + 0.008)
 
 
 def test_lights_names_and_rings_of_a_simulated_robot_are_where_it_is():

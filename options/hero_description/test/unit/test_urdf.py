@@ -68,14 +68,3 @@ def test_inertias_are_possible(robot):
         xx, yy, zz = (float(inertia.get(name)) for name in ("ixx", "iyy", "izz"))
         assert min(xx, yy, zz) > 0
         assert xx + yy >= zz and yy + zz >= xx and zz + xx >= yy
-
-
-def test_hero_plus_has_its_own_wheels_and_a_bump_shield():
-    rviz = pytest.importorskip("hero_description.rviz", reason="imports rospy")
-    plus = ElementTree.fromstring(rviz.make_hero_plus(URDF.read_text()))
-    origins = {joint.get("name"): joint.find("origin").get("xyz") for joint in plus.findall("joint")}
-    assert origins["left_wheel_joint"] == "0 0.0325 0.01548" and origins["right_wheel_joint"] == "0 -0.0325 0.01548"
-    radii = [cylinder.get("radius") for cylinder in plus.iter("cylinder")]
-    shields = [cylinder.get("length") for cylinder in plus.iter("cylinder") if cylinder.get("radius") == "0.06"]
-    assert shields == ["0.004"] * 2 and plus.get("name") == "hero_plus"
-    assert radii.count("0.025") == 4 and radii.count("0.06") == 2 and "0.0246" not in radii
