@@ -19,7 +19,7 @@ from hero_test.watches.command_watch import CommandWatch
 from hero_test.watches.swarm_watch import SwarmWatch
 
 ROBOTS = range(10)
-SCRIPTS = ["move", "read_sensors", "drive_a_square", "avoid", "keep_distance"]
+SCRIPTS = ["move", "read_sensors", "drive_a_square", "avoid"]
 """Of robot 0; here each drives the robot of its place in this list."""
 
 TOPICS = ["odom", "proximity", "led", "velocity_controller/cmd_vel"]
@@ -83,9 +83,6 @@ class FirstScriptsTest(unittest.TestCase):
 
     def test_1_avoid_drives_until_it_is_interrupted(self):
         self.check_interrupted("avoid")
-
-    def test_1_keep_distance_drives_until_it_is_interrupted(self):
-        self.check_interrupted("keep_distance")
 
     def test_2_all_robots_turns_every_robot_and_ends_by_itself(self):
         before = {robot_id: self.watch.pose(robot_id)[2] for robot_id in ROBOTS}

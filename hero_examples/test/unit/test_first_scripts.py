@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import true_paths
 
-from hero_client.values import Obstacle
-from hero_examples.first import all_robots, avoid, drive_a_square, keep_distance, move, read_sensors
+from hero_examples.first import all_robots, avoid, drive_a_square, move, read_sensors
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
 from hero_test.nonempty import nonempty
@@ -73,16 +72,6 @@ def test_avoid_keeps_driving_and_touches_nothing_that_it_sees():
         assert true_paths.measure_lengths(path).min() > 1.0
 
 
-@pytest.mark.slow
-def test_keep_distance_ends_facing_the_nearest_thing_at_its_distance():
-    with StepSwarm(1, seed=1, arena="obstacles", worlds=WORLDS) as swarm:
-        paths = true_paths.run(swarm, step_all(swarm, keep_distance.step), 60.0)
-        for path, robot in nonempty(zip(paths, swarm)):
-            assert true_paths.measure_wall_gaps(path, load_arena("obstacles")).min() > 0.05
-            assert robot.nearest().bearing_rad == 0.0
-            assert robot.nearest().range_m == pytest.approx(0.15, abs=0.01)
-
-
 def test_all_robots_turns_every_robot_in_a_color_of_its_own():
     with StepSwarm(5) as swarm:
         before = [robot.true_pose.yaw_rad for robot in swarm]
@@ -97,19 +86,18 @@ def test_all_robots_turns_every_robot_in_a_color_of_its_own():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("script", [avoid, keep_distance])
-def test_robots_that_are_not_calibrated_wait_and_drive_once_they_are(script):
+def test_robots_that_are_not_calibrated_wait_and_drive_once_they_are():
     with StepSwarm(1, seed=1, arena="obstacles", worlds=4) as swarm:
         calibrations = swarm.rows._calibration_counts_m2.copy()
         for row in range(4):
             swarm.rows.set_infrared_calibration(row, np.full(8, math.nan))
         swarm.sleep(0.3)  # the next scan
-        for path in nonempty(true_paths.run(swarm, step_all(swarm, script.step), 10.0)):
+        for path in nonempty(true_paths.run(swarm, step_all(swarm, avoid.step), 10.0)):
             assert np.ptp(path, axis=0).max() < 1e-6
         for row, calibration in enumerate(calibrations):
             swarm.rows.set_infrared_calibration(row, calibration)
         swarm.sleep(0.3)
-        for path in nonempty(true_paths.run(swarm, step_all(swarm, script.step), 3.0)):
+        for path in nonempty(true_paths.run(swarm, step_all(swarm, avoid.step), 3.0)):
             assert true_paths.measure_lengths(path).min() > 0.03
 
 
@@ -122,12 +110,12 @@ def test_avoid_turns_where_only_the_front_is_not_calibrated():
 class Noting:
     """A robot that sees what a test says, and notes what it is told."""
 
-    def __init__(self, ranges_m=(math.inf,) * 8, nearest=None):
-        self.proximity, self._nearest, self.told = ranges_m, nearest, []
+    def __init__(self, ranges_m=(math.inf,) * 8):
+        self.proximity, self.told = ranges_m, []
         self.pose = (0.1, -0.2, 0.3)
 
     def nearest(self):
-        return self._nearest
+        return None
 
     def stop_if_blind(self):
         return False
@@ -156,16 +144,6 @@ def test_steps_command_what_their_lines_say():
         robot = Noting((front, front_left, near, near, near, near, near, front_right))
         avoid.step(robot)
         assert robot.told == [("drive", *expected)], (front, front_left, front_right)
-    for nearest, expected in (
-        (None, (0.05, 0.0)),
-        (Obstacle(0.25, 0.0), (0.08, 0.0)),
-        (Obstacle(0.1, math.pi), (0.04, 1.5 * math.pi)),
-        (Obstacle(0.15, -0.5), (0.0, -0.75)),
-    ):
-        robot = Noting(nearest=nearest)
-        keep_distance.step(robot)
-        ((_, *command),) = robot.told
-        assert command == pytest.approx(expected), nearest
     robot = Noting()
     read_sensors.step(robot)
     assert robot.told == [("drive", 0.0, 0.6)]
