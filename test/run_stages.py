@@ -59,17 +59,13 @@ def find_unit_tests(paths=()):
 
 
 def make_workspace_jobs(results_dir):
-    """Return one job for each build mode, and one for each other file."""
-    parts = [("test_build_modes.py", mode) for mode in ("catkin_build", "install")]
-    others = {path.name for path in (ROOT / "test" / "workspaces").glob("test_*.py")}
-    parts += [(name, "") for name in sorted(others - {"test_build_modes.py", "test_core.py"})]
+    """Return one job for each file."""
     jobs = [make_core_job(results_dir / "core", "not unit_tests")]  # they have run, with all packages
     environment = {"PATH": run_rostests.make_program_path(results_dir), **run_rostests.DISTUTILS}
-    for file, mode in parts:
-        arguments = (str(ROOT / "test" / "workspaces" / file), *(("-k", f"[{mode}]") if mode else ()))
-        name = " ".join(["workspaces:", file, mode]).rstrip()
-        own_results = results_dir / (mode or file[:-3])
-        jobs.append(make_pytest_job(name, arguments, own_results)._replace(environment=environment))
+    for path in sorted((ROOT / "test" / "workspaces").glob("test_*.py")):
+        if path.name != "test_core.py":
+            job = make_pytest_job("workspaces: " + path.name, [str(path)], results_dir / path.stem)
+            jobs.append(job._replace(environment=environment))
     return jobs
 
 

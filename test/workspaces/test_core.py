@@ -1,6 +1,7 @@
 """The core alone builds, starts and passes its unit tests with rospy, numpy and PyYAML, without any other package.
 
-Optional modules are refused as if they were not installed.
+It is built by catkin build, package by package, where that is installed. Optional modules are refused as if they were
+not. One of the options is added last.
 """
 
 import os
@@ -22,7 +23,10 @@ OPTIONAL_MODULES = ("apriltag", "cv2", "matplotlib", "PIL", "ruamel", "scipy", "
 BUILD_TIMEOUT_S = 1800.0
 TIMEOUT_S = 900.0
 UNIT_TESTS = [name for name in CORE if (ROOT / name / "test" / "unit").is_dir()]
+# Debian 13's catkin takes only the second name.
 CMAKE_ARGUMENTS = f"-DPYTHON_EXECUTABLE={sys.executable} -DPython_EXECUTABLE={sys.executable}"
+CATKIN_BUILD = f"catkin config --init --cmake-args {CMAKE_ARGUMENTS} && catkin build --no-status --summarize"
+HAS_CATKIN_TOOLS = shutil.which("catkin") is not None
 REFUSE = f"""
 import sys
 
@@ -58,14 +62,18 @@ def run(script, timeout_s=TIMEOUT_S, **variables):
     return output
 
 
+def copy_package(name):
+    ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
+    folder = sources.PACKAGES[name]
+    shutil.copytree(str(folder), str(WORKSPACE / "src" / "hero" / folder.relative_to(ROOT)), ignore=ignored)
+
+
 @pytest.fixture(scope="module")
 def run_in_core():
     """Runs scripts where the core is built and optional modules are refused."""
     shutil.rmtree(str(WORKSPACE), ignore_errors=True)
     for name in (*CORE, "hero_test"):  # no part of the suite: helpers of its tests
-        ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
-        folder = sources.PACKAGES[name]
-        shutil.copytree(str(folder), str(WORKSPACE / "src" / "hero" / folder.relative_to(ROOT)), ignore=ignored)
+        copy_package(name)
     for name in ("conftest.py", "test/sources.py"):
         shutil.copy(str(ROOT / name), str(WORKSPACE / "src" / "hero" / name))
     # Tests compare what packages document with the pages of the repository.
@@ -73,7 +81,7 @@ def run_in_core():
     (WORKSPACE / "refuse").mkdir()
     (WORKSPACE / "refuse" / "sitecustomize.py").write_text(REFUSE)
     refuse = f"export PYTHONPATH={WORKSPACE}/refuse:$PYTHONPATH\n"
-    run(f"{refuse}catkin_make {CMAKE_ARGUMENTS}", BUILD_TIMEOUT_S)
+    run(refuse + (CATKIN_BUILD if HAS_CATKIN_TOOLS else f"catkin_make {CMAKE_ARGUMENTS}"), BUILD_TIMEOUT_S)
     return lambda script, **variables: run(f". devel/setup.bash\n{refuse}{script}", **variables)
 
 
@@ -88,6 +96,17 @@ def test_the_core_needs_no_other_package_to_be_imported(run_in_core):
         names = (".".join(path.relative_to(source).with_suffix("").parts) for path in sorted(source.rglob("*.py")))
         modules += [name.replace(".__init__", "") for name in names if not name.endswith("__main__")]
     run_in_core(f"{sys.executable} -c 'import {', '.join(modules)}'")
+
+
+def test_programs_of_the_core_name_the_python_of_the_build(run_in_core):
+    found = run_in_core(f"for name in {' '.join(CORE)}; do rospack find $name; done").split()
+    assert len(found) == len(CORE) and all(
+        Path(path).parts[: len(WORKSPACE.parts)] == WORKSPACE.parts for path in found
+    )
+    for package in ("hero_driver", "hero_tutorial"):
+        programs = [path for path in (WORKSPACE / "devel" / "lib" / package).iterdir() if os.access(path, os.X_OK)]
+        lines = {path.name: path.read_text(encoding="utf-8").splitlines()[0] for path in programs if path.is_file()}
+        assert set(lines.values()) == {f"#!{sys.executable}"}, lines
 
 
 def test_simulated_robots_walk_with_the_core_alone(run_in_core):
@@ -119,3 +138,22 @@ def test_simulated_robots_walk_with_the_core_alone(run_in_core):
 @pytest.mark.parametrize("package", UNIT_TESTS)
 def test_unit_tests_of_the_core_pass_with_the_core_alone(run_in_core, package):
     run_in_core(f"{sys.executable} -m pytest -q -p no:cacheprovider src/hero/{package}/test/unit --hypothesis-seed=0")
+
+
+@pytest.mark.skipif(not HAS_CATKIN_TOOLS, reason="catkin-tools is not installed")
+def test_run_tests_of_an_added_package_runs_units_rostests_and_launches(run_in_core):
+    for name in (
+        "hero_description",
+        "hero_monitor",
+    ):  # RViz shows robots in the colors of the monitor, which is not built
+        copy_package(name)
+    # roslaunch-check and rostest take the first python3 on PATH.
+    path = f"{Path(sys.executable).parent}:$PATH"
+    run(
+        f"catkin build --no-status --no-deps hero_description\n. devel/setup.bash\nexport PATH={path}\n"
+        "catkin run_tests --no-status --no-deps hero_description",
+        ROS_HOSTNAME="localhost",
+    )
+    results = WORKSPACE / "build" / "hero_description" / "test_results" / "hero_description"
+    kinds = {"pytest.xml", "rosunit-display.xml", "roslaunch-check_launch.xml"}
+    assert kinds <= {file.name for file in results.iterdir()}

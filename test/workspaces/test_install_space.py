@@ -1,11 +1,10 @@
-"""The suite builds and starts from the devel space of catkin build and from the install space of catkin_make.
+"""The suite builds and starts from the install space of catkin_make.
 
-Each workspace holds a fresh copy of the repository, so nothing is found in another place by accident. The install
-space is tested after sources, build and devel space have been deleted. The devel space of catkin_make is where
-script/test runs everything else.
+The workspace holds a fresh copy of the repository, so nothing is found in another place by accident, and is tested
+after sources, build and devel space have been deleted. The devel space of catkin_make is where script/test runs
+everything else; test_core.py tests the one of catkin build.
 """
 
-import functools
 import json
 import os
 import re
@@ -24,18 +23,12 @@ from hero_test.processes import find_free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 
-SCRATCH = ROOT / ".work" / "workspaces"
+SCRATCH = ROOT / ".work" / "workspaces" / "install_space"
 BUILD_TIMEOUT_S = 1800.0
 PROBE_TIMEOUT_S = 120.0
 ASK_PROGRAMS = Path(__file__).with_name("ask_programs.py")
 LAUNCH_FILES = sources.find("launch/*.launch")
 PACKAGES = sources.PACKAGES
-ISOLATED = (
-    *"hero_msgs hero_node hero_driver hero_client hero_sim hero_bringup".split(),
-    *"hero_description hero_monitor hero_test".split(),
-)
-"""Packages of each kind, which `catkin build` configures one by one: with messages, with a service, with programs, with
-launch files alone, and optional ones. test_packages.py holds that all others find what theirs find."""
 PROGRAMS = [
     (path.parent.name, program)
     for path in sources.find("CMakeLists.txt")
@@ -75,10 +68,10 @@ def run(script, directory, timeout_s=PROBE_TIMEOUT_S):
     return output
 
 
-def copy_sources(destination, packages):
-    """Copy packages, without what git ignores, to a directory of a new workspace."""
+def copy_sources(destination):
+    """Copy all packages, without what git ignores, to a directory of a new workspace."""
     ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
-    for folder in map(PACKAGES.get, packages):
+    for folder in PACKAGES.values():
         shutil.copytree(str(folder), str(destination / folder.relative_to(ROOT)), ignore=ignored)
     # Pages hold scripts of hero_tutorial.
     shutil.copytree(str(ROOT / "docs" / "tutorial"), str(destination / "docs" / "tutorial"))
@@ -87,81 +80,33 @@ def copy_sources(destination, packages):
 class Workspace:
     """A built workspace: sourcing `setup` makes its packages available."""
 
-    def __init__(self, setup, directory, packages):
+    def __init__(self, setup, directory):
         self.setup = setup
         self.directory = directory
-        self.packages = packages
-        self.programs = [names for names in PROGRAMS if names[0] in packages]
 
     def run(self, script):
         return run(f". {self.setup}\n{script}", self.directory)
 
 
-def new_workspace(name, packages):
-    workspace = SCRATCH / name
-    shutil.rmtree(str(workspace), ignore_errors=True)
-    (workspace / "src").mkdir(parents=True)
-    copy_sources(workspace / "src" / "hero", packages)
-    return workspace
-
-
-def build_with_catkin_build():
-    workspace = new_workspace("catkin_build", ISOLATED)
-    script = f"catkin config --init --cmake-args {CMAKE_ARGUMENTS} && catkin build --no-status --summarize"
-    run(script, workspace, BUILD_TIMEOUT_S)
-    return Workspace(workspace / "devel" / "setup.bash", workspace, ISOLATED)
-
-
-def build_and_install():
-    workspace = new_workspace("install_space", PACKAGES)
-    run(f"catkin_make {CMAKE_ARGUMENTS} -DCATKIN_ENABLE_TESTING=OFF install", workspace, BUILD_TIMEOUT_S)
+@pytest.fixture(scope="module")
+def workspace():
+    """The install space of all packages."""
+    shutil.rmtree(str(SCRATCH), ignore_errors=True)
+    (SCRATCH / "src").mkdir(parents=True)
+    copy_sources(SCRATCH / "src" / "hero")
+    run(f"catkin_make {CMAKE_ARGUMENTS} -DCATKIN_ENABLE_TESTING=OFF install", SCRATCH, BUILD_TIMEOUT_S)
     for gone in ("src", "build", "devel"):
-        shutil.rmtree(str(workspace / gone))
-    packages = sorted(set(PACKAGES) - {"hero", "hero_options"})  # rospack knows no metapackages
-    return Workspace(workspace / "install" / "setup.bash", workspace, packages)
-
-
-BUILDERS = {
-    "catkin_build": build_with_catkin_build,
-    "install": build_and_install,
-}
-
-
-@functools.lru_cache(maxsize=None)
-def build(mode):
-    """Return the workspace of a build mode, built once, in whatever order pytest wants them."""
-    return BUILDERS[mode]()
-
-
-INSTALLED = pytest.mark.parametrize("workspace", ["install"], indirect=True)
-"""Modules and launch files of a devel space are those of the sources, which all other tests use."""
-
-
-@pytest.fixture(params=sorted(BUILDERS))
-def workspace(request):
-    """A workspace of each build mode."""
-    if request.param == "catkin_build" and shutil.which("catkin") is None:
-        pytest.skip("catkin-tools is not installed")
-    return build(request.param)
-
-
-@pytest.mark.parametrize("workspace", ["catkin_build"], indirect=True)
-def test_run_tests_runs_unit_tests_rostests_and_launch_checks(workspace):
-    # roslaunch-check and rostest take the first python3 on PATH.
-    path = f"{Path(sys.executable).parent}:$PATH"
-    workspace.run(f"PATH={path} catkin run_tests --no-status --no-deps hero_description")
-    results = workspace.directory / "build" / "hero_description" / "test_results" / "hero_description"
-    kinds = {"pytest.xml", "rosunit-display.xml", "roslaunch-check_launch.xml"}
-    assert kinds <= {file.name for file in results.iterdir()}
+        shutil.rmtree(str(SCRATCH / gone))
+    return Workspace(SCRATCH / "install" / "setup.bash", SCRATCH)
 
 
 def test_every_package_is_found_only_in_the_workspace(workspace):
-    found = workspace.run(f"for name in {' '.join(workspace.packages)}; do rospack find $name; done").split()
-    assert len(found) == len(workspace.packages)
+    packages = sorted(set(PACKAGES) - {"hero", "hero_options"})  # rospack knows no metapackages
+    found = workspace.run(f"for name in {' '.join(packages)}; do rospack find $name; done").split()
+    assert len(found) == len(packages)
     assert all(path.startswith(str(workspace.directory)) for path in found), found
 
 
-@INSTALLED
 def test_every_module_can_be_imported(workspace):
     modules = []
     for folder in PACKAGES.values():
@@ -186,7 +131,6 @@ def test_every_module_can_be_imported(workspace):
     workspace.run(f"{sys.executable} - '{optional}' {' '.join(modules)} <<'END'\n{program}\nEND")
 
 
-@INSTALLED
 def test_every_launch_file_can_be_read(workspace):
     names = " ".join(f"{path.parents[1].name}/{path.name}" for path in LAUNCH_FILES)
     program = textwrap.dedent(
@@ -212,18 +156,17 @@ def find_programs(workspace):
             print(*find_in_workspaces(["libexec"], project=package, path=program, first_match_only=True))
         """
     )
-    names = " ".join("/".join(names) for names in workspace.programs)
+    names = " ".join("/".join(names) for names in PROGRAMS)
     paths = workspace.run(f"{sys.executable} - {names} <<'END'\n{program}\nEND").split()
-    assert len(paths) == len(workspace.programs)
+    assert len(paths) == len(PROGRAMS)
     return paths
 
 
 def test_programs_are_found_and_name_the_python_of_the_build(workspace):
     first_lines = [Path(path).read_text(encoding="utf-8").splitlines()[0] for path in find_programs(workspace)]
-    assert list(nonempty(first_lines)) == [f"#!{sys.executable}"] * len(workspace.programs)
+    assert list(nonempty(first_lines)) == [f"#!{sys.executable}"] * len(PROGRAMS)
 
 
-@INSTALLED
 def test_a_program_answers_whatever_python3_is_first(workspace):
     # As with pyenv or conda: the first python3 on PATH is another one, without rospy.
     other = workspace.directory / "other_python"
@@ -233,7 +176,6 @@ def test_a_program_answers_whatever_python3_is_first(workspace):
     assert workspace.run(f"PATH={other}:$PATH {find_programs(workspace)[0]} --help").startswith("usage: ")
 
 
-@INSTALLED
 def test_programs_answer_help_without_a_master(workspace):
     answers = workspace.run(
         f"ROS_MASTER_URI=http://localhost:1 {sys.executable} {ASK_PROGRAMS} {' '.join(find_programs(workspace))}"
@@ -247,7 +189,6 @@ def test_programs_answer_help_without_a_master(workspace):
         assert errors.splitlines()[-1].startswith(f"{Path(program).name}: error: "), f"{program}: {errors}"
 
 
-@INSTALLED
 def test_a_package_with_messages_and_programs_builds_on_what_is_installed(workspace):
     overlay = workspace.directory / "overlay"
     shutil.copytree(str(ROOT / "hero_sim"), str(overlay / "src" / "hero_sim"))
@@ -255,7 +196,6 @@ def test_a_package_with_messages_and_programs_builds_on_what_is_installed(worksp
     assert os.access(str(overlay / "devel" / "lib" / "hero_sim" / "hero_sim"), os.X_OK)
 
 
-@INSTALLED
 def test_a_module_that_is_not_installed_is_named_in_one_line(workspace):
     missing = workspace.directory / "missing"
     missing.mkdir()
@@ -264,7 +204,6 @@ def test_a_module_that_is_not_installed_is_named_in_one_line(workspace):
     assert output.startswith("export: No module named 'tqdm'; script/bootstrap") and output.count("\n") == 1
 
 
-@pytest.mark.parametrize("workspace", ["install"], indirect=True)
 def test_workers_of_a_program_do_not_start_it_again(workspace):
     """Processes that multiprocessing spawns load the program that spawned them."""
     experiment = workspace.directory / "short.yaml"
