@@ -84,7 +84,7 @@ class TrackTest(unittest.TestCase):
         directory = tempfile.mkdtemp()
         cls.addClassCleanup(shutil.rmtree, directory)
         cls.path = os.path.join(directory, "camera.yaml")
-        places = {tag.tag_id: [tag.x_m, tag.y_m, 0.0] for tag in list_references(build_default(ROBOTS), "36h11")}
+        places = {tag.tag_id: [tag.x_m, tag.y_m, 0.0] for tag in list_references(build_default(ROBOTS))}
         camera_file.update(cls.path, {**CAMERA_FILE, "references": places})
         cls.true, cls.problems, cls.poses, cls.objects, cls.measured_ids = {}, {}, {}, {}, []
         cls.spoiler = Spoiler()

@@ -40,6 +40,8 @@ def test_a_camera_with_fewer_pixels_sees_the_same():
         (["--delay", "5.1"], "--delay: 5.1 must be a number from 0 to 5"),
         (["--exposure", "0.11"], "--exposure: 0.11 must be a number from 0 to 0.1"),
         (["--tag-size", "nan"], "--tag-size: nan must be a number from 0.01 to 0.2"),
+        (["--part", "0", "2"], "--part: 0 must be a whole number from 1 to 4"),
+        (["--part", "3", "2"], "--part 3 2: there are no more parts"),
     ],
 )
 def test_options_beyond_their_limits_are_named(arguments, words, capsys):
@@ -55,8 +57,8 @@ def test_the_camera_is_a_webcam_above_a_lab():
     )  # fmt: skip
     assert PrintedTag(5) == (5, 0.04, 0.076, 0.0, 0.0, 0.0, "36h11")
     options = vars(camera_node.parse_options([]))
-    names = ("count", "first_id", "width", "rate", "delay", "exposure", "tag_size", "seed", "stamps", "family")
-    assert tuple(options[name] for name in names) == (1, 0, 1920, 30.0, 0.07, 0.008, 0.04, 0, "capture", "36h11")
+    names = ("count", "first_id", "width", "rate", "delay", "exposure", "tag_size", "seed", "stamps", "part")
+    assert tuple(options[name] for name in names) == (1, 0, 1920, 30.0, 0.07, 0.008, 0.04, 0, "capture", (1, 1))
 
 
 def test_options_are_taken_up_to_their_limits():

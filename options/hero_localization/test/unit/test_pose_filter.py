@@ -231,11 +231,11 @@ def test_a_robot_unseen_for_minutes_goes_on_by_its_odometry():
 def test_a_pose_without_odometry_or_from_long_ago_is_left_out():
     pose_filter = PoseFilter()
     pose = StampedPose(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE)
-    assert pose_filter.add_measurement(pose) is Outcome.NO_ODOMETRY
+    assert pose_filter.add_measurement(pose) is Outcome.TOO_LATE
     assert pose_filter.estimate() is None
     for index in range(100):
         pose_filter.add_odometry(0.05 * index, Pose(0.0, 0.0, 0.0))
-    assert pose_filter.add_measurement(pose) is Outcome.NO_ODOMETRY
+    assert pose_filter.add_measurement(pose) is Outcome.TOO_LATE
     assert pose_filter.add_measurement(pose._replace(stamp_s=4.5)) is Outcome.FIRST
     assert pose_filter.add_measurement(pose._replace(stamp_s=4.2)) is Outcome.TOO_LATE
 

@@ -15,10 +15,12 @@ from hero_localization.simulated_camera.view import (  # noqa: E402  # noqa: E40
     CameraOptions,
     PrintedTag,
     describe_references,
+    find_part,
     hang_above,
     list_frames,
     list_rays,
     list_references,
+    list_seen,
     plane_homography,
     tag_corners,
     write_camera_file,
@@ -183,7 +185,7 @@ def test_frames_arrive_late_in_order_and_some_never():
     "arena", [load_arena("empty"), load_arena("maze"), build_default(20), build_rectangle(0.5, 3.0, 1)]
 )
 def test_camera_hangs_so_high_that_no_reference_tag_is_cut_off(arena):
-    references = list_references(arena, "36h11")
+    references = list_references(arena)
     camera = hang_above(CameraOptions(), arena, references, 0.04)
     corners = camera.geometry.project(np.vstack([tag_corners(tag, np.zeros((1, 3)))[0] for tag in references]))
     assert (corners > 10.0).all() and (corners < np.array((1910.0, 1070.0))).all()
@@ -192,18 +194,18 @@ def test_camera_hangs_so_high_that_no_reference_tag_is_cut_off(arena):
 
 def test_camera_above_a_small_arena_hangs_at_its_usual_height():
     arena = build_default(4)
-    camera = hang_above(CameraOptions(), arena, list_references(arena, "36h11"), 0.04)
+    camera = hang_above(CameraOptions(), arena, list_references(arena), 0.04)
     assert camera.position_m == CameraOptions().position_m
 
 
 def test_arena_that_is_too_large_for_the_camera_is_refused():
     arena = build_rectangle(8.0, 6.0, 1)
     with pytest.raises(SettingsError, match="8.0 x 6.0 m, tags of 40 mm measure less than 12 px: take"):
-        hang_above(CameraOptions(), arena, list_references(arena, "36h11"), 0.04)
+        hang_above(CameraOptions(), arena, list_references(arena), 0.04)
 
 
 def test_written_camera_file_holds_the_view_and_the_tags(tmp_path):
-    references = list_references(ARENA, "36h11")
+    references = list_references(ARENA)
     path = str(tmp_path / "camera.yaml")
     write_camera_file(path, SMALL.geometry, [TAG._replace(x_m=np.float64(0.002))], references)
     settings = camera_file.load(path)
@@ -319,21 +321,39 @@ def test_noise_is_centered_and_never_repeats_in_place():
 def test_reference_tags_lie_beside_the_arena_and_are_described_by_place():
     arena = build_rectangle(2.0, 1.0, 1)
     arena = arena._replace(bounds_m=np.array([-0.5, 0.25, 1.5, 1.25]))
-    tags = list_references(arena, "36h11")
+    tags = list_references(arena)
     assert [(tag.tag_id, tag.x_m, tag.y_m) for tag in tags] == [
         (100, -0.62, 0.35), (101, -0.62, 0.75), (102, -0.62, 1.15),
         (103, 1.62, 0.35), (104, 1.62, 0.75), (105, 1.62, 1.15),
     ]  # fmt: skip
     assert {(tag.size_m, tag.height_m, tag.yaw_rad) for tag in tags} == {(0.1, 0.0, 0.0)}
     assert describe_references(tags[:2]) == "references: {100: [-0.620, 0.350, 0], 101: [-0.620, 0.750, 0]}"
-    assert [tag.tag_id for tag in list_references(arena, "16h5")] == [24, 25, 26, 27, 28, 29], (
-        "the last ones of a small family"
-    )
+
+
+def test_two_cameras_overlap_and_see_five_references_each():
+    arena = build_rectangle(3.0, 1.2, 1)
+    tags = list_references(arena, 2)
+    assert [(tag.tag_id, tag.x_m, tag.y_m) for tag in tags[6:]] == [(106, 0.0, -0.72), (107, 0.0, 0.72)]
+    for number, ids, bounds_m in (
+        (1, [100, 101, 102, 106, 107], (-1.5, -0.6, 0.2, 0.6)), (2, [103, 104, 105, 106, 107], (-0.2, -0.6, 1.5, 0.6)),
+    ):  # fmt: skip
+        part = find_part(arena, number, 2)
+        assert part.bounds_m == pytest.approx(bounds_m)
+        camera = hang_above(CameraOptions(), part, tags, 0.04)
+        assert camera.position_m[2] == 2.2, "as high as above a small arena"
+        assert [tag.tag_id for tag in list_seen(camera.geometry, tags)] == ids
+
+
+def test_one_camera_sees_the_whole_arena_and_all_references():
+    arena = build_rectangle(2.0, 1.0, 1)
+    assert find_part(arena, 1, 1).bounds_m == pytest.approx(arena.bounds_m)
+    tags = list_references(arena)
+    assert list_seen(hang_above(CameraOptions(), arena, tags, 0.04).geometry, tags) == tags
 
 
 def test_camera_hangs_over_the_middle_of_the_arena_as_high_as_it_must():
     arena = build_rectangle(4.0, 2.0, 1)._replace(bounds_m=np.array([1.0, 2.0, 5.0, 4.0]))
-    references = list_references(arena, "36h11")
+    references = list_references(arena)
     camera = hang_above(CameraOptions(), arena, references, 0.04)
     assert camera.position_m[:2] == pytest.approx((0.03 + 3.0, -0.02 + 3.0))
     lower = camera._replace(position_m=(*camera.position_m[:2], camera.position_m[2] - 0.05)).geometry
@@ -394,7 +414,7 @@ def test_a_plate_shows_print_margin_and_rim_each_at_its_place(is_round, family, 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_a_camera_hangs_as_low_as_the_last_pixel_allows(axis):
     arena = build_rectangle(*((4.0, 1.0), (1.0, 3.0))[axis], 1)
-    references = list_references(arena, "36h11")
+    references = list_references(arena)
     camera = hang_above(CameraOptions(), arena, references, 0.04)
     sheets = [tag._replace(size_m=0.13) for tag in references]
     x_m, y_m = arena.bounds_m.reshape(2, 2).T

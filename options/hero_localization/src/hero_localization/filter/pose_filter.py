@@ -48,7 +48,7 @@ class Outcome(enum.Enum):
     MOVED = "moved"
     """Used as a new start: the robot was moved by hand (kidnapped)."""
     TOO_LATE = "too late"
-    NO_ODOMETRY = "no odometry"
+    """Older than odometry, or than what newer poses can be replayed from."""
 
 
 class PoseFilter:
@@ -102,7 +102,7 @@ class PoseFilter:
 
     def _use(self, measurement: StampedPose) -> Outcome:
         if self.odometry.find(measurement.stamp_s) is None:
-            return Outcome.NO_ODOMETRY
+            return Outcome.TOO_LATE
         outcome = Outcome.USED
         if self._main is None:
             self._main, outcome = Hypothesis(self.odometry, measurement), Outcome.FIRST

@@ -162,7 +162,7 @@ class SwarmLocalizer:
         before, used_s: where the robot was taken to be before it, and the stamp of the last one that was used.
         """
         robot = self._robots[robot_id]
-        is_late = outcome in (Outcome.TOO_LATE, Outcome.NO_ODOMETRY)
+        is_late = outcome is Outcome.TOO_LATE
         offset_s = measurement.stamp_s - self._now_s
         robot.clock_offset_s = offset_s if is_late or offset_s > AHEAD_S else None
         odometry = robot.filter.odometry.find(measurement.stamp_s)

@@ -11,7 +11,6 @@ from hero_node import import_optional
 from hero_node.parameters import robot_ids_option
 
 from ..calibration.arena_calibration import MIN_TAGS
-from ..calibration.lens_calibration import MIN_VIEWS
 from ..errors import CalibrationError
 from ..tracking import settings as camera_file
 from ..tracking.settings import Settings
@@ -32,13 +31,10 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--size", default="1920x1080", help="size of a device's images (%(default)s)")
     parser.add_argument("--rate", type=float, default=30.0, help="rate of a device, Hz (%(default)s)")
     parser.add_argument("--yaml", metavar="FILE", help="lens: take the result of camera_calibration")
-    parser.add_argument("--views", type=int, default=0, metavar="N", help="lens: take this many images, moving or not")
     parser.add_argument("--robots", type=robot_ids_option, default=None, help="robots: ids, such as '0 1 2' or 0-3")
     options = parser.parse_args(arguments)
     if options.part == "robots" and options.robots is None:
         parser.error("robots: name them, such as --robots 0-3; each turns on the spot and drives 0.12 m to and fro")
-    if options.views and options.views < MIN_VIEWS:
-        parser.error("--views %d: it takes at least %d images" % (options.views, MIN_VIEWS))
     return options
 
 

@@ -37,11 +37,10 @@ def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program
     """Collect views of the board, and calibrate. Return the exit code."""
     say("move the board slowly through the whole image, near and far, tilted by 30 to 45 degrees; hold still between")
     views: List[BoardView] = []
-    wanted = options.views or MAX_VIEWS
     last: Optional[BoardView] = None
     found_s = program.now_s
     result: Optional[LensCalibration] = None
-    while len(views) < wanted and (result is None or result.problems):
+    while len(views) < MAX_VIEWS and (result is None or result.problems):
         gray = images.take().gray
         view = find_board(gray)
         if view is not None:
@@ -54,13 +53,13 @@ def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program
             say(text % gray.mean())
         is_still = view is not None and last is not None and _measure_shift(view, last) < STILL_PX
         last = view
-        if view is None or not (is_still or options.views):
+        if view is None or not is_still:
             continue
         if any(_measure_shift(view, other) < NEW_PX for other in views):
             continue
         views.append(view)
-        if len(views) < min(ENOUGH_VIEWS, wanted):
-            say("%d of at least %d images" % (len(views), min(ENOUGH_VIEWS, wanted)))
+        if len(views) < ENOUGH_VIEWS:
+            say("%d of at least %d images" % (len(views), ENOUGH_VIEWS))
             continue
         result = calibrate_lens(views, *gray.shape[::-1])
         say(f"{len(views)} images: {result.problems[0] if result.problems else 'enough'}")

@@ -23,16 +23,17 @@ from hero_sim.world import Arena, build_default, load_arena
 
 from ..camera.frame_source import keep_freed_memory
 from ..errors import SettingsError
-from ..prints.tag_images import FAMILIES
 from .renderer import CameraRenderer
 from .view import (
+    FIRST_REFERENCE_ID,
     CameraOptions,
     PrintedTag,
     describe_references,
-    find_first_reference,
+    find_part,
     hang_above,
     list_frames,
     list_references,
+    list_seen,
     write_camera_file,
 )
 
@@ -93,24 +94,21 @@ class CameraNode:
             rate_hz=options.rate, delay_s=options.delay, exposure_s=options.exposure
         )
         arena = _load_arena(options)
-        lain = list_references(arena, options.family)
-        self._options = camera = hang_above(camera, arena, lain, options.tag_size)
+        lain = list_references(arena, options.part[1])
+        self._options = camera = hang_above(camera, find_part(arena, *options.part), lain, options.tag_size)
         self._stamps_arrival = options.stamps == "arrival"
         self._seed = options.seed
         robot_ids = list(range(options.first_id, options.first_id + options.count))
         random = np.random.RandomState(options.seed)
-        errors = np.array((MOUNT_ERROR_M, MOUNT_ERROR_M, MOUNT_ERROR_RAD)) * (not options.perfect)
-        tags = [
-            PrintedTag(robot_id, options.tag_size, 0.076, x_m, y_m, yaw_rad, options.family)
-            for robot_id, (x_m, y_m, yaw_rad) in zip(robot_ids, random.standard_normal((len(robot_ids), 3)) * errors)
-        ]
-        offs_m = random.standard_normal((len(lain), 2)) * PLACE_ERROR_M * (not options.perfect)
+        errors = random.standard_normal((len(robot_ids), 3)) * (MOUNT_ERROR_M, MOUNT_ERROR_M, MOUNT_ERROR_RAD)
+        tags = [PrintedTag(robot_id, options.tag_size, 0.076, *error) for robot_id, error in zip(robot_ids, errors)]
+        offs_m = random.standard_normal((len(lain), 2)) * PLACE_ERROR_M
         references = [
             tag._replace(x_m=tag.x_m + off_x_m, y_m=tag.y_m + off_y_m) for tag, (off_x_m, off_y_m) in zip(lain, offs_m)
         ]
         self._renderer = CameraRenderer(camera, arena, tags, references, options.seed)
         if options.write_file:
-            write_camera_file(options.write_file, camera.geometry, tags, references)
+            write_camera_file(options.write_file, camera.geometry, tags, list_seen(camera.geometry, references))
         self._hand_m: Optional[Tuple[float, float]] = None
         self._true = TrueRobots(robot_ids)
         rospy.Subscriber("~hand", Point, self._receive_hand)
@@ -198,24 +196,26 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("--delay", type=within(0.0, 5.0), default=0.07, metavar="S", help="delay from capture to arrival (%(default)s)")
     add("--exposure", type=within(0.0, 0.1), default=0.008, metavar="S", help="exposure time (%(default)s)")
     add("--stamps", choices=("capture", "arrival"), default="capture", help="timestamp source (%(default)s)")
-    add("--family", choices=sorted(FAMILIES), default="36h11", help="family of the tags (%(default)s)")
     add("--tag-size", type=within(0.01, 0.2), default=0.04, metavar="M", help="side of the robots' tags (%(default)s)")
-    add("--perfect", action="store_true", help="place all tags exactly")
+    text = "see part K of N of the arena along x, and 0.2 m beyond (1 1)"
+    add("--part", type=within(1, 4, int), nargs=2, default=(1, 1), metavar=("K", "N"), help=text)
     text = "print the reference tags for the camera file, and exit"
     add("--print-references", action="store_true", help=text)
     add("--write-file", metavar="FILE", help="write a camera file, calibrated without error")
     add("--seed", type=int, default=0, help="seed of noise, dropped images and tag placement (%(default)s)")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.part[0] > options.part[1]:
+        parser.error("--part %d %d: there are no more parts than the second says" % tuple(options.part))
+    return options
 
 
 def main() -> None:
     """Run the camera until ROS ends."""
     options = parse_options(rospy.myargv(sys.argv)[1:])
-    first_reference = find_first_reference(options.family)
-    if options.first_id + options.count > first_reference:
-        raise SettingsError("tags from %d on are reference tags: take lower ids" % first_reference)
+    if options.first_id + options.count > FIRST_REFERENCE_ID:
+        raise SettingsError("tags from %d on are reference tags: take lower ids" % FIRST_REFERENCE_ID)
     if options.print_references:
-        print(describe_references(list_references(_load_arena(options), options.family)))
+        print(describe_references(list_references(_load_arena(options), options.part[1])))
         return
     check_master()
     keep_freed_memory()

@@ -13,7 +13,7 @@ from hero_sim.world import Arena
 
 from ..camera.camera_model import Camera, Intrinsics
 from ..errors import SettingsError
-from ..prints.tag_images import FAMILIES, REFERENCE_SIZE_M
+from ..prints.tag_images import REFERENCE_SIZE_M
 from ..tracking import settings as camera_file
 from ..tracking.tag_pose import list_corners
 
@@ -21,12 +21,12 @@ _ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 CIRCLE = np.column_stack((np.cos(_ANGLES_RAD), np.sin(_ANGLES_RAD)))
 """Points of the unit circle, (24, 2)."""
 
-REFERENCES = 6
 FIRST_REFERENCE_ID = 100
-"""First reference tag of families that have this many tags; otherwise the last ones are reference tags."""
-
 REFERENCE_GAP_M = 0.12
 """Distance between the arena's bounds and the centers of the reference tags beside it."""
+
+OVERLAP_M = 0.2
+"""Width of the strip beyond its part of the arena that a camera of several sees too."""
 
 SHEET = 1.3
 """Side of a reference tag with the white margin that detectors need, in sides of the tag."""
@@ -119,25 +119,33 @@ def tag_corners(tag: PrintedTag, poses: np.ndarray) -> np.ndarray:
     return np.array([list_corners(pose, tag.size_m, tag.height_m) for pose in tags])
 
 
-def find_first_reference(family: str) -> int:
-    """Return the id of the first reference tag."""
-    return min(FIRST_REFERENCE_ID, FAMILIES[family].size - REFERENCES)
+def list_references(arena: Arena, cameras: int = 1) -> List[PrintedTag]:
+    """Return the reference tags, on the floor beside the arena, where they are meant to lie: at whole millimeters.
 
-
-def list_references(arena: Arena, family: str) -> List[PrintedTag]:
-    """Return the reference tags, on the floor beside the arena, where they are meant to lie: at whole millimeters."""
+    cameras: number of them along x; where the parts of two meet, two more tags lie for both.
+    """
     x_min_m, y_min_m, x_max_m, y_max_m = arena.bounds_m.tolist()
     y_m = 0.8 * (y_max_m - y_min_m) / 2.0
     middle_m = (y_min_m + y_max_m) / 2.0
     places_m = [
-        (round(x_m, 3), round(middle_m + side * y_m, 3))
+        (x_m, middle_m + side * y_m)
         for x_m in (x_min_m - REFERENCE_GAP_M, x_max_m + REFERENCE_GAP_M)
         for side in (-1.0, 0.0, 1.0)
     ]
+    for x_m in np.linspace(x_min_m, x_max_m, cameras + 1)[1:-1].tolist():
+        places_m += [(x_m, y_min_m - REFERENCE_GAP_M), (x_m, y_max_m + REFERENCE_GAP_M)]
     return [
-        PrintedTag(find_first_reference(family) + index, REFERENCE_SIZE_M, 0.0, *place_m, family=family)
-        for index, place_m in enumerate(places_m)
+        PrintedTag(FIRST_REFERENCE_ID + index, REFERENCE_SIZE_M, 0.0, round(x_m, 3), round(y_m, 3))
+        for index, (x_m, y_m) in enumerate(places_m)
     ]
+
+
+def find_part(arena: Arena, number: int, cameras: int) -> Arena:
+    """Return an arena with the bounds of what one of some cameras along x sees of it; number: from 1 on."""
+    x_min_m, y_min_m, x_max_m, y_max_m = arena.bounds_m.tolist()
+    edges_m = np.linspace(x_min_m, x_max_m, cameras + 1)
+    low_m, high_m = max(x_min_m, edges_m[number - 1] - OVERLAP_M), min(x_max_m, edges_m[number] + OVERLAP_M)
+    return arena._replace(bounds_m=np.array((low_m, y_min_m, high_m, y_max_m)))
 
 
 def describe_references(references: Sequence[PrintedTag]) -> str:
@@ -149,26 +157,37 @@ def describe_references(references: Sequence[PrintedTag]) -> str:
 def hang_above(
     camera: CameraOptions, arena: Arena, references: Sequence[PrintedTag], tag_size_m: float
 ) -> CameraOptions:
-    """Return the camera moved over the middle of an arena, and so high that it sees all of it and the references.
+    """Return the camera moved over the middle of an arena, and so high that it sees all of it and references beside it.
 
     Raises: SettingsError if robots' tags would be too small from there.
     """
     x_min_m, y_min_m, x_max_m, y_max_m = arena.bounds_m.tolist()
     corners_m = [(x_m, y_m, PrintedTag(0).height_m) for x_m in (x_min_m, x_max_m) for y_m in (y_min_m, y_max_m)]
-    sheets = [tag._replace(size_m=SHEET * tag.size_m) for tag in references]
+    low_m, high_m = x_min_m - 1.01 * REFERENCE_GAP_M, x_max_m + 1.01 * REFERENCE_GAP_M
+    sheets = [tag._replace(size_m=SHEET * tag.size_m) for tag in references if low_m < tag.x_m < high_m]
     seen_m = np.vstack([corners_m, *(tag_corners(tag, np.zeros((1, 3)))[0] for tag in sheets)])
     off_x_m, off_y_m, height_m = camera.position_m
     middle_m = (off_x_m + (x_min_m + x_max_m) / 2.0, off_y_m + (y_min_m + y_max_m) / 2.0)
-    limits_px = np.array((camera.width_px - 1.0, camera.height_px - 1.0))
     while tag_size_m * camera.focal_px[0] > MIN_SIDE_PX * height_m:
         camera = camera._replace(position_m=(*middle_m, height_m))
-        pixels = camera.geometry.project(seen_m)
-        if ((pixels >= 0.0) & (pixels <= limits_px)).all():
+        if _lies_in(camera.geometry, seen_m):
             return camera
         height_m = round(height_m + HEIGHT_STEP_M, 3)
     text = "from %.1f m above an arena of %.1f x %.1f m, tags of %.0f mm measure less than %.0f px: take a larger"
     size_m = (x_max_m - x_min_m, y_max_m - y_min_m)
     raise SettingsError((text + " --width or --tag-size") % (height_m, *size_m, 1e3 * tag_size_m, MIN_SIDE_PX))
+
+
+def _lies_in(camera: Camera, points_m: np.ndarray) -> bool:
+    """Return whether an image shows all of points (N, 3) in world."""
+    pixels = camera.project(points_m)
+    return bool(((pixels >= 0.0) & (pixels <= (camera.lens.width_px - 1.0, camera.lens.height_px - 1.0))).all())
+
+
+def list_seen(camera: Camera, tags: Sequence[PrintedTag]) -> List[PrintedTag]:
+    """Return those of tags on the floor that lie in the image, with their white margin."""
+    sheets = [tag_corners(tag._replace(size_m=SHEET * tag.size_m), np.zeros((1, 3)))[0] for tag in tags]
+    return [tag for tag, corners_m in zip(tags, sheets) if _lies_in(camera, corners_m)]
 
 
 def write_camera_file(path: str, camera: Camera, tags: Sequence[PrintedTag], references: Sequence[PrintedTag]) -> None:
