@@ -1,5 +1,6 @@
 """Dimensions, limits and times of the HeRo, its firmware and its models, each once, with its source. Pure."""
 
+import math
 from typing import NamedTuple
 
 BODY_RADIUS_M = 0.036835
@@ -9,6 +10,9 @@ WHEEL_DIAMETER_M = 0.0492
 WHEEL_SEPARATION_M = 0.063
 TICKS_PER_TURN = 288.0
 """Encoder ticks per turn of a wheel."""
+
+TICK_M = math.pi * WHEEL_DIAMETER_M / TICKS_PER_TURN
+"""Travel of a wheel's rim per encoder tick, about 0.537 mm."""
 
 MAX_LINEAR_M_S = 0.20
 MAX_ANGULAR_RAD_S = 8.0
@@ -35,6 +39,10 @@ MIN_RANGE_M = BODY_RADIUS_M + MIN_RIM_RANGE_M
 MAX_RIM_RANGE_M = 0.20
 """The firmware's range_max, from the body's rim; ranges beyond it stand for nothing in range."""
 
+BEAM_NAMES = ("rear", "rear right", "right", "front right", "front", "front left", "left", "rear left")
+"""The infrared sensors, counter-clockwise from the rear."""
+
+BEAMS = len(BEAM_NAMES)
 STOCK_BEAMS = 16
 """Ranges of a stock laser message; the odd ones are averages."""
 

@@ -1,14 +1,7 @@
 """The firmware's own limits and watchdogs, beside hero_node.robot_constants. Source: config.h and the files named."""
 
-import math
-
-from hero_node.robot_constants import TICKS_PER_TURN, WHEEL_DIAMETER_M
-
 MAX_ID = 2**31 - 1
 """Largest id of hero_msgs/Robot."""
-
-TICK_M = math.pi * WHEEL_DIAMETER_M / TICKS_PER_TURN
-"""Travel of a wheel's rim per encoder tick, about 0.537 mm."""
 
 VELOCITY_LIMIT_US = 250.0
 POSITION_LIMIT_US = 130.0

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_sim.robot_constants import TICK_M
+from hero_node.robot_constants import TICK_M
 from hero_sim.world import kinematics
 
 HEADING = np.array([[0.6], [0.8]])

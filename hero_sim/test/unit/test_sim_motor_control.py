@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import packets
+from hero_node.robot_constants import TICK_M
 from hero_sim.robot.motor_pid import Gains, MotorPid
-from hero_sim.robot_constants import TICK_M
 from hero_test.nonempty import nonempty
 
 

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from hero_node import Pose
+from hero_node.robot_constants import TICK_M
 from hero_sim.robot.wheel_odometry import WheelOdometry
-from hero_sim.robot_constants import TICK_M
 from hero_sim.world.kinematics import join_wheels
 
 

@@ -2,8 +2,8 @@
 
 from .avoidance import WanderLaw, WanderMemory, shorten_for_body, wander
 from .go_to_goal import DEFAULT_TOLERANCE_M, Goal, GoToGoalController
-from .heading_check import HeadingCheck, is_upside_down
 from .half_planes import FAR_LOOKAHEAD_M, LOOKAHEAD_M, MARGIN_M, NEIGHBORS, nearest_allowed, steer
+from .heading_check import HeadingCheck, is_upside_down
 from .lateness import Lateness
 from .motion import DEFAULT_TIMEOUT_S, State
 from .orca import AvoidanceLaw

@@ -7,6 +7,7 @@ import math
 from typing import Any, List, NamedTuple, Optional, Sequence
 
 from hero_node import Pose, pose_of, wrap_angle
+from hero_node.robot_constants import BEAMS
 
 FRESH_S = 1.0
 """Older data count as missing. Odometry comes 29 times a second and proximity 5 times, but Wi-Fi makes gaps: in each
@@ -14,9 +15,6 @@ recording of real robots the longest one lasted 0.15 to 1.3 s."""
 
 MAX_POSITION_M = 1000.0
 """No robot drives this far; a position or range beyond is invalid."""
-
-BEAMS = 8
-"""Proximity sensors of a robot."""
 
 MAX_RANGES = 64
 """A robot has eight sensors; a scan with more ranges than this is invalid."""

@@ -7,13 +7,11 @@ is as in the stock robot; HeRo+'s own law for its motors, too, is that of the st
 
 from typing import Dict, List, NamedTuple, Tuple
 
-from hero_node import MD5SUMS, PLUS_ENCODER_MD5
-from hero_node import robot_constants
-from hero_node.robot_constants import TICKS_PER_TURN
+from hero_node import MD5SUMS, PLUS_ENCODER_MD5, robot_constants
+from hero_node.robot_constants import TICK_M, TICKS_PER_TURN
 
 from ..errors import OptionError
 from ..key_values import parse_values
-from ..robot_constants import TICK_M
 from ..world.robot_errors import RobotErrors
 from .declarations import PUB, STOCK_TOPICS, Topic, assign_ids
 

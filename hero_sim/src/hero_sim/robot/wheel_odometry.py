@@ -9,8 +9,8 @@ import math
 from typing import List, Tuple
 
 from hero_node import Pose
+from hero_node.robot_constants import TICK_M
 
-from ..robot_constants import TICK_M
 from ..world.kinematics import join_wheels
 
 FILTER_FIRST_ERROR = 1.0

@@ -9,14 +9,13 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from hero_node.robot_constants import BODY_RADIUS_M
+from hero_node.robot_constants import BEAMS, BODY_RADIUS_M
 
 from . import ray_loops
 from .arena import Segments
 from .compiled import compile_loops
 from .kinematics import find_heading
 
-BEAMS = 8
 BEAM_ANGLES_RAD = -math.pi + np.arange(BEAMS) * (math.pi / 4.0)
 """Directions in the body frame, counter-clockwise; index 4 is the front sensor."""
 

@@ -9,12 +9,12 @@ from typing import Callable, Collection, Dict, Iterable, List, NamedTuple
 import numpy as np
 
 from hero_node.files import read_file
-from hero_node.robot_constants import BODY_RADIUS_M, WHEEL_SEPARATION_M
+from hero_node.robot_constants import BEAMS, BODY_RADIUS_M, WHEEL_SEPARATION_M
 
 from ..errors import OptionError
 from ..key_values import parse_values
 from .body_loops import CREEP_M_S
-from .range_sensors import ALPHA_COUNTS_M2, BEAMS, BETA_COUNTS
+from .range_sensors import ALPHA_COUNTS_M2, BETA_COUNTS
 
 SERVO_CENTER_US = 1500.0
 SERVO_DEAD_ZONE_US = 30.0

@@ -11,6 +11,8 @@ from typing import Any, Iterator, List, NamedTuple, Optional, Sequence, Tuple, U
 
 import numpy as np
 
+from hero_node.robot_constants import BEAMS
+
 from . import wheel_loops
 from .arena import Arena, Segments
 from .compiled import compile_loops
@@ -19,7 +21,6 @@ from .kinematics import join_wheels
 from .pushing.pushing import Pushing
 from .pushing.shapes import PushedBody, list_outlines
 from .range_sensors import (
-    BEAMS,
     DISTANCE_NOISE_M,
     DISTANCE_REACH_M,
     NOISE_COUNTS,

@@ -13,10 +13,10 @@ from hero_calibration import calibrate
 from hero_calibration.errors import CalibrationError
 from hero_calibration.models import dead_zone, encoder_readings, step_response
 from hero_calibration.models import infrared_model as model
-from hero_calibration.models.encoder_readings import TICK_M
 from hero_calibration.models.infrared_model import Facing
 from hero_calibration.procedures import infrared
 from hero_client.values import BODY_RADIUS_M
+from hero_node.robot_constants import TICK_M
 
 
 def servo_speeds(pulses_us, center_us, zone_us=30.0, sign=1.0, noise_m_s=0.0, seed=0):
@@ -275,7 +275,7 @@ def face_wall(alphas, sensor, misalignment_rad=0.0, moved_m=0.0):
     """Readings of a wall that one sensor faces, by the published model."""
     wall_m = model.WALL_M + BODY_RADIUS_M - moved_m
     counts = []
-    for index in range(model.BEAMS):
+    for index in range(8):
         angle_rad = math.remainder((index - sensor) * model.BEAM_STEP_RAD + misalignment_rad, 2.0 * math.pi)
         sees = abs(angle_rad) < 1.2
         counts.append(alphas[index] * model.expected_brightness(angle_rad, wall_m) - 0.93 if sees else 0.5)

@@ -11,7 +11,7 @@ from hero_calibration.calibration import INFRARED, MOTORS, VELOCITY, WHEELS, cal
 from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models import infrared_model as model
-from hero_calibration.models.encoder_readings import TICK_M, make_readings
+from hero_calibration.models.encoder_readings import make_readings
 from hero_calibration.models.infrared_model import Facing
 from hero_calibration.models.step_response import DEFAULT_GAINS, NOMINAL_GAIN_M_S_US, Response, choose_gains, find_best
 from hero_calibration.procedures import wheels
@@ -19,12 +19,13 @@ from hero_calibration.procedures.infrared import InfraredResult
 from hero_calibration.procedures.motors import MotorResult
 from hero_calibration.procedures.placement import place_robots
 from hero_calibration.procedures.velocity import VelocityResult, evaluate_test
-from hero_calibration.procedures.wheels import CAMERA_SD, DIAMETER_M, NOMINAL_M, Leg, fit_wheels, follow_ticks
+from hero_calibration.procedures.wheels import CAMERA_SD, NOMINAL_M, Leg, fit_wheels, follow_ticks
 from hero_calibration.robots.probe import STALE_S, Probe
 from hero_calibration.robots.session import SETTLE_S, Session
 from hero_client.values import BODY_RADIUS_M
 from hero_node import Pose
 from hero_node.files import KeptCalibration
+from hero_node.robot_constants import TICK_M
 
 
 class FakeProbe(Probe):
@@ -285,7 +286,7 @@ def test_files_hold_rounded_numbers_in_the_order_that_they_say():
 
 
 def test_ticks_lead_along_arcs_and_wheels_are_scaled_by_what_was_measured():
-    assert pytest.approx(0.0492) == DIAMETER_M
+    assert NOMINAL_M[:2] == pytest.approx(0.0492)
     ticks = np.column_stack((np.zeros(101), np.arange(101.0)))
     turn_rad = 100.0 * TICK_M / 0.063
     radius_m = 0.063 / 2.0

@@ -9,11 +9,12 @@ from test_calibration_rules import FakeSession
 
 from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.models import dead_zone, step_response
-from hero_calibration.models.encoder_readings import TICK_M, Readings
+from hero_calibration.models.encoder_readings import Readings
 from hero_calibration.models.infrared_model import Facing
 from hero_calibration.procedures import infrared, motors, velocity, wheels
 from hero_calibration.robots.session import SETTLE_S
 from hero_node import Pose, transform_pose
+from hero_node.robot_constants import TICK_M
 from hero_test.nonempty import nonempty
 
 STEP_S = 0.034

@@ -8,11 +8,11 @@ from test_calibration_procedures import make_session
 from test_calibration_rules import FakeSession
 
 from hero_calibration.errors import CalibrationError, EndedError
-from hero_calibration.models.encoder_readings import TICK_M
 from hero_calibration.procedures import wheels
 from hero_calibration.procedures.wheels import NOMINAL_M, Leg, calibrate_wheels, fit_wheels, follow_ticks
 from hero_client.values import WHEEL_SEPARATION_M
 from hero_node import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node.robot_constants import TICK_M
 from hero_test.nonempty import nonempty
 
 HELD_OUT = [(0.12, 0.9, 2.0), (0.15, -0.5, 3.0), (0.0, 2.0, 1.5), (0.1, 0.0, 3.0), (0.12, -1.2, 2.5), (0.1, 0.6, 3.0)]

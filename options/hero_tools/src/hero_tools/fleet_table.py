@@ -11,12 +11,12 @@ from hero_client.values import Obstacle, describe_counts, describe_gone, describ
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import Pose, make_printable
 from hero_node.files import ExtraTopic
+from hero_node.robot_constants import BEAM_NAMES, BEAMS
 
 from .fleet_rows import RobotRow
 
 HEADINGS = ("ROBOT", "ADDRESS", "STATE", "ODOM", "FROM ROBOT", "POSE x y yaw", "DISTANCE", "NEAREST", "")
 RIGHT_ALIGNED = {"ODOM", "FROM ROBOT", "POSE x y yaw", "DISTANCE"}
-DIRECTIONS = ("front", "front left", "left", "rear left", "rear", "rear right", "right", "front right")
 
 
 def format_pose(pose: Optional[Pose]) -> str:
@@ -32,7 +32,7 @@ def format_nearest(seen: bool, free: bool, nearest: Optional[Obstacle]) -> str:
         return "-"
     if nearest is None:
         return "free" if free else "not calibrated"
-    where = DIRECTIONS[round(nearest.bearing_rad / (math.pi / 4)) % 8]
+    where = BEAM_NAMES[round((math.pi + nearest.bearing_rad) / (math.pi / 4)) % BEAMS]
     return f"touch {where}" if nearest.range_m == -math.inf else f"{nearest.range_m:.2f} m {where}"
 
 

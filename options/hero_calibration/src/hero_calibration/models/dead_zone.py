@@ -10,8 +10,10 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from hero_node.robot_constants import TICK_M
+
 from ..errors import CalibrationError
-from .encoder_readings import TICK_M, Readings
+from .encoder_readings import Readings
 
 NOMINAL_CENTER_US = 1500
 REACH_US = 120

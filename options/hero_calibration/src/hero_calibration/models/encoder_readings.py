@@ -10,9 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-TICK_M = 0.0492 * np.pi / 288.0
-"""Distance of a wheel's rim for a tick (docs/robot_interface.md)."""
-
 SPAN = 8
 """Readings over which a step is measured by stamps: more than arrive at once, few per clock setting."""
 

@@ -11,11 +11,10 @@ from typing import List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_client.values import BODY_RADIUS_M
+from hero_node.robot_constants import BEAM_NAMES, BEAMS, BODY_RADIUS_M
 
 from ..errors import CalibrationError
 
-BEAMS = 8
 BEAM_STEP_RAD = math.pi / 4.0
 FRONT = 4
 """Sensors are numbered counter-clockwise from the rear."""
@@ -71,11 +70,6 @@ def average(scans: np.ndarray) -> np.ndarray:
     return np.asarray(np.sort(scans, axis=0)[cut : len(scans) - cut].mean(axis=0))
 
 
-def name_beam(sensor: int) -> str:
-    """Return the name of a sensor."""
-    return ("rear", "rear right", "right", "front right", "front", "front left", "left", "rear left")[sensor]
-
-
 def expected_brightness(angle_rad: float, wall_m: float) -> float:
     """Return signal / alpha (1/m^2) of a sensor at angle_rad from the wall's normal.
 
@@ -93,7 +87,7 @@ def estimate_misalignment_rad(facing: Facing) -> float:
     neighbors = ((facing.sensor + 1) % BEAMS, (facing.sensor - 1) % BEAMS)
     left, right = (max(facing.counts[index], FAINT_COUNTS) for index in neighbors)
     if max(left, right) <= NO_WALL_COUNTS:
-        text = f"the sensors beside {name_beam(facing.sensor)} see no wall: is it wider than 30 cm, and white?"
+        text = f"the sensors beside {BEAM_NAMES[facing.sensor]} see no wall: is it wider than 30 cm, and white?"
         raise CalibrationError(text)
     wall_m = WALL_M + BODY_RADIUS_M - facing.moved_m
     step_rad = math.radians(1.0)
@@ -103,7 +97,7 @@ def estimate_misalignment_rad(facing: Facing) -> float:
     misalignment_rad = math.log(right / left) / slope
     if abs(misalignment_rad) > MAX_MISALIGNMENT_RAD:
         text = "misaligned by %.0f degrees when sensor %s faces the wall: place it straight, or clean its wheels"
-        raise CalibrationError(text % (abs(math.degrees(misalignment_rad)), name_beam(facing.sensor)))
+        raise CalibrationError(text % (abs(math.degrees(misalignment_rad)), BEAM_NAMES[facing.sensor]))
     return misalignment_rad
 
 
@@ -117,14 +111,14 @@ def compute_calibration(facings: Sequence[Facing]) -> List[float]:
         counts = facing.counts[facing.sensor]
         if not WALL_COUNTS[0] <= counts <= WALL_COUNTS[1]:
             text = "sensor %s reads %.0f counts; %.0f are typical of a white wall 10 cm away: place it again"
-            raise CalibrationError(text % (name_beam(facing.sensor), counts, NOMINAL_COUNTS_M2 / WALL_M**2))
+            raise CalibrationError(text % (BEAM_NAMES[facing.sensor], counts, NOMINAL_COUNTS_M2 / WALL_M**2))
         # Relative to a straight view of the wall at 10 cm.
         brightness = expected_brightness(estimate_misalignment_rad(facing), WALL_M + BODY_RADIUS_M - facing.moved_m)
         alphas[facing.sensor] = counts / brightness
     low, high = PLAUSIBLE_COUNTS_M2
     for index, alpha in enumerate(alphas):
         if not low <= alpha <= high:
-            raise CalibrationError(f"sensor {name_beam(index)} would get {alpha:.2f} counts m^2: none has")
+            raise CalibrationError(f"sensor {BEAM_NAMES[index]} would get {alpha:.2f} counts m^2: none has")
     return alphas
 
 
@@ -154,4 +148,4 @@ def find_obstacle(counts: Sequence[float], at_wall: bool) -> Optional[str]:
     if counts[nearest] <= NEAR_COUNTS:
         return None
     distance_cm = 100.0 * math.sqrt(NOMINAL_COUNTS_M2 / counts[nearest])
-    return f"something is about {distance_cm:.0f} cm from it, at sensor {name_beam(nearest)}"
+    return f"something is about {distance_cm:.0f} cm from it, at sensor {BEAM_NAMES[nearest]}"

@@ -8,10 +8,10 @@ from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values import WHEEL_SEPARATION_M
+from hero_node.robot_constants import TICK_M, WHEEL_SEPARATION_M
 
 from ..errors import CalibrationError
-from .encoder_readings import TICK_M, Readings
+from .encoder_readings import Readings
 
 STEP_M_S = 0.08
 """Speed of the wheels in a test."""

@@ -7,6 +7,7 @@ from typing import Dict, List, NamedTuple, Sequence
 import numpy as np
 
 from hero_node import Pose, invert_pose, say, transform_pose
+from hero_node.robot_constants import BEAM_NAMES, BEAMS
 
 from ..errors import CalibrationError
 from ..models import infrared_model as model
@@ -48,7 +49,7 @@ class InfraredResult(NamedTuple):
 
 def calibrate_infrared(session: Session, results: Dict[int, InfraredResult]) -> None:
     """Calibrate all active robots, which face a wall; put the results by robot into results as they are found."""
-    say(f"infrared: about {model.BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0):.0f} s")
+    say(f"infrared: about {BEAMS * (2 * TURN_S + (model.SAMPLES + model.CHECK_SAMPLES) / 5.0):.0f} s")
     walls: Dict[int, Pose] = {}
     first = _face_wall_with_each_sensor(session, "infrared", model.SAMPLES, walls)
 
@@ -56,7 +57,7 @@ def calibrate_infrared(session: Session, results: Dict[int, InfraredResult]) -> 
         facings = first[probe.robot_id]
         counts_m2 = model.compute_calibration(facings)
         probe.write("infrared_counts_m2", counts_m2)
-        unknown_m = np.full(model.BEAMS, np.nan)
+        unknown_m = np.full(BEAMS, np.nan)
         results[probe.robot_id] = InfraredResult(counts_m2, model.range_errors_m(facings), unknown_m)
 
     session.for_each("infrared", write)
@@ -74,9 +75,9 @@ def _face_wall_with_each_sensor(
     walls: places of the robots, in their odom frames, and headings straight to the wall, stored at the first sensor.
     """
     facings: Dict[int, List[model.Facing]] = {probe.robot_id: [] for probe in session.active}
-    for step in range(model.BEAMS):
-        sensor = (model.FRONT - step) % model.BEAMS
-        say("%s: sensor %s, %d of %d" % (title, model.name_beam(sensor), step + 1, model.BEAMS))
+    for step in range(BEAMS):
+        sensor = (model.FRONT - step) % BEAMS
+        say("%s: sensor %s, %d of %d" % (title, BEAM_NAMES[sensor], step + 1, BEAMS))
         for probe in session.active:
             probe.forget_scans()
         session.wait_for(lambda: all(probe.count_scans() >= samples for probe in session.active), SCAN_TIMEOUT_S)

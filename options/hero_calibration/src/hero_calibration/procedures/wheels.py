@@ -11,11 +11,11 @@ from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from hero_client.values import WHEEL_SEPARATION_M, follow_wheels
+from hero_client.values import follow_wheels
 from hero_node import Pose, invert_pose, say, transform_pose, wrap_angle
+from hero_node.robot_constants import TICK_M, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M
 
 from ..errors import CalibrationError, EndedError
-from ..models.encoder_readings import TICK_M
 from ..robots.probe import Probe
 from ..robots.session import COMMAND_PERIOD_S, Session
 from .placement import Ask
@@ -39,8 +39,7 @@ MAX_CHANGE = 0.1
 MAX_DEVIATION_SD = 3.0
 """Deviation of the legs, rms, above which the wheels found are not those of the robot: an off-center tag reaches 9."""
 
-DIAMETER_M = TICK_M * 288.0 / math.pi
-NOMINAL_M = np.array((DIAMETER_M, DIAMETER_M, WHEEL_SEPARATION_M))
+NOMINAL_M = np.array((WHEEL_DIAMETER_M, WHEEL_DIAMETER_M, WHEEL_SEPARATION_M))
 
 Sd = Tuple[float, float, float]
 
@@ -78,7 +77,7 @@ class WheelResult(NamedTuple):
 
 def follow_ticks(ticks: np.ndarray, wheels_m: np.ndarray) -> Pose:
     """Return where ticks (K, 2) lead a robot with these wheels (3,) from 0, 0, 0."""
-    rolled_m = ticks * (TICK_M / DIAMETER_M * wheels_m[:2])
+    rolled_m = ticks * (TICK_M / WHEEL_DIAMETER_M * wheels_m[:2])
     x_m, y_m, yaw_rad = follow_wheels(rolled_m, wheels_m[2])[-1].tolist()
     return Pose(x_m, y_m, wrap_angle(yaw_rad))
 

@@ -12,10 +12,11 @@ from typing import Deque, Dict, List, Optional, Sequence, Tuple
 import numpy as np
 
 from hero_node import Pose
+from hero_node.robot_constants import BEAMS
 
 from ..errors import CalibrationError
 from ..models.encoder_readings import Readings, make_readings
-from ..models.infrared_model import BEAMS, average
+from ..models.infrared_model import average
 
 KEPT_READINGS = 4000
 """Two minutes of encoder readings."""

@@ -12,6 +12,7 @@ from hero_client.ros import share_drivers
 from hero_msgs.msg import Encoder, Motor, Robot, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 from hero_node import Pose, one_line, pose_of
+from hero_node.robot_constants import TICKS_PER_TURN
 from hero_node.ros import Program
 
 from ..errors import CalibrationError
@@ -28,7 +29,7 @@ SERVICES: Dict[str, Tuple[str, Any, Callable[[float], float]]] = {
 }
 """Service that writes each of the SETTINGS, and the type of its numbers."""
 
-STOCK_TICKS = {"hero_plus": 288.0 / 96.0}
+STOCK_TICKS = {"hero_plus": TICKS_PER_TURN / 96.0}
 """Ticks of the stock robot in one of another model (docs/robot_interface.md); their wheels differ by less than 4 %."""
 
 

@@ -14,8 +14,8 @@ from scipy import ndimage
 
 from hero_client.values import BODY_RADIUS_M, MIN_RANGE_M, StampedHistory, interpolate_pose
 from hero_node import Pose
+from hero_node.robot_constants import BEAMS
 
-BEAMS = 8
 CONE_RAD = 0.21
 """Half of what a sensor sees (assumed, as in the simulator)."""
 

@@ -29,8 +29,9 @@ from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
 from hero_node.files import replace_file, write_file
 from hero_node.parameters import number, string
+from hero_node.robot_constants import BEAMS
 
-from ..mapping.occupancy_grid import BEAMS, OccupancyGrid, SwarmMap
+from ..mapping.occupancy_grid import OccupancyGrid, SwarmMap
 
 STEP_HZ = 10.0
 PUBLISH_STEPS = 10

@@ -12,15 +12,13 @@ from typing import Any, Callable, Dict, Iterable, List, Tuple
 from hero_client.values import STATES
 from hero_node import yaw_of
 from hero_node.files import ExtraTopic
+from hero_node.robot_constants import BEAM_NAMES
 
 from .topics import declare_topics, find_robot_topic, is_fleet_topic
 
 Row = Tuple[Any, ...]
 Columns = Dict[str, Callable[[Any], Any]]
 """Name of each column after time_s, and the function that reads its value from a message."""
-
-BEAMS = ("rear", "rear_right", "right", "front_right", "front", "front_left", "left", "rear_left")
-"""Names of the beams of /hero_N/proximity by index: counter-clockwise from the rear."""
 
 
 def to_seconds(stamp: Any) -> float:
@@ -71,7 +69,7 @@ TABLES: Dict[str, Columns] = {
     },
     "proximity": {
         "stamp_s": _read_stamp,
-        **{beam + "_m": _range_reader(index) for index, beam in enumerate(BEAMS)},
+        **{f"{name.replace(' ', '_')}_m": _range_reader(index) for index, name in enumerate(BEAM_NAMES)},
     },
     "range": {"stamp_s": _read_stamp, "range_m": attrgetter("range")},
     "velocity_command": _TWIST,
