@@ -1,6 +1,7 @@
 """Learned policies: batched worlds, the file, and the file as a behavior that observes what it learned on."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -122,7 +123,7 @@ def test_what_is_no_policy_is_refused(content, tmp_path):
         find_behavior(str(tmp_path / "none.npz"))
 
 
-def test_layers_that_do_not_fit_are_refused_when_saved_and_run(tmp_path):
+def test_layers_that_do_not_fit_are_refused_when_saved_read_and_run(tmp_path):
     path, observation = str(tmp_path / "p.npz"), Observation((-1.0, -1.0, 1.0, 1.0))
     first, last = make_layers(24)
     for layers, words in (
@@ -132,6 +133,13 @@ def test_layers_that_do_not_fit_are_refused_when_saved_and_run(tmp_path):
     ):
         with pytest.raises(ValueError, match=words):
             save_policy(path, layers, observation)
+        np.savez(
+            path,
+            about=json.dumps(ABOUT),
+            **{f"{k}_{n}": layer[i] for i, k in enumerate("wb") for n, layer in enumerate(layers)},
+        )
+        with pytest.raises(ValueError, match=f"p.npz cannot be read: .*{words}"):
+            load_policy(path, Path(path).read_bytes())
     with pytest.raises(ValueError, match="sensor x: only built-in sensors"):
         save_policy(path, make_layers(24), observation._replace(sensors={"x": type("Own", (Neighbors,), {})()}))
     save_policy(path, make_layers(23), observation)

@@ -5,10 +5,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from hero_client.values import sense_binary
 from hero_sim.world import compiled
 from hero_sim.world.arena import build_rectangle
 from hero_swarm.behavior import Behavior, Binary, Distance, NeighborColors, Neighbors, Odometry, Proximity, Random
 from hero_swarm.sensors import Surroundings, read_sensor
+from hero_swarm.sensors.pair_loops import find_touched
 from hero_swarm.trial import Trial
 
 STARTS = np.array([[(0.1, 0.0, 0.0), (-0.5, 0.3, 1.0)]] * 2)
@@ -124,6 +126,14 @@ def test_compiled_beams_see_what_others_see(monkeypatch, sensor):
             around = Surroundings(0.0, poses, Random(range(20), 15))
             seen.append(read_sensor("sees", sensor._replace(error=error), around).tolist())
         assert seen[0] == seen[1] and len(set(seen[0])) == 2
+
+
+@pytest.mark.parametrize("range_m", [0.3, float("inf")])
+def test_loops_over_pairs_see_what_arrays_do(range_m):
+    poses = np.random.RandomState(1).uniform(-0.4, 0.4, (4, 9, 3)) * (1.0, 1.0, 10.0)
+    poses[0, 3] = np.nan
+    sees = sense_binary(poses, Binary(range_m=range_m), None, find_touched)
+    assert sees.tolist() == sense_binary(poses, Binary(range_m=range_m)).tolist() and len(set(sees.tolist())) == 2
 
 
 @pytest.mark.option("numba")

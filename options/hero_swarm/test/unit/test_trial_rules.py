@@ -16,7 +16,7 @@ from hero_swarm.experiments.experiment_file import Start
 from hero_swarm.learning.observation import MAX_LEARNED_ANGULAR_RAD_S, count_observations
 from hero_swarm.learning.vector_env import SwarmVectorEnv
 from hero_swarm.safety import FENCE, MAX_AGE_S, ROBOTS, SafetyFilter
-from hero_swarm.trial import OPEN, Trial, scatter
+from hero_swarm.trial import OPEN, Trial, is_clear, scatter
 from hero_test.nonempty import nonempty
 
 RADIUS_M = BODY_RADIUS_M + 0.03 + 0.012
@@ -236,3 +236,10 @@ def test_an_episode_rewards_what_gets_better_and_observes_shares():
             expected = range_m / 0.8 * np.array((math.cos(bearing_rad), math.sin(bearing_rad)))
             assert shares == pytest.approx(expected, abs=1e-6)
     assert observed[:, :8].min() >= 0.0 and observed[:, :8].max() == 1.0
+
+
+def test_a_place_is_clear_up_to_an_overlap_that_is_allowed():
+    arena = build_rectangle(1.0, 1.0, 1)
+    places_m = np.array([(0.5 - BODY_RADIUS_M + into_m, 0.0) for into_m in (-0.001, 0.001, 0.003)])
+    assert is_clear(places_m, arena).tolist() == [True, False, False]
+    assert is_clear(places_m, arena, 0.002).tolist() == [True, True, False]

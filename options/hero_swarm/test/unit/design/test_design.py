@@ -30,6 +30,7 @@ time_s: 1
 score: {mean_of_last_s: {score.py:right: 1}}
 baseline: dispersion
 """
+NAN_ALONE = "algebraic_connectivity"
 SCORE = "def right(state):\n    return state.poses[..., 0].mean(axis=1)\n"
 ARENA = "bounds_m: [-1, -1, 1, 1]\nlamps_m: [[0.9, 0]]\nareas:\n  - {name: spot, circle_m: [0, 0, 0.3], color: 0}\n"
 
@@ -324,6 +325,14 @@ def test_a_score_that_is_nan_or_tells_nothing_is_refused(path):
     with pytest.raises(ExperimentError, match="the mission with seed 1000000: ValueError: metric .* gives nan at 1 s"):
         program.main(["m.yaml", "--budget", "200"])
     (path.parent / "score.py").write_text(SCORE.replace("mean(axis=1)", "mean(axis=1) * 0.0"))
+    path.write_text(
+        MISSION.replace("robots: 2", "robots: 1").replace("{mean_of_last_s: {score.py:right: 1}}", NAN_ALONE)
+    )
+    with pytest.raises(
+        ExperimentError, match=f"line 4: score {NAN_ALONE} is nan with seed 1000000, but must be a number"
+    ):
+        program.main(["m.yaml", "--budget", "200", "--fresh"])
+    path.write_text(MISSION)
     with pytest.raises(
         ExperimentError, match="m.yaml, line 4: score is 0 in all 150 runs of 30 controllers: change score or mission"
     ):

@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.reporting import statistics
 from hero_swarm.experiments.reporting.figures import draw_over_time, draw_runs
 from hero_swarm.experiments.reporting.statistics import Interval
+from hero_test.nonempty import nonempty
 
 
 def test_equal_values_give_equal_bounds():
@@ -128,3 +130,14 @@ def test_medians_over_time_lie_in_the_middle_half_up_to_the_last_run():
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["a", "b"]
     (below,) = draw_over_time("order", ["a"], times_s, [first - 5.0]).axes
     assert below.get_ylabel() == "order" and below.get_ylim()[0] < -4.0
+
+
+def test_no_label_of_a_figure_is_cut_off():
+    labels = ["speed_m_s 0.02, robots 100, behavior my_own_aggregation"] * 2
+    figure = draw_runs("dispersion_ratio", labels, [(1.0, 2.0)] * 2, [Interval(1.5, 1.0, 2.0)] * 2)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    (axes,) = figure.axes
+    for label in (*nonempty(axes.get_yticklabels()), axes.xaxis.label):
+        box = label.get_window_extent(canvas.get_renderer())
+        assert box.x0 >= 0.0 and box.y0 >= 0.0, label

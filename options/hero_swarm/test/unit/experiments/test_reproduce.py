@@ -12,7 +12,7 @@ from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import read_experiment
 from hero_swarm.experiments.reporting.statistics import Interval
-from hero_swarm.experiments.reproduce import NO_FIGURE, OPEN, OUTSIDE, WITHIN, Figure, Verdict
+from hero_swarm.experiments.reproduce import NO_FIGURE, OPEN, OUTSIDE, WITHIN, Figure, Verdict, list_changes
 from hero_swarm.experiments.results import load
 from hero_test.nonempty import nonempty
 
@@ -106,6 +106,7 @@ def test_what_was_changed_by_hand_is_shown_beside_the_verdict(shipped, capsys, a
     own = Path("reproduction")
     (own / "ahead.yaml").write_text(FILE.replace("time_s: 2", "time_s: 1") + "errors.friction: 0.1\n")
     (own / "ahead.py").write_text(ahead.replace("0.1, 0.0", "0.2, 0.0"))
+    assert list_changes("elsewhere/ahead.yaml") == [], "without files there is nothing to compare"
     with pytest.raises(ExperimentError, match="--fresh"):
         run(capsys, "--quick")
     lines = run(capsys, "--quick", "--fresh").out.splitlines()
