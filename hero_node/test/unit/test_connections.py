@@ -134,3 +134,10 @@ def test_a_call_that_has_ended_is_closed():
             assert client.recv(1) == b"" and not server._limit.remove(request)
     finally:
         server.server_close()
+
+
+def test_a_thousand_programs_may_connect_at_once(server):
+    details = server._server.tcp_ros_server.server_sock.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 32)
+    (may_wait,) = struct.unpack_from("I", details, 28)  # tcpi_sacked, which tells that of a socket that listens
+    limit = int(Path("/proc/sys/net/core/somaxconn").read_text())
+    assert may_wait == min(1024, limit)

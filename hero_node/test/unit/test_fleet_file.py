@@ -68,3 +68,13 @@ def test_lists_hold_what_they_must_and_may_be_many():
             content[name].entries()
         with pytest.raises(EntryError, match=f"a.yaml, line {line}: .*two numbers"):
             content[name].numbers(2, 0.0, 3.0, "two numbers")
+
+
+def test_numbers_may_be_written_with_an_exponent_as_yaml_takes_for_text():
+    entries = read_entries("{far: 1e3, near: soon, wide: 2e3}", "a.yaml", "").value
+    assert entries["far"].number(0.0, 1000.0, "m") == 1000.0
+    for name, shown in (("near", "'soon'"), ("wide", "'2e3'")):
+        with pytest.raises(
+            EntryError, match=f"a.yaml, line 1: {name} is {shown}, but must be a number from 0 to 1000 m"
+        ):
+            entries[name].number(0.0, 1000.0, "m")

@@ -263,6 +263,7 @@ def test_all_obstacles_have_one_color_and_ground_truth_its_name(two_robots):
     (walls,) = axes.collections
     circle = next(patch for patch in axes.patches if patch.get_radius() == pytest.approx(0.1))
     assert tuple(walls.get_edgecolor()[0]) == circle.get_edgecolor()
+    assert not circle.get_fill(), "paths below it are seen"
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert {"ground truth", "walls, obstacles"} <= set(labels)
 

@@ -57,6 +57,13 @@ def test_with_many_robots_the_largest_last_errors_have_their_ids():
     labels = {text.get_text(): text.xy for text in axes.texts}
     assert labels and set(labels) == {str(robot_id) for robot_id in range(20 - len(labels), 20)}
     assert labels["19"] == pytest.approx((1.0, 190.0))
+    canvas = FigureCanvasAgg(axes.figure)
+    canvas.draw()
+    for text in nonempty(axes.texts):
+        box, end_px = text.get_window_extent(canvas.get_renderer()), axes.transData.transform(text.xy)
+        assert np.abs(np.array(((box.x0 + box.x1) / 2.0, (box.y0 + box.y1) / 2.0)) - end_px).max() < 30.0, (
+            "beside its end"
+        )
 
 
 def test_an_error_is_known_only_near_a_reading_of_the_ground_truth():

@@ -2,6 +2,7 @@
 
 import math
 import signal
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -201,7 +202,13 @@ def make_recording(monkeypatch, tmp_path):
     monkeypatch.setattr(record, "repair_bag", lambda path: "repaired " + path)
     monkeypatch.setattr(record, "end_process", lambda process, patience_s: made.code)
     poll = SimpleNamespace(poll=lambda: None if made.now_s < 100.0 + made.ends_s else 1)
-    monkeypatch.setattr(record.subprocess, "Popen", lambda command, **options: made.commands.append(command) or poll)
+
+    def start(command, **options):
+        made.commands.append(command)
+        made.logging = Path(options["env"]["ROSCONSOLE_CONFIG_FILE"]).read_text()
+        return poll
+
+    monkeypatch.setattr(record.subprocess, "Popen", start)
     made.commands = []
     made.folder = tmp_path
 
@@ -288,6 +295,7 @@ def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
         "--max-files", "3", "--split-mb", "7", "--topics", "/a /b", "--compression", "none", "--robots", "1 2"
     )
     (command,) = recording.commands
+    assert recording.logging == "log4j.logger.ros=WARN\n", "it would name every topic"
     assert command[:3] == ["/opt/record", "--quiet", "--regex"] and "--repeat-latched" in command
     pairs = list(zip(command, command[1:]))
     for pair in (("--size", "7"), ("--max-splits", "3"), ("--min-space", "1k"), ("-o", str(recording.folder / "hero"))):
