@@ -21,7 +21,7 @@ axe.run(document, { runOnly: only }).then(({ violations }) =>
 """
 KEEP_STEPS = """
 const done = arguments[0];
-import("/history.js").then(({ History }) => {
+import("/panels/chart.js").then(({ History }) => {
   const robot = { name: "hero_0", state: "READY", known: true, odom: 29, speed: 0.1, turn: 0, values: {} };
   const [history, state] = [new History(), { fleet: { robots: [robot] }, ranges: {} }];
   const now = Date.now;
@@ -33,7 +33,7 @@ import("/history.js").then(({ History }) => {
   robot.known = false;
   history.update(state);
   Date.now = now;
-  done(history.listSeries(["hero_0"], "speed"));
+  done(history.listSeries(["hero_0"], (one) => one.speed));
 });
 """
 READ_PIXELS = """

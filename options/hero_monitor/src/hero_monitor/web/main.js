@@ -6,7 +6,6 @@ import { element, make, setPressed, setText } from "./dom.js";
 import { Connection } from "./connection.js";
 import { onTheme } from "./map/colors.js";
 import { FleetTable } from "./panels/fleet.js";
-import { History, addTopics } from "./history.js";
 import { countsOf, showLosses } from "./losses.js";
 import { FleetMap } from "./map/map.js";
 import { LogView } from "./panels/log.js";
@@ -87,11 +86,10 @@ function notice(level, text) {
   setTimeout(() => line.remove(), NOTICE_MS);
 }
 
-const history = new History();
 const map = new FleetMap(state, { choose, connection });
 const table = new FleetTable({ choose, isAdding: () => map.shows.select });
 const log = new LogView();
-const chart = new Chart(history);
+const chart = new Chart();
 new Projector(() => map.draw());
 const panel = new RobotPanel({ connection, map, notice });
 const programs = new ProgramPanel({ connection, map, notice });
@@ -150,12 +148,10 @@ function receive(updates) {
   if ("hello" in updates) log.ownNode = updates.hello.node;
   if (updates.hello?.topics?.length && !hasTopics) {
     hasTopics = true;
-    addTopics(updates.hello.topics);
-    table.addTopics(updates.hello.topics);
-    chart.listQuantities();
+    for (const shown of [table, chart]) shown.addTopics(updates.hello.topics);
   }
   stop.receive(updates);
-  history.update(state);
+  chart.history.update(state);
   if ("notice" in updates) notice(updates.notice.level, updates.notice.text);
   if ("hold_over" in updates) panel.endHold(updates.hold_over);
   if ("log" in updates) log.append(updates.log);

@@ -131,7 +131,7 @@ export class FleetTable {
     const button = make("button", { type: "button" }, chip, targets[0]);
     const cells = COLUMNS.slice(1).map(({ className = "" }, index) => make("td", { className }, targets[index + 1]));
     const line = make("tr", {}, make("th", { scope: "row" }, button), ...cells);
-    const row = { line, button, chip, targets, texts: [], robot: null };
+    const row = { line, button, chip, targets, robot: null };
     const choose = (isAdded) => row.robot.state !== "REFUSED" && this.choose([row.robot.name], isAdded);
     line.addEventListener("click", (event) => choose(this.isAdding() || event.shiftKey || event.ctrlKey || event.metaKey));
     return row;
@@ -140,10 +140,8 @@ export class FleetTable {
   fill(row, robot, state) {
     row.robot = robot;
     COLUMNS.forEach((column, index) => {
-      const shown = textOf(column, robot, state);
-      if (row.texts[index] === shown) return;
-      row.texts[index] = shown;
-      const target = row.targets[index];
+      const [shown, target] = [textOf(column, robot, state), row.targets[index]];
+      if (target.textContent === shown) return;
       target.textContent = shown;
       if (column.tag) target.dataset[column.tag] = shown;
       if (column.title === "Light") target.style.setProperty("--light", shown === "-" ? "transparent" : state.lights[robot.name] || "transparent");
