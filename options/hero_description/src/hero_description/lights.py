@@ -6,6 +6,7 @@ Robots do not report their light: it is the last color on /hero_N/led, for as lo
 """
 
 import math
+from contextlib import suppress
 from typing import List
 
 import rospy
@@ -84,7 +85,8 @@ def main() -> None:
         publisher = rospy.Publisher(LIGHTS_TOPIC, MarkerArray, queue_size=len(robots) + 10)
 
         def show(color: ColorRGBA, robot_id: int) -> None:
-            publisher.publish(MarkerArray([make_light(robot_id, color, places.get(robot_id, ""))]))
+            with suppress(rospy.ROSException):  # while the node ends, its topic is closed
+                publisher.publish(MarkerArray([make_light(robot_id, color, places.get(robot_id, ""))]))
 
         for robot_id in robots:
             rospy.Subscriber("/hero_%d/led" % robot_id, ColorRGBA, show, robot_id, queue_size=5)

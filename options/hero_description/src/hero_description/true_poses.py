@@ -6,12 +6,14 @@ The robots' own frames, hero_N/..., are where odometry believes them: drawn by t
 """
 
 import xml.etree.ElementTree as ElementTree
+from contextlib import suppress
 from typing import List
 
 import rospy
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 from tf2_ros import StaticTransformBroadcaster
 
@@ -26,23 +28,17 @@ def make_links(robot: str, urdf: str) -> List[TransformStamped]:
     transforms = []
     for joint in ElementTree.fromstring(urdf).iter("joint"):  # noqa: S314 - this package's own file
         parts = {part.tag: part.attrib for part in joint}
-        transform = TransformStamped()
-        transform.header.frame_id = f"{robot}/{TRUE}/{parts['parent']['link']}"
-        transform.child_frame_id = f"{robot}/{TRUE}/{parts['child']['link']}"
-        place = transform.transform.translation
-        place.x, place.y, place.z = map(float, parts["origin"]["xyz"].split())
-        transform.transform.rotation.w = 1.0
-        transforms.append(transform)
+        header = Header(frame_id=f"{robot}/{TRUE}/{parts['parent']['link']}")
+        place = Transform(Vector3(*map(float, parts["origin"]["xyz"].split())), Quaternion(w=1.0))
+        transforms.append(TransformStamped(header, f"{robot}/{TRUE}/{parts['child']['link']}", place))
     return transforms
 
 
 def make_base(robot: str, truth: Odometry) -> TransformStamped:
     """Return where the base of a robot truly is."""
-    transform = TransformStamped(header=truth.header, child_frame_id=f"{robot}/{TRUE}/base_link")
     pose = truth.pose.pose
-    place, transform.transform.rotation = transform.transform.translation, pose.orientation
-    place.x, place.y, place.z = pose.position.x, pose.position.y, pose.position.z
-    return transform
+    place = Transform(Vector3(pose.position.x, pose.position.y, pose.position.z), pose.orientation)
+    return TransformStamped(truth.header, f"{robot}/{TRUE}/base_link", place)
 
 
 def main() -> None:
@@ -57,14 +53,16 @@ def main() -> None:
         frames = rospy.Publisher("/tf", TFMessage, queue_size=len(robots) + 10)
 
         def place(truth: Odometry, robot: str) -> None:
-            frames.publish(TFMessage([make_base(robot, truth)]))
+            with suppress(rospy.ROSException):  # while the node ends, its topics are closed
+                frames.publish(TFMessage([make_base(robot, truth)]))
 
         def look(scan: LaserScan, seen: rospy.Publisher) -> None:
             robot, _, link = scan.header.frame_id.partition("/")
             scan.header.frame_id = f"{robot}/{TRUE}/{link}"
             # The newest pose there is: ground truth comes before the driver's scans, or a little later.
             scan.header.stamp = rospy.Time(0)
-            seen.publish(scan)
+            with suppress(rospy.ROSException):
+                seen.publish(scan)
 
         for robot in robots:
             seen = rospy.Publisher(f"/{robot}/{TRUE}/proximity", LaserScan, queue_size=2)

@@ -1,11 +1,19 @@
 """The frames of simulated robots where they truly are."""
 
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock, create_autospec
 
 import pytest
 
 true_poses = pytest.importorskip("hero_description.true_poses", reason="imports rospy")
+import rospy  # noqa: E402
 from nav_msgs.msg import Odometry  # noqa: E402
+from sensor_msgs.msg import LaserScan  # noqa: E402
+from std_msgs.msg import ColorRGBA  # noqa: E402
+
+from hero_description import lights  # noqa: E402
 
 URDF = (Path(__file__).resolve().parents[2] / "urdf" / "hero.urdf").read_text()
 
@@ -29,3 +37,25 @@ def test_the_base_is_where_the_ground_truth_says():
     assert (base.header.frame_id, base.header.stamp.secs, base.child_frame_id) == ("world", 7, "hero_7/true/base_link")
     place, turn = base.transform.translation, base.transform.rotation
     assert (place.x, place.y, place.z, turn.z, turn.w) == (0.3, -0.2, 0.0, 0.6, 0.8)
+
+
+@pytest.mark.parametrize(("module", "messages"), [(true_poses, [Odometry(), LaserScan()]), (lights, [ColorRGBA()])])
+def test_what_comes_while_the_node_ends_is_dropped_silently(module, messages, monkeypatch):
+    closed = create_autospec(rospy.Publisher, instance=True)
+    closed.publish.side_effect = rospy.ROSException("topic was closed during publish()")
+    received = []
+    monkeypatch.setattr(rospy, "Publisher", lambda *arguments, **options: closed)
+    monkeypatch.setattr(
+        rospy, "Subscriber", lambda topic, kind, *receive, queue_size: received.append((kind, *receive))
+    )
+    monkeypatch.setattr(rospy, "get_param", lambda name: URDF)
+    monkeypatch.setattr(true_poses, "StaticTransformBroadcaster", Mock)
+    parameters = {"robots": [7], "hero_plus": (), "simulated": ()}
+    monkeypatch.setattr(module, "read_parameters", lambda declared: parameters)
+    ended = SimpleNamespace(running=False, rate=lambda rate_hz: ())
+    monkeypatch.setattr(module, "Program", lambda name: nullcontext(ended))
+    module.main()
+    assert [kind for kind, *_ in received] == [type(message) for message in messages]
+    for (_, receive, argument), message in zip(received, messages):
+        receive(message, argument)
+    assert closed.publish.call_count == len(messages)
