@@ -85,13 +85,9 @@ class RandomFields(Segregation):
         velocities /= np.maximum(np.hypot(*velocities), 1.0)
         energies = self.find_energies(sensed, own, signs, mass, velocities)
         wanted = self._draw(velocities, energies, random.random(SAMPLES).T)
-        command = self.max_linear_m_s * turn(wanted, -sensed.poses[:, 2]) + keep_clear(
-            sensed.infrared.ranges_m, self.clear_m, 2.0
-        )
-        return (
-            wanted.T,
-            *steer(command[0], command[1], self.max_linear_m_s, max_angular_rad_s=self.max_angular_rad_s),
-        )
+        clear_m_s = keep_clear(sensed.infrared.ranges_m, self.clear_m, 2.0)
+        ahead_m_s, left_m_s = self.max_linear_m_s * turn(wanted, -sensed.poses[:, 2]) + clear_m_s
+        return (wanted.T, *steer(ahead_m_s, left_m_s, self.max_linear_m_s, max_angular_rad_s=self.max_angular_rad_s))
 
     def find_energies(
         self, sensed: Sensed, own: np.ndarray, signs: np.ndarray, mass: Any, velocities: np.ndarray

@@ -81,9 +81,7 @@ def test_the_sign_of_a_difference_is_second_minus_first():
     assert statistics.compare_pairs([3.0, 4.0], [1.0, 2.0]).difference.median == -2.0
 
 
-def test_samples_that_cannot_be_paired_are_refused():
-    with pytest.raises(ExperimentError, match="2 and 1 values"):
-        statistics.compare_pairs([1.0, 2.0], [1.0])
+def test_samples_with_an_infinite_value_are_not_compared():
     with pytest.raises(ExperimentError, match="not finite"):
         statistics.compare_pairs([1.0, math.inf], [1.0, 2.0])
 

@@ -83,11 +83,9 @@ def cliffs_delta(first: Sequence[float], second: Sequence[float]) -> float:
 def compare_pairs(first: Sequence[float], second: Sequence[float]) -> Comparison:
     """Compare values of the same seeds, in the same order.
 
-    Raises: ExperimentError for samples of different lengths, or a value that is not finite. ProgramError without scipy.
+    Raises: ExperimentError for a value that is not finite. ProgramError without scipy.
     """
     ours, theirs = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    if len(ours) != len(theirs):
-        raise ExperimentError(f"{len(ours)} and {len(theirs)} values cannot be paired")
     differences = theirs - ours
     if not np.isfinite(differences).all():
         raise ExperimentError("a value that is not finite cannot be compared: compare another metric, or longer runs")
