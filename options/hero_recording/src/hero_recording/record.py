@@ -5,7 +5,6 @@ closed at the end.
 """
 
 import argparse
-import ctypes
 import glob
 import math
 import os
@@ -39,9 +38,6 @@ SILENCE_S = 15.0
 
 CLOSING_S = 10.0
 """The recorder has to close its files within this; roslaunch waits 15 s before it sends SIGTERM."""
-
-PR_SET_PDEATHSIG = 1
-"""Option of prctl(2)."""
 
 REMAPPING = re.compile(r"(__|[^_-]).*:=")
 """An argument for ROS, such as __name:=my_record; private parameters are refused: the options take their place."""
@@ -103,13 +99,8 @@ class Recording:
 
     def _record(self, start_s: float, environment: Dict[str, str]) -> None:
         """Run the recorder from start to end. Raises: RecordingError."""
-        recorder = subprocess.Popen(
-            self._command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            env=environment,
-            preexec_fn=_end_with_parent,  # noqa: PLW1509 - this program has no other thread
-        )
+        null = subprocess.DEVNULL
+        recorder = subprocess.Popen(self._command, stdin=null, stdout=null, env=environment)
         reason = None
         try:
             reason = self._watch(recorder, start_s)
@@ -165,11 +156,6 @@ def format_size(size: float) -> str:
     return f"{size / 1000000000.0:.1f} GB" if size >= 1e9 else f"{size / 1000000.0:.1f} MB"
 
 
-def _end_with_parent() -> None:
-    """Make this process, the recorder to be, close its files and end if the program is killed."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
-
-
 def say(text: str) -> None:
     """Write a line; the recording continues if its output is closed."""
     command_line.say("record: " + text)
@@ -182,7 +168,9 @@ def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str])
         raise RecordingError(
             "rosbag's recorder is missing; install it: apt install python3-rosbag, or ros-noetic-rosbag"
         )
-    command = [found[0], "--quiet", "--regex", "--repeat-latched", "--buffsize", "256", "--tcpnodelay"]
+    # If this program is killed, the recorder closes its files and ends (setpriv(1) of util-linux).
+    command = ["setpriv", "--pdeathsig", "INT", found[0]]
+    command += ["--quiet", "--regex", "--repeat-latched", "--buffsize", "256", "--tcpnodelay"]
     command += ["-o", os.path.join(options.folder, options.name), "--split", "--size", str(options.split_mb)]
     # The recorder's own guard only stops writing; it is the second line, should this program be killed.
     command += ["--min-space", "%dk" % max(1, options.min_free_mb * MB / 1024 / 10)]

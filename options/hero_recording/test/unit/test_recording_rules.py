@@ -296,7 +296,8 @@ def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
     )
     (command,) = recording.commands
     assert recording.logging == "log4j.logger.ros=WARN\n", "it would name every topic"
-    assert command[:3] == ["/opt/record", "--quiet", "--regex"] and "--repeat-latched" in command
+    assert command[:3] == ["setpriv", "--pdeathsig", "INT"], "it ends with its program"
+    assert command[3:6] == ["/opt/record", "--quiet", "--regex"] and "--repeat-latched" in command
     pairs = list(zip(command, command[1:]))
     for pair in (("--size", "7"), ("--max-splits", "3"), ("--min-space", "1k"), ("-o", str(recording.folder / "hero"))):
         assert pair in pairs
@@ -306,14 +307,6 @@ def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
     assert "--lz4" in recording.commands[1] and "--max-splits" not in recording.commands[1]
     assert record.parse_options(["--repair", "a.bag.active", "b.bag.active"]).repair == ["a.bag.active", "b.bag.active"]
     assert record.format_size(999_900_000) == "999.9 MB" and record.format_size(1e9) == "1.0 GB"
-
-
-def test_the_recorder_ends_when_its_program_is_killed(monkeypatch):
-    told = []
-    library = SimpleNamespace(prctl=lambda *arguments: told.append(arguments))
-    monkeypatch.setattr(record.ctypes, "CDLL", lambda name: library)
-    record._end_with_parent()
-    assert told == [(1, signal.SIGINT)], "PR_SET_PDEATHSIG of linux/prctl.h"
 
 
 def test_a_reader_without_ros_names_types_and_times_as_ros_does(monkeypatch):

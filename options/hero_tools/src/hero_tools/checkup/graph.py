@@ -22,11 +22,9 @@ from hero_node.ros import ask_master, read_master_uri
 
 from ..inventory import VERSIONS, list_differences
 from .network import HOST_REMEDY, Address, is_own, resolve
-from .points import Finding, fail, ok, wait_until, warn
+from .points import LINES_MAX, REPORT_TIMEOUT_S, Finding, fail, ok, wait_until, warn
 
 CONNECT_TIMEOUT_S = 3.0
-REPORT_TIMEOUT_S = 3.0
-LINES_MAX = 10
 CLEAN_UP = "did it end without a word? rosnode cleanup"
 
 

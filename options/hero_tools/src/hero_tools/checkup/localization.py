@@ -9,13 +9,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from hero_node.ros import ask_master
 
-from .points import Finding, ok, wait_until, warn
+from .points import LINES_MAX, REPORT_TIMEOUT_S, Finding, ok, wait_until, warn
 
 DIAGNOSTICS_TOPIC = "/diagnostics"
-REPORT_TIMEOUT_S = 3.0
-"""They report once a second; a busy PC takes its time to connect."""
-
-LINES_MAX = 10
 
 
 def check_camera(pattern: str = "/dev/video*") -> Finding:

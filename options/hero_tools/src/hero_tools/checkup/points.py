@@ -12,6 +12,12 @@ OK = "OK"
 WARN = "WARN"
 FAIL = "FAIL"
 
+REPORT_TIMEOUT_S = 3.0
+"""Nodes report once a second; a busy PC takes its time to connect."""
+
+LINES_MAX = 10
+"""Remedies of one point."""
+
 # Administration tools on Debian, which the PATH of a user does not contain.
 TOOL_PATH = "/usr/sbin:/sbin"
 
