@@ -11,7 +11,6 @@ from hero_localization.calibration.lens_calibration import (
     _list_empty_regions,
     calibrate_lens,
     find_board,
-    is_mirrored,
 )
 from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.errors import CalibrationError
@@ -167,14 +166,6 @@ def test_the_focal_length_is_no_worse_than_reported():
         off.append(found.lens.matrix[0, 0] / OPTIONS.focal_px[0] - 1.0)
         reported.append(found.focal_error)
     assert np.sqrt(np.mean(np.square(off))) < 1.5 * np.sqrt(np.mean(np.square(reported)))
-
-
-@pytest.mark.slow
-def test_a_mirrored_board_is_recognized():
-    random = np.random.RandomState(5)
-    picture = render(OPTIONS, *list_holds(1, 0.3)[0], random)
-    assert not is_mirrored(picture)
-    assert is_mirrored(np.ascontiguousarray(picture[:, ::-1]))
 
 
 def put_corners(places):

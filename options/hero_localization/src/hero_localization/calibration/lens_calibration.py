@@ -81,11 +81,6 @@ def find_board(gray: np.ndarray) -> Optional[BoardView]:
     return BoardView(np.asarray(ids).ravel(), _refine(gray, np.asarray(pixels, dtype=np.float32).reshape(-1, 2)))
 
 
-def is_mirrored(gray: np.ndarray) -> bool:
-    """Return whether the board shows only in the mirror image of an image (H, W)."""
-    return find_board(gray) is None and find_board(np.ascontiguousarray(gray[:, ::-1])) is not None
-
-
 def _refine(gray: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     """Return corners found again in windows well within their squares: OpenCV 4.6 leaves them half a pixel off."""
     apart_px = np.linalg.norm(pixels[:, None] - pixels, axis=2)

@@ -22,8 +22,9 @@ MARGIN_CELLS = 2
 """Margin of white around the print, of which SEEN_CELLS are compared."""
 SEEN_CELLS = 0.7
 
-MAX_SIZE_ERROR_PX = 0.033
-"""Error of the size of a robot's tag, by many images of some robots: half of what 5 mm of height change of 25 px."""
+SMALL_PX, MAX_SIZE_ERRORS_PX = 18.0, (0.05, 0.033)
+"""Error of the size of a robot's tag below this size, and from it on, by many images of some robots: the second is half of
+what 5 mm of height change of 25 px. Gamma makes small tags seem a sixtieth of a pixel larger."""
 
 ROUNDS, MIN_GAIN = 20, 1e-4
 FIRST_BLUR_PX = 0.8
@@ -83,7 +84,7 @@ def find_height_error(camera: Camera, layout: TagLayout) -> float:
     """Return the error, m, that heights of robots' tags by their size may have below a camera."""
     from_camera_m = float(camera.position_m[2]) - layout.height_m
     side_px = float(camera.lens.matrix[0, 0]) * layout.size_m / from_camera_m
-    return MAX_SIZE_ERROR_PX / side_px * from_camera_m
+    return MAX_SIZE_ERRORS_PX[side_px >= SMALL_PX] / side_px * from_camera_m
 
 
 class _Print:

@@ -224,15 +224,10 @@ class DeviceSource(FrameSource):
 def _open_capture(path: str) -> Any:
     """Open a device or an address. Raises: FrameSourceError with what OpenCV does not tell."""
     is_device = path.startswith(_DEVICES)
-    if is_device:
-        if not os.path.exists(path):
-            raise FrameSourceError(f"{path} does not exist; ls /dev/video* lists cameras")
-        if not stat.S_ISCHR(os.stat(path).st_mode):  # a pipe would be waited for
-            raise FrameSourceError(f"{path} is no camera, but a folder, pipe, socket or file of another kind")
-        if not os.access(path, os.R_OK):
-            raise FrameSourceError(
-                f"{path} may not be read by this user: sudo usermod -aG video $USER, and log in again"
-            )
+    if is_device and not (os.path.exists(path) and stat.S_ISCHR(os.stat(path).st_mode)):  # a pipe would be waited for
+        raise FrameSourceError(f"{path} is no camera, or not plugged in; ls /dev/video* lists cameras")
+    if is_device and not os.access(path, os.R_OK):
+        raise FrameSourceError(f"{path} may not be read by this user: sudo usermod -aG video $USER, and log in again")
     capture = cv2.VideoCapture(path, cv2.CAP_V4L2 if is_device else cv2.CAP_ANY)
     if not capture.isOpened():
         raise FrameSourceError(f"{path} cannot be opened: no camera, or another program uses it")

@@ -14,10 +14,8 @@ from ..calibration.lens_calibration import (
     LensCalibration,
     calibrate_lens,
     find_board,
-    is_mirrored,
     load_lens,
 )
-from ..errors import CalibrationError
 from ..tracking.settings import describe_lens
 from .calibration_images import Images, finish
 
@@ -47,9 +45,7 @@ def calibrate_lens_by_board(options: argparse.Namespace, images: Images, program
             found_s = program.now_s
         elif program.now_s > found_s + HINT_S:
             found_s = program.now_s
-            if is_mirrored(gray):
-                raise CalibrationError("images are mirrored: switch that off in the camera or its driver")
-            text = "no board in the images (mean shade %.0f of 255): hold it near, flat, in good light"
+            text = "no board in the images (mean shade %.0f of 255): hold it near and flat; are they dark or mirrored?"
             say(text % gray.mean())
         is_still = view is not None and last is not None and _measure_shift(view, last) < STILL_PX
         last = view

@@ -58,7 +58,10 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
     height_m = float(np.median(heights_m)) if heights_m else math.nan
     if layout.references and not heights_m:
         problems.append("tag_height_m is not checked: no reference tag lies well within the image")
-    if heights_m and abs(height_m - layout.height_m) > find_height_error(_get_camera(images), layout):
+    limit_m = find_height_error(_get_camera(images), layout)
+    if heights_m and abs(height_m - layout.height_m) <= limit_m:
+        say(f"tag_height_m is right to {1e3 * limit_m:.0f} mm, as far as tags of this size tell")
+    elif heights_m:
         text = "tags are %.0f mm above the floor by their size, not %.0f: is tag_height_m right, are all printed alike?"
         problems.append(text % (1e3 * height_m, 1e3 * layout.height_m))
     mounts = {**layout.mounts, **{tag_id: result.mount for tag_id, result in results.items()}}
