@@ -190,6 +190,6 @@ def test_diagnostics_have_a_part_for_each_robot_that_is_known(reporter):
     stat = DiagnosticStatusWrapper()
     updater.tasks["hero_8"](stat)
     values = {pair.key: pair.value for pair in stat.values}
-    assert (values["address"], values["state"], values["stop"]) == ("10.0.0.1:4711", "READY", "NOT_STOPPED")
+    assert (values["address"], values["state"], values["stop_state"]) == ("10.0.0.1:4711", "READY", "NOT_STOPPED")
     stat = updater.tasks["driver"](DiagnosticStatusWrapper())
     assert (stat.level, stat.message) == (stat.OK, "1 of 1 robots connected")

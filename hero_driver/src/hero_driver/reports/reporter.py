@@ -99,23 +99,10 @@ class Reporter:
         robot = self._known[name]
         row = robot.message
         stat.summary(robot.level, robot.text)
-        for key, value in {
-            "address": row.address,
-            "state": RobotState(row.state).name,
-            "stop": StopState(row.stop_state).name,
-            "firmware": row.firmware,
-            "hardware": row.hardware,
-            "config": row.config,
-            "uptime (s)": f"{row.uptime.to_sec():.0f}",
-            "reconnects": row.reconnects,
-            "packets per second": f"{row.packets_per_s:.1f}",
-            "bytes per second": f"{row.bytes_per_s:.0f}",
-            "dropped messages": row.dropped_messages,
-            "bad packets": row.bad_packets,
-            "clock offset (s)": f"{row.clock_offset:.4f}",
-            **robot.details,
-            "refused duplicates": "; ".join(duplicate.last_error for duplicate in robot.duplicates),
-            "last error": row.last_error,
-        }.items():
+        shown = {field: getattr(row, field) for field in row.__slots__}
+        shown.update(state=RobotState(row.state).name, stop_state=StopState(row.stop_state).name)
+        shown.update(since=row.since.to_sec(), uptime=row.uptime.to_sec(), **robot.details)
+        shown["refused duplicates"] = "; ".join(duplicate.last_error for duplicate in robot.duplicates)
+        for key, value in shown.items():
             stat.add(key, value)
         return stat
