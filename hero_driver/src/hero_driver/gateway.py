@@ -131,7 +131,7 @@ class Gateway(LinkHandler):
             if expired is not None:
                 expired.close()
                 text = f"{expired.label} has left; its topics and services are unregistered"
-                self._log.log_throttled("info", "gone " + expired.label, text, host=record.host)
+                self._log.log_throttled("info", "gone " + expired.label, text)
             self._admit_duplicates(record, lambda host: True)
             self.note_change()
 
@@ -196,7 +196,7 @@ class Gateway(LinkHandler):
             record.last_heard_s = peer.session.last_receive_s
         if self.fleet.leave(link, reason, time.monotonic()) is not None:
             text = f"{peer.label} left ({link.address}): {reason}"
-            self._log.log_throttled(level, "left " + record.identity.namespace, text, host=link.address.host)
+            self._log.log_throttled(level, "left " + record.identity.namespace, text)
             self.note_change()
         if peer.bridge is not None:
             peer.bridge.detach(reason)
@@ -304,7 +304,7 @@ class Gateway(LinkHandler):
         bridge.corrections.odometry.restart(rebooted and decision.verdict is not Verdict.ARRIVED, peer.wheels)
         bridge.attach(peer)
         text = f"{bridge.label} {decision.verdict.value} ({peer.link.address})"
-        self._log.log_throttled("info", "joined " + bridge.label, text, host=peer.link.address.host)
+        self._log.log_throttled("info", "joined " + bridge.label, text)
         self.note_change()
         early, peer.early = peer.early, []
         for event in early:
@@ -381,7 +381,7 @@ class Gateway(LinkHandler):
             peer.record.last_error = text
         group = peer.label if peer.bridge is not None else peer.link.address.host
         line = f"{peer.label}: {text}"
-        self._log.log_throttled("error", peer.label + text[:80], line, group, peer.link.address.host)
+        self._log.log_throttled("error", peer.label + text[:80], line, group)
 
     def warn_late(self) -> None:
         """Log that what robots send is read too late to tell what they do, if that is this PC's doing."""

@@ -264,7 +264,7 @@ def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
         raise ProgramError(text % running + " alone: roslaunch hero_sim hero_sim.launch)")
     report_dropped_log_lines()
     limit_xmlrpc_connections()
-    open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text, host=host))
+    open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text))
     rospy_internals.keep_publishers_connected()
     init_ros_node(NODE_NAME, arguments=argv)
     rospy_internals.leave_topics_out_of_rosout()

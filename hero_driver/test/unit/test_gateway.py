@@ -55,7 +55,7 @@ class Driver:
             lambda: None,
         )
 
-    def log_throttled(self, level, key, text, robot="", host=""):
+    def log_throttled(self, level, key, text, robot=""):
         self.lines.append(text)
         self.keys.add(key)
 

@@ -85,7 +85,7 @@ class Driver:
     def note_change(self):
         self.changes += 1
 
-    def log_throttled(self, level, key, text, robot="", host=""):
+    def log_throttled(self, level, key, text, robot=""):
         self.lines.append((level, text))
         self.keys.append(key)
 

@@ -56,7 +56,7 @@ def _receive_uptime(relay: LogRelay, peer: Peer, record: RobotRecord, uptime_s: 
     record.heard_uptime_s = uptime_s
     if has_rebooted:
         text = f"{peer.label} rebooted {uptime_s:.1f} s ago"
-        relay.log_throttled("warn", "rebooted " + peer.label, text, host=peer.link.address.host)
+        relay.log_throttled("warn", "rebooted " + peer.label, text)
         if peer.bridge is not None and peer.boot is None:
             peer.bridge.corrections.odometry.note_reboot()
     # Delays only make a boot look later, so the earliest is the best.

@@ -17,9 +17,6 @@ KNOWN_KEYS_MAX = 1000
 ROBOT_LINES_MAX = 20
 """Different messages about one robot at once, and in each THROTTLE_S after that."""
 
-HOST_LINES_MAX = 300
-"""Likewise lines about one address: a hundred simulated robots that join at once are a hundred lines."""
-
 
 class LogRelay:
     """The log for every other thread of the driver."""
@@ -28,7 +25,6 @@ class LogRelay:
         self._worker = Worker("log relay", QUEUE_LENGTH, "a log line was lost", print_error)
         self._last: Dict[str, Tuple[float, int]] = {}
         self._robots = TokenBuckets(ROBOT_LINES_MAX, ROBOT_LINES_MAX / THROTTLE_S)
-        self._hosts = TokenBuckets(HOST_LINES_MAX, HOST_LINES_MAX / THROTTLE_S)
         self._reported_drops = 0
         self._logger = logging.getLogger(ROSOUT_LOGGER)
 
@@ -44,19 +40,18 @@ class LogRelay:
         if self._worker.submit(lambda: self._logger.log(number, "%s", text)):
             self._reported_drops = dropped
 
-    def log_throttled(self, level: str, key: str, text: str, robot: str = "", host: str = "") -> None:
-        """Log a line unless its key was in the last THROTTLE_S; those about a robot and a host are limited, too."""
+    def log_throttled(self, level: str, key: str, text: str, robot: str = "") -> None:
+        """Log a line unless its key was in the last THROTTLE_S; those about a robot, or an unknown one, are limited."""
         now_s = time.monotonic()
         last_s, suppressed = self._last.get(key, (None, 0))
         if last_s is not None and now_s - last_s < THROTTLE_S:
             self._last[key] = (last_s, suppressed + 1)
             return
         # What is said again and again takes nothing of what else may be said.
-        for name, buckets in ((robot, self._robots), (host, self._hosts)):
-            if name and not buckets.take(name, 1.0, now_s):
-                text = f"{name}: too many different messages; further ones are suppressed"
-                self.log_throttled("warn", "suppressed " + name, text)
-                return
+        if robot and not self._robots.take(robot, 1.0, now_s):
+            text = f"{robot}: too many different messages; further ones are suppressed"
+            self.log_throttled("warn", "suppressed " + robot, text)
+            return
         if len(self._last) >= KNOWN_KEYS_MAX:
             self._last.clear()
         self._last[key] = (now_s, 0)
