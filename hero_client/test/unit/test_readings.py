@@ -9,7 +9,7 @@ from geometry_msgs.msg import Pose as PoseMessage
 from sensor_msgs.msg import LaserScan
 
 from hero_client.values.colors import parse_color
-from hero_client.values.readings import MAX_RANGES, find_nearest, front_first, read_pose, read_ranges
+from hero_client.values.readings import find_nearest, front_first, read_pose
 from hero_node import Pose, invert_pose, transform_pose
 
 INF = math.inf
@@ -44,21 +44,22 @@ def test_the_inverse_of_a_pose_leads_back_to_the_origin():
 
 
 def test_invalid_ranges_become_nan():
-    ranges = read_ranges(LaserScan(ranges=[0.1, math.inf, -math.inf, math.nan, 1e306, -0.5]))
-    assert ranges[:3] == [0.1, math.inf, -math.inf]
-    assert all(map(math.isnan, ranges[3:]))
+    ranges = front_first(make_scan([INF, INF, INF, INF, 0.1, math.nan, 1e306, -0.5]))
+    assert ranges[0] == 0.1 and ranges[4:] == [INF] * 4
+    assert all(map(math.isnan, ranges[1:4]))
 
 
 @pytest.mark.parametrize(
     "message",
     [
-        LaserScan(ranges=[0.1] * (MAX_RANGES + 1)),
-        LaserScan(ranges=[0.1], angle_min=math.nan),
-        LaserScan(ranges=[0.1], angle_increment=math.inf),
+        LaserScan(ranges=[0.1] * 10000, angle_increment=EIGHTH_RAD),
+        LaserScan(ranges=[0.1] * 8, angle_min=math.nan, angle_increment=EIGHTH_RAD),
+        LaserScan(ranges=[0.1] * 8, angle_increment=math.inf),
+        LaserScan(ranges=[0.1] * 8, angle_increment=math.nan),
     ],
 )
 def test_an_invalid_scan_has_no_ranges(message):
-    assert list(read_ranges(message)) == []
+    assert front_first(message) == []
 
 
 def test_ranges_begin_at_the_front_and_go_counter_clockwise():
@@ -72,21 +73,21 @@ def test_too_close_is_zero_and_invalid_stays_invalid():
 
 
 @pytest.mark.parametrize(
-    ("index", "bearing_rad"), [(4, 0.0), (6, math.pi / 2), (2, -math.pi / 2), (5, EIGHTH_RAD), (0, -math.pi)]
+    ("index", "bearing_rad"), [(0, 0.0), (2, math.pi / 2), (6, -math.pi / 2), (1, EIGHTH_RAD), (4, -math.pi)]
 )
 def test_the_nearest_obstacle_has_the_bearing_of_its_beam(index, bearing_rad):
     ranges_m = [0.2] * 8
     ranges_m[index] = 0.1
-    nearest = find_nearest(ranges_m, -math.pi, EIGHTH_RAD)
+    nearest = find_nearest(ranges_m)
     assert nearest.range_m == 0.1
     assert math.remainder(nearest.bearing_rad - bearing_rad, math.tau) == pytest.approx(0.0)
 
 
 def test_only_ranges_within_reach_are_obstacles_and_touch_is_nearest():
     for ranges_m in ([], [INF] * 4 + [math.nan] * 4, [math.nan, 1e306, -1e306, INF]):
-        assert find_nearest(ranges_m, -math.pi, EIGHTH_RAD) is None
-    touching = [0.1, math.nan, -INF, 0.2, INF, INF, INF, INF]
-    assert find_nearest(touching, -math.pi, EIGHTH_RAD).range_m == -INF
+        assert find_nearest(ranges_m) is None
+    touching = [0.1, math.nan, 0.0, 0.2, INF, INF, INF, INF]
+    assert find_nearest(touching).range_m == 0.0
 
 
 def test_a_scan_whose_beams_all_point_the_same_way_has_no_ranges():

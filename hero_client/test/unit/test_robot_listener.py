@@ -8,7 +8,7 @@ from nav_msgs.msg import Odometry
 
 from hero_client.ros import robot_listener
 from hero_client.ros.robot_listener import RateMeter, RobotTrack
-from hero_client.values.readings import read_ranges
+from hero_client.values.readings import front_first
 from hero_node import Pose
 
 
@@ -79,9 +79,9 @@ def test_a_listener_takes_no_implausible_pose(number, monkeypatch):
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
 def test_a_free_track_is_told_from_one_whose_sensors_are_not_calibrated(number):
     track = RobotTrack()
-    track.receive_proximity([math.inf] * 7 + [number], 0.0, 0.8)
+    track.receive_proximity([math.inf] * 7 + [number])
     assert track.is_free == (number == math.inf)
-    track.receive_proximity([], 0.0, 0.8)
+    track.receive_proximity([])
     assert not track.is_free
 
 
@@ -89,6 +89,6 @@ def test_a_free_track_is_told_from_one_whose_sensors_are_not_calibrated(number):
 def test_ranges_at_invalid_angles_are_not_seen(number):
     track = RobotTrack()
     for angle_min_rad, increment_rad, is_seen in ((0.0, 0.8, True), (number, 0.8, False), (0.0, number, False)):
-        scan = SimpleNamespace(ranges=[0.1], angle_min=angle_min_rad, angle_increment=increment_rad)
-        track.receive_proximity(read_ranges(scan), angle_min_rad, increment_rad)
+        scan = SimpleNamespace(ranges=[0.1] * 8, angle_min=angle_min_rad, angle_increment=increment_rad)
+        track.receive_proximity(front_first(scan))
         assert track.proximity_seen == is_seen == (track.nearest is not None)

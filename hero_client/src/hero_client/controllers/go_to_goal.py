@@ -104,7 +104,7 @@ class GoToGoalController(MotionController):
         bent, side = bend_around(command, bearing_rad, self.distance_m, ranges, self._side)
         if side:
             self._side, self._last_bent_s = side, seen_s
-            self._obstacle = find_nearest(ranges, 0.0, math.tau / len(ranges))
+            self._obstacle = find_nearest(ranges)
         if self.distance_m < self._min_distance_m - PROGRESS_M:
             self._min_distance_m, self._progress_s = self.distance_m, seen_s
         elif seen_s - self._progress_s > PROGRESS_S:

@@ -171,7 +171,7 @@ class RobotReadings(Group):
         Raises: as `pose`. NotCalibratedError if no obstacle is seen, but a sensor that is not calibrated may miss one.
         """
         ranges = self.proximity
-        nearest = find_nearest(ranges, 0.0, math.tau / max(1, len(ranges)))
+        nearest = find_nearest(ranges)
         if nearest is None and not is_free(ranges):
             raise NotCalibratedError(f"what is near {self.name} is not known: {NOT_CALIBRATED}")
         return nearest

@@ -13,7 +13,7 @@ from sensor_msgs.msg import LaserScan
 
 from hero_node import Pose, Velocity, measure_distance, wrap_angle
 
-from ..values.readings import Obstacle, find_nearest, is_free, read_pose, read_ranges
+from ..values.readings import Obstacle, find_nearest, front_first, is_free, read_pose
 from .extra_topics import find_class, load_fleet_file, read_field
 
 RATE_WINDOW_S = 3.0
@@ -95,11 +95,11 @@ class RobotTrack:
             self.turned_rad += abs(wrap_angle(pose.yaw_rad - self.pose.yaw_rad))
         self.pose = pose
 
-    def receive_proximity(self, ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float) -> None:
-        """Take the newest proximity scan; an invalid one, without ranges, counts as none."""
+    def receive_proximity(self, ranges_m: Sequence[float]) -> None:
+        """Take the newest ranges, as front_first() gives them; none: the newest scan is invalid."""
         self.proximity_seen = len(ranges_m) > 0
         self.is_free = is_free(ranges_m)
-        self.nearest = find_nearest(ranges_m, angle_min_rad, increment_rad)
+        self.nearest = find_nearest(ranges_m)
 
 
 class RobotListener:
@@ -132,8 +132,8 @@ class RobotListener:
             if message is not None:
                 self.values[topic.name] = read_field(message, topic)
         if scan is not None:
-            self.ranges_m = read_ranges(scan)
-            self.track.receive_proximity(self.ranges_m, scan.angle_min, scan.angle_increment)
+            self.ranges_m = front_first(scan)
+            self.track.receive_proximity(self.ranges_m)
 
     def close(self) -> None:
         """Unsubscribe."""

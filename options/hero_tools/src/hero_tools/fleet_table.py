@@ -33,7 +33,7 @@ def format_nearest(seen: bool, free: bool, nearest: Optional[Obstacle]) -> str:
     if nearest is None:
         return "free" if free else "not calibrated"
     where = BEAM_NAMES[round((math.pi + nearest.bearing_rad) / (math.pi / 4)) % BEAMS]
-    return f"touch {where}" if nearest.range_m == -math.inf else f"{nearest.range_m:.2f} m {where}"
+    return f"touch {where}" if nearest.range_m == 0.0 else f"{nearest.range_m:.2f} m {where}"
 
 
 def format_cells(row: RobotRow, topics: Sequence[ExtraTopic] = ()) -> List[str]:

@@ -67,7 +67,7 @@ class World:
         def read_newest():
             if self.now_s >= 100.0 + self.hears_s:
                 listener.track.receive_pose(Pose(self.now_s - 100.0, 0.0, 0.0))
-                listener.track.receive_proximity([0.1], 0.0, 0.8)
+                listener.track.receive_proximity([0.1])
 
         listener.read_newest = read_newest
         return listener

@@ -69,7 +69,7 @@ def test_texts_of_robots_cannot_draw_on_the_terminal():
 )
 def test_the_nearest_obstacle_has_a_direction_in_words(bearing_rad, where):
     assert format_nearest(True, False, Obstacle(0.123, bearing_rad)) == "0.12 m " + where
-    assert format_nearest(True, False, Obstacle(-math.inf, bearing_rad)) == "touch " + where
+    assert format_nearest(True, False, Obstacle(0.0, bearing_rad)) == "touch " + where
 
 
 def test_free_is_shown_apart_from_no_scan_yet():
@@ -102,7 +102,7 @@ def test_robots_that_are_gone_stay_in_the_title_and_in_json():
 
 
 def test_json_has_no_infinity():
-    row = make_row(0, nearest=Obstacle(-math.inf, 0.0), pose=Pose(math.nan, 1.0, 0.0), clock_offset=math.inf)
+    row = make_row(0, nearest=Obstacle(math.inf, 0.0), pose=Pose(math.nan, 1.0, 0.0), clock_offset=math.inf)
     (robot,) = json.loads(format_json([row], RobotArray()))["robots"]
     assert robot["nearest"] == {"range_m": None, "bearing_rad": 0.0}
     assert robot["pose"] == {"x_m": None, "y_m": 1.0, "yaw_rad": 0.0}

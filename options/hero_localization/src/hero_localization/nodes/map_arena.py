@@ -24,12 +24,11 @@ from std_msgs.msg import Float32
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from hero_client import Program, ProgramError, read_parameters
-from hero_client.values import front_first, is_plausible, read_ranges
+from hero_client.values import front_first, is_plausible
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
 from hero_node.files import replace_file, write_file
 from hero_node.parameters import number, string
-from hero_node.robot_constants import BEAMS
 
 from ..mapping.occupancy_grid import OccupancyGrid, SwarmMap
 
@@ -102,9 +101,8 @@ class MapNode:
                 )
 
     def _receive_ranges(self, robot_id: int, scan: LaserScan) -> None:
-        scan.ranges = read_ranges(scan)
         ranges_m = front_first(scan)
-        if len(ranges_m) == BEAMS:
+        if ranges_m:
             with self._lock:
                 self._map.add_ranges(robot_id, scan.header.stamp.to_sec(), ranges_m)
 

@@ -398,7 +398,7 @@ class FleetFeed:
 def encode_nearest(track: RobotTrack) -> Any:
     """Return the distance of the nearest obstacle, m; a word where there is none."""
     if track.nearest is not None:
-        return max(0.0, round(track.nearest.range_m, 3))
+        return round(track.nearest.range_m, 3)
     return "-" if not track.proximity_seen else "free" if track.is_free else "not calibrated"
 
 

@@ -42,12 +42,10 @@ def encode_pose(pose: Optional[Pose]) -> Optional[List[int]]:
 
 
 def encode_range(range_m: float) -> Optional[int]:
-    """Return a proximity range (REP 117) in mm: None for nothing in range, 0 for contact, -1 for an invalid reading."""
-    if abs(range_m) <= MAX_RIM_RANGE_M:
-        return max(0, round(range_m * 1000.0))
-    if math.isinf(range_m):
-        return None if range_m > 0 else 0
-    return -1
+    """Return a proximity range in mm: None for nothing in range, 0 for contact, -1 for an invalid reading."""
+    if 0.0 <= range_m <= MAX_RIM_RANGE_M:
+        return round(range_m * 1000.0)
+    return None if range_m == math.inf else -1
 
 
 def encode_color(red: float, green: float, blue: float) -> Optional[str]:

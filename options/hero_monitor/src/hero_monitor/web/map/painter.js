@@ -221,7 +221,7 @@ export class MapPainter {
     const { context, view } = this;
     this.at(this.state.poses[robot.name], () => {
       ranges.forEach((range, index) => {
-        const turn = -Math.PI + (index * 2 * Math.PI) / ranges.length;
+        const turn = (index * 2 * Math.PI) / ranges.length;
         const along = (distance) => [distance * Math.cos(turn), distance * Math.sin(turn)];
         if (range === null || range < 0) {
           // Nothing in range: a tick shows the sensor's direction.
