@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import random
 import re
 import signal
 import socket
@@ -13,12 +14,17 @@ import rosgraph
 
 from hero_test.waiting import TIMEOUT_S, wait_for
 
+_ports = iter(random.sample(range(22000, 32000), 10000))
+"""Below those that systems give to connections, which would take the port before the program that it is for."""
+
 
 def find_free_port():
-    """Return a TCP port that is free now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """Return a TCP port that is free now, another one at each call."""
+    for port in _ports:
+        with contextlib.suppress(OSError), socket.socket() as probe:
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("no port is free")
 
 
 def find_program(package, name):
