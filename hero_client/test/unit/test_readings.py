@@ -56,6 +56,8 @@ def test_invalid_ranges_become_nan():
         LaserScan(ranges=[0.1] * 8, angle_min=math.nan, angle_increment=EIGHTH_RAD),
         LaserScan(ranges=[0.1] * 8, angle_increment=math.inf),
         LaserScan(ranges=[0.1] * 8, angle_increment=math.nan),
+        LaserScan(ranges=[0.1] * 8, angle_min=1.0, angle_increment=1e-320),
+        LaserScan(ranges=[0.1] * 8, angle_min=1e38, angle_increment=EIGHTH_RAD),
     ],
 )
 def test_an_invalid_scan_has_no_ranges(message):

@@ -50,7 +50,7 @@ def front_first(scan: Any) -> List[float]:
 
     They go from the front on, with 0.0 for -inf (too close to measure) and NaN for what no range can be.
     """
-    are_angles_valid = math.isfinite(scan.angle_min) and 0.0 < scan.angle_increment < math.inf
+    are_angles_valid = abs(scan.angle_min) <= math.tau and 0.01 < scan.angle_increment < math.inf
     if len(scan.ranges) != BEAMS or not are_angles_valid:
         return []
     front = int(round(-scan.angle_min / scan.angle_increment))
