@@ -18,11 +18,12 @@ class TokenBucket:
 
     def take(self, tokens: float, now_s: float) -> bool:
         """Take tokens; return False, and take none, if there are not enough."""
-        self._tokens = self.count(now_s)
-        self._filled_s = now_s
-        if tokens > self._tokens:
+        left = self._tokens + self._per_s * (now_s - self._filled_s) - tokens
+        if left > self.burst - tokens:  # min() in count() would cost more than all else here
+            left = self.burst - tokens
+        if left < 0.0:
             return False
-        self._tokens -= tokens
+        self._tokens, self._filled_s = left, now_s
         return True
 
     def count(self, now_s: float) -> float:
