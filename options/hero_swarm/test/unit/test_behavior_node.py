@@ -44,8 +44,8 @@ def write_calibration(folder, number):
 class Stage:
     """Stepped robots, in place of all that the node has of ROS."""
 
-    def __init__(self, monkeypatch, count=6):
-        self.swarm = StepSwarm(count, seed=3)
+    def __init__(self, monkeypatch, count=6, **options):
+        self.swarm = StepSwarm(count, seed=3, **options)
         self.sent, self.warnings = {}, []
         self.silent = set()
         self.clock_ahead_s = 0.0  # of ROS, which is set back and forth
@@ -343,6 +343,13 @@ def test_robots_of_others_are_avoided_by_their_own_radii(stage, tmp_path, speed_
         stage.swarm.robots[5].drive(speed_m_s, speed_m_s / 0.05)
         stage.run(1.0)
     assert 0.0 < min(gaps_m) < 0.3, min(gaps_m)
+
+
+def test_driven_robots_are_kept_apart_by_the_radii_of_their_models(monkeypatch):
+    stage = Stage(monkeypatch, 3, model="hero_plus,robot=1")
+    stage.start("rendezvous", safety="fence and robots")
+    stage.run(0.1)
+    assert stage.node._filter.radii_m == [BODY_RADIUS_M, 0.060, BODY_RADIUS_M]
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from hero_sim.errors import OptionError
 from hero_sim.world import load_arena
 from hero_swarm.behavior import Behavior, Floor, Light, Pheromone, Random, RangeAndBearing, sense
 from hero_swarm.trial import Trial
+from hero_test.nonempty import nonempty
 
 ARENA = """\
 bounds_m: [-1, -1, 1, 1]
@@ -73,6 +74,9 @@ def test_messages_reach_neighbors_in_range_of_the_same_world():
         got = read(RangeAndBearing(0.5, rate_hz=2.0), poses, messages=sent, kept=kept, time_s=step * 0.1)
         heard.append(got.seen.any())
     assert heard == ([True] + [False] * 4) * 4
+    kept, rarely = {}, RangeAndBearing(0.5, rate_hz=10.0)
+    times_s = [step * 0.1 for step in range(100)]  # rounded: some are a little earlier than 0.1 s after the one before
+    assert all(read(rarely, poses, messages=sent, kept=kept, time_s=time_s).seen.any() for time_s in nonempty(times_s))
 
 
 def test_pheromone_stays_evaporates_and_keeps_worlds_apart(arena):

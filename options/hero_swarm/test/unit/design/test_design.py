@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from hero_node import HeroError
 from hero_swarm.behaviors import find_behavior
@@ -251,6 +252,19 @@ def test_candidates_of_a_batch_score_as_they_do_alone(path):
         together = evaluation.score_runs(*common, genomes, [7, 7, 8])
         alone = [evaluation.score_runs(*common, genomes[k : k + 1], [seed])[0] for k, seed in enumerate((7, 7, 8))]
         assert together == alone and len(set(together)) > 1
+
+
+def test_no_state_of_a_machine_leads_to_itself(path):
+    kind = Machines(read_mission("m.yaml"))
+    shares, seen = np.random.RandomState(2).random_sample((50, len(kind.genes.low))), 0
+    for genome in kind.genes.place(shares):
+        states = yaml.safe_load(kind.dump(genome, "arena.yaml", ""))["states"]
+        names = [state["name"] for state in states]
+        for state in states:
+            others = {condition["to"] for condition in state.get("next", [])}
+            assert others <= set(names) - {state["name"]}
+            seen += len(others)
+    assert seen > 100
 
 
 @pytest.mark.slow

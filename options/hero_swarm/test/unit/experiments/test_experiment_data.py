@@ -4,6 +4,7 @@ import csv
 import io
 import itertools
 import tarfile
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -148,10 +149,19 @@ def test_a_pack_is_computed_again_elsewhere_with_the_same_bytes(folder, tmp_path
 
     contents = pack.collect(str(folder))
     assert b"farthest" in contents["files/work/lib/own.py"] and b"walls_m" in contents["files/field.yaml"]
-    other = contents["runs.csv"].replace(b"simulated,", b"simulated,1", 1)
-    write_tar(packed, {**contents, "runs.csv": other})
-    with pytest.raises(ExperimentError, match="runs.csv differs in 1 of 13 lines, first in line 2"):
-        verify.main([str(packed), "--jobs", "1"])
+
+    def compute(command, **options):
+        out = Path(command[command.index("--out") + 1])
+        out.mkdir()
+        (out / "runs.csv").write_bytes(contents["runs.csv"])
+        return SimpleNamespace(returncode=0)
+
+    monkeypatch.setattr(verify.subprocess, "run", compute)
+    other, more = contents["runs.csv"].replace(b"simulated,", b"simulated,1", 1), contents["runs.csv"] + b"one more\n"
+    for changed, words in ((other, "1 of 13 lines, first in line 2"), (more, "0 of 14 lines, first in line 14")):
+        write_tar(packed, {**contents, "runs.csv": changed})
+        with pytest.raises(ExperimentError, match="runs.csv differs in " + words):
+            verify.main([str(packed), "--jobs", "1"])
 
 
 def write_tar(path, contents):
