@@ -22,6 +22,7 @@ from hero_swarm.experiments.computing.batch import load_checked
 from hero_swarm.experiments.computing.cell_setup import set_up
 from hero_swarm.experiments.computing.engines import Engine
 from hero_swarm.experiments.errors import ExperimentError
+from hero_test.nonempty import nonempty
 
 MISSIONS = Path(__file__).resolve().parents[3] / "examples" / "missions"
 MISSION = """\
@@ -257,10 +258,10 @@ def test_candidates_of_a_batch_score_as_they_do_alone(path):
 def test_no_state_of_a_machine_leads_to_itself(path):
     kind = Machines(read_mission("m.yaml"))
     shares, seen = np.random.RandomState(2).random_sample((50, len(kind.genes.low))), 0
-    for genome in kind.genes.place(shares):
+    for genome in nonempty(kind.genes.place(shares)):
         states = yaml.safe_load(kind.dump(genome, "arena.yaml", ""))["states"]
         names = [state["name"] for state in states]
-        for state in states:
+        for state in nonempty(states):
             others = {condition["to"] for condition in state.get("next", [])}
             assert others <= set(names) - {state["name"]}
             seen += len(others)
