@@ -41,10 +41,6 @@ class RefusedError(Exception):
     """A valid request is not carried out; the message says why."""
 
 
-class LateError(RefusedError):
-    """A request was made before the connection or the monitor paused."""
-
-
 class PageRequests:
     """Requests of pages: each kind of requests.REQUESTS has a method _do_KIND."""
 
@@ -76,22 +72,21 @@ class PageRequests:
             page.tell("error", f"invalid request ({error}): reload the page")
             return
         do = request["do"]
+        if not is_fresh(request, read_clock_ms()):
+            if do != "drive":  # a button that is still held sends the next one at once
+                page.tell("error", "the request was delayed: nothing was done")
+            return
         try:
             self._carry_out(page, request)
             if do in ("stop", "release"):
                 page.acknowledge(do)
-        except LateError as error:
-            if do != "drive":  # a button that is still held sends the next one at once
-                page.tell("error", str(error))
         except (RefusedError, FormationError) as error:
             page.tell("error", str(error))
             if do == "drive":
                 page.end_hold(request["pressed_ms"])
 
     def _carry_out(self, page: "PageSocket", request: Request) -> None:
-        """Carry out a request, if it may be made now. Raises: RefusedError or FormationError."""
-        if not is_fresh(request, read_clock_ms()):
-            raise LateError("the request was delayed: nothing was done")
+        """Carry out a request, if its user may make it. Raises: RefusedError or FormationError."""
         do, robots = request["do"], request.get("robots", ())
         refusal = page.user.role.find_refusal(
             do, self.programs.find_robots(request["number"]) if do == "end" else robots

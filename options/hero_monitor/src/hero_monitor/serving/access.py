@@ -25,11 +25,6 @@ class Access:
         self.lesson = lesson
         self._host_names: FrozenSet[str] = frozenset(name.lower().rstrip(".") for name in host_names)
 
-    @property
-    def needs_token(self) -> bool:
-        """Return whether a browser has to give a token."""
-        return self._token is not None
-
     def admits_host(self, name: str) -> bool:
         """Return whether a Host header's name, without port, is this PC's; any address is: rebinding needs a name."""
         name = name.lower().rstrip(".")

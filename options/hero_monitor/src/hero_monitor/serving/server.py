@@ -115,7 +115,7 @@ class BaseHandler(tornado.web.RequestHandler):
 
     def find_user(self) -> Optional[User]:
         """Return who makes the request; None for a browser that is not logged in."""
-        cookie = self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS) if self.access.needs_token else None
+        cookie = self.get_secure_cookie(COOKIE, max_age_days=SESSION_DAYS)
         return self.access.find_user(None if cookie is None else cookie.decode())
 
     @property

@@ -110,12 +110,6 @@ def _compare(path: Path, truth: Path, is_aligned: bool) -> Optional[PoseErrors]:
     return PoseErrors(path.times_s, np.hypot(path.x_m - x_m, path.y_m - y_m), wrap(path.yaw_rad - yaw_rad))
 
 
-def compute_message_delays(robot: RobotObservations) -> np.ndarray:
-    """Return arrival minus stamp of every odometry message (s)."""
-    arrival_s, stamp_s, *_ = robot.odometry.columns()
-    return arrival_s - stamp_s
-
-
 def break_at_gaps(times_s: np.ndarray, values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return a curve that is interrupted at gaps in the odometry."""
     gaps = np.flatnonzero(np.diff(times_s) > ODOMETRY_GAP_S) + 1
