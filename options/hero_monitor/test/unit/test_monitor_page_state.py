@@ -48,16 +48,6 @@ def test_a_page_that_missed_updates_gets_the_newest():
     assert json.loads(state.take_updates(slow)) == {"poses": {"hero_0": [9]}}
 
 
-def test_a_page_gets_no_more_parts_than_those_that_are_named():
-    state, page = PageState(), {}
-    assert state.take_updates(page, ["stop"]) is None
-    state.put("fleet", {})
-    state.put("stop", {"text": "stopping"})
-    assert json.loads(state.take_updates(page, ["stop"])) == {"stop": {"text": "stopping"}}
-    assert state.take_updates(page, ["stop"]) is None
-    assert json.loads(state.take_updates(page)) == {"fleet": {}}
-
-
 def test_a_new_page_gets_the_newest_lines_and_a_slow_one_a_count():
     state, early = PageState(), {}
     state.log.append(1.0, 2, "node", "", "first")
@@ -334,5 +324,6 @@ def test_codes_for_drivers_reach_teachers_only():
     state, teacher, pupil = PageState(), {}, {}
     state.put("lesson", {"drivers": [["120934", ["hero_3"]]]})
     state.put("fleet", {})
-    assert set(json.loads(state.take_updates(pupil, state.list_names("lesson")))) == {"fleet"}
+    assert set(json.loads(state.take_updates(pupil, "lesson"))) == {"fleet"}
+    assert state.take_updates(pupil, "lesson") is None
     assert set(json.loads(state.take_updates(teacher))) == {"fleet", "lesson"}

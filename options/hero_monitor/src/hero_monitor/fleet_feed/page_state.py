@@ -7,7 +7,7 @@ integers in mm and angles in mrad: short, and finer than a screen can show.
 import json
 import math
 from collections import deque
-from typing import Any, Deque, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Deque, Dict, List, Optional, Tuple
 
 from hero_node import Pose, make_printable
 
@@ -95,18 +95,14 @@ class PageState:
         self._texts[name] = text
         return True
 
-    def list_names(self, hidden: str) -> List[str]:
-        """Return the names of all parts but one."""
-        return [name for name in (*self._texts, "log") if name != hidden]
-
-    def take_updates(self, seen: Dict[str, Any], names: Optional[Sequence[str]] = None) -> Optional[str]:
+    def take_updates(self, seen: Dict[str, Any], hidden: str = "") -> Optional[str]:
         """Return what is new to a page as one JSON object, None without any; marks it as seen.
 
-        seen: the parts that the page has, and of the log its last line; empty for a new page. names: of the parts;
-        None: all.
+        seen: the parts that the page has, and of the log its last line; empty for a new page. hidden: the part that
+        it may not see.
         """
         parts: Dict[str, Any] = {**self._texts, "log": self.log.count}
-        new = [name for name in parts if parts[name] != seen.get(name, 0) and (names is None or name in names)]
+        new = [name for name in parts if parts[name] != seen.get(name, 0) and name != hidden]
         texts = [parts[name] if name != "log" else self.log.encode_after(seen.get(name, 0)) for name in new]
         seen.update((name, parts[name]) for name in new)
         return "{%s}" % ",".join('"%s":%s' % part for part in zip(new, texts)) if new else None
