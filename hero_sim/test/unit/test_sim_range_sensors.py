@@ -6,7 +6,7 @@ from driver_side import SENT, DriverSide
 
 from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim.robot import ranges
-from hero_sim.world import compiled, range_sensors
+from hero_sim.world import compiled, range_sensors, ray_loops
 from hero_sim.world.arena import Segments, build_default, build_rectangle
 from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.kinematics import find_heading
@@ -253,3 +253,16 @@ def test_compiled_sensors_see_the_same_bytes(monkeypatch):
         read.append([world.read_infrared(np.arange(60)).tobytes(), signals.tobytes()])
         assert len(np.unique(signals)) > 200
     assert read[0] == read[1]
+
+
+def test_loops_over_rays_see_the_same_bytes_as_arrays(monkeypatch):
+    arena = build_rectangle(0.6, 0.5, 0)._replace(circles_m=np.array([[0.1, 0.15, 0.04]]))
+    poses = np.array([(-0.2, -0.1, 0.4), (-0.1, -0.1, 2.5), (0.0, 0.1, -1.0), (0.2, -0.15, 5.0)])
+    errors = draw_errors([np.random.RandomState(row) for row in range(4)])
+    world = World(arena, poses, [np.random.RandomState(0)], errors)
+    ((_, sight),) = world._look(np.arange(4), world.observe())
+    seen = []
+    for loops in (None, ray_loops):
+        monkeypatch.setattr(range_sensors, "compile_loops", lambda module, rows, loops=loops: loops)
+        seen.append(range_sensors.measure_signals(sight, ALPHA, BETA))
+    assert seen[0].tobytes() == seen[1].tobytes() and len(np.unique(seen[0])) > 20

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 from unittest import mock
 
 import pytest
@@ -111,6 +112,13 @@ def make_login(headers=OURS):
     tokens = server._http.request_callback.find_handler(login).handler_kwargs["wrong_tokens"]
     fixed = {"headers": headers, "method": "POST", "token": TOKEN, "wrong_tokens": tokens}
     return lambda body, address="10.0.0.2": ask(LoginHandler, body=body.encode(), address=address, **fixed)
+
+
+def test_requests_of_clients_fill_no_disk_with_warnings():
+    logger = logging.getLogger("tornado.general")  # warns of each invalid request and cookie
+    logger.setLevel(logging.NOTSET)
+    Server(Access(TOKEN, []), ClientLimits(400), mock.Mock())
+    assert not logger.isEnabledFor(logging.WARNING) and logger.isEnabledFor(logging.ERROR)
 
 
 @pytest.fixture(name="clock")

@@ -34,6 +34,8 @@ def test_each_robot_has_a_folder_with_a_table_for_each_kind(bag, tmp_path, capsy
     for name in ("hero_0", "hero_3"):
         assert {path.name for path in (tmp_path / "out" / name).iterdir()} == {kind + ".csv" for kind in kinds}
     assert "2 robots, 12 tables" in output
+    written = [read_csv(path) for path in (tmp_path / "out").rglob("*.csv")]
+    assert len(written) == 12 and f"12 tables, {sum(map(len, written))} rows\n" in output
     assert not (tmp_path / "out.part").exists()
 
 
