@@ -256,12 +256,12 @@ def test_a_tag_that_is_gone_is_looked_for_by_one_finer_detector_at_times():
 
 @pytest.mark.slow
 def test_many_tags_that_are_missed_take_turns_within_a_bounded_time():
-    """Each costs 1.5 ms by the third detector; 0.4 of a core is 13 ms of an image."""
+    """Each costs 0.8 ms by the third detector; 0.4 of a core is 13 ms of an image."""
     watch, tags = Watch(with_fine=True), everywhere()[:400:8]
     watch.see(tags, frames=60)
     watch.detector.blind = watch.fine.blind = {tag_id for tag_id, _ in tags}
     seen = [watch.see(tags) for _ in range(40)]
-    assert all(5 <= len(found) <= 12 for found in seen), list(map(len, seen))
+    assert all(9 <= len(found) <= 20 for found in seen), list(map(len, seen))
     assert set().union(*seen[-8:]) == set(watch.detector.blind)
     watch.detector.blind = set()
     assert [len(watch.see(tags)) for _ in range(70)][-1] == len(tags)

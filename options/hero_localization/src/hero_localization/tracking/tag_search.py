@@ -27,7 +27,7 @@ BACKOFF, MAX_BACKOFF_S = 0.2, 0.6
 """A tag that is missed for longer than the first is looked for by one finer detector at a time, at intervals of this
 share of the time for which it is missed: most are covered or gone."""
 
-FINE_COSTS_MS = (0.3, 1.5, 0.6)
+FINE_COSTS_MS = (0.15, 0.8, 0.6)
 """CPU of a window by each of the finer detectors, ms; of the last one where the heading is known."""
 BLIND_COST = 5.0
 """Cost of the last one for any heading, by that."""
