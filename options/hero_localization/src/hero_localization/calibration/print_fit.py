@@ -23,8 +23,8 @@ MARGIN_CELLS = 2
 SEEN_CELLS = 0.7
 
 SMALL_PX, MAX_SIZE_ERRORS_PX = 18.0, (0.05, 0.033)
-"""Error of the size of a robot's tag below this size, and from it on, by many images of some robots: the second is half of
-what 5 mm of height change of 25 px. Gamma makes small tags seem a sixtieth of a pixel larger."""
+"""Error of the size of a robot's tag below this size, and from it on, by many images of some robots: the second is half
+of what 5 mm of height change of 25 px. Gamma makes small tags seem a sixtieth of a pixel larger."""
 
 ROUNDS, MIN_GAIN = 20, 1e-4
 FIRST_BLUR_PX = 0.8

@@ -160,8 +160,8 @@ class Tracker:
         for tag_id in sightings.doubled:
             note[tag_id] = (stamp_s, "appears more than once in the image and is ignored: remove one")
         for tag_id, share in sightings.misshapen.items():
-            text = f"measures {100.0 * share:.0f} % of its size: print it at 100 %, set tag_size_m, or list it in references"
-            note[tag_id] = (stamp_s, text)
+            text = "measures %.0f %% of its size: print it at 100 %%, set tag_size_m, or list it in references"
+            note[tag_id] = (stamp_s, text % (100.0 * share))
         seen = {tag_id: sighting.pose for tag_id, sighting in sightings.references.items()}
         moved = find_moved_references(seen, self._settings.seen_references)
         known = seen.keys() & self._settings.seen_references.keys()
