@@ -146,25 +146,42 @@ def test_forty_robots_that_press_into_a_corner_come_to_rest():
     assert np.hypot(*(world.poses - before)[:, :2].T).max() < MAX_CREPT_M
 
 
+def compare_loops(monkeypatch, arena, poses, worlds, steps_each):
+    """Compare several worlds at once by the loops for many rows with those that are computed one by one."""
+    rows, results = len(poses), []
+    errors = draw_errors([np.random.RandomState(row) for row in range(rows)])
+    monkeypatch.setattr(contacts, "_MANY", 0)
+    for rows_compiled in (10**9, 0):
+        monkeypatch.setattr(compiled, "COMPILED_ROWS", rows_compiled)
+        world = World(arena, poses, [np.random.RandomState(seed) for seed in range(worlds)], errors)
+        rng, log = np.random.RandomState(0), []
+        for _ in range(30):
+            world.commands_m_s[:] = rng.uniform(-0.1, 0.28, (rows, 2))
+            for _ in range(steps_each):
+                world.step(10)
+                log += [world.poses.tobytes(), world.travels_m.tobytes()]
+        assert world._contacts._is_compiled == (rows_compiled == 0)
+        results.append(log)
+    assert results[0] == results[1]
+
+
 @pytest.mark.option("numba")
 @pytest.mark.parametrize("arena", ["discs", "maze"])
 def test_worlds_give_the_same_bytes_compiled_and_not(monkeypatch, arena):
     """In several worlds at once, with robots that meet, walls, obstacles, and room for contacts that runs out."""
-    arena, results = load_arena(arena)._replace(objects=()), []
+    arena = load_arena(arena)._replace(objects=())
     poses = np.vstack([place_robots(arena, 9, np.random.RandomState(seed)) for seed in range(3)])
-    errors = draw_errors([np.random.RandomState(row) for row in range(27)])
-    monkeypatch.setattr(contacts, "_MANY", 0)
-    for rows in (10**9, 0):
-        monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
-        world = World(arena, poses, [np.random.RandomState(seed) for seed in range(3)], errors)
-        rng, log = np.random.RandomState(0), []
-        for _ in range(30):
-            world.commands_m_s[:] = rng.uniform(-0.1, 0.28, (27, 2))
-            world.step(10)
-            log += [world.poses.tobytes(), world.travels_m.tobytes()]
-        assert world._contacts._is_compiled == (rows == 0)
-        results.append(log)
-    assert results[0] == results[1]
+    compare_loops(monkeypatch, arena, poses, 3, 1)
+
+
+@pytest.mark.slow
+def test_loops_over_worlds_give_the_same_bytes_also_without_numba(monkeypatch):
+    """With robots that touch each other, walls and a post all the time."""
+    arena = build_rectangle(0.3, 0.24, 0)._replace(circles_m=np.array([(0.0, 0.0, 0.02)]))
+    places = [(x_m, y_m, 3.0 * x_m) for x_m in (-0.1, 0.0, 0.1) for y_m in (-0.07, 0.07)]
+    monkeypatch.setattr(compiled, "_compile_loops", lambda module: module)
+    with np.errstate(over="ignore"):  # of random bits, which wrap
+        compare_loops(monkeypatch, arena, np.array(places * 2), 2, 2)
 
 
 @pytest.mark.option("numba")
