@@ -23,7 +23,7 @@ beside its center, which u stands for. The world without bodies, the last one, i
 """
 
 import math
-from typing import Any, Tuple
+from typing import Any, NamedTuple, Tuple
 
 import numpy as np
 
@@ -49,22 +49,46 @@ IDLE, STARTS, CONTINUES = 0, 1, 2
 
 X, Y, THETA, COSINE, SINE, LEFT, RIGHT, REAR = range(8)
 STEP_X, STEP_Y, TURN, HALF, WHEEL_N, CASTER_N, CREEP, RADIUS, ON_ROBOT, ON_WALL = range(8, 18)
-MOVED_X, MOVED_Y, TURNED, A, U_X, U_Y, H, STAMP = range(18, 26)
-KEPT_ROWS, MOVING_ROWS, BODY_ROWS = 8, 11, 26
+MOVED_X, MOVED_Y, TURNED = range(18, 21)
+KEPT_ROWS, MOVING_ROWS, BODY_ROWS = 8, 11, 21
 """Rows of bodies, lengths in m: pose and heading; slips of wheels and caster in the last step. Free twist in this step;
 distance of a wheel from the center, largest forces of a wheel and the caster (N), slip in a step below which they are
-not reached, radius, and friction on robots and on walls. What contacts move it by; and, of a solution, its stiffness
-and when it was moved last (0 between solutions)."""
+not reached, radius, and friction on robots and on walls. What contacts move it by."""
 
 TOUCHING, FRICTION, ARM_1, LEVER_1, ARM_2, LEVER_2, SHARE, PRESSURE, DRAG, GIVE = range(10)
-GAP, SLIDE, NORMAL_X, NORMAL_Y, DRAG_GIVE, STIFFNESS, DRAG_STIFFNESS, SEEN = range(10, 18)
-PRESSED_X_1, PRESSED_Y_1, PRESSED_TURN_1, DRAGGED_X_1, DRAGGED_Y_1, DRAGGED_TURN_1 = range(18, 24)
-PRESSED_X_2, PRESSED_Y_2, PRESSED_TURN_2, DRAGGED_X_2, DRAGGED_Y_2, DRAGGED_TURN_2 = range(24, 30)
-CONTACT_ROWS = 30
+GAP, SLIDE, NORMAL_X, NORMAL_Y = range(10, 14)
+CONTACT_ROWS = 14
 """Rows of contacts, lengths in m: distance of the centers that touch, friction, moment arms of a pressure and a drag
 about each body's center, and how many contacts the two bodies have; forces (N) and give (m/N), with which the next step
-starts. What was found in this step; and, of a solution, how it gives and the inverse, when it was looked at last, and
-how a pressure and a drag of 1 N move the first and the second body."""
+starts; what was found in this step."""
+
+OF_PLACE = np.dtype([(name, int) for name in ("first", "second", "starts", "seen")])
+OF_BODY = np.dtype([("stamp", int), *((name, float) for name in ("x", "y", "turn", "a", "u_x", "u_y", "h"))])
+_ENDS = [f"{how}_{part}_{end}" for end in (1, 2) for how in ("pressed", "dragged") for part in ("x", "y", "turn")]
+_FOUND = "normal_x normal_y gap slide arm_1 lever_1 arm_2 lever_2 friction share pressure drag give".split()
+OF_PRESS = np.dtype([(name, float) for name in (*_FOUND, "stiffness", "drag_give", "drag_stiffness", *_ENDS)])
+"""Records of a solution: see Solution."""
+
+IS_COMPILED = False
+"""True in loops that numba compiles: a branch that is hard to predict costs a processor more than what it skips."""
+
+
+class Solution(NamedTuple):
+    """Room for what is computed while contacts are solved: records side by side in memory, or in lists.
+
+    Attributes:
+        places: of each active contact, its bodies, whether it is their first one, and when it was looked at last.
+        presses: of each active contact, its rows, the inverse of how it gives, and how a pressure and a drag of 1 N
+            move its first and its second body.
+        bodies: of each body, when it was moved last (0: it is in no contact), by how much, and its a, u and h.
+        members: numbers of the bodies in contacts.
+    """
+
+    places: Any
+    presses: Any
+    bodies: Any
+    members: Any
+
 
 START_X, START_Y, ALONG_X, ALONG_Y, LENGTH2, THICKNESS = range(6)
 """Rows of obstacles: segments (see Segments) with a radius."""
@@ -175,142 +199,151 @@ def leave_walls(
 
 
 def solve_contacts(
-    active: Any, first: Any, second: Any, state: Any, contacts: Any, bodies: Any, members: Any, robots: int,
+    active: Any, first: Any, second: Any, state: Any, contacts: Any, bodies: Any, solution: Solution, robots: int,
     has_things: bool,
 ) -> Tuple[float, bool]:  # fmt: skip
     """Solve the active contacts of one world, and move its bodies, in place.
 
     Contact k pushes the bodies first[k] and second[k] apart; its normal points from the first to the second. The first
-    bodies are robots. members: room for the numbers of bodies. Return how far a body is moved at most, along x or y,
-    and whether a contact presses.
+    bodies are robots. Return how far a body is moved at most, along x or y, and whether a contact presses.
     """
+    places, presses, moving, members = solution
     cosine, sine, left, right, rear = bodies[COSINE], bodies[SINE], bodies[LEFT], bodies[RIGHT], bodies[REAR]
     half, wheel_n, caster_n, creep = bodies[HALF], bodies[WHEEL_N], bodies[CASTER_N], bodies[CREEP]
-    moved_x, moved_y, turned, stamp = bodies[MOVED_X], bodies[MOVED_Y], bodies[TURNED], bodies[STAMP]
-    a, u_x, u_y, h, step_x, step_y = bodies[A], bodies[U_X], bodies[U_Y], bodies[H], bodies[STEP_X], bodies[STEP_Y]
+    step_x, step_y, share = bodies[STEP_X], bodies[STEP_Y], contacts[SHARE]
     normal_x, normal_y, gap, slide = contacts[NORMAL_X], contacts[NORMAL_Y], contacts[GAP], contacts[SLIDE]
     arm_1, lever_1, arm_2, lever_2 = contacts[ARM_1], contacts[LEVER_1], contacts[ARM_2], contacts[LEVER_2]
-    pressure, drag, give, drag_give = contacts[PRESSURE], contacts[DRAG], contacts[GIVE], contacts[DRAG_GIVE]
-    friction, share, seen = contacts[FRICTION], contacts[SHARE], contacts[SEEN]
-    stiffness, drag_stiffness = contacts[STIFFNESS], contacts[DRAG_STIFFNESS]
-    pressed_x_1, pressed_y_1, pressed_turn_1 = contacts[PRESSED_X_1], contacts[PRESSED_Y_1], contacts[PRESSED_TURN_1]
-    dragged_x_1, dragged_y_1, dragged_turn_1 = contacts[DRAGGED_X_1], contacts[DRAGGED_Y_1], contacts[DRAGGED_TURN_1]
-    pressed_x_2, pressed_y_2, pressed_turn_2 = contacts[PRESSED_X_2], contacts[PRESSED_Y_2], contacts[PRESSED_TURN_2]
-    dragged_x_2, dragged_y_2, dragged_turn_2 = contacts[DRAGGED_X_2], contacts[DRAGGED_Y_2], contacts[DRAGGED_TURN_2]
-    kind, static = 1 if has_things else 0, len(half) - 1
+    pressure, drag, give, friction = contacts[PRESSURE], contacts[DRAG], contacts[GIVE], contacts[FRICTION]
+    kind, static, active_count = 1 if has_things else 0, len(half) - 1, len(active)
     enough, same = _SETTLED_M[kind], _SAME_SLIP[kind]
-    count, farthest = 0, 0.0
-    for k in active:
+    fixed, count, farthest = moving[static], 0, 0.0
+    fixed.a = fixed.h = fixed.u_x = fixed.u_y = fixed.x = fixed.y = fixed.turn = 0.0
+    for n in range(active_count):
+        k = active[n]
+        place, press = places[n], presses[n]
+        place.first, place.second, place.starts = first[k], second[k], state[k] == STARTS
         for i in (first[k], second[k]):
-            if stamp[i] == 0.0 and i != static:
-                stamp[i] = 1.0
+            if moving[i].stamp == 0 and i != static:
+                moving[i].stamp = 1
                 members[count] = i
                 count += 1
                 farthest = max(farthest, math.sqrt(step_x[i] * step_x[i] + step_y[i] * step_y[i]))
-    a[static] = u_x[static] = u_y[static] = h[static] = 0.0
+        press.normal_x, press.normal_y, press.gap, press.slide = normal_x[k], normal_y[k], gap[k], slide[k]
+        press.arm_1, press.lever_1, press.arm_2, press.lever_2 = arm_1[k], lever_1[k], arm_2[k], lever_2[k]
+        press.friction, press.share, press.pressure, press.drag = friction[k], share[k], pressure[k], drag[k]
+        press.give = give[k]
     for m in range(count):
         i = members[m]
         if left[i] < TOUCH_M and right[i] < TOUCH_M:
             # In a new contact, most of what a robot rolls becomes slip; one that stands, stands. A thing is moved.
             rolled = math.sqrt(step_x[i] * step_x[i] + step_y[i] * step_y[i]) if i < robots else farthest
             left[i] = right[i] = rear[i] = rolled
-    apart_x = apart_y = turned_1 = turned_2 = clock = 0.0
+    apart_x = apart_y = turned_1 = turned_2 = 0.0
     for _ in range(_ROUNDS[kind]):
         for m in range(count):
             i = members[m]
+            body = moving[i]
             left_n_m = wheel_n[i] / max(left[i], creep[i])
             right_n_m = wheel_n[i] / max(right[i], creep[i])
             rear_n_m = caster_n[i] / max(rear[i], creep[i])
             all_n_m = left_n_m + right_n_m + rear_n_m
             ahead, aside = half[i] * (left_n_m - right_n_m) / all_n_m, -CASTER_M * rear_n_m / all_n_m
             turning = half[i] * half[i] * (left_n_m + right_n_m) + CASTER_M * CASTER_M * rear_n_m
-            a[i] = 1.0 / all_n_m
-            h[i] = 1.0 / (turning - (ahead * ahead + aside * aside) * all_n_m)
-            u_x[i] = cosine[i] * ahead - sine[i] * aside
-            u_y[i] = sine[i] * ahead + cosine[i] * aside
-            moved_x[i] = moved_y[i] = turned[i] = 0.0
-            stamp[i] = 1.0
-        for k in active:
-            i, j, n_x, n_y = first[k], second[k], normal_x[k], normal_y[k]
-            n_1, n_2 = u_x[i] * n_x + u_y[i] * n_y + arm_1[k], u_x[j] * n_x + u_y[j] * n_y + arm_2[k]
-            t_1, t_2 = u_y[i] * n_x - u_x[i] * n_y + lever_1[k], u_y[j] * n_x - u_x[j] * n_y + lever_2[k]
-            both = a[i] + a[j]
-            give_m = share[k] * (both + h[i] * n_1 * n_1 + h[j] * n_2 * n_2)
-            drag_give[k] = share[k] * (both + h[i] * t_1 * t_1 + h[j] * t_2 * t_2)
-            stiffness[k], drag_stiffness[k], seen[k] = 1.0 / give_m, 1.0 / drag_give[k], 0.0
-            turn = -h[i] * n_1
-            pressed_x_1[k], pressed_y_1[k] = u_x[i] * turn - a[i] * n_x, u_y[i] * turn - a[i] * n_y
-            pressed_turn_1[k] = turn
-            turn = -h[i] * t_1
-            dragged_x_1[k], dragged_y_1[k] = u_x[i] * turn + a[i] * n_y, u_y[i] * turn - a[i] * n_x
-            dragged_turn_1[k] = turn
-            turn = h[j] * n_2
-            pressed_x_2[k], pressed_y_2[k] = u_x[j] * turn + a[j] * n_x, u_y[j] * turn + a[j] * n_y
-            pressed_turn_2[k] = turn
-            turn = h[j] * t_2
-            dragged_x_2[k], dragged_y_2[k] = u_x[j] * turn - a[j] * n_y, u_y[j] * turn + a[j] * n_x
-            dragged_turn_2[k] = turn
-            if pressure[k] != 0.0:
+            body.a = 1.0 / all_n_m
+            body.h = 1.0 / (turning - (ahead * ahead + aside * aside) * all_n_m)
+            body.u_x = cosine[i] * ahead - sine[i] * aside
+            body.u_y = sine[i] * ahead + cosine[i] * aside
+            body.x = body.y = body.turn = 0.0
+            body.stamp = 1
+        for n in range(active_count):
+            place, press = places[n], presses[n]
+            one, two, n_x, n_y = moving[place.first], moving[place.second], press.normal_x, press.normal_y
+            a_1, h_1, x_1, y_1 = one.a, one.h, one.u_x, one.u_y
+            a_2, h_2, x_2, y_2 = two.a, two.h, two.u_x, two.u_y
+            n_1, n_2 = x_1 * n_x + y_1 * n_y + press.arm_1, x_2 * n_x + y_2 * n_y + press.arm_2
+            t_1, t_2 = y_1 * n_x - x_1 * n_y + press.lever_1, y_2 * n_x - x_2 * n_y + press.lever_2
+            both = a_1 + a_2
+            give_m = press.share * (both + h_1 * n_1 * n_1 + h_2 * n_2 * n_2)
+            press.drag_give = press.share * (both + h_1 * t_1 * t_1 + h_2 * t_2 * t_2)
+            press.stiffness, press.drag_stiffness, place.seen = 1.0 / give_m, 1.0 / press.drag_give, 0
+            turn = -h_1 * n_1
+            press.pressed_x_1, press.pressed_y_1 = x_1 * turn - a_1 * n_x, y_1 * turn - a_1 * n_y
+            press.pressed_turn_1 = turn
+            turn = -h_1 * t_1
+            press.dragged_x_1, press.dragged_y_1 = x_1 * turn + a_1 * n_y, y_1 * turn - a_1 * n_x
+            press.dragged_turn_1 = turn
+            turn = h_2 * n_2
+            press.pressed_x_2, press.pressed_y_2 = x_2 * turn + a_2 * n_x, y_2 * turn + a_2 * n_y
+            press.pressed_turn_2 = turn
+            turn = h_2 * t_2
+            press.dragged_x_2, press.dragged_y_2 = x_2 * turn - a_2 * n_y, y_2 * turn + a_2 * n_x
+            press.dragged_turn_2 = turn
+            if press.pressure != 0.0:
                 # The motion is kept rather than the force: it is what the contacts ask for.
-                scale = give[k] * stiffness[k]
-                more, more_drag = pressure[k] * scale, drag[k] * scale
-                pressure[k], drag[k] = more, more_drag
-                moved_x[i] += more * pressed_x_1[k] + more_drag * dragged_x_1[k]
-                moved_y[i] += more * pressed_y_1[k] + more_drag * dragged_y_1[k]
-                turned[i] += more * pressed_turn_1[k] + more_drag * dragged_turn_1[k]
-                moved_x[j] += more * pressed_x_2[k] + more_drag * dragged_x_2[k]
-                moved_y[j] += more * pressed_y_2[k] + more_drag * dragged_y_2[k]
-                turned[j] += more * pressed_turn_2[k] + more_drag * dragged_turn_2[k]
-            give[k] = give_m
-        clock = 1.0
+                scale = press.give * press.stiffness
+                more, more_drag = press.pressure * scale, press.drag * scale
+                press.pressure, press.drag = more, more_drag
+                one.x += more * press.pressed_x_1 + more_drag * press.dragged_x_1
+                one.y += more * press.pressed_y_1 + more_drag * press.dragged_y_1
+                one.turn += more * press.pressed_turn_1 + more_drag * press.dragged_turn_1
+                two.x += more * press.pressed_x_2 + more_drag * press.dragged_x_2
+                two.y += more * press.pressed_y_2 + more_drag * press.dragged_y_2
+                two.turn += more * press.pressed_turn_2 + more_drag * press.dragged_turn_2
+            press.give = give_m
+        clock = 1
         for _ in range(_PASSES[kind]):
             is_settled = True
             skips = False
-            for k in active:
-                i, j = first[k], second[k]
-                if state[k] == STARTS:
-                    skips = stamp[i] <= seen[k] and stamp[j] <= seen[k]
-                    apart_x, apart_y = moved_x[j] - moved_x[i], moved_y[j] - moved_y[i]
-                    turned_1, turned_2 = turned[i], turned[j]
+            for n in range(active_count):
+                place = places[n]
+                one, two = moving[place.first], moving[place.second]
+                if not has_things or place.starts:
+                    skips = one.stamp <= place.seen and two.stamp <= place.seen
+                    apart_x, apart_y = two.x - one.x, two.y - one.y
+                    turned_1, turned_2 = one.turn, two.turn
                 if skips:
                     continue
-                clock += 1.0
-                seen[k] = clock
-                n_x, n_y = normal_x[k], normal_y[k]
-                left_m = (gap[k] + n_x * apart_x) + (n_y * apart_y + (arm_2[k] * turned_2 - arm_1[k] * turned_1))
-                old, old_drag = pressure[k], drag[k]
-                if left_m >= 0.0 and old == 0.0:
+                clock += 2
+                place.seen = clock
+                press = presses[n]
+                n_x, n_y, old, old_drag = press.normal_x, press.normal_y, press.pressure, press.drag
+                left_m = (press.gap + n_x * apart_x) + (
+                    n_y * apart_y + (press.arm_2 * turned_2 - press.arm_1 * turned_1)
+                )
+                if not IS_COMPILED and left_m >= 0.0 and old == 0.0:
                     continue
-                pressed = max(old - left_m * stiffness[k], 0.0)
-                most = friction[k] * pressed
-                slid_m = (slide[k] + n_x * apart_y) - (n_y * apart_x - (lever_2[k] * turned_2 - lever_1[k] * turned_1))
-                dragged = min(max(old_drag - slid_m * drag_stiffness[k], -most), most)
+                pressed = max(old - left_m * press.stiffness, 0.0)
+                most = press.friction * pressed
+                slid_m = (press.slide + n_x * apart_y) - (
+                    n_y * apart_x - (press.lever_2 * turned_2 - press.lever_1 * turned_1)
+                )
+                dragged = min(max(old_drag - slid_m * press.drag_stiffness, -most), most)
                 more, more_drag = pressed - old, dragged - old_drag
-                pressure[k], drag[k] = pressed, dragged
-                moved_x[i] += more * pressed_x_1[k] + more_drag * dragged_x_1[k]
-                moved_y[i] += more * pressed_y_1[k] + more_drag * dragged_y_1[k]
-                turned[i] += more * pressed_turn_1[k] + more_drag * dragged_turn_1[k]
-                moved_x[j] += more * pressed_x_2[k] + more_drag * dragged_x_2[k]
-                moved_y[j] += more * pressed_y_2[k] + more_drag * dragged_y_2[k]
-                turned[j] += more * pressed_turn_2[k] + more_drag * dragged_turn_2[k]
-                if abs(more) * give[k] + abs(more_drag) * drag_give[k] > enough:
+                press.pressure, press.drag = pressed, dragged
+                one.x += more * press.pressed_x_1 + more_drag * press.dragged_x_1
+                one.y += more * press.pressed_y_1 + more_drag * press.dragged_y_1
+                one.turn += more * press.pressed_turn_1 + more_drag * press.dragged_turn_1
+                two.x += more * press.pressed_x_2 + more_drag * press.dragged_x_2
+                two.y += more * press.pressed_y_2 + more_drag * press.dragged_y_2
+                two.turn += more * press.pressed_turn_2 + more_drag * press.dragged_turn_2
+                if abs(more) * press.give + abs(more_drag) * press.drag_give > enough:
                     is_settled = False
                     # Pressure and drag depend on each other: this contact, too, is looked at again.
-                    stamp[j] = clock + 0.5 if most > 0.0 else clock
-                    if i != static:
-                        stamp[i] = stamp[j]
+                    one.stamp = two.stamp = clock + 1 if most > 0.0 else clock
+                    fixed.stamp = 0
             if is_settled:
                 break
         is_same = True
         for m in range(count):
             i = members[m]
-            ahead = cosine[i] * moved_x[i] + sine[i] * moved_y[i]
-            aside = cosine[i] * moved_y[i] - sine[i] * moved_x[i]
-            turn = half[i] * turned[i]
+            body = moving[i]
+            ahead = cosine[i] * body.x + sine[i] * body.y
+            aside = cosine[i] * body.y - sine[i] * body.x
+            turn = half[i] * body.turn
             if i < robots:
                 slip_left = math.sqrt((ahead - turn) * (ahead - turn) + aside * aside)
                 slip_right = math.sqrt((ahead + turn) * (ahead + turn) + aside * aside)
-                aside += CASTER_M * turned[i]
+                aside += CASTER_M * body.turn
                 slip_rear = math.sqrt(ahead * ahead + aside * aside)
             else:
                 slip_left = slip_right = slip_rear = math.sqrt(ahead * ahead + aside * aside + turn * turn)
@@ -324,17 +357,22 @@ def solve_contacts(
             left[i], right[i], rear[i] = slip_left, slip_right, slip_rear
         if is_same:
             break
-    x, y, theta, presses, most = bodies[X], bodies[Y], bodies[THETA], False, 0.0
-    for k in active:
-        presses = presses or pressure[k] != 0.0
+    x, y, theta, is_pressing, most = bodies[X], bodies[Y], bodies[THETA], False, 0.0
+    moved_x, moved_y, turned = bodies[MOVED_X], bodies[MOVED_Y], bodies[TURNED]
+    for n in range(active_count):
+        k, press = active[n], presses[n]
+        pressure[k], drag[k], give[k] = press.pressure, press.drag, press.give
+        is_pressing = is_pressing or press.pressure != 0.0
     for m in range(count):
         i = members[m]
-        stamp[i], turn = 0.0, turned[i]
-        most = max(most, abs(moved_x[i]), abs(moved_y[i]))
+        body = moving[i]
+        moved_x[i], moved_y[i], turned[i] = body.x, body.y, body.turn
+        body.stamp, turn = 0, body.turn
+        most = max(most, abs(body.x), abs(body.y))
         if i >= robots:
             continue
-        x[i] += moved_x[i]
-        y[i] += moved_y[i]
+        x[i] += body.x
+        y[i] += body.y
         theta[i] += turn
         half_tangent = turn * (0.5 + turn * turn / 24.0)
         scale = 1.0 / (1.0 + half_tangent * half_tangent)
@@ -343,7 +381,7 @@ def solve_contacts(
             cosine[i] * turn_cosine - sine[i] * turn_sine,
             cosine[i] * turn_sine + sine[i] * turn_cosine,
         )
-    return most, presses
+    return most, is_pressing
 
 
 def list_near(
@@ -405,7 +443,7 @@ def list_near(
 
 def move_worlds(
     ground_m: Any, separations_m: Any, margin_m: float, begun: Any, reach_m: Any, gap_m: Any, ends: Any, numbers: Any,
-    contacts: Any, bodies: Any, obstacles: Any, members: Any, spare: Any, spare_forces: Any,
+    contacts: Any, bodies: Any, obstacles: Any, solution: Solution, spare: Any, spare_forces: Any,
 ) -> bool:  # fmt: skip
     """Move the robots of all worlds by the steps of their wheels over the ground (K, 2, R); return False without room.
 
@@ -454,7 +492,7 @@ def move_worlds(
             gap_m[world] = min(least_m, reach_m[world])
             if touches:
                 listed = active[:count]
-                moved_m, presses = solve_contacts(listed, first, second, state, own, bodies, members, rows, False)
+                moved_m, presses = solve_contacts(listed, first, second, state, own, bodies, solution, rows, False)
                 leave_walls(pairs, listed, second, obstacle, own, bodies, obstacles)
                 moved_m *= math.sqrt(2.0)
                 reach_m[world] -= moved_m

@@ -20,7 +20,7 @@ def _compile_loops(module: ModuleType) -> Optional[Any]:
         numba = importlib.import_module("numba")
     except ImportError:
         return None
-    loops, names = SimpleNamespace(), dict(vars(module))
+    loops, names = SimpleNamespace(), {**vars(module), "IS_COMPILED": True}
     for name, loop in vars(module).items():
         if isinstance(loop, FunctionType):
             # In these names, for it to call the others compiled.

@@ -29,6 +29,9 @@ from .body_loops import (
     LEVER_2,
     MOVED_X,
     MOVING_ROWS,
+    OF_BODY,
+    OF_PLACE,
+    OF_PRESS,
     ON_ROBOT,
     ON_WALL,
     PRESSURE,
@@ -43,6 +46,7 @@ from .body_loops import (
     TURN,
     TURNED,
     WHEEL_N,
+    Solution,
     X,
     follow_arc,
     shape_arc,
@@ -84,6 +88,16 @@ class _Near(NamedTuple):
     active: Any
 
 
+def _make_records(count: int, kind: np.dtype) -> List[Any]:
+    """Return records of zeros as objects in a list, which are read and written much faster than those of an array."""
+    record: Any = type("Record", (), {"__slots__": kind.names})
+    records = [record() for _ in range(count)]
+    for each in records:
+        for name in record.__slots__:
+            setattr(each, name, 0)
+    return records
+
+
 class Contacts:
     """The bodies of worlds with the same arena.
 
@@ -112,6 +126,7 @@ class Contacts:
         self._hold = np.ascontiguousarray if compiled else np.ndarray.tolist
         self._obstacles = self._hold(obstacles)
         self._near: Optional[_Near] = None
+        self._solution = self._make_solution(0)
         self._is_compiled = compiled is not None and not any(pushing)
         # How far all robots may still move until the lists are incomplete, and until something could touch: in each
         # world, or in all together.
@@ -147,17 +162,25 @@ class Contacts:
         self._contacts = np.dstack((self._contacts, np.zeros((worlds, CONTACT_ROWS, room))))
         self._contacts[:, SHARE] = 1.0
         room = self._contacts.shape[2]
+        self._solution = self._make_solution(room)
         self._spare = np.zeros((3, room), dtype=np.int64), np.zeros((GIVE + 1 - PRESSURE, room))
+
+    def _make_solution(self, contacts: int) -> Solution:
+        """Return room to solve so many contacts at once."""
+        bodies: int = self._bodies.shape[1]
+        make: Any = _make_records if self._loops is body_loops else np.zeros
+        members = self._hold(np.zeros(bodies, dtype=int))
+        return Solution(make(contacts, OF_PLACE), make(contacts, OF_PRESS), make(bodies, OF_BODY), members)
 
     def move(self, ground_m: np.ndarray) -> None:
         """Move the robots by K steps of their left and right wheels over the ground (K, 2, R)."""
         if not self._is_compiled:
             self._move_together(ground_m)
             return
-        begun, members = np.zeros(len(self._gap_m), dtype=np.int64), np.zeros(self._bodies.shape[1], dtype=np.int64)
+        begun = np.zeros(len(self._gap_m), dtype=np.int64)
         while not self._loops.move_worlds(
             ground_m, self._separations_m, _MARGIN_M, begun, self._reach_m, self._gap_m, self._ends, self._numbers,
-            self._contacts, self._bodies, self._obstacles, members, *self._spare,
+            self._contacts, self._bodies, self._obstacles, self._solution, *self._spare,
         ):  # fmt: skip
             self._make_room(self._contacts.shape[2] + 1)
 
@@ -205,12 +228,14 @@ class Contacts:
         for k in listed:
             if k >= pairs:
                 worlds[near.worlds[k]].append(k)
-        pressure, gap, members = contacts[PRESSURE], contacts[GAP], self._hold(np.zeros(len(near.columns), dtype=int))
+        pressure, gap = contacts[PRESSURE], contacts[GAP]
+        if len(self._solution.presses) < len(gap):
+            self._solution = self._make_solution(2 * len(gap))
         farthest_m, presses = 0.0, False
         for world, active in enumerate(worlds):
             for k in active:
                 if pressure[k] != 0.0 or gap[k] < -TOUCH_M:
-                    own = first, second, state, contacts, bodies, members, near.robots, bool(things[world])
+                    own = first, second, state, contacts, bodies, self._solution, near.robots, bool(things[world])
                     moved_m, pressed = loops.solve_contacts(active if loops is body_loops else np.array(active), *own)
                     farthest_m, presses = max(farthest_m, moved_m), presses or pressed
                     break

@@ -15,7 +15,8 @@ from ...world.kinematics import find_heading, follow_arcs, join_wheels
 
 _TURN_RAD = 2.0 * math.pi
 
-_MAX_WAITING = 32
+_MAX_WAITING, _CACHED = 32, 16384
+"""Readings that are computed at once at most, and numbers of robots in them: more do not fit the cache."""
 
 
 class TickOdometryRows:
@@ -56,7 +57,7 @@ class TickOdometryRows:
         moved_ticks = ticks - self._window_ticks[self._newest]
         if np.count_nonzero(moved_ticks):
             self._moved_ticks.append(moved_ticks)
-            if len(self._moved_ticks) == _MAX_WAITING:
+            if len(self._moved_ticks) >= min(_MAX_WAITING, _CACHED / moved_ticks.shape[1]):
                 self._move()
         self._velocities = None
         self._newest = (self._newest + 1) % TWIST_WINDOW
