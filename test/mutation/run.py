@@ -246,7 +246,9 @@ def try_package(package, work_dir, sample, seed):
     """Try a package; return how many mutants it has, and [(mutant, verdict), ...] of those tried."""
     state = work_dir / package
     state.mkdir(parents=True, exist_ok=True)
-    paths = sorted(path for path in (sources.PACKAGES[package] / "src").rglob("*.py") if path.name != "__init__.py")
+    found = (sources.PACKAGES[package] / "src").rglob("*.py")
+    # What lies in no package is no module: it is read as the files of users are, and would stay as it is.
+    paths = sorted(path for path in found if path.name != "__init__.py" and path.with_name("__init__.py").is_file())
     reached = find_reached_lines(package, paths, state)
     for name in reached["imported"]:
         with contextlib.suppress(Exception):  # only saves the children time

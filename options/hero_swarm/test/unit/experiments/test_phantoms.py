@@ -57,6 +57,9 @@ def test_a_behavior_is_run_by_its_own_metric(path):
     assert made == "ahead_phantoms.yaml"
     assert [metric.source for metric in experiment.metrics] == ["dispersion"]
     assert {cell.settings["robots"] for cell in experiment.cells} == {4} and experiment.time_s == 3.0
+    assert {(cell.start.kind, cell.start.cover, cell.start.gap_m) for cell in experiment.cells} == {
+        ("uniform", 0.02, 0.0)
+    }
     worlds = {cell.varied["world"]: cell.settings for cell in experiment.cells}
     assert worlds["friction"]["errors.friction"] == 0.3 and worlds["nominal"]["errors.friction"] == 0.0
     assert worlds["bad radio"]["wifi"] == "bad" and worlds["late poses"]["delay_s"] == 0.2
