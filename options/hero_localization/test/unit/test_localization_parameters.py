@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from hero_localization.calibration.lens_calibration import MIN_VIEWS
 from hero_localization.filter import pose_filter, pose_sources, source_clocks, swarm_localizer
 from hero_localization.nodes import localize, map_arena, track
 from hero_localization.prints.print_tags import ROBOT_DIAMETER_MM
@@ -27,7 +26,6 @@ def test_the_readme_has_the_list_of_a_program(program):
         "Poses stamped %g s ahead of the clock are not used" % swarm_localizer.AHEAD_S,
         "%g ms or more are corrected, and named after %g s" % (1e3 * source_clocks.NAMED_S, source_clocks.CONFIRMED_S),
         "with the tags found, at most %g Hz" % (1.0 / track.PICTURE_PERIOD_S),
-        "this many images (at least %d)" % MIN_VIEWS,
         "Discs of %g mm" % ROBOT_DIAMETER_MM,
     ],
 )
