@@ -9,6 +9,8 @@ def test_a_bucket_gives_its_burst_and_then_its_rate():
     assert not bucket.take(1.0, 0.4)
     assert bucket.take(1.0, 0.5) and not bucket.take(1.0, 0.5)
     assert bucket.count(100.0) == 3.0
+    assert bucket.take(1.0, 100.0) and bucket.count(100.0) == 2.0, "what is beyond the burst is lost"
+    assert bucket.count(100.25) == 2.5
 
 
 def test_names_have_a_bucket_each():
