@@ -15,6 +15,9 @@ MAX_FUTURE_NS = NS_PER_S // 20
 MAX_AGE_NS = 5 * NS_PER_S
 """Stamps further in the future, or in the past, are of a clock that was not set: their corrections are counted."""
 
+LEAD_NS = 2 * 10**6
+"""Stamps up to this far in the future stay as they are: messages take unlike times."""
+
 STEP_NS = 1000
 """Distance of a stamp from the one before it while the robot's clock has gone back: 1 us keeps them distinct."""
 
@@ -35,6 +38,7 @@ class StampFilter:
     def __init__(self) -> None:
         self.last_ns: Dict[Topic, int] = {}
         self.corrected = 0
+        self._ahead_ns = self._replacement_ns = 0
         self._seqs: DefaultDict[str, Iterator[int]] = collections.defaultdict(itertools.count)
 
     def count(self, topic: str) -> int:
@@ -44,10 +48,15 @@ class StampFilter:
     def correct(self, topic: Topic, stamp_ns: int, arrival_ns: int) -> int:
         """Return the stamp (ns) to publish on topic for a message stamped stamp_ns that came at arrival_ns."""
         last_ns = self.last_ns.get(topic)
-        result_ns = min(stamp_ns, arrival_ns)
+        result_ns = stamp_ns
         if not -MAX_AGE_NS <= stamp_ns - arrival_ns <= MAX_FUTURE_NS:
             result_ns = arrival_ns
             self.corrected += 1
+        elif stamp_ns == self._ahead_ns:
+            result_ns = self._replacement_ns  # odometry and transforms of a reading stay together in two reads, too
+        elif stamp_ns > arrival_ns + LEAD_NS:
+            self._ahead_ns, self._replacement_ns = stamp_ns, arrival_ns
+            result_ns = arrival_ns
         if last_ns is not None and result_ns <= last_ns:
             if last_ns - arrival_ns > MAX_FUTURE_NS + STEP_SLACK_NS:
                 # No stamp that was let through lies this far ahead of its arrival: ROS time itself went back
