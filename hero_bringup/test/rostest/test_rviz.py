@@ -57,6 +57,21 @@ class RvizTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.screen = VirtualScreen(1400, 1000)
+        cls.start_rviz()
+        if cls.launch.poll() is not None:
+            cls.start_rviz()
+        cls.watch = SwarmWatch(LIGHTS)
+        cls.watch.wait_until_complete(TIMEOUT_S)
+        cls.lights = {
+            robot_id: rospy.Publisher("/hero_%d/led" % robot_id, ColorRGBA, queue_size=1) for robot_id in LIGHTS
+        }
+
+    @classmethod
+    def start_rviz(cls):
+        """Start all, and wait until RViz shows the arena, or has died.
+
+        RViz 1.14.19 has damaged its own memory in one of 75 starts, before it opened a window.
+        """
         arena = Path(__file__).with_name("square_arena.yaml")
         cls.launch = subprocess.Popen(
             ["roslaunch", "hero_bringup", "hero_bringup.launch", "host:=127.0.0.1", "port:=21342", "count:=3"]
@@ -64,11 +79,7 @@ class RvizTest(unittest.TestCase):
             env=cls.screen.environment(),
             start_new_session=True,
         )
-        cls.watch = SwarmWatch(LIGHTS)
-        cls.watch.wait_until_complete(TIMEOUT_S)
-        cls.lights = {
-            robot_id: rospy.Publisher("/hero_%d/led" % robot_id, ColorRGBA, queue_size=1) for robot_id in LIGHTS
-        }
+        wait_for(lambda: cls.launch.poll() is not None or find_walls(cls.screen.read(), SIDE_M), "a picture of RViz")
 
     @classmethod
     def tearDownClass(cls):
