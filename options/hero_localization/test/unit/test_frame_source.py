@@ -147,7 +147,7 @@ def test_the_memory_of_an_image_is_kept_for_the_next_one(receivers, monkeypatch)
 @pytest.mark.parametrize(
     ("device", "reason"),
     [
-        ("/dev/video-of-nobody", "is no camera, or not plugged in; ls /dev/video* lists cameras"),
+        ("/dev/video-unplugged", "is no camera, or not plugged in; ls /dev/video* lists cameras"),
         ("/dev/", "is no camera, or not plugged in; ls /dev/video* lists cameras"),
         ("/dev/../{folder}/pipe", "is no camera, or not plugged in; ls /dev/video* lists cameras"),
         ("http://127.0.0.1:1/none", "cannot be opened: no camera, or another program uses it"),
