@@ -7,7 +7,7 @@ from typing import Callable, List, Tuple
 import numpy as np
 
 from .errors import OptionError
-from .faults import FaultInjector, parse_fault
+from .faults import FaultInjector
 from .link.tcp_link import TcpLink
 from .population import build_radios, build_world, draw_seeds, draw_servo_timing
 from .robot.firmware import Firmware
@@ -70,8 +70,8 @@ def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simula
         swarm = build_swarm(options, link.own_addresses, report)
         simulator = Simulator(swarm, link, build_radios(options), report, options.speed)
         injector = FaultInjector(simulator, report)
-        for text in options.fault:
-            injector.add(parse_fault(text))
+        for fault in options.fault:
+            injector.add(fault)
     except OptionError:
         link.close_all()
         raise

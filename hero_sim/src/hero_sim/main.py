@@ -6,10 +6,11 @@ import signal
 from typing import Callable, Iterator, Optional, Sequence, Tuple
 
 from hero_node import WRONG_ARGUMENTS, call
+from hero_node.parameters import within
 
 from .build import build_simulator
 from .errors import OptionError
-from .faults import MAX_DURATION_S, FaultInjector, parse_fault
+from .faults import FaultInjector, parse_fault
 from .population import SERVO_TIMINGS, add_options, build_errors, check_population
 from .robot.servo_pins import CORE_2
 from .simulator import Simulator
@@ -27,7 +28,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_options(parser)
     add = parser.add_argument
     add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
-    add("--speed", type=float, default=1.0, metavar="X", help="simulated seconds per second (%(default)s)")
+    add("--speed", type=within(0.01, 100.0), default=1.0, metavar="X", help="simulated seconds per second (1)")
     add("--quiet", action="store_true", help="print nothing but errors")
     _add_link_options(parser.add_argument_group("network"))
     _add_robot_options(parser.add_argument_group("robots"))
@@ -37,9 +38,10 @@ def build_parser() -> argparse.ArgumentParser:
 def _add_link_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
     add("--host", default="127.0.0.1", help="host of the driver (%(default)s)")
-    add("--port", type=int, default=DEFAULT_PORT, help="port of the driver (%(default)s)")
+    add("--port", type=within(1, 65535, int), default=DEFAULT_PORT, help="port of the driver (%(default)s)")
     add(
         "--fault",
+        type=parse_fault,
         action="append",
         default=[],
         metavar="KIND[@S][:key=value]",
@@ -84,27 +86,14 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
     )
 
 
-def check_options(options: argparse.Namespace) -> None:
-    """Raise OptionError for a value that cannot be used."""
-    check_population(options)
-    if not 1 <= options.port <= 65535:
-        raise OptionError("--port %d: must be 1..65535" % options.port)
-    if options.seconds is not None and not 0 < options.seconds <= MAX_DURATION_S:
-        raise OptionError(f"--seconds {options.seconds:g}: must be more than 0, and at most {MAX_DURATION_S:g}")
-    if not 0.01 <= options.speed <= 100:
-        raise OptionError(f"--speed {options.speed:g}: must be 0.01..100")
-    for text in options.fault:
-        parse_fault(text)
-
-
 def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Return the options of a run; wrong ones, and those that ask for a text instead, end the program.
 
     Raises: OptionError for an error of a robot that cannot be set.
     """
-    options = parser.parse_args(arguments)
     try:
-        check_options(options)
+        options = parser.parse_args(arguments)
+        check_population(options)
     except OptionError as error:
         parser.exit(WRONG_ARGUMENTS, f"hero_sim: {error}\n")
     if options.print_errors:

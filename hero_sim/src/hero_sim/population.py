@@ -10,7 +10,10 @@ from typing import Any, Dict, List, Optional, Sequence
 
 import numpy as np
 
+from hero_node.parameters import within
+
 from .errors import OptionError
+from .faults import MAX_DURATION_S
 from .link.wifi import PROFILES, Radio, build_network, parse_wifi
 from .robot.models import build_body, parse_models
 from .robot.servo_pins import CORE_2, CORE_3
@@ -55,7 +58,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="PROFILE[,channels=C]",
         help=f"quality of the network: {', '.join(PROFILES)}; robots of a channel share its airtime (ideal; 1 channel)",
     )
-    add("--seconds", type=float, metavar="S", help="end after S simulated seconds")
+    add("--seconds", type=within(0.001, MAX_DURATION_S), metavar="S", help="end after S simulated seconds")
     add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
     add(
         "--model",

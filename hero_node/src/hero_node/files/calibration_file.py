@@ -1,12 +1,10 @@
 """Files of `calibrate`, hero_N.yaml: their schema, and a folder of them, of which a damaged one harms no other."""
 
-import math
 import os
 import re
 from typing import Any, Dict, List, NamedTuple, Tuple
 
 from ..errors import HeroError
-from ..parameters.number_checks import is_number
 from ..texts import make_printable, shorten
 from .marked_yaml import Entry, EntryError, load_entries
 
@@ -32,7 +30,7 @@ class Numbers(NamedTuple):
     low: float
     high: float
     meaning: str
-    may_be_unknown: bool = False  # a number may be .nan
+    may_be_nan: bool = False  # a number that is not known
 
 
 SETTINGS = {
@@ -45,9 +43,9 @@ SETTINGS = {
 RESULTS = {
     "wheels_m": Numbers(3, 0.01, 1.0, "diameters of the left and the right wheel, distance between them"),
     "dead_zones_us": Numbers(4, 0.0, 3000.0, "edges of the left wheel, then of the right"),
-    "velocity_errors": Numbers(2, 0.0, 100.0, "before, after", may_be_unknown=True),
-    "range_errors_before_m": Numbers(8, -10.0, 10.0, "by index of proximity", may_be_unknown=True),
-    "range_errors_after_m": Numbers(8, -10.0, 10.0, "by index of proximity", may_be_unknown=True),
+    "velocity_errors": Numbers(2, 0.0, 100.0, "before, after", may_be_nan=True),
+    "range_errors_before_m": Numbers(8, -10.0, 10.0, "by index of proximity", may_be_nan=True),
+    "range_errors_after_m": Numbers(8, -10.0, 10.0, "by index of proximity", may_be_nan=True),
 }
 """Results that programs use, or that the user may want to look up."""
 
@@ -134,7 +132,8 @@ def _read_values(content: Dict[str, Entry]) -> Tuple[Dict[str, List[float]], Dic
     others: Dict[str, Any] = {}
     for key, entry in content.items():
         if key in NUMBERS:
-            values[key] = _read_numbers(entry, NUMBERS[key])
+            text = "%d numbers from %g to %g (%s)" % NUMBERS[key][:4]
+            values[key] = entry.numbers(*NUMBERS[key][:3], text, NUMBERS[key].may_be_nan)
         elif key == "model":
             others[key] = "" if entry.value == "" else entry.choice(MODELS)
         elif key == "ticks_per_turn":
@@ -143,15 +142,3 @@ def _read_values(content: Dict[str, Entry]) -> Tuple[Dict[str, List[float]], Dic
             names = ", ".join(("robot", "date", *OTHERS, *NUMBERS))
             raise EntryError(f"{entry.place}: unknown key {shorten(key)}; known are {names}")
     return values, others
-
-
-def _read_numbers(entry: Entry, allowed: Numbers) -> List[float]:
-    text = "%d numbers from %g to %g (%s)" % allowed[:4]
-    if not isinstance(entry.value, list) or len(entry.value) != allowed.length:
-        entry.refuse(text)
-    for item in entry.value:
-        number = item.value
-        is_unknown = allowed.may_be_unknown and isinstance(number, float) and math.isnan(number)
-        if not is_unknown and not is_number(number, allowed.low, allowed.high):
-            item.refuse(text)
-    return [float(item.value) for item in entry.value]

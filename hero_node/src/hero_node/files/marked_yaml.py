@@ -39,12 +39,14 @@ class Entry(NamedTuple):
         shown = kinds.get(type(self.value), self.value)
         raise EntryError(f"{self.place}: {self.name} is {shorten(shown)}, but must be {text}")
 
-    def number(self, low: float, high: float, unit: str) -> float:
-        """Return a number in low..high; YAML takes some, such as 1e3, for texts."""
+    def number(self, low: float, high: float, unit: str, may_be_nan: bool = False) -> float:
+        """Return a number in low..high, or nan where it may be that; YAML takes some, such as 1e3, for texts."""
         value = self.value
         if isinstance(value, str):
             with suppress(ValueError):
                 value = float(value)
+        if may_be_nan and value != value:
+            return math.nan
         if not is_number(value) or not low <= value <= high:
             limits = f" from {low:g} to {high:g}" if math.isfinite(high - low) else ""
             self.refuse(f"a number{limits}{' ' + unit if unit else ''}")
@@ -75,11 +77,11 @@ class Entry(NamedTuple):
             self.refuse("a list such as [a, b], not an empty one")
         return list(self.value)
 
-    def numbers(self, count: int, low: float, high: float, what: str) -> List[float]:
-        """Return the numbers in low..high of a list of count, which what describes."""
+    def numbers(self, count: int, low: float, high: float, what: str, may_be_nan: bool = False) -> List[float]:
+        """Return the numbers of a list of count, which what describes, each as number() does."""
         if not isinstance(self.value, list) or len(self.value) != count:
             self.refuse(what)
-        return [item.number(low, high, "") for item in self.value]
+        return [item.number(low, high, "", may_be_nan) for item in self.value]
 
     def plain(self) -> Any:
         """Return the value without marks."""

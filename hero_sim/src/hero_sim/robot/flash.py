@@ -7,8 +7,7 @@ import json
 import os
 from typing import Optional, Sequence
 
-from hero_node.files import read_file, write_file
-from hero_node.parameters import is_number
+from hero_node.files import EntryError, load_entries, write_file
 
 from ..errors import CommandError, OptionError
 from ..robot_constants import MAX_PARAMETER
@@ -17,8 +16,6 @@ _LENGTHS = {"ir_calibration_counts_m2": 8, "motor_centers_us": 2, "velocity_pid"
 
 _ERASED_PID = [-1.0] * 6
 """The firmware then uses the gains of the program."""
-
-_REMEDY = "delete it to start over"
 
 
 class Flash:
@@ -53,26 +50,16 @@ class Flash:
             raise OptionError(f"--flash-dir {folder} cannot be made: {error.strerror}; choose another") from error
         if not os.access(folder, os.W_OK):
             raise OptionError(f"--flash-dir {folder} is not writable; choose another")
-        try:
-            content = json.loads(read_file(path))
-        except FileNotFoundError:
+        if not os.path.exists(path):
             return
-        except (OSError, RecursionError, ValueError) as error:
-            reason = error.strerror if isinstance(error, OSError) else error
-            raise OptionError(f"flash file {path} cannot be read: {reason}; {_REMEDY}") from error
-        for key, length in _LENGTHS.items():
-            values = content.get(key) if isinstance(content, dict) else None
-            may_be_erased = key == "ir_calibration_counts_m2"  # then it is NaN
-            if (
-                not isinstance(values, list)
-                or len(values) != length
-                or not all(
-                    is_number(value, -MAX_PARAMETER, MAX_PARAMETER) or (may_be_erased and value != value)
-                    for value in values
-                )
-            ):
-                raise OptionError("flash file %s: %s must be a list of %d numbers; %s" % (path, key, length, _REMEDY))
-            setattr(self, key, [float(value) for value in values])
+        try:
+            content = load_entries(path, "motor_centers_us: [1500, 1500]").mapping(None, tuple(_LENGTHS))
+            for key, length in _LENGTHS.items():
+                what, may_be_nan = "a list of %d numbers" % length, key == "ir_calibration_counts_m2"
+                numbers = content[key].numbers(length, -MAX_PARAMETER, MAX_PARAMETER, what, may_be_nan)
+                setattr(self, key, numbers)
+        except EntryError as error:
+            raise OptionError(f"flash file {error}; delete it to start over") from error
 
     def save(self) -> None:
         """Write the file, whole or not at all.
