@@ -429,20 +429,27 @@ def test_the_handler_and_every_other_link_are_polled_though_each_fails(still_loo
 
 
 @pytest.mark.parametrize("error", [None, RuntimeError, MemoryError, SystemExit, KeyboardInterrupt])
-def test_whatever_ends_the_loop_robots_stop_before_connections_close(monkeypatch, error):
+@pytest.mark.parametrize("stop_error", [None, ArithmeticError])
+def test_whatever_ends_the_loop_robots_stop_before_connections_close(monkeypatch, error, stop_error):
     handler, steps = Handler(), []
     loop = EventLoop("127.0.0.1", 0, 1.0)
     loop.open(handler)
-    handler.stop_at_end = lambda: steps.append("stop")
     close_all = loop._close_all
+
+    def stop():
+        steps.append("stop")
+        if stop_error is not None:
+            raise stop_error
 
     def break_down():
         loop._end()
         if error is not None:
             raise error
 
+    handler.stop_at_end = stop
     monkeypatch.setattr(loop, "_run_once", break_down)
     monkeypatch.setattr(loop, "_close_all", lambda: (steps.append("close"), close_all()))
-    with pytest.raises(error) if error else contextlib.nullcontext():
+    raised = stop_error or error
+    with pytest.raises(raised) if raised else contextlib.nullcontext():
         loop.run()
     assert steps == ["stop", "close"]

@@ -46,3 +46,15 @@ def test_every_duplicate_may_try_again_when_the_robot_left_for_good(driver):
     others = [driver.join("10.42.0.%d" % number) for number in (18, 19)]
     first.close("closed by the robot")
     assert [other.reason for other in others] == ["the robot with the same id left; this one may try again"] * 2
+
+
+def test_a_robot_whose_connection_goes_for_another_is_stopped_before(monkeypatch):
+    driver = Driver(monkeypatch, max_connections=3)
+    first, second = [driver.join(port=port, number=port, declarations=STOCK_DECLARATIONS) for port in (2, 7)]
+    for link in (first, second):
+        close = link.close
+        link.close = lambda reason, link=link, close=close: (setattr(link, "sent_before", link.sent), close(reason))
+    driver.join("10.42.0.19", number=9)
+    sent = second.sent
+    assert not driver.connect(OTHER_HOST).refusal and second.closed and not first.closed
+    assert len(second.sent_before) > len(sent), "the newest of the address with the most"

@@ -8,7 +8,14 @@ import threading
 import pytest
 
 from hero_node.ros import handshakes
-from hero_node.ros.handshakes import HANDSHAKE, HEADER_LENGTH_MAX, LAST_HANDSHAKE, THREAD_TRIES, HandshakeReader
+from hero_node.ros.handshakes import (
+    HANDSHAKE,
+    HEADER_LENGTH_MAX,
+    LAST_HANDSHAKE,
+    THREAD_TRIES,
+    ConnectionLimit,
+    HandshakeReader,
+)
 
 DEADLINE_S = 60.0
 HEADER = struct.pack("<I", 9) + b"some text"
@@ -148,6 +155,15 @@ def test_one_too_many_closes_the_oldest_of_the_address_with_the_most(server):
     assert addresses == {client.getsockname() for client in (other, many[1], many[2], newest)}
 
 
+def test_one_that_is_closed_already_makes_room_for_the_next():
+    limit, socks = ConnectionLimit(2), [socket.socket() for _ in range(3)]
+    for sock in socks:  # none is connected, so that none can be shut down
+        limit.add(sock, ("127.0.0.1", 1))
+        sock.close()
+    assert [limit.remove(sock) for sock in socks] == [False, True, True]
+    assert [limit.remove(sock) for sock in socks] == [False] * 3
+
+
 @pytest.mark.parametrize("lacking", [3, THREAD_TRIES + 1])
 def test_a_program_without_a_thread_is_kept_for_2_s_then_refused(lacking, monkeypatch):
     served, names, slept_s = queue.Queue(), [], []
@@ -162,6 +178,7 @@ def test_a_program_without_a_thread_is_kept_for_2_s_then_refused(lacking, monkey
     monkeypatch.setattr(threading.Thread, "start", lack)
     monkeypatch.setattr(handshakes.time, "sleep", slept_s.append)
     ours, theirs = socket.socketpair()
+    theirs.settimeout(DEADLINE_S)
     theirs.sendall(HEADER)
     HandshakeReader(lambda *connection: served.put(connection)).add(ours, ("127.0.0.1", 1))
     if lacking == 3:

@@ -1,10 +1,13 @@
 """Robots in real time: the pace of the clock, pauses of the machine, and what is told of connections."""
 
+import inspect
+
 import pytest
 from driver_side import parse_options
 
 from hero_sim import simulator as simulators
 from hero_sim.build import build_simulator
+from hero_sim.link.tcp_link import TcpLink
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 from hero_sim.simulator import _FLAPPING_MS, _LATE_S, _MAX_WAIT_S, _MIN_WAIT_S
 
@@ -18,7 +21,13 @@ class Link:
         self.calls, self.waits_s, self.open, self.connecting = [], [], 0, set()
 
     def __getattr__(self, name):
-        return lambda *arguments: self.calls.append((name, *arguments))
+        signature = inspect.signature(getattr(TcpLink, name))
+
+        def note(*arguments):
+            signature.bind(self, *arguments)
+            self.calls.append((name, *arguments))
+
+        return note
 
     def poll(self, timeout_s):
         self.waits_s.append(timeout_s)
@@ -208,3 +217,44 @@ def test_a_robot_blocked_by_its_channel_and_its_link_waits_for_both(bench):
             assert resumed == [], "the link blocks it"
             simulator.writing_resumed(0)
         assert resumed.pop() == simulator.swarm.now_ms
+
+
+ENDS = {
+    "power cut": lambda simulator: simulator.switch_off(1),
+    "reboot": lambda simulator: simulator.reboot(1),
+    "leaves": lambda simulator: simulator.leave(1, 100),
+    "closed by the driver": lambda simulator: simulator.connection_lost(1, "the driver closed"),
+}
+
+
+@pytest.mark.parametrize("end", ENDS.values(), ids=ENDS)
+def test_what_is_on_its_way_ends_with_the_connection_of_this_robot(bench, end):
+    simulator, lines, link, _ = bench("--count", "2", "--first-id", "4", "--wifi", "router")
+    taken = {index: [] for index in range(2)}
+    for index, robot in enumerate(simulator.swarm.robots):
+        robot.switch_on(simulator.swarm.now_ms)
+        robot.receive_bytes = lambda now_ms, data, index=index: taken[index].append(data)
+        simulator.connection_made(index)
+        simulator.receive_bytes(index, b"down")
+        simulator._send_up(index, [b"up"])
+    link.calls.clear()
+    end(simulator)
+    for _ in range(60000):
+        simulator.swarm.now_ms += 1
+        simulator._carry(simulator.swarm.now_ms)
+    assert taken == {0: [b"down"], 1: []}
+    assert [one for one in link.calls if one[0] == "send"] == [("send", 0, b"up")]
+    simulator.connection_made(1)
+    assert lines.count("hero_5 connected") == 2 and lines.count("hero_4 connected") == 1
+
+
+def test_a_connection_that_is_made_without_power_reaches_no_robot(bench):
+    simulator, _, _, _ = bench("--count", "2")
+    made = []
+    for robot in simulator.swarm.robots:
+        robot.switch_on(simulator.swarm.now_ms)
+        robot.connection_made = lambda now_ms, robot=robot: made.append(robot.name)
+    simulator.switch_off(0)
+    for index in range(2):
+        simulator.connection_made(index)
+    assert made == ["hero_1"]

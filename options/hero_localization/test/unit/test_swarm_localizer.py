@@ -89,7 +89,7 @@ def test_robots_of_a_moved_camera_are_lost_without_a_line():
     swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})
     swarm.localizer.distrust(swarm.now_s + 0.03, [0], swarm.now_s)
     assert swarm[0].state is RobotState.TRACKED, "another camera sees it"
-    swarm.localizer.distrust(swarm.now_s + 0.2, [0, 7], swarm.now_s)
+    swarm.localizer.distrust(swarm.now_s + 0.2, [7, 0], swarm.now_s)
     assert swarm[0].state is RobotState.LOST and "calibrate_camera arena" in swarm[0].problem
     for _ in range(6):
         swarm.run(0.5)

@@ -7,15 +7,19 @@ from unittest import mock
 
 import pytest
 import tornado.httputil
+import tornado.ioloop
 import tornado.web
 
 from hero_monitor.control import guard
 from hero_monitor.control.dead_man import DeadMan
+from hero_monitor.control.drive_requests import DriveRequests
+from hero_monitor.control.programs import Programs
+from hero_monitor.fleet_feed.feed import FleetFeed
 from hero_monitor.page_requests import INERT_S
-from hero_monitor.program import Monitor
+from hero_monitor.program import END_CHECK_PERIOD_S, Monitor
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
 from hero_monitor.serving.client_limits import ClientLimits
-from hero_monitor.serving.server import COOKIE, PAGES_MAX, BaseHandler, Server
+from hero_monitor.serving.server import COOKIE, PAGES_MAX, BaseHandler, MonotonicLoop, Server
 
 DOCS = Path(__file__).resolve().parents[4] / "docs"
 README = Path(__file__).resolve().parents[2] / "README.md"
@@ -104,13 +108,53 @@ def test_an_address_has_the_documented_number_of_wrong_tokens():
     assert tokens.take("10.0.0.2", 1.0, 100.1 + period_s)
 
 
-def test_programs_end_the_documented_time_after_the_last_page():
-    (linger_s,) = find_limits(MONITOR, r"after (\d+) s without an open page")
+@pytest.fixture(name="monitor")
+def make_monitor():
     monitor = Monitor.__new__(Monitor)  # without a server and a ROS node
     monitor._server, monitor._resting = SimpleNamespace(pages=["another"]), None
-    monitor._commander, monitor._loop = mock.Mock(), mock.Mock()
+    monitor._commander = mock.create_autospec(DriveRequests, instance=True, dead_man=mock.create_autospec(DeadMan))
+    monitor._loop = mock.create_autospec(MonotonicLoop, instance=True)
+    monitor._programs = mock.create_autospec(Programs, instance=True)
+    monitor._feed = mock.create_autospec(FleetFeed, instance=True)
+    calls = [mock.create_autospec(tornado.ioloop.PeriodicCallback, instance=True) for _ in range(2)]
+    monitor._repeated = calls
+    return monitor
+
+
+def test_programs_end_the_documented_time_after_the_last_page(monitor):
+    (linger_s,) = find_limits(MONITOR, r"after (\d+) s without an open page")
     monitor._leave(4)
     assert not monitor._loop.call_later.called
     monitor._server.pages.clear()
     monitor._leave(1)
     monitor._loop.call_later.assert_called_once_with(pytest.approx(linger_s), monitor._rest)
+    monitor._leave(2)
+    monitor._loop.call_later.assert_called_once()
+    assert monitor._commander.dead_man.drop_page.call_args_list == [mock.call(4), mock.call(1), mock.call(2)]
+
+
+def test_a_page_that_comes_back_in_time_keeps_programs_running(monitor):
+    running, resting = monitor._repeated
+    running.is_running.return_value, resting.is_running.return_value = True, False
+    monitor._enter("a page")
+    assert not monitor._loop.remove_timeout.called and not running.start.called and resting.start.called
+    monitor._server.pages.clear()
+    monitor._leave(1)
+    monitor._enter("the page")
+    monitor._loop.remove_timeout.assert_called_once_with(monitor._loop.call_later.return_value)
+    monitor._leave(2)
+    assert monitor._loop.call_later.call_count == 2, "its time begins anew"
+
+
+def test_without_pages_programs_end_and_then_nothing_is_read_any_more(monitor):
+    monitor._resting = "the timer that calls"
+    monitor._programs.end_all.side_effect = [True, True, False]
+    for _ in range(2):
+        monitor._rest()
+        monitor._loop.call_later.assert_called_with(END_CHECK_PERIOD_S, monitor._rest)
+        assert monitor._resting is monitor._loop.call_later.return_value
+    assert not monitor._feed.update_subscriptions.called
+    monitor._rest()
+    assert monitor._loop.call_later.call_count == 2 and monitor._resting is None
+    assert [repeated.stop.call_count for repeated in monitor._repeated] == [1, 1]
+    monitor._feed.update_subscriptions.assert_called_once_with(has_pages=False, picture=False)

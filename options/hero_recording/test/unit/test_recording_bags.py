@@ -11,6 +11,7 @@ from std_msgs.msg import String
 from synthetic_bag import START_S, write_bag
 
 from hero_recording import disk_guard, plot
+from hero_recording.bags import repair
 from hero_recording.bags.bag_set import BagSet
 from hero_recording.bags.repair import repair_bag
 from hero_recording.errors import RecordingError
@@ -134,6 +135,31 @@ def test_a_file_that_cannot_be_repaired_is_left_as_it_is(tmp_path):
     with pytest.raises(RecordingError, match="No such file"):
         repair_bag(str(tmp_path / "missing.bag"))
     assert (tmp_path / "text.bag.active").read_text() == "not a bag\n"
+
+
+def test_a_repair_that_is_broken_off_leaves_the_file_as_it_is(tmp_path, monkeypatch):
+    path = tmp_path / "half.bag"
+    write_bag(path, seconds=1.0)
+    content = path.read_bytes()
+
+    def show(chunks, *_, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(repair, "tqdm", show)
+    with pytest.raises(KeyboardInterrupt):
+        repair_bag(str(path))
+    assert path.read_bytes() == content and [found.name for found in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_repair_takes_the_place_of_no_other_file(tmp_path):
+    for there in ("half.bag", "half.bag.orig"):
+        (tmp_path / "half.bag.active").write_text("cut off")
+        (tmp_path / there).write_text("another recording")
+        with pytest.raises(RecordingError, match=there + " exists already"):
+            repair_bag(str(tmp_path / "half.bag.active"))
+        assert (tmp_path / "half.bag.active").read_text() == "cut off"
+        assert (tmp_path / there).read_text() == "another recording"
+        (tmp_path / there).unlink()
 
 
 CHUNK_MARK = b"\4\0\0\0op=\5"

@@ -23,7 +23,7 @@ from hero_recording.errors import RecordingError
 from hero_recording.plots import analysis
 from hero_recording.plots.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, SAME_TIME_S
 from hero_recording.plots.observations import MAX_VALUE, Observations, Origin, RobotObservations
-from hero_recording.record import CHECK_PERIOD_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
+from hero_recording.record import CHECK_PERIOD_S, CLOSING_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
 from hero_recording.step_recorder import StepRecorder
 from hero_sim.stepped import LATCHED, StepSwarm
 
@@ -199,11 +199,23 @@ def make_recording(monkeypatch, tmp_path):
     monkeypatch.setattr(record.roslib.packages, "find_node", lambda package, name: ["/opt/record"])
     made.reason = None
     monkeypatch.setattr(record, "find_reason_to_stop", lambda folder, limit_mb: made.reason)
-    monkeypatch.setattr(record, "repair_bag", lambda path: "repaired " + path)
-    monkeypatch.setattr(record, "end_process", lambda process, patience_s: made.code)
     poll = SimpleNamespace(poll=lambda: None if made.now_s < 100.0 + made.ends_s else 1)
+    made.is_writing = False
+
+    def repair(path):
+        assert not made.is_writing, "its recorder still writes to it"
+        return "repaired " + path
+
+    def end(process, patience_s):
+        assert process is poll and patience_s == CLOSING_S
+        made.is_writing = False
+        return made.code
+
+    monkeypatch.setattr(record, "repair_bag", repair)
+    monkeypatch.setattr(record, "end_process", end)
 
     def start(command, **options):
+        made.is_writing = True
         made.commands.append(command)
         made.logging = Path(options["env"]["ROSCONSOLE_CONFIG_FILE"]).read_text()
         return poll
@@ -270,6 +282,14 @@ def test_a_file_that_cannot_be_repaired_keeps_no_other_from_it(recording, monkey
     recording.reasons[0.5], recording.ends_s = write, 1.0
     assert recording.run() == 1
     assert recording.errors[0] == "nothing can be read" and "repaired %s" % paths[1] in recording.said
+
+
+def test_whatever_breaks_the_watch_ends_the_recorder(recording, monkeypatch):
+    active = recording.folder / "hero_2026_1.bag.active"
+    recording.reasons = {0.5: lambda: active.write_bytes(bytes(2 * EMPTY_BAG_BYTES)), 1.0: lambda: 1 / 0}
+    with pytest.raises(ZeroDivisionError):
+        recording.run()
+    assert not recording.is_writing and recording.said[-1] == "repaired %s" % active
 
 
 def test_silence_and_a_recorder_that_fails_are_told(recording):

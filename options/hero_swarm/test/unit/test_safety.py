@@ -121,6 +121,16 @@ def test_speeds_beyond_the_limits_count_as_the_fastest_of_their_curve():
     assert linear_m_s[0, 2] == angular_rad_s[0, 2] == 0.0
 
 
+def test_the_outer_wheel_of_each_model_keeps_within_its_limit():
+    models = [MODELS["hero"], MODELS["hero_plus"]]
+    safe = SafetyFilter(ROBOTS)
+    safe.set_models(models)
+    linear_m_s, angular_rad_s = safe(np.array([[(0.0, 0.0, 0.0), (9.0, 0.0, 0.0)]]), np.full(2, 0.2), np.full(2, 4.0))
+    arms_m = np.array([model.wheel_separation_m for model in models]) / 2.0
+    assert linear_m_s[0] + angular_rad_s[0] * arms_m == pytest.approx(np.full(2, MAX_WHEEL_M_S))
+    assert linear_m_s[0, 0] != linear_m_s[0, 1] and safe.radii_m == [model.body_radius_m for model in models]
+
+
 class LeaveTogether(Behavior):
     """All robots drive to one place outside of the fence as fast as they can, or back away to there, turning on."""
 

@@ -69,3 +69,7 @@ class ScriptedNmcli:
         file = self.folder / "calls.jsonl"
         lines = file.read_text().splitlines() if file.is_file() else []
         return [Call(**json.loads(line)) for line in lines]
+
+    def list_changes(self):
+        """Return the arguments of the calls so far that are no questions."""
+        return [call.arguments for call in self.read_calls() if "-f" not in call.arguments]

@@ -1,6 +1,8 @@
 """The program fleet in virtual time: how long it waits and shows, what keys do, and how it ends."""
 
 import argparse
+import contextlib
+import io
 import json
 from types import SimpleNamespace
 
@@ -14,11 +16,14 @@ from hero_tools import fleet as module
 from hero_tools.fleet import (
     DRAW_PERIOD_S,
     DRIVER_TIMEOUT_S,
+    ENTER_SCREEN,
+    LEAVE_SCREEN,
     LISTEN_MAX_S,
     LISTEN_S,
     PRINT_PERIOD_S,
     FleetProgram,
     RobotRow,
+    take_screen,
 )
 from hero_tools.fleet_rows import MOVED_M, MOVED_RAD, find_missing
 from hero_tools.fleet_table import format_cells, format_nearest, make_row_dict
@@ -215,3 +220,35 @@ def test_cells_have_units_and_the_table_its_words():
         1.234,
         None,
     )
+
+
+class Terminal(io.StringIO):
+    """An output, which may be closed meanwhile."""
+
+    is_closed = False
+
+    def write(self, text):
+        if self.is_closed:
+            raise OSError("Input/output error")
+        return super().write(text)
+
+
+@pytest.mark.parametrize("is_closed", [False, True])
+@pytest.mark.parametrize("error", [None, KeyboardInterrupt, ArithmeticError])
+def test_the_terminal_gets_its_screen_and_keys_back_whatever_happens(monkeypatch, error, is_closed):
+    terminal, steps = Terminal(), []
+
+    @contextlib.contextmanager
+    def read_keys():
+        try:
+            yield
+        finally:
+            steps.append("keys are given back")
+
+    monkeypatch.setattr(module.sys, "stdout", terminal)
+    with pytest.raises(error) if error else contextlib.nullcontext(), take_screen(read_keys()):
+        terminal.is_closed = is_closed
+        if error:
+            raise error
+    assert terminal.getvalue() == ENTER_SCREEN + ("" if is_closed else LEAVE_SCREEN)
+    assert steps == ["keys are given back"]

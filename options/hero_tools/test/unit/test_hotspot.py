@@ -73,19 +73,22 @@ def test_the_password_is_on_no_command_line_nor_in_output_or_history(nmcli, monk
     ],
 )
 def test_a_password_that_wpa2_does_not_take_is_refused_and_not_repeated(nmcli, monkeypatch, capsys, password, says):
+    nmcli.answer("-f NAME connection show", 0, "hero_hotspot\n")
     code, _, errors = run(monkeypatch, capsys, "create", "--password-stdin", typed=password + "\n")
     assert code == 1
     assert says in errors
     assert password not in errors
-    assert not [call for call in nmcli.read_calls() if "add" in call.arguments]
+    assert not nmcli.list_changes(), "the hotspot that there is stays"
 
 
 def test_a_password_that_is_repeated_wrongly_is_refused(nmcli, monkeypatch, capsys):
+    nmcli.answer("-f NAME connection show", 0, "hero_hotspot\n")
     for repeated, wanted in ((PASSWORD, 0), ("another password", 1)):
         typed = iter([PASSWORD, repeated])
         monkeypatch.setattr(hotspot.getpass, "getpass", lambda prompt, typed=typed: next(typed))
         code, _, errors = run(monkeypatch, capsys, "create", "--yes", typed=None)
         assert code == wanted and ("differ" in errors) == bool(wanted)
+        assert [change[1] for change in nmcli.list_changes()] == ["delete", "add", "edit", "30"]
 
 
 def test_without_a_command_the_commands_are_named(nmcli, monkeypatch, capsys):
@@ -94,9 +97,10 @@ def test_without_a_command_the_commands_are_named(nmcli, monkeypatch, capsys):
 
 
 def test_without_a_terminal_the_password_is_not_guessed(nmcli, monkeypatch, capsys):
+    nmcli.answer("-f NAME connection show", 0, "hero_hotspot\n")
     code, _, errors = run(monkeypatch, capsys, "create")
     assert code == 1
-    assert "--password-stdin" in errors
+    assert "--password-stdin" in errors and not nmcli.list_changes()
 
 
 def test_unconfigured_robots_get_the_network_that_they_look_for(nmcli, monkeypatch, capsys):
