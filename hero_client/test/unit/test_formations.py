@@ -73,7 +73,7 @@ def test_a_formation_has_its_spacing_and_its_center(shape):
         ({"shape": "star"}, "shape is 'star'"),
         ({"spacing": 1}, "formation: unknown 'spacing'; allowed are: shape, center"),
         ({"spacing_m": 0.1}, "make spacing_m larger"),
-        ({"center": [1]}, r"center is 'a list', but must be \[x, y\]"),
+        ({"center": [1]}, r"center is a list, but must be \[x, y\]"),
         ({"turn_deg": True}, "turn_deg is True"),
         ({"shape": "grid", "columns": 0}, "columns is 0"),
         ({"shape": "points", "points": [[0, 0]]}, "at least 3 places"),

@@ -62,7 +62,7 @@ def test_a_file_is_read_with_all_its_parts(tmp_path):
     "text, words",
     [
         ("walls_m:\n  - [[0, 0], [1, b]]\n", ", line 2: walls_m is 'b', but must be a number from -1000 to 1000"),
-        ("walls_m:\n  - [[0, 0]]\n", "line 2: walls_m is 'a list', but must be a list of at least 2 points"),
+        ("walls_m:\n  - [[0, 0]]\n", "line 2: walls_m is a list, but must be a list of at least 2 points"),
         ("walls_m:\n  - [[0, 0], [1, 1, 1]]\n", "a list of 2 numbers: x and y"),
         ("walls_m:\n  - [0, 0, 1, 1]\n", "a list of 2 numbers: x and y"),
         ("walls_m: 3\n", "walls_m is '3', but must be a list"),

@@ -112,7 +112,7 @@ def test_a_directory_in_place_of_a_flash_file_is_named(tmp_path):
         ("[" * 20000, "more than 20 levels"),
         ("[]", "must hold names and values"),
         ("{}", "ir_calibration_counts_m2 is missing"),
-        (write_flash(ir_calibration_counts_m2=[1, 2]), "is 'a list', but must be a list of 8 numbers"),
+        (write_flash(ir_calibration_counts_m2=[1, 2]), "is a list, but must be a list of 8 numbers"),
         (write_flash(ir_calibration_counts_m2=["x"] * 8), "ir_calibration_counts_m2 is 'x', but must be a number"),
         (write_flash(ir_calibration_counts_m2=[math.inf] * 8), "is 'Infinity', but must be a number"),
         (write_flash(motor_centers_us=[10**400, 1500]), "motor_centers_us is 1000"),

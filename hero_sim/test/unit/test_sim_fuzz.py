@@ -123,9 +123,9 @@ def test_any_flash_file_is_read_or_refused_with_file_and_remedy(path, script):
     [
         ("bounds_m: [0, 0, 1, 1]\nname: \x00\n", "special characters are not allowed"),
         ("name: x\n? [a]\n: 1\n", "a name must be a text"),
-        ("name: x\nbounds_m: [0, 0, 1, [1]]\n", "bounds_m is 'a list', but must be a number"),
+        ("name: x\nbounds_m: [0, 0, 1, [1]]\n", "bounds_m is a list, but must be a number"),
         ("bounds_m: &a [0, 0, 1, *a]\n", "anchors cannot be used"),
-        ("name: [a]\nbounds_m: [0, 0, 1, 1]\n", "name is 'a list', but must be a text"),
+        ("name: [a]\nbounds_m: [0, 0, 1, 1]\n", "name is a list, but must be a text"),
         ('name: "\\e[2J"\nbounds_m: [0, 0, 1, 1]\n', "name is .*but must be one line of text"),
         pytest.param("[" * 2000, "more than 20 levels", id="2,000 brackets"),
     ],

@@ -9,6 +9,7 @@ import glob
 import math
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -165,9 +166,9 @@ def make_command(options: argparse.Namespace, recorder_arguments: Sequence[str])
     """Return the command line of rosbag's recorder. Raises: RecordingError if it is not installed."""
     found = roslib.packages.find_node("rosbag", "record")
     if not found:
-        raise RecordingError(
-            "rosbag's recorder is missing; install it: apt install python3-rosbag, or ros-noetic-rosbag"
-        )
+        raise RecordingError("rosbag's recorder is missing: apt install python3-rosbag, or ros-noetic-rosbag")
+    if not shutil.which("setpriv"):
+        raise RecordingError("setpriv, which stops the recorder at the end, is missing: apt install util-linux")
     # If this program is killed, the recorder closes its files and ends (setpriv(1) of util-linux).
     command = ["setpriv", "--pdeathsig", "INT", found[0]]
     command += ["--quiet", "--regex", "--repeat-latched", "--buffsize", "256", "--tcpnodelay"]

@@ -329,6 +329,15 @@ def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
     assert record.format_size(999_900_000) == "999.9 MB" and record.format_size(1e9) == "1.0 GB"
 
 
+@pytest.mark.parametrize(("missing", "package"), [("find_node", "python3-rosbag"), ("which", "util-linux")])
+def test_a_program_that_a_recording_needs_is_named_with_its_package(recording, monkeypatch, missing, package):
+    owner = {"find_node": record.roslib.packages, "which": record.shutil}[missing]
+    monkeypatch.setattr(owner, missing, lambda *_: None)
+    with pytest.raises(record.RecordingError, match=f"is missing: apt install {package}"):
+        recording.run()
+    assert not recording.commands
+
+
 def test_a_reader_without_ros_names_types_and_times_as_ros_does(monkeypatch):
     def connect(topic, kind, count):
         return SimpleNamespace(topic=topic, msgtype=kind, msgcount=count)

@@ -145,7 +145,7 @@ def test_sensors_of_an_arena_say_that_they_need_one():
     ("old", "new", "words"),
     [
         ("color: 1}", "color: 2}", "line 3: areas.color is '2', but must be a number from 0 to 1"),
-        ("color: [1, 0, 0]", "color: [1, 0]", "line 5: .*color is 'a list', but must be .red, green, blue"),
+        ("color: [1, 0, 0]", "color: [1, 0]", "line 5: .*color is a list, but must be .red, green, blue"),
         ("name: nest, ", "", "line 3: name is missing in areas"),
         ("circle_m: [0.5, 0, 0.3]", "circle_m: [0.5, 0, 0]", "line 4: .*circle whose radius is more than 0"),
         ("[-1, -1, 1, -0.6]", "[1, -1, -1, -0.6]", "line 3: .*each minimum less than its maximum"),

@@ -9,7 +9,8 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
 from hero_client.ros import share_drivers
-from hero_msgs.msg import Encoder, Motor, Robot, RobotPose, RobotPoses
+from hero_client.swarm import ready_ids
+from hero_msgs.msg import Encoder, Motor, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 from hero_node import Pose, one_line, pose_of
 from hero_node.robot_constants import TICKS_PER_TURN
@@ -138,7 +139,7 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Ro
         if not program.sleep(0.05):
             raise CalibrationError("ended before a robot was found")
         report = drivers.read()
-        ready = [robot.id for robot in report.robots if robot.state == Robot.READY and robot.id >= 0] if report else []
+        ready = ready_ids(report) if report else []
         if ready and (drivers.is_settled if robot_ids is None else set(ready).issuperset(robot_ids)):
             break
     if report is None:

@@ -322,7 +322,7 @@ def test_cma_designs_the_numbers_of_a_behavior(path, light, monkeypatch):
         (
             "baseline: dispersion",
             "ranges: {gain: [2, 1]}",
-            "line 5: ranges.gain is .a list., but must be the lower limit",
+            "line 5: ranges.gain is a list, but must be the lower limit",
         ),
     ],
 )

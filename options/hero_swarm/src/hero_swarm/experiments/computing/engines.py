@@ -67,7 +67,7 @@ def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
     if is_address:
         _check_reach([address])
     if not is_address and not os.path.isfile(address):  # Dask would wait for it without end
-        text = "no Dask scheduler file %s: start dask-scheduler --scheduler-file %s"
+        text = "no Dask scheduler file %s (an address is tls://HOST:PORT): start dask-scheduler --scheduler-file %s"
         raise ExperimentError(text % (address, address))
     try:
         client = distributed.Client(
