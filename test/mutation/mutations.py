@@ -124,13 +124,19 @@ def _may_matter_first(first: ast.stmt, second: ast.stmt) -> bool:
     both = (first, second)
     if not all(isinstance(node, (ast.Expr, ast.Assign, ast.AugAssign, ast.Delete)) for node in both):
         return False
-    if any(_name_called(getattr(node, "value", None)) in DRAWING for node in both):
+    if any(_name_called(getattr(node, "value", None)) in DRAWING or _declares_option(node) for node in both):
         return False
     if not any(isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) for node in both):
         return False
     named = {node.id for node in ast.walk(first) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     read = {node.id for node in ast.walk(second) if isinstance(node, ast.Name)}
     return not named & read and not any(_only_says(getattr(node, "value", None)) for node in both)
+
+
+def _declares_option(node: ast.stmt) -> bool:
+    """Return whether a statement adds an option to a parser, under whatever name: --help alone shows their order."""
+    first = node.value.args[:1] if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) else []
+    return any(isinstance(word, ast.Constant) and str(word.value).startswith("--") for word in first)
 
 
 def _to_text(node: ast.AST) -> str:

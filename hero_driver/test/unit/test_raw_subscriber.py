@@ -194,6 +194,9 @@ def test_closing_the_inlet_ends_what_the_loop_reads(bench):
     assert connection.done
     assert not bench.loop._readers
     bench.subscriber.close()
+    before = bench.list_payloads()
+    bench.subscriber.take(connection, b"was under way")
+    assert bench.list_payloads() == before
 
 
 def test_the_end_of_the_loop_lets_the_threads_of_rospy_go(bench):

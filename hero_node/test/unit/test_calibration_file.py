@@ -154,6 +154,16 @@ def test_numbers_at_their_limits_are_taken_and_beyond_them_refused(tmp_path):
                     read_calibration(str(path))
 
 
+def test_ticks_per_turn_are_one_to_a_million_or_none(tmp_path):
+    path = tmp_path / "hero_3.yaml"
+    for text, ticks in (("1", 1.0), ("1000000", 1e6), ("null", None)):
+        path.write_text(f"robot: hero_3\nticks_per_turn: {text}\n")
+        assert read_calibration(str(path)).others == {"ticks_per_turn": ticks}
+    path.write_text("robot: hero_3\nticks_per_turn: 1000000.1\n")
+    with pytest.raises(CalibrationFileError, match="ticks_per_turn is 1000000.1, but must be a number from 1 to 1e"):
+        read_calibration(str(path))
+
+
 def test_a_date_cannot_draw_on_the_terminal(tmp_path):
     (tmp_path / "hero_3.yaml").write_text('robot: hero_3\ndate: "\\e[2J"\n')
     assert read_calibration(str(tmp_path / "hero_3.yaml")).date.isprintable()

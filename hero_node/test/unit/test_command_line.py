@@ -1,5 +1,6 @@
 """A command's end: its output, one line on stderr, its exit status; each in its own process."""
 
+import argparse
 import os
 import subprocess
 import sys
@@ -165,12 +166,19 @@ def test_arguments_that_a_node_does_not_know_end_it(monkeypatch, capsys):
         assert ended.value.code == status
     told = capsys.readouterr()
     assert "usage: rosrun hero_x node [_PARAMETER:=VALUE ...]" in told.out
+    assert told.err.splitlines()[-1] == "node: error: unrecognized arguments: word"
     assert "Parameters and topics: hero_x/README.md" in told.out
     command_line.check_node_arguments("hero_x", "node", None, ["word"])
     monkeypatch.setattr(sys, "argv", ["node", "--help"])
     with pytest.raises(SystemExit):
         command_line.check_node_arguments("hero_x", "node", None, ["word"])
     assert "README" not in capsys.readouterr().out
+
+
+def test_wrong_arguments_have_the_status_of_argparse():
+    with pytest.raises(SystemExit) as ended:
+        argparse.ArgumentParser().parse_args(["word"])
+    assert ended.value.code == command_line.WRONG_ARGUMENTS
 
 
 def test_the_first_argument_names_the_program_of_a_package(monkeypatch):

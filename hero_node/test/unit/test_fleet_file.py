@@ -35,6 +35,22 @@ def test_a_file_tells_of_robots_topics_and_run_time(tmp_path):
     assert ada.text == "Ada, BROKEN, squeaks" and RobotNotes().text == ""
 
 
+def test_an_error_cannot_draw_on_the_terminal():
+    assert str(EntryError("a.yaml, line 1: name is \x1b[2J\ntwo lines")).isprintable()
+
+
+def test_robots_are_known_by_any_number_that_a_robot_can_have(tmp_path):
+    assert list(read_fleet_file(write(tmp_path, "robots: [{id: 0}, {id: 1000000000}]")).robots) == [0, 10**9]
+    with pytest.raises(EntryError, match="id is 1000000001, but must be a whole number from 0 to 1000000000"):
+        read_fleet_file(write(tmp_path, "robots: [{id: 1000000001}]"))
+
+
+def test_a_battery_lasts_up_to_a_thousand_hours(tmp_path):
+    assert [read_fleet_file(write(tmp_path, f"run_time_h: {hours}")).run_time_h for hours in (0, 1000)] == [0.0, 1000.0]
+    with pytest.raises(EntryError, match="run_time_h is 1000.1, but must be a number from 0 to 1000 h"):
+        read_fleet_file(write(tmp_path, "run_time_h: 1000.1"))
+
+
 def test_without_a_file_or_with_an_empty_one_there_are_no_notes(tmp_path, monkeypatch):
     assert read_fleet_file(str(tmp_path / "none.yaml")) == read_fleet_file(write(tmp_path, "")) == FleetFile()
     monkeypatch.setenv("ROS_HOME", str(tmp_path))

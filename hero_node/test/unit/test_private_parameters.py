@@ -24,6 +24,20 @@ def test_what_the_command_line_gave_is_gone_at_the_end(monkeypatch):
     assert server.values == {"launched": 1}
 
 
+@pytest.mark.parametrize("error", [OSError(110, "no answer"), private_parameters.rospy.ROSException("no master")])
+def test_a_master_that_does_not_answer_at_the_end_is_asked_once(monkeypatch, error):
+    asked = []
+
+    def delete(name):
+        asked.append(name)
+        raise error
+
+    monkeypatch.setattr(private_parameters.rospy, "delete_param", delete)
+    monkeypatch.setattr(sys, "argv", ["walk", "_linear:=0.1", "_angular:=2"])
+    private_parameters.delete_own_parameters()
+    assert asked == ["~linear"]
+
+
 @pytest.mark.parametrize(("arguments", "has_remedy"), [([], True), (["_linear:=0.1"], False)])
 def test_a_wrong_parameter_of_an_earlier_start_is_named_with_the_remedy(monkeypatch, arguments, has_remedy):
     Server(monkeypatch, {"linear": 0.1})

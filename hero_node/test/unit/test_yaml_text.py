@@ -16,6 +16,7 @@ from hero_node.texts import shorten
         ("a: 1\n" * MAX_CHARACTERS, "more than 500000 characters"),
         ("a: \x1b[2J", "special characters are not allowed"),
     ],
+    ids=["deep", "cut off", "no date", "long", "control characters"],
 )
 def test_what_is_no_yaml_is_refused_in_one_line(tmp_path, text, words):
     with pytest.raises(YamlError, match=words) as refused:

@@ -191,7 +191,7 @@ def test_of_too_many_abandoned_connections_the_first_ends(driver, monkeypatch):
             later.recv(1)
 
 
-def test_robots_connect_from_addresses_of_their_own():
+def test_robots_connect_from_addresses_of_their_own(monkeypatch):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         link = TcpLink(3, *taken.getsockname(), first_number=248)
@@ -202,6 +202,9 @@ def test_robots_connect_from_addresses_of_their_own():
             link.poll(1.0)
         assert events.seen == ["failed"], "no server listens"
         link._address = ("255.255.255.255", 1)  # not for TCP, so that the system refuses at once
+        made, make = [], socket.socket
+        monkeypatch.setattr(tcp_link.socket, "socket", lambda *given: made.append(make(*given)) or made[-1])
         link.connect(1)
+        assert [sock.fileno() for sock in made] == [-1], "closed"
         assert events.seen == ["failed"] * 2 and not link.is_connecting(1)
         link.close_all()

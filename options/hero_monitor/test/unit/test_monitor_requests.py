@@ -395,9 +395,11 @@ def test_silence_the_end_of_a_page_and_a_stop_of_all_stop_robots(monkeypatch):
         ros.commander.step()
         assert ros.take() == [(TOPIC, 0.0, 0.0)]
         assert ros.commander.drive(2, *MOVE)
-    ros.take()
-    ros.commander.request_stop(True)
-    assert ros.take() == [(TOPIC, 0.0, 0.0)], "at once, not at the next step"
+    for end in (lambda: ros.commander.request_stop(True), ros.commander.close):
+        ros.commander.drive(2, *MOVE)
+        ros.take()
+        end()
+        assert ros.take() == [(TOPIC, 0.0, 0.0)], "at once, not at the next step"
 
 
 def test_the_clock_of_holds_is_in_ms_and_runs_while_the_pc_sleeps(monkeypatch):

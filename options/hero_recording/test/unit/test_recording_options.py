@@ -1,5 +1,7 @@
 """Options of record that are wrong: each is refused by name."""
 
+import os
+import re
 import sys
 
 import pytest
@@ -52,6 +54,18 @@ def test_the_ends_of_what_options_may_be_are_allowed():
         for word in words:
             name, _, value = word[2:].partition("=")
             assert getattr(parsed, name.replace("-", "_")) == float(value)
+
+
+def test_without_options_the_defaults_are_those_of_the_help(capsys):
+    defaults = record.parse_options([])
+    assert defaults.folder == os.getcwd() and defaults.seconds is defaults.repair is defaults.robots is None
+    with pytest.raises(SystemExit):
+        record.parse_options(["--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    for name, text in (("split_mb", "of a file"), ("max_files", "newest N"), ("min_free_mb", "stop below this"),
+                       ("name", r"NAME_DATE_0\.bag"), ("compression", "bag compression")):  # fmt: skip
+        (default,) = re.findall(text + r" \((\w+)(?:: all)?\)", shown)
+        assert str(getattr(defaults, name)).partition(".")[0] == default
 
 
 def test_a_private_parameter_is_refused_by_name(capsys, monkeypatch):

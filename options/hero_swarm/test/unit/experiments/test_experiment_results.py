@@ -219,6 +219,8 @@ def test_what_a_killed_program_left_of_poses_goes_with_the_next_one_alone(tmp_pa
         path.write_text("")
     enter(folder.hold(is_shared=True))
     assert left.exists(), "another part may be writing it"
+    enter(folder.hold(REAL))
+    assert left.exists(), "trials on robots do not keep others from computing"
     enter(folder.hold())
     assert not left.exists() and other.exists()
 

@@ -65,11 +65,12 @@ def test_a_behavior_is_run_by_its_own_metric(path):
     assert worlds["bad radio"]["wifi"] == "bad" and worlds["late poses"]["delay_s"] == 0.2
 
 
-def test_a_file_that_somebody_wrote_is_not_written_over(path):
-    (path.parent / "e_phantoms.yaml").write_text("mine: 1\n")
+@pytest.mark.parametrize("text", ["mine: 1\n", "", "# Made by hand\n", phantoms._FIRST_LINE % "another.yaml"])
+def test_a_file_that_somebody_wrote_is_not_written_over(path, text):
+    (path.parent / "e_phantoms.yaml").write_text(text)
     with pytest.raises(ExperimentError, match="was not made by this command: move it away"):
         phantoms.make_file(phantoms.parse_options([str(path)]))
-    assert (path.parent / "e_phantoms.yaml").read_text() == "mine: 1\n"
+    assert (path.parent / "e_phantoms.yaml").read_text() == text
 
 
 def test_a_behavior_that_is_not_there_is_refused_with_those_that_are(path):
