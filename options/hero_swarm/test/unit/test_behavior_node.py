@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker
 
 from hero_client import ProgramError
 from hero_client.ros.localized_poses import PoseListener, PoseReport
-from hero_client.values import BODY_RADIUS_M
+from hero_client.values import BODY_RADIUS_M, HERO
 from hero_msgs.msg import Robot, RobotArray, RobotPose
 from hero_node import Pose
 from hero_node.parameters import check_parameters
@@ -347,7 +347,13 @@ def test_robots_of_others_are_avoided_by_their_own_radii(stage, tmp_path, speed_
 
 def test_driven_robots_are_kept_apart_by_the_radii_of_their_models(monkeypatch):
     stage = Stage(monkeypatch, 3, model="hero_plus,robot=1")
+    link, reported = type(stage.swarm.robots[1]._link), []
+    told = link.model.fget
+    monkeypatch.setattr(link, "model", property(lambda own: told(own) if reported else HERO))
     stage.start("rendezvous", safety="fence and robots")
+    stage.run(0.1)
+    assert stage.node._filter.radii_m == [BODY_RADIUS_M] * 3, "no driver has reported them yet"
+    reported.append("by their driver")
     stage.run(0.1)
     assert stage.node._filter.radii_m == [BODY_RADIUS_M, 0.060, BODY_RADIUS_M]
 
