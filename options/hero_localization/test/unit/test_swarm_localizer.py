@@ -7,6 +7,7 @@ from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import NAMED_S, RobotState, SwarmLocalizer
 from hero_msgs.msg import RobotPose
 from hero_node import Pose
+from hero_test.nonempty import nonempty
 
 COVARIANCE = np.diag((1e-6, 1e-6, 1e-4))
 PERIOD_S = 0.05
@@ -171,8 +172,12 @@ def test_stamps_of_another_clock_are_named():
 
 def test_robots_are_localized_again_after_a_jump_back_in_time():
     swarm = Swarm(0, 1).run(1.0, {0: (1.0, 2.0, 0.0)})
+    clocks = swarm.localizer.clocks
+    clocks._due_s[0, 0] = swarm.now_s + 1.0  # when the next pose is compared
     swarm.now_s -= 50.0
     swarm.run(1.0, {0: (1.5, 2.0, 0.0)})
+    assert max(clocks._due_s.values(), default=0.0) <= swarm.now_s + 1.0, "no clock waits for the time before"
+    assert all(pose.stamp_s <= swarm.now_s for poses in nonempty(clocks._poses.values()) for pose in poses)
     assert swarm.lines[1:] == [
         "time jumped back by 50.0 s: all robots are localized again",
         "hero_0 found at (1.500, 2.000) m, 0 degrees",
