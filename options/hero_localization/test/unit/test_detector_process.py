@@ -168,6 +168,8 @@ def test_the_process_answers_with_what_it_finds():
     [
         ("apriltag", ["fine 16h5"], 9.0, 1.5),
         ("aruco", [], 9.0, 1.5),
+        ("aruco", [], 35.9, 1.5),
+        ("aruco", [], 36.0, 2.25),
         ("aruco", [], 48.0, 3.0),
         ("aruco", [], math.inf, 1.5),
     ],

@@ -23,8 +23,8 @@ from .tag_search import TagSearch
 ANSWER_S = 60.0
 """Long enough for a search of the whole image on a machine that is busy with much else."""
 END_S = 5.0
-COARSE_FROM_PX = 48.0
-"""Side in pixels from which on tags are found as well, with corners as accurate, when decimated twice as much."""
+COARSE = ((48.0, 2.0), (36.0, 1.5))
+"""Sides in pixels from which on tags are found as well, with corners as accurate, when decimated more, by that."""
 
 
 class DetectorProcess:
@@ -103,8 +103,7 @@ def serve(connection: Connection, memory: int) -> None:
     """Answer requests until the parent has ended."""
     backend, family, decimate, width_px, height_px, smallest_px = connection.recv()
     frame = np.frombuffer(mmap.mmap(memory, width_px * height_px), np.uint8).reshape(height_px, width_px)
-    if COARSE_FROM_PX <= smallest_px < math.inf:
-        decimate *= 2.0
+    decimate *= next((factor for side_px, factor in COARSE if side_px <= smallest_px < math.inf), 1.0)
     try:
         fine = create_fine_detectors(family) if backend == "apriltag" else []
         search = TagSearch(create_detector(backend, family, decimate), width_px, height_px, fine, smallest_px)

@@ -54,6 +54,9 @@ MAX_NOISE = 12.0
 BLUR_PX, BLUR_CELLS = 0.35, 0.35
 """Most blur (standard deviation), in pixels and in cells of a tag, as the sum of both: a sharp image has two thirds."""
 
+CROSS = np.array(((-1.0, 0.0), (0.0, 1.0), (1.0, 0.0), (0.0, -1.0)))
+"""Ends of a cross through the middles of a square's sides, by half a side."""
+
 PERIOD_IMAGES, MAX_TAGS, MIN_TAGS = 30, 7, 3
 CELLS = 8
 
@@ -130,20 +133,14 @@ class Tracker:
         if not tags:
             return {}
         places = [transform_pose(robots[robot], layout.find_mount(tag_id)) for robot, tag_id in tags.items()]
-        half_m = layout.size_m / 2.0
-        crosses = [
-            (place.x_m + x_m, place.y_m + y_m, layout.height_m)
-            for place in places
-            for x_m, y_m in ((-half_m, 0.0), (0.0, half_m), (half_m, 0.0), (0.0, -half_m))
-        ]
-        pixels = self.camera.project(np.array(crosses)).reshape(-1, 4, 2)
-        found = {}
-        for tag_id, ends in zip(tags.values(), pixels):
-            cross = TagCorners(tag_id, ends)  # of half the tag's area, as its diagonals are as long as a side
-            if np.isfinite(ends).all():
-                u, v = cross.center.tolist()
-                found[tag_id] = (u, v, math.sqrt(2.0) * cross.side_px)
-        return found
+        points_m = np.full((len(places), 4, 3), layout.height_m)
+        points_m[:, :, :2] = np.array(places)[:, None, :2] + layout.size_m / 2.0 * CROSS
+        ends = self.camera.project(points_m)
+        diagonals = ends[:, :2] - ends[:, 2:]
+        # Each is as long as a side.
+        sides_px = np.sqrt(np.abs(np.cross(diagonals[:, 0], diagonals[:, 1])))
+        found = np.column_stack((ends.mean(axis=1), sides_px)).tolist()
+        return {tag_id: (u, v, side) for tag_id, (u, v, side) in zip(tags.values(), found) if math.isfinite(u + v)}
 
     def _note_expected(self, seen: Set[int], expected: Mapping[int, Tuple[float, float, float]]) -> None:
         size_px = (self.camera.lens.width_px, self.camera.lens.height_px)
