@@ -5,6 +5,10 @@ from unittest import mock
 import pytest
 
 pytest.importorskip("rospy", reason="the program needs ROS")
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
 from hero_localization.nodes import localize
 from hero_msgs.msg import RobotPose, RobotPoses
 
@@ -52,3 +56,17 @@ def test_a_report_in_another_frame_is_left_alone_and_told(node):
     node._receive_swarm(make_report("odom", (9, RobotPose.TRACKED)))
     assert not node._localizer.add_measurement.called
     assert "'odom', but must be in 'map'" in localize.rospy.logwarn_throttle.call_args.args[1]
+
+
+def test_cameras_are_where_their_programs_publish_them_in_the_common_frame(node):
+    node._localizer.heights = mock.Mock(cameras_m={})
+    transforms = [
+        TransformStamped(Header(frame_id=frame), "x", Transform(Vector3(*place_m), Quaternion(0.0, 0.0, 0.0, 1.0)))
+        for frame, place_m in (("hero_0/base_link", (1.0, 1.0, 1.0)), ("map", (0.1, -0.2, 2.2)))
+    ]
+    message = TFMessage(transforms)
+    message._connection_header = {"callerid": "/track_2"}
+    node._note_cameras(message)
+    assert {name: place_m.tolist() for name, place_m in node._localizer.heights.cameras_m.items()} == {
+        "/track_2": [0.1, -0.2, pytest.approx(2.124)]
+    }

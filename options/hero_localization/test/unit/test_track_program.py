@@ -1,12 +1,18 @@
 """The program track: a detector that ends is an error, unless the program was to end with it."""
 
 import contextlib
+import math
 from types import SimpleNamespace
+from unittest import mock
 
+import cv2
+import numpy as np
 import pytest
 
+from hero_localization.camera.camera_model import Camera, Intrinsics
 from hero_localization.errors import DetectorError, LocalizationError
 from hero_localization.nodes import track
+from hero_localization.tracking.settings import Settings
 
 
 @pytest.fixture
@@ -67,7 +73,7 @@ def make_node(monkeypatch):
 
     monkeypatch.setattr(track.camera_file, "load", load)
     monkeypatch.setattr(track.camera_file, "find_change_s", lambda path: node.file.changed_s)
-    monkeypatch.setattr(track, "Tracker", lambda settings, camera: ("tracker", settings, camera))
+    node._start_tracker = lambda camera: setattr(node, "_tracker", ("tracker", node._settings, camera))
     for level in ("loginfo", "logwarn", "logerr"):
         monkeypatch.setattr(track.rospy, level, lambda text, level=level: node.lines.append((level[3:], text)))
     return node
@@ -110,3 +116,32 @@ def test_each_kind_of_problem_is_logged_every_thirty_seconds(node):
         ("err", "camera: no image for 33 s"),
         ("err", "camera: no image for 2 s"),
     ], "also after ROS time went back"
+
+
+def test_time_without_images_is_no_longer_than_the_node_runs(monkeypatch):
+    node = track.TrackNode.__new__(track.TrackNode)
+    node._tracker, node._opened_s = SimpleNamespace(list_problems=list), 5.0
+    node._source = SimpleNamespace(problem="", warning="", arrived_s=0.0)
+    for opened_s, text in ((1.0, None), (3.0, "no image for 3 s: is the camera's driver running?")):
+        monkeypatch.setattr(track, "time", SimpleNamespace(monotonic=lambda opened_s=opened_s: 5.0 + opened_s))
+        assert node._list_problems(1.8e9) == ([] if text is None else [("camera", text, True)])
+
+
+@pytest.mark.parametrize("turn_rad", [(math.pi, 0.0, 0.0), (3.0, 0.2, -0.4), (0.0, 0.0, 0.0)])
+def test_the_place_of_the_camera_is_published(monkeypatch, turn_rad):
+    monkeypatch.setattr(track.rospy, "get_name", lambda: "/track_2")
+    monkeypatch.setattr(track.rospy, "get_rostime", lambda: track.rospy.Time(7))
+    lens = Intrinsics(640, 480, np.diag((500.0, 500.0, 1.0)), np.zeros(5))
+    camera = Camera(lens, cv2.Rodrigues(np.array(turn_rad))[0], np.array((0.1, -0.2, 2.2)))
+    node = track.TrackNode.__new__(track.TrackNode)
+    node._settings, node._frame_id, node._tf = Settings(camera=camera), "map", mock.Mock()
+    node._start_tracker(camera)
+    ((message,),) = [call.args for call in node._tf.publish.call_args_list]
+    (found,) = message.transforms
+    place, (x, y, z, w) = found.transform.translation, [getattr(found.transform.rotation, key) for key in "xyzw"]
+    assert (found.header.frame_id, found.child_frame_id) == ("map", "track_2_camera")
+    assert (place.x, place.y, place.z) == (0.1, -0.2, 2.2) and x * x + y * y + z * z + w * w == pytest.approx(1.0)
+    # The optical axis, z of the camera's frame, as the quaternion turns it into map.
+    axis = (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y))
+    assert axis == pytest.approx(camera.rotation[2], abs=1e-9)
+    assert node._tracker.camera is camera

@@ -68,6 +68,11 @@ class StampedPose(NamedTuple):
     is_systematic: bool = False
     """True if its errors stay however many are joined, as those of a camera's calibration do."""
 
+    @property
+    def node(self) -> str:
+        """Node that a measured pose came from: one clock and one camera, whatever the number of topics."""
+        return self.source.rpartition("(")[2].rstrip(")")
+
 
 class _Step(NamedTuple):
     """An estimate, and the measured pose that led to it from the one before; None for a start."""
@@ -193,7 +198,7 @@ class Hypothesis:
         innovation = np.array(
             (seen.x_m - expected.x_m, seen.y_m - expected.y_m, wrap_angle(seen.yaw_rad - expected.yaw_rad))
         )
-        weight = _invert(predicted.covariance + measurement.covariance)
+        weight = invert(predicted.covariance + measurement.covariance)
         if float(innovation @ weight @ innovation) > GATE:
             return None
         gain = predicted.covariance @ weight
@@ -246,8 +251,11 @@ def _is_blocked(steps: Sequence[_Step], measurement: StampedPose, odometry: Odom
     return False
 
 
-def _invert(matrix: np.ndarray) -> np.ndarray:
-    """Return the inverse of a symmetric matrix (3, 3); LAPACK takes five times as long for one so small."""
+def invert(matrix: np.ndarray) -> np.ndarray:
+    """Return the inverse of a symmetric matrix (3, 3).
+
+    LAPACK takes five times as long for one so small, and OpenBLAS wakes threads for it, which then spin.
+    """
     (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
     first, second, third = d * f - e * e, c * e - b * f, b * e - c * d
     fourth, fifth, sixth = a * f - c * c, b * c - a * e, a * d - b * b

@@ -19,14 +19,21 @@ taken to be. A robot that fewer poses have confirmed is contradicted by as few."
 KEPT_S = 1.0
 """A source that measured the robot this long before another one does not count any more."""
 
+LASTING_S = 8.0
+"""A source that disagrees for this long is in another frame; clocks are found in 2 s of motion, and corrected in 4."""
+
 NO_OFFSET = Pose(0.0, 0.0, 0.0)
 
 
 class Conflict(NamedTuple):
-    """Two sources that measure one robot at different places: their names, in any order the same, and the remedy."""
+    """Two sources that measure one robot at different places.
+
+    key: their names, in any order the same; is_lasting: it is no matter of clocks, which are corrected by then.
+    """
 
     key: str
     text: str
+    is_lasting: bool
 
 
 class _Source:
@@ -92,6 +99,7 @@ class PoseSources:
                     off_mm = 1e3 * measure_distance(NO_OFFSET, source.off)
                     off = f"{off_mm:.0f} mm and {math.degrees(abs(source.off.yaw_rad)):.0f} degrees"
                     text = f"its poses from {source.name} are {off} off those from {other.name}"
-                    text += ": calibrate both in one frame, or end one"
-                    return Conflict(" ".join(sorted((source.name, other.name))), text)
+                    is_lasting = source.measured_s >= source.since_s + LASTING_S
+                    text += ": calibrate both in one frame, or end one" if is_lasting else ""
+                    return Conflict(" ".join(sorted((source.name, other.name))), text, is_lasting)
         return None

@@ -13,7 +13,7 @@ import numpy as np
 from hero_node import Pose, clamp, invert_pose, transform_pose, wrap_angle
 
 from .odometry_history import KEPT_S, OdometryHistory
-from .pose_hypothesis import StampedPose
+from .pose_hypothesis import StampedPose, invert
 
 SPAN_S = 0.3
 """Time between two poses of a source that are compared."""
@@ -60,10 +60,10 @@ MIN_EFFECT = 0.1
 
 
 class _Source:
-    """One source, what is corrected of its delay, when that was found, and since when it is off."""
+    """One source, what is corrected of its delay, when that was found, since when it is off, whether all is corrected."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.is_off = name, False
+        self.name, self.is_off, self.is_adjusted = name, False, True
         self.corrected_s, self.now_s, self.off_s = 0.0, math.inf, math.inf
 
 
@@ -79,6 +79,11 @@ class SourceClocks:
         """SPAN_S apart, by robot and source: odometry of their time has not come yet."""
         self._due_s: Dict[Tuple[int, int], float] = {}
 
+    @property
+    def are_adjusted(self) -> bool:
+        """False while stamps of a source are being corrected."""
+        return all(source.is_adjusted for source in self._sources)
+
     def list_off(self) -> Dict[str, str]:
         """Return by how much clocks are off, and the remedy, by the nodes that poses come from."""
         off, corrected = {}, ", which is corrected" if self._slew else ""
@@ -91,19 +96,19 @@ class SourceClocks:
 
     def correct(self, measurement: StampedPose, now_s: float) -> StampedPose:
         """Return a measured pose with the time at which it was true, as far as that is known."""
-        index = self._find_source(measurement.source)
+        index = self._find_source(measurement.node)
         source, delay_s = self._sources[index], self._delays_s.item(index)
         if SURE_SDS * math.sqrt(self._covariance.item(index, index)) < max(abs(delay_s), NAMED_S):
             was_off, source.is_off = source.is_off, abs(delay_s) > (SETTLED_S if source.is_off else NAMED_S)
             source.off_s = source.off_s if was_off else now_s
             missing_s = (delay_s if source.is_off else 0.0) - source.corrected_s
+            source.is_adjusted = abs(missing_s) <= SETTLED_S or not self._slew
             source.corrected_s += clamp(missing_s, self._slew * max(0.0, now_s - source.now_s))
         source.now_s = now_s
         return measurement._replace(stamp_s=measurement.stamp_s - source.corrected_s)
 
-    def _find_source(self, topic: str) -> int:
-        """Return the index of the node that publishes on a topic: one clock, whatever the number of topics."""
-        name = topic.rpartition("(")[2].rstrip(")")
+    def _find_source(self, name: str) -> int:
+        """Return the index of a node."""
         for index, source in enumerate(self._sources):
             if source.name == name:
                 return index
@@ -120,7 +125,7 @@ class SourceClocks:
 
     def add(self, robot_id: int, measurement: StampedPose, odometry: OdometryHistory) -> None:
         """Take a measured pose with its own stamp; odometry: that of its robot."""
-        source, stamp_s = self._find_source(measurement.source), measurement.stamp_s
+        source, stamp_s = self._find_source(measurement.node), measurement.stamp_s
         key = (robot_id, source)
         if stamp_s < self._due_s.get(key, -math.inf):
             return
@@ -146,7 +151,7 @@ class SourceClocks:
 
     def _compare(self, first: StampedPose, second: StampedPose, odometry: OdometryHistory) -> None:
         """Correct the delays by two poses of a robot."""
-        both = [self._find_source(sample.source) for sample in (first, second)]
+        both = [self._find_source(sample.node) for sample in (first, second)]
         sources = sorted(set(both))
         stamps_s = np.array((first.stamp_s, second.stamp_s)) - self._delays_s[both]
 
@@ -178,7 +183,7 @@ class SourceClocks:
         told = effects @ self._covariance
         # More for what is not linear: delays that are hardly known are found in several steps.
         expected = told @ effects.T
-        weight = np.linalg.inv(expected * (1.0 + BENT * np.eye(3)) + np.diag(noise))
+        weight = invert(expected * (1.0 + BENT * np.eye(3)) + np.diag(noise))
         off = np.array(_subtract(seen, counted))
         if float(off @ weight @ off) > GATE:
             self._covariance[sources, sources] = np.minimum(DOUBT * self._covariance[sources, sources], START_SD_S**2)

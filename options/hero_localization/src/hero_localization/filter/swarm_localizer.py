@@ -16,6 +16,7 @@ from .pose_filter import Outcome, PoseFilter, is_near
 from .pose_hypothesis import StampedPose
 from .pose_sources import DISAGREEING_S, NO_OFFSET, PoseSources
 from .source_clocks import SourceClocks
+from .tag_heights import TagHeights
 
 LOST_S = 1.0
 """A robot whose pose was not measured for this long is lost: its pose follows its odometry alone."""
@@ -89,10 +90,13 @@ class _Robot:
 
 
 class SwarmLocalizer:
-    """Filters of all robots; clocks: those of the sources of measured poses."""
+    """Filters of all robots.
+
+    clocks: those of the sources of measured poses; heights: those of the robots' tags, where two cameras see them.
+    """
 
     def __init__(self, is_correcting_clocks: bool = True) -> None:
-        self.clocks = SourceClocks(is_correcting_clocks)
+        self.clocks, self.heights = SourceClocks(is_correcting_clocks), TagHeights()
         self._robots: Dict[int, _Robot] = {}
         self._now_s = -math.inf
         self._named_s: Dict[str, float] = {}
@@ -142,6 +146,8 @@ class SwarmLocalizer:
             return lines + self._name(measurement.source, text % (measurement.source, offset_s))
         self.clocks.add(robot_id, measurement, robot.filter.odometry)
         measurement = self.clocks.correct(measurement, now_s)
+        if not self.clocks.are_adjusted:
+            self.heights.restart()
         before = robot.filter.pose()
         used_s = robot.filter.used_s
         outcome = robot.filter.add_measurement(measurement)
@@ -168,13 +174,17 @@ class SwarmLocalizer:
         odometry = robot.filter.odometry.find(measurement.stamp_s)
         if odometry is not None and measurement.stamp_s > robot.measured_s:
             robot.heading.add(measurement.pose, odometry.pose)
+        if odometry is not None:
+            self.heights.add(robot_id, measurement, odometry.pose)
         robot.measured_s = max(robot.measured_s, measurement.stamp_s)
         if is_late:
             return []
         conflict = robot.sources.note(measurement, outcome)
         if outcome is Outcome.OUTLIER or conflict is not None:
             robot.outliers += outcome is Outcome.OUTLIER
-            return [] if conflict is None else self._name(conflict.key, "hero_%d: %s" % (robot_id, conflict.text))
+            if conflict is None or not conflict.is_lasting or self.heights.list_wrong():
+                return []
+            return self._name(conflict.key, "hero_%d: %s" % (robot_id, conflict.text))
         robot.outliers = 0
         was_lost, robot.untrusted_s = robot.is_lost, -math.inf
         # What comes late tells where a lost robot was; it would be lost again at once.
@@ -195,6 +205,12 @@ class SwarmLocalizer:
             return self._name("found %d" % robot_id, line)
         return ["hero_%d corrected by %s" % (robot_id, step)] if step_m > ANNOUNCED_STEP_M else []
 
+    def list_source_problems(self) -> Dict[str, str]:
+        """Return what is wrong with clocks, or cameras' heights of tags, by a name for it."""
+        problems = {f"clock of {name}": text for name, text in self.clocks.list_off().items()}
+        heights = self.heights.describe()
+        return {**problems, "tag heights": heights} if heights else problems
+
     def distrust(self, stamp_s: float, robot_ids: Iterable[int], now_s: float) -> None:
         """Take robots as lost, without a line, until a pose is used again: the camera that alone sees them moved."""
         if stamp_s > now_s + AHEAD_S:
@@ -208,8 +224,8 @@ class SwarmLocalizer:
         """Notice robots that are not measured any more; return lines for users. Call it some times a second."""
         lines = self._follow_clock(now_s)
         lost = []
-        for name, text in self.clocks.list_off().items():
-            lines += self._name("clock " + name, text)
+        for name, text in self.list_source_problems().items():
+            lines += self._name(name, text)
         for robot_id, robot in sorted(self._robots.items()):
             seen_s = max(robot.filter.used_s, robot.untrusted_s)
             if not robot.is_lost and -math.inf < seen_s < now_s - LOST_S:
@@ -229,12 +245,18 @@ class SwarmLocalizer:
         self.clocks.forget_poses()
         return [f"time jumped back by {back_s:.1f} s: all robots are localized again"]
 
-    def list_robots(self, now_s: float, is_extrapolating: bool = False) -> List[LocalizedRobot]:
+    def list_robots(
+        self, now_s: float, is_extrapolating: bool = False, has_problems: bool = True
+    ) -> List[LocalizedRobot]:
         """Return what is known of all robots, in the order of their ids.
 
         is_extrapolating: where they are now, if they drive on as by their newest odometry; at most MAX_AHEAD_S from it.
+        has_problems: say what is wrong with each.
         """
-        robots = [self._describe(robot_id, robot, now_s) for robot_id, robot in sorted(self._robots.items())]
+        robots = []
+        for robot_id, robot in sorted(self._robots.items()):
+            problem = self._find_problem(robot, now_s) if has_problems else ""
+            robots.append(self._describe(robot_id, robot, problem))
         return [self._extrapolate(robot, now_s) for robot in robots] if is_extrapolating else robots
 
     def _extrapolate(self, robot: LocalizedRobot, now_s: float) -> LocalizedRobot:
@@ -245,7 +267,8 @@ class SwarmLocalizer:
         pose = transform_pose(estimate.pose, motion)
         return robot._replace(estimate=estimate._replace(stamp_s=now_s, pose=pose))
 
-    def _describe(self, robot_id: int, robot: _Robot, now_s: float) -> LocalizedRobot:
+    @staticmethod
+    def _describe(robot_id: int, robot: _Robot, problem: str) -> LocalizedRobot:
         estimate, off = robot.filter.estimate(), robot.sources.find_disagreement()
         state = RobotState.TRACKED
         if estimate is None:
@@ -254,12 +277,11 @@ class SwarmLocalizer:
             state = RobotState.LOST
         if estimate is not None and off is not None:  # it may be at either place
             estimate = estimate._replace(covariance=estimate.covariance + np.diag(np.square(off)))
-        problem = self._find_problem(robot, state, now_s)
         origin = None if estimate is None else robot.filter.find_odom_origin(estimate.pose)
         return LocalizedRobot(robot_id, state, estimate, origin, problem)
 
     @staticmethod
-    def _find_problem(robot: _Robot, state: RobotState, now_s: float) -> str:
+    def _find_problem(robot: _Robot, now_s: float) -> str:
         newest_s = robot.filter.odometry.newest_s
         if newest_s < now_s - SILENT_S:
             if now_s < robot.heard_s + SILENT_S:

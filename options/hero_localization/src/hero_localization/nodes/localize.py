@@ -8,7 +8,9 @@ import threading
 from functools import partial
 from typing import Any, Callable, Dict, List, Optional
 
+import numpy as np
 import rospy
+from tf2_msgs.msg import TFMessage
 
 from hero_client import Program, ProgramError, read_parameters
 from hero_client.ros import share_drivers
@@ -20,6 +22,7 @@ from hero_node.parameters import flag, number, robot_ids, string
 from ..filter.pose_filter import make_covariance
 from ..filter.pose_hypothesis import StampedPose
 from ..filter.swarm_localizer import PUBLISH_RATE_HZ, SwarmLocalizer
+from ..tracking.tag_pose import DEFAULT_HEIGHT_M
 from .inputs import PoseInput, describe_source, subscribe_odometry
 from .outputs import Outputs
 
@@ -55,6 +58,7 @@ class LocalizationNode:
         self._add_robots(self._chosen or [])
         self._swarm_topic = str(parameters["swarm_topic"])
         rospy.Subscriber(self._swarm_topic, RobotPoses, self._receive_swarm, queue_size=10, tcp_nodelay=True)
+        rospy.Subscriber("/tf_static", TFMessage, self._note_cameras, queue_size=10)
 
     def _add_robots(self, ids: List[int]) -> None:
         for robot_id in ids:
@@ -76,6 +80,15 @@ class LocalizationNode:
             lines = work(*values, rospy.get_time())
         for line in lines:
             rospy.loginfo(line)
+
+    def _note_cameras(self, message: TFMessage) -> None:
+        """Note where the cameras are whose programs publish that, among other things that never move."""
+        for transform in message.transforms:
+            if transform.header.frame_id.lstrip("/") == self._frame:
+                place = transform.transform.translation
+                with self._lock:
+                    node = message._connection_header["callerid"]
+                    self._localizer.heights.cameras_m[node] = np.array((place.x, place.y, place.z - DEFAULT_HEIGHT_M))
 
     def _receive_swarm(self, report: RobotPoses) -> None:
         """Take the poses of all robots that one image shows."""
@@ -108,10 +121,11 @@ class LocalizationNode:
         now_s = rospy.get_time()
         self._call(self._localizer.find_lost)
         with self._lock:
-            robots = self._localizer.list_robots(now_s, self._is_extrapolating)
-            clocks = self._localizer.clocks.list_off()
+            is_due = not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s
+            robots = self._localizer.list_robots(now_s, self._is_extrapolating, is_due)
+            problems = self._localizer.list_source_problems()
         self._outputs.publish(robots)
-        if not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s:
+        if is_due:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S
             # Robots whose tags are seen, but which no driver knows.
             unknown = [
@@ -119,7 +133,7 @@ class LocalizationNode:
                 for robot_id, seen_s in sorted(self._unknown_s.copy().items())
                 if self._chosen is None and abs(now_s - seen_s) < UNKNOWN_S and robot_id not in self._inputs
             ]
-            self._outputs.publish_diagnostics(robots, unknown, clocks)
+            self._outputs.publish_diagnostics(robots, unknown, problems)
 
 
 SD_TEXT = "standard deviation, in x and y each, of poses that come without covariance; `track` tells its own"

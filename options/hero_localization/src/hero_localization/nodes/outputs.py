@@ -70,12 +70,12 @@ class Outputs:
             self._tf.publish(TFMessage(transforms))
 
     def publish_diagnostics(
-        self, robots: Iterable[LocalizedRobot], unknown: Iterable[int], clocks: Mapping[str, str]
+        self, robots: Iterable[LocalizedRobot], unknown: Iterable[int], sources: Mapping[str, str]
     ) -> None:
-        """Publish the state of each robot, and warnings: tags of robots that no driver knows, clocks that are off."""
+        """Publish the state of each robot, and warnings: tags of robots that no driver knows, problems of sources."""
         text = "its tag is seen, but no driver knows the robot: is it on, and is tag %d its own?"
         statuses = [make_status("hero_%d" % robot_id, DiagnosticStatus.WARN, text % robot_id) for robot_id in unknown]
-        statuses += [make_status(f"clock of {name}", DiagnosticStatus.WARN, clock) for name, clock in clocks.items()]
+        statuses += [make_status(name, DiagnosticStatus.WARN, text) for name, text in sources.items()]
         for robot in robots:
             level = DiagnosticStatus.WARN if robot.problem else DiagnosticStatus.OK
             text = robot.problem or robot.state.name.lower()

@@ -11,17 +11,20 @@ import time
 from typing import Any, Dict, List, Optional, Tuple
 
 import cv2
+import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Point32, Polygon, PolygonStamped
+from geometry_msgs.msg import Point32, Polygon, PolygonStamped, Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import CompressedImage, Image
 from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
 
 from hero_client import Program, read_parameters
 from hero_msgs.msg import ObjectPose, ObjectPoses, RobotPose, RobotPoses
 from hero_node import Pose
 from hero_node.parameters import number, string
 
+from ..camera.camera_model import Camera
 from ..camera.frame_source import Frame, open_source
 from ..errors import DetectorError, LocalizationError
 from ..tracking import settings as camera_file
@@ -95,7 +98,10 @@ class TrackNode:
         self._file_s = camera_file.find_change_s(self._path)
         self._frame_id = str(parameters["frame"]).lstrip("/")
         camera = self._settings.camera
-        self._tracker = Tracker(self._settings, camera) if camera is not None else None
+        self._tracker: Optional[Tracker] = None
+        self._tf = rospy.Publisher("/tf_static", TFMessage, queue_size=1, latch=True)
+        if camera is not None:
+            self._start_tracker(camera)
         self._process: Optional[DetectorProcess] = None
         self._expected: Dict[int, Pose] = {}
         self._diagnosed_s = -math.inf
@@ -108,6 +114,17 @@ class TrackNode:
         rospy.Subscriber(parameters["poses_topic"], RobotPoses, self._expect, queue_size=2, tcp_nodelay=True)
         image, device, size_px = (str(parameters[name]) for name in ("image", "device", "size_px"))
         self._source = open_source(image, device, size_px, parameters["rate_hz"], self._settings.controls)
+
+    def _start_tracker(self, camera: Camera) -> None:
+        """Track with this camera, and publish where it is: its frame is named after this node."""
+        self._tracker = Tracker(self._settings, camera)
+        turn = cv2.Rodrigues(camera.rotation.T)[0].ravel()
+        half_rad = max(float(np.linalg.norm(turn)), 1e-9) / 2.0
+        turn *= math.sin(half_rad) / (2.0 * half_rad)
+        transform = Transform(Vector3(*camera.position_m), Quaternion(*turn, math.cos(half_rad)))
+        header = Header(stamp=rospy.get_rostime(), frame_id=self._frame_id)
+        frame_id = rospy.get_name().strip("/") + "_camera"
+        self._tf.publish(TFMessage([TransformStamped(header, frame_id, transform)]))
 
     def _expect(self, report: RobotPoses) -> None:
         self._expected = {
@@ -140,7 +157,8 @@ class TrackNode:
             rospy.logerr(f"{error}; the calibration before it counts")
             return
         if settings.camera is not None:
-            self._settings, self._tracker = settings, Tracker(settings, settings.camera)
+            self._settings = settings
+            self._start_tracker(settings.camera)
             rospy.loginfo(f"{self._path} has changed, and counts from now on")
 
     def _take_frame(self, tracker: Tracker, frame: Frame) -> None:
@@ -197,7 +215,8 @@ class TrackNode:
             return [("camera", text % self._path, True)]
         if self._source.problem:
             return [("camera", self._source.problem, True)]
-        silent_s = now_s - self._source.arrived_s
+        # No longer than this node runs: simulated time begins with a jump from 0.
+        silent_s = min(now_s - self._source.arrived_s, time.monotonic() - self._opened_s)
         if silent_s > SILENT_S:
             text = "no image for %.0f s: is the camera's driver running?"
             return [("camera", text % silent_s, True)]
