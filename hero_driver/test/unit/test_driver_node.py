@@ -1,6 +1,8 @@
 """The driver's node: addresses at which it cannot listen, and its end, when rospy closes its topics."""
 
+import queue
 import signal
+import threading
 from types import SimpleNamespace
 from unittest.mock import create_autospec
 
@@ -9,8 +11,10 @@ import rospy
 
 from hero_driver import node as node_module
 from hero_driver.config import read_config
-from hero_driver.node import LEAVE_WAIT_S, DriverNode
-from hero_driver.transport.event_loop import EventLoop
+from hero_driver.gateway import Gateway
+from hero_driver.node import LEAVE_WAIT_S, REPORT_CHECK_S, DriverNode
+from hero_driver.reports.reporter import Reporter
+from hero_driver.transport.event_loop import EventLoop, NoAnswerError
 from hero_node import ProgramError
 
 
@@ -136,3 +140,94 @@ def test_the_end_stops_robots_first_and_waits_for_that_as_long_as_it_takes(threa
     hangs = [] if thread_ends else ["the driver ends, and could not stop the robots: its loop hangs"]
     assert steps[2 : 6 + len(hangs)] == [*hangs, "stop interface", "closed", "registrar", "log"]
     assert steps.count("stop") == (1 if thread_ends else 2)
+
+
+class Spin:
+    """A node that reports in virtual time, whose state changes when a test says so."""
+
+    def __init__(self, monkeypatch, changes=(), ends_s=5.0, period_s=1.0):
+        self.now_s, self.changes, self.reports, self.told = 100.0, list(changes), [], []
+        self.node = DriverNode.__new__(DriverNode)
+        self.node._threads, self.node._crash = SimpleNamespace(failure=""), None
+        self.node._config, self.node._changed = SimpleNamespace(report_period_s=period_s), threading.Event()
+        self.node._report = lambda reporter, is_due: self.reports.append((self.now_s - 100.0, is_due))
+        self.ends_s = ends_s
+        self.node._has_ended = self.wait
+        monkeypatch.setattr(node_module, "Reporter", lambda: "reporter")
+        monkeypatch.setattr(node_module.time, "monotonic", lambda: self.now_s)
+        monkeypatch.setattr(rospy, "logfatal", lambda text, *values: self.told.append(text % values))
+
+    def wait(self, timeout_s):
+        assert timeout_s == REPORT_CHECK_S
+        self.now_s += 0.125  # of which sums are exact
+        while self.changes and self.changes[0] <= self.now_s - 100.0:
+            self.changes.pop(0)
+            self.node._changed.set()
+        return self.now_s >= 100.0 + self.ends_s
+
+
+def test_reports_come_each_period_and_once_for_a_burst_of_changes(monkeypatch):
+    spin = Spin(monkeypatch, changes=(1.42, 1.44, 1.46, 2.01), ends_s=3.0)
+    assert spin.node.spin() == 0
+    assert spin.reports == [(0.125, True), (1.125, True), (1.5, False), (2.125, True)]
+    assert spin.told == []
+
+
+def test_a_loop_that_breaks_ends_the_node_with_an_error(monkeypatch):
+    spin = Spin(monkeypatch)
+    node = spin.node
+    node._ends = queue.SimpleQueue()
+    node._has_ended = lambda timeout_s: DriverNode._has_ended(node, 0.0)
+    node._loop = create_autospec(EventLoop, instance=True)
+    node._loop.run.side_effect = ZeroDivisionError("a bug")
+    with pytest.raises(ZeroDivisionError):
+        node._run_loop()
+    assert node.spin() == 1 and spin.told == ["the driver broke: ZeroDivisionError: a bug"]
+
+
+def test_a_node_without_threads_for_programs_ends_with_an_error(monkeypatch):
+    spin = Spin(monkeypatch)
+    spin.node._threads.failure = "no more threads"
+    assert spin.node.spin() == 1 and spin.told[0].endswith("could not stop robots any more: no more threads")
+    assert spin.reports == []
+
+
+def test_a_gateway_that_hangs_is_not_reported_on(monkeypatch):
+    node, reporter = DriverNode.__new__(DriverNode), create_autospec(Reporter, instance=True)
+    node._loop, node._gateway = create_autospec(EventLoop, instance=True), create_autospec(Gateway, instance=True)
+    node._loop.ask.side_effect = NoAnswerError("hangs")
+    node._report(reporter, True)
+    assert not reporter.method_calls
+    assert node._serve_dismissal(None).message == "the driver hangs"
+    node._loop.ask.side_effect = [["hero_3", "hero_9"], []]
+    answers = [node._serve_dismissal(None) for _ in range(2)]
+    assert [answer.message for answer in answers] == [
+        "no longer listed as gone: hero_3, hero_9",
+        "no longer listed as gone: no robot",
+    ]
+    node._loop.ask.side_effect = None
+    for is_periodic in (False, True):
+        node._report(reporter, is_periodic)
+    names = [call[0] for call in reporter.method_calls]
+    assert names == ["publish", "measure_rates", "publish", "diagnose"]
+
+
+def test_a_report_tells_of_all_that_the_driver_knows(monkeypatch):
+    node, answers = DriverNode.__new__(DriverNode), []
+    monkeypatch.setattr(node_module.time, "monotonic", lambda: 100.0)
+    monkeypatch.setattr(node_module, "find_stamp", lambda stopped_s, now_s: rospy.Time(int(now_s - stopped_s)))
+    node._loop = SimpleNamespace(listening="10.42.0.1:11411")
+    node._stop_interface = SimpleNamespace(stopped_by="/teleop", stopped_s=93.0)
+    node._gateway = create_autospec(Gateway, instance=True, stopped=True, peers={1: 1, 2: 2})
+    node._gateway.refused_connections, node._gateway.last_refusal = 5, "why"
+    node._gateway.list_robots.return_value = ["hero_2"]
+    node._gateway.list_gone.return_value = [SimpleNamespace(message="hero_9, as it was")]
+    node._take_status(answers.append)
+    (status,) = answers
+    message = status.message
+    assert (message.listening, message.stopped, message.stopped_by) == ("10.42.0.1:11411", True, "/teleop")
+    assert message.gone == ["hero_9, as it was"] and message.stopped_since == rospy.Time(7)
+    assert status[0] == 100.0 and status[2:] == (["hero_2"], 2, 5, "why")
+    node._stop_interface.stopped_s = None
+    node._take_status(answers.append)
+    assert answers[1].message.stopped_since == rospy.Time(0)

@@ -7,13 +7,20 @@ import termios
 import threading
 import time
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 import rospy
 import rospy.topics
 from rospy.impl.tcpros_base import TCPROSTransport, TCPROSTransportProtocol
 
-from hero_driver.ros.raw_publisher import RETRY_S, RawPublisher
+from hero_driver.ros.raw_publisher import (
+    RETRY_S,
+    TRANSFORMS_MAX,
+    TRANSFORMS_PERIOD_S,
+    RawPublisher,
+    TransformPublisher,
+)
 
 QUEUE_LENGTH = 10
 LARGE = 20000
@@ -281,3 +288,28 @@ def test_a_released_publisher_publishes_nothing_and_unregisters(bench):
     assert bench.rospy_publisher.unregistered
     assert poller.closed, "its file must not wait for Python's garbage collection"
     assert bench.publisher.release() == []
+
+
+@pytest.mark.parametrize("is_wanted", [True, False])
+def test_transforms_of_a_moment_are_one_message_or_parts_of_it(monkeypatch, is_wanted):
+    later, sent = [], []
+    transforms = TransformPublisher(lambda delay_s, call: later.append((delay_s, call)))
+    transforms._publisher = create_autospec(RawPublisher, instance=True, is_wanted=is_wanted)
+    transforms._publisher.publish.side_effect = sent.append
+    transforms.schedule()
+    assert later == [] and not transforms.is_scheduled, "there are none"
+    for count in (2, TRANSFORMS_MAX + 1):
+        for number in range(count):
+            transforms.add(struct.pack("<H", number))
+        transforms.schedule()
+        assert transforms.is_scheduled
+        ((delay_s, publish),) = later
+        later.clear()
+        publish()
+        assert delay_s == TRANSFORMS_PERIOD_S and not transforms.is_scheduled
+    numbers = [struct.unpack("<I%dH" % ((len(message) - 4) // 2), message) for message in sent]
+    assert [(first, len(rest)) for first, *rest in numbers] == (
+        [(2, 2), (TRANSFORMS_MAX, TRANSFORMS_MAX), (1, 1)] if is_wanted else []
+    )
+    transforms.schedule()
+    assert later == [], "each goes out once, or not at all"

@@ -1,5 +1,6 @@
 """What declarations become while the ROS master is slow, and the robot leaves, returns or changes its mind."""
 
+import struct
 from types import SimpleNamespace
 from unittest.mock import call, create_autospec
 
@@ -11,7 +12,7 @@ from hero_driver.ros.endpoints import Endpoints
 from hero_driver.ros.log_relay import LogRelay
 from hero_driver.ros.raw_publisher import RawPublisher, TransformPublisher
 from hero_driver.ros.robot_bridge import RobotBridge
-from hero_driver.ros.robot_commands import Owner
+from hero_driver.ros.robot_commands import Owner, RobotCommands
 from hero_driver.ros.services import RobotService
 from hero_driver.rosserial.payloads import TopicInfo
 from hero_driver.rosserial.session import Topic, TopicKind
@@ -180,6 +181,48 @@ def test_a_service_whose_halves_differ_in_type_is_refused(bench):
     assert not bench.endpoints.serve.called and bench.bridge.ids == {}
     ((key, text),) = [one.args for one in bench.endpoints.report_error.call_args_list]
     assert key == SERVICE and text.endswith("its halves are hero_msgs/SetOdom and hero_msgs/SetPID")
+
+
+def test_a_request_goes_only_to_the_service_that_the_robot_has_now(bench):
+    bench.bridge.commands = create_autospec(RobotCommands, instance=True)
+    bench.bridge.commands.offer_request.return_value = None
+    declare_service(bench, "hero_msgs/SetOdom", "hero_msgs/SetOdom")
+    first = bench.bridge._services[SERVICE]
+    assert bench.bridge.send_request(first, b"pose") is None
+    bench.bridge.commands.offer_request.assert_called_once_with(SERVICE, "hero_msgs/SetOdom", b"pose")
+    bench.bridge.detach("silent")
+    assert bench.bridge.send_request(first, b"pose") == "the robot is not connected"
+    bench.connect()
+    declare_service(bench, "hero_msgs/SetPID", "hero_msgs/SetPID")
+    bench.settle()
+    assert bench.bridge.send_request(first, b"pose") == "the robot declared it with another type"
+    assert bench.bridge.commands.offer_request.call_count == 1
+
+
+@pytest.mark.parametrize(("answer", "is_set"), [(b"\x01", True), (b"\x00", False), (b"", False)])
+def test_odometry_is_set_by_the_answer_of_a_robot_that_agrees(bench, answer, is_set):
+    declare_service(bench, "hero_msgs/SetOdom", "hero_msgs/SetOdom")
+    service, poses = bench.bridge._services[SERVICE], []
+    bench.bridge.corrections.odometry.set_pose = poses.append
+    bench.bridge._receive_answer(service, answer)
+    assert poses == [], "none was asked for"
+    service._request = struct.pack("<3d", 1.0, 2.0, 0.5)
+    bench.bridge._receive_answer(service, answer)
+    assert poses == ([(1.0, 2.0, 0.5)] if is_set else [])
+
+
+def test_transforms_of_another_type_and_unknown_layouts_are_refused(bench):
+    for name, message_type, md5, words in (
+        ("/tf", "std_msgs/ColorRGBA", COLOR_MD5, "topic /tf refused: its type is std_msgs/ColorRGBA"),
+        ("/hero_7/encoder", "hero_msgs/Encoder", "0" * 32, "loses distance: flash firmware with that message"),
+        ("/hero_7/imu", "sensor_msgs/Imu", "0" * 32, "its sensor_msgs/Imu has md5 000"),
+    ):
+        bench.endpoints.report_error.reset_mock()
+        topic = bench.declare(name, message_type, md5, kind=TopicKind.PUBLISHER)
+        told = " ".join(one.args[1] for one in bench.endpoints.report_error.call_args_list)
+        assert words.partition(": flash")[0] in told, told
+        topic.receive(b"goes nowhere", 0)
+        bench.jobs.clear()
 
 
 def test_half_a_service_of_the_connection_before_makes_none(bench):
