@@ -3,10 +3,11 @@
 A job says how many cores it keeps busy. Most tests wait more than they compute (for ROS, for robots that move in real
 time), so more of them run at once than there are cores. A job that leaves no results (it hung, or died) counts as one
 failure. Where the system permits it, each job has a network of its own: ports cannot collide, and no program outside
-reaches the robots of a test. Its processes are its own too: none outlives it, not even if it is killed.
+reaches the robots of a test. Its processes end with it, in sessions of their own too, also where it is killed.
 """
 
 import concurrent.futures
+import contextlib
 import functools
 import os
 import signal
@@ -19,9 +20,7 @@ from typing import Dict, List, NamedTuple, Set, Tuple
 from results import Counts, count_results, record
 
 LOG_LINES_SHOWN = 80
-
-
-_sessions: Set[int] = set()  # of the jobs that run
+MARK = "HERO_TEST_JOB"  # in the environment of a job and of all that it starts: the folder of its results
 
 
 class Job(NamedTuple):
@@ -63,28 +62,40 @@ def run_command(job):
             stdin=subprocess.DEVNULL,
             stdout=log,
             stderr=subprocess.STDOUT,
-            env={**os.environ, **job.environment, "HERO_OWN_NETWORK": own_network},
+            env={**os.environ, **job.environment, "HERO_OWN_NETWORK": own_network, MARK: str(job.results_dir)},
             start_new_session=True,
         )
-        _sessions.add(process.pid)
-        ender = threading.Timer(job.timeout_s, kill_session, [process.pid])
+        ender = threading.Timer(job.timeout_s, kill_job, [job])
         ender.start()
         _, status, usage = os.wait4(process.pid, 0)
         ender.cancel()
         process.returncode = status  # so that process looks for its child no more
-        kill_session(process.pid)
-        _sessions.discard(process.pid)
+        kill_job(job)
         if os.WIFSIGNALED(status):
             log.write(b"\nkilled by signal %d, after %d s at the latest\n" % (os.WTERMSIG(status), job.timeout_s))
     return status == 0, usage.ru_utime + usage.ru_stime
 
 
-def kill_session(session_id):
-    """Kill what a job left behind."""
+def kill_job(job):
+    """Kill what a job has started and left behind, in sessions of its own too, where containers are not permitted."""
+    mark = f"{MARK}={job.results_dir}".encode() + b"\0"
+    killed: Set[int] = set()
+    while True:  # until none was started meanwhile
+        found = {pid for pid in map(int, filter(str.isdigit, os.listdir("/proc"))) if has_mark(pid, mark)} - killed
+        if not found:
+            return
+        for pid in found:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        killed |= found
+
+
+def has_mark(pid, mark):
+    """Return whether a process was started with a mark in its environment; not those of others, or that ended."""
     try:
-        os.killpg(session_id, signal.SIGKILL)
-    except ProcessLookupError:
-        return
+        return mark in Path(f"/proc/{pid}/environ").read_bytes()
+    except OSError:
+        return False
 
 
 def drop_wrappers(results_dir):
@@ -141,8 +152,8 @@ def run_jobs(jobs: List[Job], max_load: float) -> bool:
                     passed = passed and not has_failed
                     print(text, flush=True)
         except KeyboardInterrupt:
-            for session_id in list(_sessions):
-                kill_session(session_id)
+            for job in running.values():
+                kill_job(job)
             raise
     return passed
 

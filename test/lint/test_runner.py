@@ -38,13 +38,18 @@ def wait_until(condition):
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("network", [True, False])
-def test_sigterm_ends_all_that_jobs_have_started(tmp_path, network):
-    duration = f"98765.{os.getpid()}{int(network)}"
+@pytest.mark.parametrize(
+    ("network", "containers"),
+    [(True, "permitted"), (False, "permitted"), (False, "refused")],  # as in Docker
+)
+def test_sigterm_ends_all_that_jobs_have_started(tmp_path, network, containers):
+    duration = f"98765.{os.getpid()}{int(network)}{int(containers == 'refused')}"
     command = (sys.executable, "-c", STARTS_SLEEPERS.format(duration) + "; time.sleep(1000)")
     script = (
-        "from pathlib import Path; from jobs import Job, run_jobs;"
-        f"run_jobs([Job('one', {command!r}, Path({str(tmp_path / 'one')!r}), 900.0, has_own_network={network})], 1.0)"
+        "from pathlib import Path; import jobs; "
+        + ("jobs.make_container = lambda has_own_network: (); " if containers == "refused" else "")
+        + f"job = jobs.Job('one', {command!r}, Path({str(tmp_path / 'one')!r}), 900.0, has_own_network={network}); "
+        "jobs.run_jobs([job], 1.0)"
     )
     with subprocess.Popen([sys.executable, "-c", script], cwd=str(TEST), stderr=subprocess.DEVNULL) as runner:
         wait_until(lambda: len(find_processes(f"sleep {duration}")) >= 2)
