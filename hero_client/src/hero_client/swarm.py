@@ -4,20 +4,16 @@ from typing import Iterable, List, Optional
 
 import rospy
 
-from hero_msgs.msg import RobotArray
 from hero_node import ProgramError
 from hero_node.ros import ROS_CLOCK, Program, start_node
 
 from .robot import Robot
 from .robots.group import check_robot_id
 from .robots.swarm_base import REPORT_PERIOD_S, BaseSwarm
-from .ros.drivers import USUAL_TOPIC, Drivers, share_drivers
+from .ros.drivers import Drivers, share_drivers
 from .ros.stop_status import StopStatus
 from .values.background_motion import Sleep
 from .values.errors import RobotNotReadyError
-
-POLL_PERIOD_S = 0.02
-"""Time between two looks whether robots have joined."""
 
 
 class Swarm(BaseSwarm[Robot]):
@@ -55,17 +51,7 @@ class Swarm(BaseSwarm[Robot]):
         answers within 3 s.
         """
         start_node()
-        deadline_s = ROS_CLOCK.now_s + timeout_s
-        report = None
-        drivers = share_drivers()
-        while ROS_CLOCK.now_s < deadline_s and sleep(POLL_PERIOD_S):
-            report = drivers.read()
-            ids = ready_ids(report) if report else []
-            if ids and drivers.is_settled:
-                return cls(ids, odom, proximity)
-        if report is None:
-            raise RobotNotReadyError(f"nothing on {USUAL_TOPIC} within {timeout_s:.3g} s: is the driver running?")
-        raise RobotNotReadyError(f"no robot joined the driver within {timeout_s:.3g} s: are they on?")
+        return cls(share_drivers().wait_for_robots(timeout_s, sleep), odom, proximity)
 
     def emergency_stop(self) -> StopStatus:
         """Stop all robots of all drivers, not only those of this swarm, until release_stop().
@@ -88,11 +74,6 @@ class Swarm(BaseSwarm[Robot]):
 
     def _log(self, level: str, text: str) -> None:
         (rospy.loginfo if level == "info" else rospy.logwarn)(text)
-
-
-def ready_ids(robots: RobotArray) -> List[int]:
-    """Return the numbers of the robots that can be driven now, sorted."""
-    return sorted(robot.id for robot in robots.robots if robot.state == robot.READY and robot.id >= 0)
 
 
 def open_swarm(program: Program, robot_ids: Optional[List[int]], odom: bool = True, proximity: bool = True) -> Swarm:

@@ -22,6 +22,8 @@ from hero_msgs.msg import Robot, RobotArray
 from hero_node import NodeError, ProgramError, list_names
 from hero_node.ros import ask_master
 
+from ..values.background_motion import Sleep
+from ..values.errors import RobotNotReadyError
 from ..values.robot_states import STATES
 from .stop_status import TIME_LIMIT_S, Replies, StopRequest, StopStatus
 
@@ -254,6 +256,30 @@ class Drivers:
         merged = merge(list(reports.values()))
         merged.stopped = merged.stopped and not self.find_silent()
         return merged
+
+    def list_ready(self) -> List[int]:
+        """Return the numbers of the robots that can be driven now, sorted."""
+        report = self.read()
+        robots = report.robots if report else ()
+        return sorted(robot.id for robot in robots if robot.state == Robot.READY and robot.id >= 0)
+
+    def wait_for_robots(self, timeout_s: float, sleep: Sleep, robot_ids: Optional[Sequence[int]] = None) -> List[int]:
+        """Return the numbers of all robots that can be driven, sorted, as soon as those of robot_ids are among them.
+
+        After timeout_s some of them suffice. None: as soon as there is one, and every driver has reported.
+        Raises: RobotNotReadyError after timeout_s without a driver or without a robot.
+        """
+        ready: List[int] = []
+        deadline_s = time.monotonic() + timeout_s
+        while time.monotonic() < deadline_s and sleep(POLL_PERIOD_S):
+            ready = self.list_ready()
+            if ready and (self.is_settled if robot_ids is None else set(ready).issuperset(robot_ids)):
+                return ready
+        if not self.read_each():
+            raise RobotNotReadyError(f"nothing on {USUAL_TOPIC} within {timeout_s:.3g} s: is the driver running?")
+        if not ready or robot_ids is None:
+            raise RobotNotReadyError(f"no robot joined the driver within {timeout_s:.3g} s: are they on?")
+        return ready
 
     def dismiss_gone(self) -> None:
         """Ask all drivers to list robots that are gone no longer; waits for the ROS master and the drivers."""

@@ -8,8 +8,8 @@ from geometry_msgs.msg import Twist, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import LaserScan
 
+from hero_client import RobotNotReadyError
 from hero_client.ros import share_drivers
-from hero_client.swarm import ready_ids
 from hero_msgs.msg import Encoder, Motor, RobotPose, RobotPoses
 from hero_msgs.srv import SetIRCalibration, SetMotor, SetPID
 from hero_node import Pose, one_line, pose_of
@@ -132,19 +132,10 @@ def find_robots(program: Program, robot_ids: Optional[Sequence[int]]) -> List[Ro
     Raises: CalibrationError without a driver, without a robot, or while all robots are stopped.
     """
     drivers = share_drivers()
-    report = None
-    ready: List[int] = []
-    deadline_s = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < deadline_s:
-        if not program.sleep(0.05):
-            raise CalibrationError("ended before a robot was found")
-        report = drivers.read()
-        ready = ready_ids(report) if report else []
-        if ready and (drivers.is_settled if robot_ids is None else set(ready).issuperset(robot_ids)):
-            break
-    if report is None:
-        text = "no driver: nothing on /hero_driver/robots; start roslaunch hero_bringup hero_bringup.launch"
-        raise CalibrationError(text)
+    try:
+        ready = drivers.wait_for_robots(TIMEOUT_S, program.sleep, robot_ids)
+    except RobotNotReadyError as error:
+        raise CalibrationError(str(error) if program.running else "ended before a robot was found") from None
     wanted = sorted(ready if robot_ids is None else robot_ids)
     for driver in sorted({drivers.find("/hero_%d" % robot_id) for robot_id in wanted}):
         if drivers.is_stopped(driver):

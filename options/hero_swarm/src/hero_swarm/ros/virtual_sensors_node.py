@@ -17,7 +17,6 @@ from std_msgs.msg import ColorRGBA, Float32, Float32MultiArray, MultiArrayDimens
 
 from hero_client import Program, read_parameters
 from hero_client.ros import share_drivers
-from hero_client.swarm import ready_ids
 from hero_client.values import Neighborhood, Neighbors, list_neighbors
 from hero_msgs.msg import Neighbor as NeighborMessage
 from hero_msgs.msg import Neighbors as NeighborsMessage
@@ -123,8 +122,7 @@ class VirtualSensorsNode:
     def step(self) -> None:
         """Publish what all robots sense."""
         if self._chosen is None:
-            report = share_drivers().read()
-            self._add_robots(ready_ids(report) if report else [])
+            self._add_robots(share_drivers().list_ready())
         if not self._ids:
             self._source.warn("no robot has joined a driver yet: are the robots on?")
             return
