@@ -14,8 +14,9 @@ from hero_driver.corrections.tick_odometry import MAX_GAP_S, MAX_WHEEL_SPEED_M_S
 from hero_driver.corrections.wheel_motion import REST_TICKS, SETTLED_TICKS, WheelMotion
 from hero_driver.ros import robot_commands
 from hero_driver.ros.robot_commands import LIGHT_SUFFIX, SUPERSEDED_S, TUNING_SILENCE_S, RobotCommands
-from hero_node import Pose, encode_pose
+from hero_node import Pose
 from hero_node.robot_constants import MAX_WATCHDOG_S
+from hero_node.ros_messages import encode_pose
 
 VELOCITY, POSITION = "/hero_1/velocity_controller/cmd_vel", "/hero_1/position_controller/cmd_vel"
 TWIST = "geometry_msgs/Twist"

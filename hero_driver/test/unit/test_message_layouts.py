@@ -25,7 +25,7 @@ from robot_messages import (
 from sensor_msgs.msg import Range
 
 from hero_driver.corrections import message_layouts
-from hero_node import LENGTH, encode_list, encode_pose, encode_text
+from hero_node.ros_messages import LENGTH, encode_list, encode_pose, encode_text
 from hero_test.nonempty import nonempty
 
 POSE_DIAGONAL = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

@@ -19,7 +19,8 @@ from robot_messages import (
     read_stamp_ns,
 )
 
-from hero_node import PLUS_ENCODER_MD5, Pose
+from hero_node import Pose
+from hero_node.ros_messages import PLUS_ENCODER_MD5
 
 PERIOD_NS = 34 * MS
 TICK_M = math.pi * 0.0492 / 288.0

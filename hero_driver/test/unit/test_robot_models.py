@@ -6,8 +6,8 @@ import pytest
 from corrected_robot import CorrectedRobot
 from robot_messages import MS, NOW_NS
 
-from hero_node import PLUS_ENCODER_MD5
 from hero_node.files import KeptCalibration
+from hero_node.ros_messages import PLUS_ENCODER_MD5
 
 STOCK_ENCODER_MD5 = "b5586cdbae9b740afc6a1f403a2d7dde"
 

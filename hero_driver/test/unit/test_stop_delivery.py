@@ -11,7 +11,7 @@ from hero_driver.commands.stop_progress import StopState
 from hero_driver.rosserial.packets import RosserialError
 from hero_driver.stops import delivery
 from hero_driver.stops.delivery import BURST_LIGHTS, LIGHT_MD5, LIGHT_TYPE, encode_stop, is_light
-from hero_node import MD5SUMS
+from hero_node.ros_messages import MD5SUMS
 from hero_test.fake_motors import LAG_S, FakeMotors
 
 phases = st.floats(0.0, 0.051)

@@ -20,27 +20,5 @@ from .geometry import (
 )
 from .optional import import_optional
 from .processes import end_process, raise_file_limit
-from .ros_messages import (
-    COVARIANCE_FORM,
-    ENCODER_FORM,
-    HEADER,
-    LENGTH,
-    MD5SUMS,
-    PLUS_ENCODER_MD5,
-    POSE_FORM,
-    SCAN_FORM,
-    TWIST_FORM,
-    TooLongError,
-    encode_header,
-    encode_list,
-    encode_odometry,
-    encode_pose,
-    encode_scan,
-    encode_text,
-    encode_transforms,
-    encode_turn_scan,
-    encode_twist,
-    find_messages,
-)
 from .texts import list_names, make_printable, one_line, shorten, suggest
 from .token_bucket import TokenBucket, TokenBuckets

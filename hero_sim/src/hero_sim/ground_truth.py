@@ -12,7 +12,8 @@ from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from hero_node import Pose, encode_odometry, encode_transforms
+from hero_node import Pose
+from hero_node.ros_messages import encode_odometry, encode_transforms
 
 from .scene import FRAME, START_S, Shape, draw_arena, draw_objects, draw_robots, encode_markers
 from .simulator import Simulator

@@ -7,8 +7,9 @@ from typing import Iterable, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from hero_node import Pose, encode_header, encode_list, encode_pose, encode_text
+from hero_node import Pose
 from hero_node.robot_constants import BODY_RADIUS_M
+from hero_node.ros_messages import encode_header, encode_list, encode_pose, encode_text
 
 from .world.arena import Area, Arena
 from .world.pushing.shapes import PushedBody, list_outlines

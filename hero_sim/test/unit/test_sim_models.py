@@ -11,7 +11,7 @@ from hero_driver.corrections import PLUS_WHEELS, WheelGeometry
 from hero_driver.corrections.message_layouts import drop_tick_difference, read_encoder
 from hero_driver.corrections.tick_odometry import TickOdometry
 from hero_driver.rosserial import packets, payloads
-from hero_node import PLUS_ENCODER_MD5
+from hero_node.ros_messages import PLUS_ENCODER_MD5
 from hero_sim.robot.models import MODELS
 from hero_sim.world.arena import build_rectangle
 from hero_sim.world.robot_errors import draw_errors

@@ -9,8 +9,8 @@ import math
 import struct
 from typing import Optional
 
-from hero_node import TWIST_FORM
 from hero_node.robot_constants import SERVO_CENTER_US
+from hero_node.ros_messages import TWIST_FORM
 
 COMMAND_INTERVAL_S = 0.06
 """Time between two commands to one controller: the firmware drops one within 50 ms of the last accepted one."""

@@ -4,7 +4,16 @@ import math
 import struct
 from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
-from hero_node import (
+from hero_node.robot_constants import (
+    BODY_RADIUS_M,
+    DISTANCE_CONE_RAD,
+    MAX_DISTANCE_M,
+    MAX_RIM_RANGE_M,
+    MIN_DISTANCE_M,
+    MIN_RIM_RANGE_M,
+    STOCK_BEAMS,
+)
+from hero_node.ros_messages import (
     COVARIANCE_FORM,
     ENCODER_FORM,
     HEADER,
@@ -15,15 +24,6 @@ from hero_node import (
     TWIST_FORM,
     encode_header,
     encode_turn_scan,
-)
-from hero_node.robot_constants import (
-    BODY_RADIUS_M,
-    DISTANCE_CONE_RAD,
-    MAX_DISTANCE_M,
-    MAX_RIM_RANGE_M,
-    MIN_DISTANCE_M,
-    MIN_RIM_RANGE_M,
-    STOCK_BEAMS,
 )
 
 from .stamps import NS_PER_S

@@ -7,7 +7,8 @@ for longer than until the next odom. Pure.
 
 from typing import Any, Callable, List, Optional, Protocol, Tuple
 
-from hero_node import Pose, encode_pose
+from hero_node import Pose
+from hero_node.ros_messages import encode_pose
 
 from . import message_layouts
 from .correction_settings import CorrectionSettings

@@ -8,9 +8,9 @@ import collections
 import functools
 from typing import Callable, Deque, Dict, NamedTuple, Optional, Sequence, Tuple
 
-from hero_node import PLUS_ENCODER_MD5
 from hero_node.files import HERO_PLUS, STOCK
 from hero_node.robot_constants import SCAN_TIME_S
+from hero_node.ros_messages import PLUS_ENCODER_MD5
 
 from . import message_layouts
 from .correction_settings import CorrectionSettings

@@ -3,7 +3,7 @@
 import re
 from typing import Callable, Dict, Set
 
-from hero_node import encode_text
+from hero_node.ros_messages import encode_text
 
 from . import message_layouts
 from .message_layouts import TRANSFORM, TRANSFORM_FRAMES, TRANSFORM_HEAD, TRANSFORM_START, TRANSFORM_TAIL

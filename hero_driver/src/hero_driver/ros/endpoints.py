@@ -9,7 +9,7 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence, Tuple
 
 import rospy
 
-from hero_node import MD5SUMS
+from hero_node.ros_messages import MD5SUMS
 
 from . import message_types
 from .message_types import MessageTypeError

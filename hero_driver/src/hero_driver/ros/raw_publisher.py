@@ -10,7 +10,7 @@ from typing import Any, Callable, Deque, Dict, List
 
 from tf2_msgs.msg import TFMessage
 
-from hero_node import LENGTH, encode_list
+from hero_node.ros_messages import LENGTH, encode_list
 
 from ..transport.event_loop import CallLater
 from .message_types import make_raw_class

@@ -16,7 +16,7 @@ from typing import Any, Callable, FrozenSet, Optional
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
 
-from hero_node import LENGTH, TooLongError, find_messages
+from hero_node.ros_messages import LENGTH, TooLongError, find_messages
 
 from ..transport.event_loop import EventLoop, Reader
 from .rospy_internals import (

@@ -9,7 +9,7 @@ registrar. Endpoints stay up when the connection goes and are there again when t
 import functools
 from typing import Any, Callable, Dict, List, Optional, Set, Tuple
 
-from hero_node import MD5SUMS
+from hero_node.ros_messages import MD5SUMS
 
 from ..commands.command_queue import CommandSettings
 from ..commands.service_requests import is_success, read_set_odom_pose

@@ -3,7 +3,7 @@
 import struct
 from typing import List, NamedTuple, Tuple
 
-from hero_node import LENGTH, encode_text
+from hero_node.ros_messages import LENGTH, encode_text
 
 from .packets import RosserialError
 

@@ -16,7 +16,7 @@ one write, below the robot's TCP window of 2144 bytes, and no second one before 
 import time
 from typing import Callable, List, Optional
 
-from hero_node import MD5SUMS
+from hero_node.ros_messages import MD5SUMS
 
 from ..commands.stop_progress import StopProgress, StopState
 from ..commands.velocity_shaper import STOP_PAYLOADS, ZERO_TWIST

@@ -8,7 +8,7 @@ import itertools
 from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 
 from hero_driver.rosserial import packets, payloads
-from hero_node import MD5SUMS
+from hero_node.ros_messages import MD5SUMS
 
 BUFFER_LENGTH = 4096
 """INPUT_SIZE and OUTPUT_SIZE of the firmware's NodeHandle."""

@@ -11,19 +11,19 @@ import struct
 from typing import List, Sequence, Tuple
 
 from hero_driver.rosserial import packets
-from hero_node import (
+from hero_node import Pose
+from hero_node.robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
+from hero_node.ros_messages import (
     COVARIANCE_FORM,
     ENCODER_FORM,
     POSE_FORM,
     TWIST_FORM,
-    Pose,
     encode_header,
     encode_odometry,
     encode_scan,
     encode_text,
     encode_transforms,
 )
-from hero_node.robot_constants import TICKS_PER_TURN, WHEEL_SEPARATION_M
 
 from .models import HERO, RobotModel
 

@@ -7,8 +7,9 @@ is as in the stock robot; HeRo+'s own law for its motors, too, is that of the st
 
 from typing import Dict, List, NamedTuple, Tuple
 
-from hero_node import MD5SUMS, PLUS_ENCODER_MD5, robot_constants
+from hero_node import robot_constants
 from hero_node.robot_constants import TICK_M, TICKS_PER_TURN
+from hero_node.ros_messages import MD5SUMS, PLUS_ENCODER_MD5
 
 from ..errors import OptionError
 from ..key_values import parse_values

@@ -9,16 +9,9 @@ from typing import Callable, Dict, List, Sequence, Tuple
 
 import numpy as np
 
-from hero_node import (
-    Pose,
-    encode_header,
-    encode_odometry,
-    encode_transforms,
-    encode_turn_scan,
-    encode_twist,
-    find_frame,
-)
+from hero_node import Pose, find_frame
 from hero_node.robot_constants import BODY_RADIUS_M, MAX_RIM_RANGE_M, MIN_RIM_RANGE_M, SCAN_TIME_S
+from hero_node.ros_messages import encode_header, encode_odometry, encode_transforms, encode_turn_scan, encode_twist
 
 from ..scene import FRAME, START_S, draw_arena, draw_objects, draw_robots, encode_markers
 from .robot_rows import RobotRows

@@ -13,7 +13,8 @@ from geometry_msgs.msg import Pose as PoseMessage
 from nav_msgs.msg import Odometry
 
 from hero_client.values import is_plausible, read_pose
-from hero_node import HEADER, LENGTH, POSE_FORM, Pose
+from hero_node import Pose
+from hero_node.ros_messages import HEADER, LENGTH, POSE_FORM
 
 from ..filter.pose_hypothesis import StampedPose
 from .outputs import IN_PLANE
