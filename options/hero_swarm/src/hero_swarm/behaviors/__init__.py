@@ -15,8 +15,6 @@ from ..machines.machine_file import ENDING, read_controller
 from ..sources import Sources, load_file, read_content
 from .machine import make_machine
 
-__all__ = ["find_behavior", "list_classes", "list_names", "make_behavior"]
-
 POLICY_ENDING = ".npz"
 
 MAX_NUMBER = 1e6

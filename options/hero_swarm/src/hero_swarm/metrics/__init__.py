@@ -10,13 +10,6 @@ from .graphs import algebraic_connectivity, cluster_fraction, collisions, neares
 from .motion import consensus_error, order, rotation, wall_following
 from .shapes import dispersion, dispersion_ratio, fatness, object_cluster_fraction, object_distance
 
-__all__ = [
-    "CHANCE", "FALLING", "METRICS", "UNITS", "algebraic_connectivity", "cluster_fraction", "collisions",
-    "consensus_error", "dispersion",
-    "dispersion_ratio", "fatness", "nearest_neighbor",
-    "object_cluster_fraction", "object_distance", "order", "rotation", "score", "wall_following",
-]  # fmt: skip
-
 Metric = Callable[..., np.ndarray]
 """Function of poses and velocities (W, N, 3) in the common frame, of the poses of objects (W, M, 3), of the bodies'
 radii (N,), and of the arena; the last three may be left out where they do not count. Returns numbers (W,)."""
