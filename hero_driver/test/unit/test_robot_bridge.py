@@ -18,7 +18,7 @@ from hero_driver.rosserial.payloads import TopicInfo
 from hero_driver.rosserial.session import Topic, TopicKind
 from hero_driver.transport.call_queue import Worker
 from hero_driver.transport.event_loop import EventLoop
-from hero_node import MD5SUMS
+from hero_node.ros_messages import MD5SUMS
 
 LIGHT = "/hero_7/led"
 COLOR_MD5 = "a29a96539573343b1310c73607334b00"
