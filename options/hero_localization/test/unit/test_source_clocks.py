@@ -223,3 +223,10 @@ def test_a_robot_that_is_silent_is_not_moved_on():
     drive.run(3.0)
     (robot,) = drive.localizer.list_robots(drive.now_s + 0.3, True)
     assert robot.estimate.stamp_s < drive.now_s + 0.01
+
+
+@pytest.mark.slow
+def test_a_clock_that_is_not_known_yet_is_not_taken_for_a_hand():
+    drive = Drive([0.1], motion=lambda now_s: (0.2 * (now_s % 1.0 < 0.5), 2.5 if now_s % 1.4 < 0.7 else -2.5))
+    drive.run(4.0)
+    assert len(drive.lines) == 1 and "found at" in drive.lines[0], drive.lines

@@ -64,42 +64,42 @@ class TwoCameras:
 )
 def test_a_height_that_is_wrong_for_all_robots_is_named_once(too_high_m, text):
     cameras = TwoCameras({0: too_high_m, 3: too_high_m})
-    cameras.run(4.8)
+    cameras.run(7.8)
     assert cameras.problem == ""
-    cameras.run(4.2)
+    cameras.run(2.2)
     assert cameras.problem.startswith("two cameras see tags of robots " + text), cameras.problem
     assert [line for line in cameras.lines if "found at" not in line] == [cameras.problem], "and no conflict of sources"
 
 
 def test_one_robots_tag_at_another_height_is_named():
-    cameras = TwoCameras({0: 0.0, 3: 0.015, 5: 0.0}).run(9.0)
+    cameras = TwoCameras({0: 0.0, 3: 0.015, 5: 0.0}).run(10.0)
     assert cameras.problem.startswith("two cameras see tags of hero_3 15 mm higher"), cameras.problem
 
 
 @pytest.mark.parametrize("too_high_m", [0.0, 0.002, -0.002])
 def test_a_height_that_is_right_within_the_cameras_errors_is_not_named(too_high_m):
-    assert TwoCameras({0: too_high_m}).run(9.0).problem == ""
+    assert TwoCameras({0: too_high_m}).run(10.0).problem == ""
 
 
 def test_a_right_height_is_not_blamed_for_frames_that_are_off_across():
     baseline_m = (CAMERAS_M["/track_2"] - CAMERAS_M["/track"])[:2]
     across_m = 0.004 * np.array((-baseline_m[1], baseline_m[0])) / np.linalg.norm(baseline_m)
-    assert TwoCameras({0: 0.0}).run(9.0, across_m).problem == ""
+    assert TwoCameras({0: 0.0}).run(10.0, across_m).problem == ""
 
 
 @pytest.mark.parametrize(
     "cameras_m", [{}, {"/track": CAMERAS_M["/track"]}, {"/track": np.zeros(3), "/vrpn": np.ones(3)}]
 )
 def test_heights_are_not_judged_without_the_places_of_both_cameras(cameras_m):
-    assert TwoCameras({0: 0.015}, cameras_m).run(9.0).problem == ""
+    assert TwoCameras({0: 0.015}, cameras_m).run(10.0).problem == ""
 
 
 def test_cameras_side_by_side_tell_no_heights():
     near_m = {"/track": CAMERAS_M["/track"], "/track_2": CAMERAS_M["/track"] + (0.3, 0.0, 0.0)}
-    assert TwoCameras({0: 0.015}, near_m).run(9.0).problem == ""
+    assert TwoCameras({0: 0.015}, near_m).run(10.0).problem == ""
 
 
 def test_a_clock_that_is_off_is_not_taken_for_a_wrong_height():
-    cameras = TwoCameras({0: 0.0}, late_s=0.1, speed_m_s=0.3).run(14.0)
+    cameras = TwoCameras({0: 0.0}, late_s=0.1, speed_m_s=0.3).run(20.0)
     named = [line for line in cameras.lines if "found at" not in line]
     assert cameras.problem == "" and len(named) == 1 and "ms late, which is corrected" in named[0], named

@@ -252,10 +252,7 @@ def _is_blocked(steps: Sequence[_Step], measurement: StampedPose, odometry: Odom
 
 
 def invert(matrix: np.ndarray) -> np.ndarray:
-    """Return the inverse of a symmetric matrix (3, 3).
-
-    LAPACK takes five times as long for one so small, and OpenBLAS wakes threads for it, which then spin.
-    """
+    """Return the inverse of a symmetric matrix (3, 3); LAPACK takes five times as long for one so small."""
     (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
     first, second, third = d * f - e * e, c * e - b * f, b * e - c * d
     fourth, fifth, sixth = a * f - c * c, b * c - a * e, a * d - b * b

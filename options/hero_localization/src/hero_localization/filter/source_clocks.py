@@ -60,10 +60,10 @@ MIN_EFFECT = 0.1
 
 
 class _Source:
-    """One source, what is corrected of its delay, when that was found, since when it is off, whether all is corrected."""
+    """One source, what is corrected of its delay, when that was found, and since when it is off."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.is_off, self.is_adjusted = name, False, True
+        self.name, self.is_off = name, False
         self.corrected_s, self.now_s, self.off_s = 0.0, math.inf, math.inf
 
 
@@ -78,11 +78,6 @@ class SourceClocks:
         self._poses: Dict[Tuple[int, int], List[StampedPose]] = {}
         """SPAN_S apart, by robot and source: odometry of their time has not come yet."""
         self._due_s: Dict[Tuple[int, int], float] = {}
-
-    @property
-    def are_adjusted(self) -> bool:
-        """False while stamps of a source are being corrected."""
-        return all(source.is_adjusted for source in self._sources)
 
     def list_off(self) -> Dict[str, str]:
         """Return by how much clocks are off, and the remedy, by the nodes that poses come from."""
@@ -102,10 +97,15 @@ class SourceClocks:
             was_off, source.is_off = source.is_off, abs(delay_s) > (SETTLED_S if source.is_off else NAMED_S)
             source.off_s = source.off_s if was_off else now_s
             missing_s = (delay_s if source.is_off else 0.0) - source.corrected_s
-            source.is_adjusted = abs(missing_s) <= SETTLED_S or not self._slew
             source.corrected_s += clamp(missing_s, self._slew * max(0.0, now_s - source.now_s))
         source.now_s = now_s
         return measurement._replace(stamp_s=measurement.stamp_s - source.corrected_s)
+
+    def is_settled(self, node: str) -> bool:
+        """Return whether the delay of a node's stamps is known and corrected."""
+        index = self._find_source(node)
+        missing_s = self._delays_s.item(index) - self._sources[index].corrected_s
+        return abs(missing_s) + SURE_SDS * math.sqrt(self._covariance.item(index, index)) < 2.0 * NAMED_S
 
     def _find_source(self, name: str) -> int:
         """Return the index of a node."""

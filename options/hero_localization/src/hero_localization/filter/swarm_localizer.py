@@ -12,6 +12,7 @@ import numpy as np
 from hero_client.controllers import HeadingCheck, is_upside_down
 from hero_node import Pose, list_names, measure_distance, transform_pose, wrap_angle
 
+from .odometry_history import JITTER_M, JITTER_RAD
 from .pose_filter import Outcome, PoseFilter, is_near
 from .pose_hypothesis import StampedPose
 from .pose_sources import DISAGREEING_S, NO_OFFSET, PoseSources
@@ -26,6 +27,9 @@ ANNOUNCED_STEP_M = 0.02
 
 WRONG_HEADING_RAD = 0.35
 """A tag that is glued on by eye is right to a tenth of this."""
+
+UNKNOWN_S = 0.5
+"""Time before a measured pose whose motion may seem to be missing, while clocks are unknown: they, and the filter."""
 
 SILENT_S = 1.0
 """Odometry comes 29 times a second."""
@@ -146,8 +150,6 @@ class SwarmLocalizer:
             return lines + self._name(measurement.source, text % (measurement.source, offset_s))
         self.clocks.add(robot_id, measurement, robot.filter.odometry)
         measurement = self.clocks.correct(measurement, now_s)
-        if not self.clocks.are_adjusted:
-            self.heights.restart()
         before = robot.filter.pose()
         used_s = robot.filter.used_s
         outcome = robot.filter.add_measurement(measurement)
@@ -182,7 +184,7 @@ class SwarmLocalizer:
         conflict = robot.sources.note(measurement, outcome)
         if outcome is Outcome.OUTLIER or conflict is not None:
             robot.outliers += outcome is Outcome.OUTLIER
-            if conflict is None or not conflict.is_lasting or self.heights.list_wrong():
+            if conflict is None or not conflict.is_lasting or self.heights.describe():
                 return []
             return self._name(conflict.key, "hero_%d: %s" % (robot_id, conflict.text))
         robot.outliers = 0
@@ -196,6 +198,13 @@ class SwarmLocalizer:
         step_deg = math.degrees(abs(wrap_angle(after.yaw_rad - before.yaw_rad)))
         step = f"{1000.0 * step_m:.0f} mm and {step_deg:.0f} degrees"
         if outcome is Outcome.MOVED:
+            earlier = robot.filter.odometry.find(measurement.stamp_s - UNKNOWN_S)
+            if odometry is not None and earlier is not None and not self.clocks.is_settled(measurement.node):
+                # What a robot drove lately was no hand while it is unknown when it did.
+                turned_rad = odometry.turned_rad - earlier.turned_rad + JITTER_RAD
+                driven_m = odometry.distance_m - earlier.distance_m + JITTER_M
+                if step_m <= driven_m and math.radians(step_deg) <= turned_rad:
+                    return []
             return ["hero_%d was moved by hand: pose reset by %s to %s" % (robot_id, step, _describe_pose(after))]
         if robot.is_lost:
             return []

@@ -5,13 +5,14 @@ and a lower one for a nearer one. So two cameras see it apart, along the line be
 """
 
 import math
-from typing import Dict, List, Tuple
+from typing import Dict, Tuple
 
 import numpy as np
 
 from hero_node import Pose, find_frame, list_names, transform_pose
 
 from .pose_hypothesis import StampedPose
+from .pose_sources import LASTING_S
 
 MAX_STEP_S = 0.2
 """Time between poses from two cameras that are compared."""
@@ -19,22 +20,12 @@ MAX_STEP_S = 0.2
 MIN_SLOPE = 0.2
 """Distance between two cameras, by their height above the tags, from which on they tell heights."""
 
-KEPT_PAIRS = 200
-"""Comparisons that count: of the last seconds, as errors of clocks do not last."""
+KEPT_PAIRS = 60
+"""Comparisons that count, the last ones: clocks that are off are corrected meanwhile."""
 
 SURE_SDS = 1.5
 """A height is wrong by more than this many of the standard deviations that the cameras tell, which are 1.7 times what
 calibrations of two cameras by six tags each, measured to 0.7 mm, leave."""
-
-CONFIRMED_S = 5.0
-"""A wrong height is named after this long: by then clocks are corrected."""
-
-
-class _Height:
-    """Error of the height of one robot's tag: m, its limit, and since when that is exceeded (stamp, s)."""
-
-    def __init__(self) -> None:
-        self.pairs, self.error_m, self.limit_m, self.since_s = 0, 0.0, math.inf, math.inf
 
 
 class TagHeights:
@@ -46,56 +37,40 @@ class TagHeights:
     def __init__(self) -> None:
         self.cameras_m: Dict[str, np.ndarray] = {}
         self._last: Dict[int, Tuple[StampedPose, Pose]] = {}
-        self._heights: Dict[int, _Height] = {}
-
-    def restart(self) -> None:
-        """Forget all comparisons: stamps were wrong."""
-        self._heights.clear()
+        self._errors: Dict[int, Tuple[int, float, float]] = {}
+        """Number of comparisons, by how much the tag is too high (m), and since when by too much (stamp), by robot."""
 
     def add(self, robot_id: int, measurement: StampedPose, odometry: Pose) -> None:
         """Take a measured pose, and the one by odometry at its time."""
-        if len(self.cameras_m) < 2:
-            return
         before, counted = self._last.get(robot_id, (measurement, odometry))
         self._last[robot_id] = measurement, odometry
-        cameras_m = [self.cameras_m.get(pose.node) for pose in (before, measurement)]
-        is_near = abs(measurement.stamp_s - before.stamp_s) <= MAX_STEP_S
-        if before.node == measurement.node or cameras_m[0] is None or cameras_m[1] is None or not is_near:
+        cameras_m = [self.cameras_m[pose.node] for pose in (before, measurement) if pose.node in self.cameras_m]
+        if before.node == measurement.node or len(cameras_m) < 2:
             return
-        there = transform_pose(find_frame(before.pose, counted), odometry)
-        slopes = [
-            np.subtract(measurement.pose[:2], camera_m[:2]) / camera_m[2]
-            for camera_m in cameras_m
-            if camera_m is not None
-        ]
+        place_m, there = measurement.pose[:2], transform_pose(find_frame(before.pose, counted), odometry)
+        slopes = [np.subtract(place_m, camera_m[:2]) / camera_m[2] for camera_m in cameras_m]
         across = slopes[0] - slopes[1]
         slope = math.hypot(*across)
-        if slope < MIN_SLOPE:
+        if slope < MIN_SLOPE or abs(measurement.stamp_s - before.stamp_s) > MAX_STEP_S:
             return
-        height = self._heights.setdefault(robot_id, _Height())
-        height.pairs = min(height.pairs + 1, KEPT_PAIRS)
-        error_m = float(np.subtract(there[:2], measurement.pose[:2]) @ across) / slope**2
-        height.error_m += (error_m - height.error_m) / height.pairs
-        sd_m = math.sqrt(before.covariance.item(0) + measurement.covariance.item(0)) / slope
-        height.limit_m = SURE_SDS * sd_m
-        is_wrong = abs(height.error_m) > height.limit_m
-        height.since_s = min(height.since_s, measurement.stamp_s) if is_wrong else math.inf
-
-    def list_wrong(self) -> Dict[int, float]:
-        """Return by how much (m) tags are higher than the camera file says, by robot, where that is wrong."""
-        return {
-            robot_id: height.error_m
-            for robot_id, height in sorted(self._heights.items())
-            if self._last[robot_id][0].stamp_s >= height.since_s + CONFIRMED_S
-        }
+        pairs, error_m, since_s = self._errors.get(robot_id, (0, 0.0, math.inf))
+        pairs = min(pairs + 1, KEPT_PAIRS)
+        error_m += (float(np.subtract(there[:2], place_m) @ across) / slope**2 - error_m) / pairs
+        limit_m = SURE_SDS * math.sqrt(before.covariance.item(0) + measurement.covariance.item(0)) / slope
+        since_s = min(since_s, measurement.stamp_s) if abs(error_m) > limit_m else math.inf
+        self._errors[robot_id] = pairs, error_m, since_s
 
     def describe(self) -> str:
-        """Return which heights are wrong, and the remedy; empty if none is."""
-        wrong = self.list_wrong()
-        if not wrong:
+        """Return which robots' tags have been at another height for LASTING_S, and the remedy; empty if none has."""
+        wrong_m = {
+            "hero_%d" % robot_id: error_m
+            for robot_id, (_, error_m, since_s) in sorted(self._errors.items())
+            if self._last[robot_id][0].stamp_s >= since_s + LASTING_S
+        }
+        if not wrong_m:
             return ""
-        off_m = float(np.median(list(wrong.values())))
-        names: List[str] = ["hero_%d" % robot_id for robot_id in wrong]
-        whose = list_names(names) if len(wrong) <= len(self._heights) / 2.0 else "robots"
+        off_mm = 1e3 * float(np.median(list(wrong_m.values())))
+        whose = list_names(list(wrong_m)) if 2 * len(wrong_m) <= len(self._errors) else "robots"
+        side = "higher" if off_mm > 0.0 else "lower"
         text = "two cameras see tags of %s %.0f mm %s than tag_height_m: correct it in both camera files"
-        return text % (whose, 1e3 * abs(off_m), "higher" if off_m > 0.0 else "lower")
+        return text % (whose, abs(off_mm), side)
