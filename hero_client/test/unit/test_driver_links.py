@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("rospy", reason="drivers are ROS nodes")
 from hero_client.ros import drivers
-from hero_client.ros.drivers import FORGET_S, REPEAT_PERIOD_S, SETTLE_LOOKS, SILENT_S, Drivers
+from hero_client.ros.drivers import FIND_PERIOD_S, FORGET_S, REPEAT_PERIOD_S, SETTLE_LOOKS, SILENT_S, Drivers
 from hero_client.ros.stop_status import CROSSING_S, TIME_LIMIT_S
 from hero_msgs.msg import Robot, RobotArray
 from hero_node import NodeError, ProgramError
@@ -300,3 +300,31 @@ def test_a_connection_that_is_being_closed_takes_no_request(monkeypatch):
     link._requests.unregister = lambda: answers.append(link.request_stop(True))
     link.close()
     assert answers == [False] and ros.requests == []
+
+
+def run_finder(ros, monkeypatch, looks):
+    """Let the thread that finds drivers look so many times, until the program ends."""
+    waits_s = []
+    ros.drivers._end = SimpleNamespace(is_set=lambda: len(waits_s) >= looks, wait=waits_s.append)
+    ros.drivers._links = {}
+    ros.drivers._find()
+    return waits_s
+
+
+def test_the_usual_driver_is_connected_to_whoever_is_found(ros, monkeypatch):
+    ros.known = [B]
+    assert run_finder(ros, monkeypatch, 2) == [FIND_PERIOD_S] * 2
+    assert set(ros.drivers._links) == {A + "/robots", B + "/robots"} and ros.drivers._looks == 2
+    assert sorted(ros.unregistered) == sorted(name + part for name in (A, B) for part in ("/stop_request", "/robots"))
+
+
+def test_a_node_that_ends_leaves_its_topics_to_rospy(ros, monkeypatch):
+    monkeypatch.setattr(drivers.rospy.core, "is_shutdown_requested", lambda: True)
+    run_finder(ros, monkeypatch, 1)
+    assert ros.unregistered == []
+
+
+def test_where_the_usual_topic_is_remapped_no_other_driver_is_looked_for(ros, monkeypatch):
+    ros.drivers._usual, ros.known = B + "/robots", [A]
+    run_finder(ros, monkeypatch, 1)
+    assert set(ros.drivers._links) == {B + "/robots"} and ros.drivers._has_found and ros.drivers.names() == [B]

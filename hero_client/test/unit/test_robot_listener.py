@@ -1,15 +1,21 @@
 """What is received of a robot becomes a rate, a distance and the nearest obstacle."""
 
+import io
 import math
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
+import rospy
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Float32
 
 from hero_client.ros import robot_listener
-from hero_client.ros.robot_listener import RateMeter, RobotTrack
+from hero_client.ros.robot_listener import NewestMessage, RateMeter, RobotTrack, follow
 from hero_client.values.readings import front_first
 from hero_node import Pose
+from hero_node.files import ExtraTopic, FleetFile
 
 
 def test_a_rate_is_the_count_divided_by_the_time():
@@ -92,3 +98,83 @@ def test_ranges_at_invalid_angles_are_not_seen(number):
         scan = SimpleNamespace(ranges=[0.1] * 8, angle_min=angle_min_rad, angle_increment=increment_rad)
         track.receive_proximity(front_first(scan))
         assert track.proximity_seen == is_seen == (track.nearest is not None)
+
+
+def receive(newest, message, md5sum=None):
+    """Let a message come on a subscription, as rospy passes it on undecoded."""
+    data = io.BytesIO()
+    message.serialize(data)
+    came = rospy.AnyMsg().deserialize(data.getvalue())
+    came._connection_header = {"md5sum": md5sum or message._md5sum}
+    newest._keep(came)
+
+
+@pytest.fixture(name="subscriber")
+def make_subscriber(monkeypatch):
+    made = create_autospec(rospy.Subscriber)
+    made.return_value.get_num_connections.return_value = 1
+    monkeypatch.setattr(robot_listener.rospy, "Subscriber", made)
+    return made
+
+
+def test_of_the_messages_that_came_the_newest_is_read_once(subscriber):
+    newest = NewestMessage("/hero_3/battery", Float32)
+    subscriber.assert_called_once_with("/hero_3/battery", rospy.AnyMsg, newest._keep, queue_size=10)
+    assert newest.take() is None and newest.has_publisher
+    for value in (1.0, 2.0, 3.0):
+        receive(newest, Float32(value))
+    receive(newest, Float32(9.0), "0" * 32)
+    assert newest.count == 3 and newest.take() == Float32(3.0), "that of another layout is none"
+    assert newest.take() is None and newest.count == 3
+    newest._bytes = b"no"
+    assert newest.take() is None and newest.take() is None
+    newest.close()
+    subscriber.return_value.unregister.assert_called_once_with()
+    subscriber.return_value.get_num_connections.return_value = 0
+    assert not newest.has_publisher
+
+
+def test_a_listener_reads_odometry_proximity_and_what_the_fleet_declares(subscriber, monkeypatch):
+    topics = [
+        ExtraTopic("charge", "battery", "std_msgs/Float32", "data"),
+        ExtraTopic("load", "cpu", "std_msgs/Float32", "data"),
+    ]
+    monkeypatch.setattr(robot_listener, "load_fleet_file", lambda: FleetFile(topics=tuple(topics)))
+    listener = robot_listener.RobotListener("/hero_3")
+    assert [call[0][0] for call in subscriber.call_args_list] == [
+        "/hero_3/battery",
+        "/hero_3/cpu",
+        "/hero_3/odom",
+        "/hero_3/proximity",
+    ]
+    odometry = Odometry()
+    odometry.pose.pose.position.x, odometry.pose.pose.orientation.w = 1.0, 1.0
+    odometry.twist.twist.linear.x, odometry.twist.twist.angular.z = 0.1, -0.2
+    for _ in range(2):
+        receive(listener._odometry, odometry)
+    receive(listener._extras[topics[1]], Float32(0.5))
+    receive(listener._proximity, LaserScan(ranges=[0.1] + [math.inf] * 7, angle_min=0.0, angle_increment=0.785))
+    listener.read_newest()
+    track = listener.track
+    assert track.odometry.total == 2 and track.pose == (1.0, 0.0, 0.0) and track.velocity == pytest.approx((0.1, -0.2))
+    assert listener.values == {"load": 0.5} and listener.ranges_m[0] == pytest.approx(0.1)
+    assert track.proximity_seen and track.nearest.range_m == pytest.approx(0.1)
+    receive(listener._extras[topics[0]], Float32(3.75))
+    listener.read_newest()
+    assert listener.values == {"load": 0.5, "charge": 3.75} and track.pose == (1.0, 0.0, 0.0), "known as before"
+    listener.close()
+    assert subscriber.return_value.unregister.call_count == 4
+
+
+def test_what_is_wanted_is_opened_and_the_rest_closed_each_once():
+    opened, closed = [], []
+
+    def open_source(name):
+        opened.append(name)
+        return SimpleNamespace(close=lambda: closed.append(name))
+
+    sources = {}
+    for wanted in ({"b", "a"}, {"b", "a"}, {"b", "c"}, set()):
+        follow(sources, wanted, open_source)
+        assert set(sources) == wanted
+    assert opened == ["a", "b", "c"] and closed[0] == "a" and sorted(closed) == ["a", "b", "c"]

@@ -1,0 +1,172 @@
+"""The monitor's loop: what is done in which order at its end, and what each page is sent."""
+
+import contextlib
+import json
+from types import SimpleNamespace
+from unittest.mock import create_autospec
+
+import pytest
+import tornado.ioloop
+
+from hero_client.ros import Drivers
+from hero_monitor import program as module
+from hero_monitor.background import Background
+from hero_monitor.control.drive_requests import DriveRequests
+from hero_monitor.control.programs import Programs
+from hero_monitor.fleet_feed.feed import FleetFeed
+from hero_monitor.fleet_feed.page_state import PageState
+from hero_monitor.page_requests import PageRequests
+from hero_monitor.program import LESSON, Monitor
+from hero_monitor.serving.lesson import TEACHER, VIEWER, Lesson, Role, User
+from hero_monitor.serving.server import MonotonicLoop, PageSocket, Server
+from hero_node import ProgramError
+from hero_node.ros import Program
+
+DRIVER = Role("driver", frozenset(["hero_7", "hero_2"]))
+
+
+class Page:
+    """A page as the monitor sees it."""
+
+    def __init__(self, user=None, ready=True, picture=False):
+        self.socket = create_autospec(PageSocket, instance=True, ready=ready, picture=picture)
+        self.socket.user, self.socket.shown_user, self.socket.seen = user or User("", TEACHER), None, {}
+
+    @property
+    def sent(self):
+        return [json.loads(one.args[0]) for one in self.socket.send.call_args_list]
+
+
+@pytest.fixture(name="monitor")
+def make_monitor(monkeypatch):
+    """A monitor whose parts note what they are asked for, in one list: monitor.calls."""
+    monitor, calls = Monitor.__new__(Monitor), []
+    parts = {
+        "_loop": MonotonicLoop,
+        "_server": Server,
+        "_background": Background,
+        "_commander": DriveRequests,
+        "_programs": Programs,
+        "_requests": PageRequests,
+        "_feed": FleetFeed,
+        "_end_check": tornado.ioloop.PeriodicCallback,
+    }
+    for name, kind in parts.items():
+        part = create_autospec(kind, instance=True)
+        setattr(monitor, name, part)
+        for method in ("start", "stop", "close", "shutdown", "listen"):
+            if hasattr(part, method):
+                getattr(part, method).side_effect = lambda *_, name=name, method=method, **__: calls.append(
+                    f"{name[1:]}.{method}"
+                )
+    monitor._feed.page_state, monitor._feed.drivers = PageState(), create_autospec(Drivers, instance=True)
+    monitor._server.pages = []
+    monitor._parameters = SimpleNamespace(host="0.0.0.0", port=8080, control=False)
+    monitor._program = create_autospec(Program, instance=True, running=True)
+    monitor._lesson, monitor.calls = None, calls
+    monkeypatch.setattr(module.rospy, "loginfo", lambda *_: None)
+    monkeypatch.setattr(module, "read_clock_ms", lambda: 5000)
+    return monitor
+
+
+ENDS = ["programs.close", "commander.close", "server.close", "background.shutdown"]
+
+
+@pytest.mark.parametrize("error", [None, KeyboardInterrupt, ArithmeticError])
+def test_programs_and_robots_are_stopped_before_pages_whatever_ends_it(monitor, error):
+    if error:
+        monitor._loop.start.side_effect = error
+    else:
+        monitor._loop.start.side_effect = lambda: monitor.calls.append("served")
+    with pytest.raises(error) if error else contextlib.nullcontext():
+        monitor.run()
+    assert monitor.calls == ["server.listen", "end_check.start", *([] if error else ["served"]), *ENDS]
+    assert not monitor._background.submit.called, "it only shows"
+
+
+def test_a_port_that_is_taken_is_an_error_with_what_to_do(monitor):
+    monitor._server.listen.side_effect = OSError(98, "Address already in use")
+    with pytest.raises(ProgramError, match=r"cannot listen on 0\.0\.0\.0 port 8080: Address already in use; choose"):
+        monitor.run()
+    assert not monitor._loop.start.called
+
+
+def test_what_programs_can_be_started_is_found_in_the_background(monitor):
+    monitor._parameters.control = True
+    finding = monitor._background.submit.return_value
+    finding.add_done_callback.side_effect = lambda then: then(SimpleNamespace(result=lambda: {"record": "/opt/record"}))
+    monitor.run()
+    monitor._background.submit.assert_called_once_with(monitor._find_programs)
+    ((offer, paths),) = [one.args for one in monitor._loop.add_callback.call_args_list]
+    offer(paths)
+    assert monitor._programs.paths == {"record": "/opt/record"}
+    offers = json.loads(monitor._feed.page_state.take_updates({}))["offers"]
+    assert offers["record"] is True and offers["programs"] == []
+
+
+def test_guards_are_told_that_it_runs_until_the_program_ends(monitor):
+    monitor._check_end()
+    assert monitor._programs.beat.call_count == 1 and monitor.calls == []
+    monitor._program.running = False
+    monitor._check_end()
+    assert monitor.calls == ["loop.stop"]
+
+
+def test_between_updates_robots_are_stopped_and_a_new_stop_is_shown(monitor):
+    monitor._feed.read_stop.side_effect = [False, True]
+    page = Page()
+    monitor._server.pages.append(page.socket)
+    monitor._feed.page_state.put("stop", {"text": "stopping"})
+    monitor._step()
+    assert monitor._commander.step.called and monitor._requests.end_motions_of_stopped_robots.called
+    assert page.sent == []
+    monitor._step()
+    assert page.sent == [{"stop": {"text": "stopping"}}]
+
+
+def test_each_page_gets_what_is_new_to_it_and_a_slow_one_waits(monitor):
+    fast, slow = Page(), Page(ready=False)
+    monitor._server.pages += [slow.socket, fast.socket]
+    monitor._feed.page_state.put("fleet", 1)
+    for _ in range(2):
+        monitor._broadcast_updates()
+    assert fast.sent == [{"fleet": 1}] and slow.sent == [] and slow.socket.send_waiting.call_count == 2
+    slow.socket.ready = True
+    monitor._feed.page_state.put("fleet", 2)
+    monitor._broadcast_updates()
+    assert slow.sent == [{"fleet": 2}] and fast.sent == [{"fleet": 1}, {"fleet": 2}]
+
+
+def test_codes_are_shown_to_teachers_alone(monitor):
+    monitor._lesson, monitor._invitation = create_autospec(Lesson, instance=True), {"link": "http://pc"}
+    monitor._lesson.list_drivers.return_value = [["123456", ["hero_2"]]]
+    monitor._programs.describe.return_value = []
+    pages = [Page(User(name, role)) for name, role in (("Kim", VIEWER), ("Lee", DRIVER), ("Ada", TEACHER))]
+    monitor._server.pages += [page.socket for page in pages]
+    monitor._update_pages()
+    viewer, driver, teacher = ([part for message in page.sent for part in message] for page in pages)
+    assert LESSON not in viewer + driver and "programs" in viewer
+    lesson = next(message[LESSON] for message in pages[2].sent if LESSON in message)
+    assert lesson["drivers"] == [["123456", ["hero_2"]]] and lesson["link"] == "http://pc" and teacher
+    assert lesson["users"] == [["Ada", "teacher", []], ["Kim", "viewer", []], ["Lee", "driver", ["hero_2", "hero_7"]]]
+
+
+@pytest.mark.parametrize("shows", [[False, False], [False, True]])
+def test_the_picture_is_subscribed_to_while_a_page_shows_it(monitor, shows):
+    monitor._server.pages += [Page(picture=picture).socket for picture in shows]
+    monitor._programs.describe.return_value = []
+    monitor._update_pages()
+    monitor._feed.update_subscriptions.assert_called_once_with(True, any(shows))
+    assert monitor._feed.read.called
+
+
+def test_each_page_hears_the_clock_and_who_its_user_is_now(monitor):
+    page, slow = Page(User("Lee", DRIVER)), Page(ready=False)
+    monitor._server.pages += [slow.socket, page.socket]
+    for _ in range(2):
+        monitor._send_clock()
+    user = {"name": "Lee", "title": "driver", "robots": ["hero_2", "hero_7"]}
+    assert page.sent == [{"clock_ms": 5000, "user": user}, {"clock_ms": 5000}] and slow.sent == []
+    page.socket.user = User("Lee", VIEWER)
+    monitor._send_clock()
+    assert page.sent[-1] == {"clock_ms": 5000, "user": {"name": "Lee", "title": "viewer", "robots": []}}
