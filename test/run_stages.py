@@ -111,6 +111,8 @@ def make_jobs(stages, results, paths):
         jobs.append(documents._replace(has_own_network=False))
     if "workspaces" in stages:
         found = make_workspace_jobs(results / "workspaces")
+        if "core" in stages:  # builds in the same folder, and runs the unit tests, too
+            found = [job for job in found if job.name != "core"]
         jobs += keep_matching(found, stages["workspaces"], "job of workspaces")
     if "core" in stages:
         jobs.append(make_core_job(results / "core", ""))

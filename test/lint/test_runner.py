@@ -9,6 +9,7 @@ import time
 
 import pytest
 
+import run_stages
 import sources
 from mutation import equivalents, mutations
 
@@ -64,6 +65,12 @@ def test_a_pattern_without_a_match_is_an_error(tmp_path, stage):
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 2
     assert "matches 'no_such_name'" in ended.stderr
+
+
+def test_one_job_builds_the_core_where_two_stages_ask_for_it(tmp_path):
+    jobs = run_stages.make_jobs({"workspaces": "", "core": ""}, tmp_path, ())
+    (job,) = [job for job in jobs if "test_core.py" in " ".join(job.command)]
+    assert "not unit_tests" not in job.command
 
 
 def test_equivalent_changes_are_neither_stale_nor_greedy():

@@ -1,8 +1,7 @@
-"""The suite builds and starts from the install space of catkin_make.
+"""The suite starts from the install space of catkin_make.
 
-The workspace holds a fresh copy of the repository, so nothing is found in another place by accident, and is tested
-after sources, build and devel space have been deleted. The devel space of catkin_make is where script/test runs
-everything else; test_core.py tests the one of catkin build.
+It is installed from what script/test has built by catkin_make, in whose devel space everything else runs, and names
+neither that nor the sources. test_core.py tests the devel space of catkin build, of a copy of the sources.
 """
 
 import json
@@ -23,6 +22,8 @@ from hero_test.processes import find_free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 
+BUILT = ROOT / ".work" / "ws"
+INSTALLED = BUILT / "install"
 SCRATCH = ROOT / ".work" / "workspaces" / "install_space"
 BUILD_TIMEOUT_S = 1800.0
 PROBE_TIMEOUT_S = 120.0
@@ -44,8 +45,6 @@ CMAKE_ARGUMENTS = f"-DPYTHON_EXECUTABLE={sys.executable} -DPython_EXECUTABLE={sy
 OVERLAY = ("CMAKE_PREFIX_PATH", "ROS_PACKAGE_PATH", "PYTHONPATH", "LD_LIBRARY_PATH", "PKG_CONFIG_PATH")
 FROM_OTHER_ROS = bool(os.environ.get("CONDA_PREFIX")) or Path("/opt/ros/noetic").exists()
 ENVIRONMENT = {name: value for name, value in os.environ.items() if FROM_OTHER_ROS or name not in OVERLAY}
-# Messages in Python only: script/test builds the others.
-ENVIRONMENT["ROS_LANG_DISABLE"] = "gencpp:geneus:genlisp:gennodejs"
 
 
 def run(script, directory, timeout_s=PROBE_TIMEOUT_S):
@@ -68,15 +67,6 @@ def run(script, directory, timeout_s=PROBE_TIMEOUT_S):
     return output
 
 
-def copy_sources(destination):
-    """Copy all packages, without what git ignores, to a directory of a new workspace."""
-    ignored = shutil.ignore_patterns("__pycache__", "*.pyc", ".*_cache", ".hypothesis")
-    for folder in PACKAGES.values():
-        shutil.copytree(str(folder), str(destination / folder.relative_to(ROOT)), ignore=ignored)
-    # Pages hold scripts of hero_tutorial.
-    shutil.copytree(str(ROOT / "docs" / "tutorial"), str(destination / "docs" / "tutorial"))
-
-
 class Workspace:
     """A built workspace: sourcing `setup` makes its packages available."""
 
@@ -90,21 +80,25 @@ class Workspace:
 
 @pytest.fixture(scope="module")
 def workspace():
-    """The install space of all packages."""
-    shutil.rmtree(str(SCRATCH), ignore_errors=True)
-    (SCRATCH / "src").mkdir(parents=True)
-    copy_sources(SCRATCH / "src" / "hero")
-    run(f"catkin_make {CMAKE_ARGUMENTS} -DCATKIN_ENABLE_TESTING=OFF install", SCRATCH, BUILD_TIMEOUT_S)
-    for gone in ("src", "build", "devel"):
-        shutil.rmtree(str(SCRATCH / gone))
-    return Workspace(SCRATCH / "install" / "setup.bash", SCRATCH)
+    """The install space of all packages, and a folder for what the tests make."""
+    for folder in (SCRATCH, INSTALLED):
+        shutil.rmtree(str(folder), ignore_errors=True)
+    SCRATCH.mkdir(parents=True)
+    # As `make install` does, but without a look at what to build again: other tests use the devel space.
+    run(f"cmake -P {BUILT}/build/cmake_install.cmake", SCRATCH, BUILD_TIMEOUT_S)
+    return Workspace(INSTALLED / "setup.bash", SCRATCH)
+
+
+def test_nothing_installed_names_the_sources_or_what_was_built(workspace):
+    elsewhere = (f"{ROOT}/[^.]", f"{BUILT}/(src|build|devel)")
+    run(f"! grep -rIE '{'|'.join(elsewhere)}' {INSTALLED}", SCRATCH)
 
 
 def test_every_package_is_found_only_in_the_workspace(workspace):
     packages = sorted(set(PACKAGES) - {"hero", "hero_options"})  # rospack knows no metapackages
     found = workspace.run(f"for name in {' '.join(packages)}; do rospack find $name; done").split()
     assert len(found) == len(packages)
-    assert all(path.startswith(str(workspace.directory)) for path in found), found
+    assert all(path.startswith(f"{INSTALLED}/") for path in found), found
 
 
 def test_every_module_can_be_imported(workspace):
@@ -119,16 +113,17 @@ def test_every_module_can_be_imported(workspace):
     program = textwrap.dedent(
         """
         import importlib, sys
-        for name in sys.argv[2:]:
+        for name in sys.argv[3:]:
             try:
-                print(importlib.import_module(name).__file__)
+                path = importlib.import_module(name).__file__
+                assert path.startswith(sys.argv[1]), path
             except ModuleNotFoundError as error:
-                if error.name not in sys.argv[1].split():
+                if error.name not in sys.argv[2].split():
                     raise
         """
     )
     optional = " ".join(sorted(sources.WITHOUT_ROSDEP_KEY))
-    workspace.run(f"{sys.executable} - '{optional}' {' '.join(modules)} <<'END'\n{program}\nEND")
+    workspace.run(f"{sys.executable} - {INSTALLED}/ '{optional}' {' '.join(modules)} <<'END'\n{program}\nEND")
 
 
 def test_every_launch_file_can_be_read(workspace):

@@ -32,13 +32,17 @@ def picture(left, top, tag_id=5):
 
 @pytest.fixture
 def process():
-    started = DetectorProcess("aruco", "36h11", 2.0, WIDTH_PX, HEIGHT_PX)
+    socket.setdefaulttimeout(60.0)  # as rospy does
+    try:
+        started = DetectorProcess("aruco", "36h11", 2.0, WIDTH_PX, HEIGHT_PX)
+    finally:
+        socket.setdefaulttimeout(None)
     yield started
     started.close()
 
 
 @pytest.mark.slow
-def test_process_finds_what_a_search_in_this_process_does(process):
+def test_process_finds_what_a_search_in_this_process_does_and_ends(process):
     search = TagSearch(create_detector("aruco", "36h11", 2.0), WIDTH_PX, HEIGHT_PX)
     for index in range(10):
         gray = picture(100 + 4 * index, 200 - 3 * index)
@@ -51,18 +55,9 @@ def test_process_finds_what_a_search_in_this_process_does(process):
     assert found.center == pytest.approx((419.5, 319.5), abs=0.5)
     with pytest.raises(ValueError, match="480"):
         process.search(picture(60, 60)[:100], 11 / 30.0, {})
-
-
-@pytest.mark.slow
-def test_process_answers_also_where_sockets_have_a_default_timeout():
-    socket.setdefaulttimeout(60.0)  # as rospy does
-    try:
-        started = DetectorProcess("aruco", "36h11", 2.0, WIDTH_PX, HEIGHT_PX)
-    finally:
-        socket.setdefaulttimeout(None)
-    found = [started.search(picture(100, 200), index / 5.0, {}) for index in range(3)]
-    started.close()
-    assert [tag.tag_id for tag in found[-1]] == [5]
+    process.close()
+    assert process._process.returncode == 0
+    process.close()
 
 
 @pytest.mark.slow
@@ -83,41 +78,22 @@ def test_process_that_died_is_named(process):
 
 
 @pytest.mark.slow
-def test_close_ends_the_process_and_is_safe_twice(process):
-    process.close()
-    assert process._process.returncode == 0
-    process.close()
-
-
-def run_program(lines):
-    """Run a program that starts a detector's process, in a group of its own; return what it prints, and its status."""
-    program = "import os, signal; import numpy as np;"
-    program += "from hero_localization.tracking.detector_process import DetectorProcess;"
-    program += "started = DetectorProcess('aruco', '36h11', 2.0, 480, 360);" + lines
+def test_process_is_deaf_to_ctrl_c_and_ends_when_its_parent_is_killed():
+    """The child holds the parent's standard output: its end of file tells that both have ended."""
+    program = (
+        "import os, signal; import numpy as np;"
+        "from hero_localization.tracking.detector_process import DetectorProcess;"
+        "started = DetectorProcess('aruco', '36h11', 2.0, 480, 360);"
+        "signal.signal(signal.SIGINT, signal.SIG_IGN); os.killpg(0, signal.SIGINT);"
+        "print(started.search(np.zeros((360, 480), np.uint8), 0.0, {}), flush=True);"
+        "os.kill(os.getpid(), signal.SIGKILL)"
+    )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     command = [sys.executable, "-c", program]
     ended = subprocess.run(
         command, env=environment, stdout=subprocess.PIPE, timeout=120, check=False, start_new_session=True
     )
-    return ended.stdout.decode(), ended.returncode
-
-
-@pytest.mark.slow
-def test_ctrl_c_in_the_terminal_leaves_the_process_to_its_parent():
-    printed, status = run_program(
-        "signal.signal(signal.SIGINT, signal.SIG_IGN); os.killpg(0, signal.SIGINT);"
-        "print(started.search(np.zeros((360, 480), np.uint8), 0.0, {})); started.close()"
-    )
-    assert (printed, status) == ("[]\n", 0)
-
-
-@pytest.mark.slow
-def test_process_ends_when_its_parent_is_killed():
-    """The child holds the parent's standard output: its end of file tells that both have ended."""
-    assert run_program("print('up', flush=True); os.kill(os.getpid(), signal.SIGKILL)") == (
-        "up\n",
-        -signal.SIGKILL,
-    )
+    assert (ended.stdout.decode(), ended.returncode) == ("[]\n", -signal.SIGKILL)
 
 
 class FakeConnection:
