@@ -72,7 +72,7 @@ def build_simulator(options: argparse.Namespace, report: Report) -> Tuple[Simula
         injector = FaultInjector(simulator, report)
         for fault in options.fault:
             injector.add(fault)
-    except OptionError:
+    except (OptionError, OSError):
         link.close_all()
         raise
     names = [robot.name for robot in simulator.swarm.robots]

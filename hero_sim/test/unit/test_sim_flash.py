@@ -132,5 +132,5 @@ def test_a_file_that_is_not_a_flash_is_named_with_the_reason(tmp_path, content, 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OptionError, match=r"--flash-dir .*file/flash cannot be made"):
+    with pytest.raises(OSError, match=r"Not a directory: .*file/flash"):
         DriverSide("--flash-dir", str(tmp_path / "file" / "flash"))

@@ -89,11 +89,12 @@ def _lock(descriptor: int, kind: int) -> bool:
 
 @contextmanager
 def name_file(path: str) -> Iterator[None]:
-    """Name the file in an OSError that does not, as that of a full disk."""
+    """Name the file in an OSError that does not, as that of a full disk, or names what was to replace the file."""
     try:
         yield
     except OSError as error:
-        error.filename = error.filename or path
+        if error.filename is None or str(error.filename).endswith(NEW_ENDING):
+            error.filename = path
         raise
 
 

@@ -40,14 +40,11 @@ class Flash:
     def keep_in(self, path: str) -> None:
         """Load the file at path, if it is there, and write it at each change from now on.
 
-        Raises: OptionError if its folder cannot be made, or the file cannot be read or is not ours.
+        Raises: OptionError if the file cannot be read or is not ours. OSError if its folder cannot be made.
         """
         self._path = path
         folder = os.path.dirname(path)
-        try:
-            os.makedirs(folder, exist_ok=True)
-        except OSError as error:
-            raise OptionError(f"--flash-dir {folder} cannot be made: {error.strerror}; choose another") from error
+        os.makedirs(folder, exist_ok=True)
         if not os.access(folder, os.W_OK):
             raise OptionError(f"--flash-dir {folder} is not writable; choose another")
         if not os.path.exists(path):

@@ -15,7 +15,7 @@ from hero_node.ros import Program
 from .calibration import DEFAULT_PARTS, ENDED, INFRARED, PARTS, WHEELS, calibrate_parts
 from .errors import CalibrationError, EndedError
 from .robots.ros_probe import RosSession, find_robots
-from .store import describe_status, find_missing, load_calibrations, make_folder, restore
+from .store import describe_status, find_missing, load_calibrations, restore
 
 RESTORE, STATUS = "restore", "status"
 
@@ -54,7 +54,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def main() -> int:
-    """Calibrate; return the exit code. Raises: CalibrationError, CalibrationFileError, ProgramError."""
+    """Calibrate; return the exit code. Raises: CalibrationError, CalibrationFileError, ProgramError, OSError."""
     options = parse_options(rospy.myargv(sys.argv)[1:])
     if options.status:
         say("\n".join(describe_status(read_calibrations(options.folder))))
@@ -64,7 +64,7 @@ def main() -> int:
         calibrations = load_calibrations(options.folder, options.files, options.robots)
         robot_ids = list(calibrations)
     else:
-        make_folder(options.folder)
+        os.makedirs(options.folder, exist_ok=True)
         robot_ids = options.robots
     with Program("hero_calibrate", anonymous=True) as program:
         probes = find_robots(program, robot_ids)

@@ -7,7 +7,7 @@ from hero_node import say
 from hero_node.files import KeptCalibration
 
 from . import store
-from .errors import CalibrationError, EndedError
+from .errors import EndedError
 from .procedures.infrared import calibrate_infrared
 from .procedures.motors import calibrate_motors
 from .procedures.placement import Ask, place_robots
@@ -81,7 +81,7 @@ def _save(probe: Probe, folder: str, results: Dict[str, Any]) -> str:
     date = time.strftime("%Y-%m-%d %H:%M:%S")
     try:
         store.save(path, KeptCalibration(probe.robot_id, date, values, {"model": probe.model}))
-    except CalibrationError as error:
-        probe.failure = probe.failure or str(error)
+    except OSError as error:
+        probe.failure = probe.failure or f"{path} cannot be written: {error.strerror}"
         return ""
     return path

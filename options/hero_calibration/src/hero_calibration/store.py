@@ -42,35 +42,24 @@ def name_file(folder: str, robot_id: int) -> str:
     return os.path.join(folder, "hero_%d.yaml" % robot_id)
 
 
-def make_folder(folder: str) -> None:
-    """Create a folder unless it exists. Raises: CalibrationError."""
-    try:
-        os.makedirs(folder, exist_ok=True)
-    except OSError as error:
-        raise CalibrationError(f"{folder} cannot be created: {error.strerror}") from error
-
-
 def save(path: str, calibration: KeptCalibration) -> None:
     """Write a file; the previous one is kept beside it. Values that were not measured again stay, with their comments.
 
-    A damaged previous file, or one of another robot or model, does not prevent the new one. Raises: CalibrationError.
+    A damaged previous file, or one of another robot or model, does not prevent the new one. Raises: OSError.
     """
     base, suffix = os.path.splitext(path)
     values, others, text = calibration.values, calibration.others, ""
-    try:
-        with lock_file(path):
-            if os.path.exists(path):
-                with open(path, "rb") as file:
-                    write_file(base + PREVIOUS + suffix, file.read())
-                with suppress(CalibrationFileError):
-                    old = read_calibration(path)
-                    is_same_model = old.others.get("model", others.get("model")) == others.get("model")
-                    if old.robot_id == calibration.robot_id and is_same_model:
-                        values, others, text = {**old.values, **values}, {**old.others, **others}, read_text(path)
-            content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **others, **values}
-            write_file(path, replace_values(text, content).encode())
-    except OSError as error:
-        raise CalibrationError(f"{path} cannot be written: {error.strerror}") from error
+    with lock_file(path):
+        if os.path.exists(path):
+            with open(path, "rb") as file:
+                write_file(base + PREVIOUS + suffix, file.read())
+            with suppress(CalibrationFileError):
+                old = read_calibration(path)
+                is_same_model = old.others.get("model", others.get("model")) == others.get("model")
+                if old.robot_id == calibration.robot_id and is_same_model:
+                    values, others, text = {**old.values, **values}, {**old.others, **others}, read_text(path)
+        content = {"robot": "hero_%d" % calibration.robot_id, "date": calibration.date, **others, **values}
+        write_file(path, replace_values(text, content).encode())
 
 
 def rate(kept: KeptCalibration) -> Tuple[Optional[float], Optional[float]]:

@@ -4,7 +4,7 @@ import os
 import shutil
 from typing import Optional
 
-from .errors import RecordingError, explain_write_errors
+from .errors import RecordingError
 
 MB = 10**6
 
@@ -17,11 +17,10 @@ def read_free_mb(folder: str) -> float:
 def prepare_folder(folder: str, limit_mb: float) -> float:
     """Create a folder if it is missing, and return what is free there (MB).
 
-    Raises: RecordingError if it cannot be created or written to, or less than the limit is free.
+    Raises: RecordingError if it cannot be written to, or less than the limit is free. OSError.
     """
-    with explain_write_errors(folder):
-        os.makedirs(folder, exist_ok=True)
-        free_mb = read_free_mb(folder)
+    os.makedirs(folder, exist_ok=True)
+    free_mb = read_free_mb(folder)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise RecordingError(f"{folder} is not writable; choose another folder")
     if free_mb < limit_mb:

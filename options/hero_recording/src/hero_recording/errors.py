@@ -22,13 +22,3 @@ def explain_bag_errors(what: str) -> Iterator[None]:
     except Exception as error:  # rosbag checks little: a wrong byte may raise anything
         reason = make_printable(str(error))[:200]
         raise RecordingError(f"{what}: it is damaged, or no bag ({type(error).__name__}: {reason})") from error
-
-
-@contextmanager
-def explain_write_errors(path: str) -> Iterator[None]:
-    """Turn an OSError of the block into one line that names the file. Raises: RecordingError."""
-    try:
-        yield
-    except OSError as error:
-        text = "%s cannot be written: %s; choose another path"
-        raise RecordingError(text % (path, error.strerror or error)) from error

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any, Dict, Optional, Sequence, Tuple
 
 from hero_node import raise_file_limit
-from hero_node.files import read_fleet_file
+from hero_node.files import name_file, read_fleet_file
 from hero_node.parameters import robot_ids_option
 
 from .bags.bag_set import BagSet
 from .bags.tables import TABLES, Row, declare_tables, is_exported, read_rows
 from .bags.topics import Message
-from .errors import RecordingError, explain_write_errors
+from .errors import RecordingError
 
 TIME_COLUMN = "time_s"
 
@@ -39,16 +39,15 @@ class CsvFiles(ExitStack):
         self._writers: Dict[Tuple[int, str], Any] = {}
 
     def add(self, robot_id: int, kind: str, row: Row) -> None:
-        """Add a row. Raises: RecordingError if a file cannot be written."""
+        """Add a row. Raises: OSError if a file cannot be written."""
         key = robot_id, kind
-        path = Path(self._folder, "hero_%d" % robot_id, kind + ".csv")
-        with explain_write_errors(str(path)):
-            if key not in self._writers:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                file = self.enter_context(path.open("w", encoding="utf-8", newline=""))
-                self._writers[key] = csv.writer(file)
-                self._writers[key].writerow((TIME_COLUMN, *TABLES[kind]))
-            self._writers[key].writerow(row)
+        if key not in self._writers:
+            path = Path(self._folder, "hero_%d" % robot_id, kind + ".csv")
+            path.parent.mkdir(parents=True, exist_ok=True)
+            file = self.enter_context(path.open("w", encoding="utf-8", newline=""))
+            self._writers[key] = csv.writer(file)
+            self._writers[key].writerow((TIME_COLUMN, *TABLES[kind]))
+        self._writers[key].writerow(row)
         self.rows[key] = self.rows.get(key, 0) + 1
 
 
@@ -62,7 +61,7 @@ def parse_options(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
 
 
 def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str:
-    """Write tables into a new folder and return what was written. Raises: RecordingError, also if that is nothing."""
+    """Write tables into a new folder; return what was written. Raises: RecordingError if that is nothing. OSError."""
     files = CsvFiles(folder)
 
     def receive(message: Message) -> None:
@@ -70,7 +69,7 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
             if options.robots is None or robot_id in options.robots:
                 files.add(robot_id, kind, row)
 
-    with explain_write_errors(folder), files:
+    with name_file(folder), files:
         bags.read(is_exported, receive)
     if not files.rows:
         raise RecordingError(
@@ -81,7 +80,7 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
-    """Export. Raises: RecordingError."""
+    """Export. Raises: RecordingError. OSError."""
     declare_tables(read_fleet_file().topics)
     options = parse_options(arguments)
     bags = BagSet(options.bags)
@@ -89,8 +88,7 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     if os.path.exists(out):
         raise RecordingError(f"{out} exists already; move it away or choose another --out")
     part = out + ".part"
-    with explain_write_errors(part):
-        os.makedirs(part)
+    os.makedirs(part)
     incomplete = os.path.join(part, os.path.basename(out))
     try:
         written = export_tables(bags, options, incomplete)

@@ -11,7 +11,7 @@ from hero_node.files import replace_file
 from hero_node.parameters import robot_ids_option
 
 from .bags.bag_set import BagSet
-from .errors import RecordingError, explain_write_errors
+from .errors import RecordingError
 from .plots import analysis
 from .plots.observations import Observations, RobotObservations
 
@@ -65,7 +65,7 @@ def draw(options: argparse.Namespace, observations: Observations, bags: BagSet) 
         if figure is None:
             missing.append(f"no figure of {name}: nothing of {needed} in the recording")
             continue
-        with explain_write_errors(path), replace_file(path) as file:
+        with replace_file(path) as file:
             figure.savefig(file, dpi=130, format=options.format)
         paths.append(path)
     if not paths:

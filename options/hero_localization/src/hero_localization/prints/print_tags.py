@@ -197,7 +197,7 @@ def _draw_square(axes: Any, sheet: Sheet, family: str, x_mm: float, y_mm: float)
 
 
 def main(arguments: Optional[Sequence[str]] = None) -> None:
-    """Write the PDF and say what is in it. Raises: LocalizationError; ProgramError if a library is missing."""
+    """Write the PDF and say what is in it. Raises: LocalizationError. OSError. ProgramError if a library is missing."""
     options = parse_options(arguments)
     import_optional("matplotlib", "python3-matplotlib")
     import_optional("cv2", "python3-opencv")
@@ -213,14 +213,11 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
             raise LocalizationError(str(error)) from None
     paper_mm = PAPERS_MM[options.paper]
     pages = list(split_pages(sheets, paper_mm))
-    try:
-        with replace_file(options.out) as file, PdfPages(file) as pdf:
-            for page in pages:
-                pdf.savefig(draw_page(page, options.family, paper_mm))
-            if options.board:
-                pdf.savefig(draw_board_page(paper_mm))
-    except OSError as error:
-        raise LocalizationError(f"{options.out} cannot be written: {error.strerror}; choose another --out") from None
+    with replace_file(options.out) as file, PdfPages(file) as pdf:
+        for page in pages:
+            pdf.savefig(draw_page(page, options.family, paper_mm))
+        if options.board:
+            pdf.savefig(draw_board_page(paper_mm))
     made = ([_count(len(sheets), "tag")] if sheets else []) + (["the board"] if options.board else [])
     on_pages = f"{' and '.join(made)} on {_count(len(pages) + bool(options.board), 'page')}"
     print(f"{options.out}: {on_pages}; print at 100 %, and check the ruler")
