@@ -9,7 +9,7 @@ from hero_driver.ros import endpoints as module
 from hero_driver.ros.endpoints import QUEUE_LENGTH, Endpoints, Layout
 from hero_driver.ros.raw_publisher import RawPublisher
 from hero_driver.ros.raw_subscriber import RawSubscriber
-from hero_node import MD5SUMS
+from hero_node.ros_messages import MD5SUMS
 
 COLOR = Layout("std_msgs/ColorRGBA", ("a29a96539573343b1310c73607334b00",))
 NUMBER = Layout("std_msgs/Float32", (MD5SUMS["std_msgs/Float32"],))
