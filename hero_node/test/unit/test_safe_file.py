@@ -149,8 +149,10 @@ def test_a_file_is_read_whole_and_what_is_none_is_refused_at_once(tmp_path, monk
         (str(pipe), "pipe, device or socket"), ("/dev/zero", "pipe, device or socket"),
         (str(tmp_path), "Is a directory"), ("a\0b", "NUL character"), (str(tmp_path / "none"), "No such file"),
     ):  # fmt: skip
-        with pytest.raises(OSError, match=words):
+        opened = len(os.listdir("/proc/self/fd"))
+        with pytest.raises(OSError, match=words) as refused:
             read_file(name)
+        assert refused.value.filename == name and len(os.listdir("/proc/self/fd")) == opened
     monkeypatch.setattr(safe_file, "MAX_FILE_BYTES", 4)
     with pytest.raises(OSError, match="more than 4 bytes"):
         read_file(str(path))
