@@ -203,7 +203,7 @@ def test_a_motion_on_a_thread_ends_with_its_steps_its_error_or_cancel(monkeypatc
         yield FullWait(0.0)
         sent.append("sent")
 
-    for error in (GoalError("no"), ValueError("wrong")):
+    for error in (GoalError("no"), ValueError("wrong"), TypeError("kind"), rospy.ROSException("closed topic")):
         motion = ThreadMotion(take([], error))
         with pytest.raises(type(error)):
             motion.result(60.0)

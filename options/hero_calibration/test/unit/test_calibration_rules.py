@@ -200,6 +200,23 @@ def test_badly_placed_robots_may_be_placed_again_or_left_out(capsys):
     assert len(session.active) == 2
 
 
+@pytest.mark.parametrize("ask", [None, lambda question: ""])
+def test_what_sensors_saw_before_a_robot_was_placed_does_not_count(ask):
+    session = FakeSession(2)
+    for probe in session.probes:
+        for _ in range(20):
+            probe.receive_scan(session.time_s, [30.0] * 8, (0.1,) * 8)
+
+    def receive(now_s):
+        session.hear()
+        for probe in session.probes:
+            probe.receive_scan(now_s, [1.0] * 8, (0.1,) * 8)
+
+    session.on_sleep = receive
+    place_robots(session, False, ask)
+    assert [probe.failure for probe in session.probes] == [None, None] and session.time_s > 100.0
+
+
 def test_obstacles_count_beyond_their_limits():
     for counts, at_wall, is_seen in (
         ({0: 16.0}, False, False),

@@ -26,7 +26,7 @@ from hero_sim.stepped.swarm import StepWorld
 from hero_swarm.behavior import Behavior, Binary, Neighbors, Sight, sense
 from hero_swarm.metrics import consensus_error
 from hero_swarm.metrics.graphs import measure_distances
-from hero_swarm.ros import behavior_node, pose_source
+from hero_swarm.ros import behavior_node, pose_source, wheel_commands
 from hero_swarm.ros.behavior_markers import BehaviorMarkers
 from hero_swarm.ros.behavior_node import PARAMETERS, BehaviorNode, _parse_fence
 from hero_swarm.wheel_pulses import find_pulses, list_dead_zones
@@ -225,6 +225,15 @@ def test_the_robots_of_hero_sim_count_as_calibrated(stage):
     assert [message.left_motor_pwm for message in sent] == left_us.tolist()
     assert [message.right_motor_pwm for message in sent] == right_us.tolist()
     assert not stage.warnings
+
+
+def test_a_file_of_calibrate_stands_above_what_the_simulator_tells(stage, tmp_path):
+    write_calibration(tmp_path, 4)
+    (tmp_path / "hero_5.yaml").write_text("robot: hero_5\nwheels_m: [0.049, 0.049, 0.063]\n")
+    simulated = wheel_commands._find_dead_zones("", 6)
+    found = wheel_commands._find_dead_zones(str(tmp_path), 6)
+    assert found == {**simulated, "hero_4": DEAD_ZONE_US}, "hero_5 was not swept"
+    assert wheel_commands._find_dead_zones(str(tmp_path), 0) == {"hero_4": DEAD_ZONE_US}
 
 
 def test_without_all_motors_calibrated_velocities_drive_and_are_explained(stage, tmp_path):
