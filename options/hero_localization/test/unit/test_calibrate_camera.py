@@ -29,6 +29,7 @@ FOUND = {
     2: RobotCalibration(Pose(0.0, 0.001, math.pi), 0.200, 0.001, 0.001, ["the tag is on upside down"], 0.076),
     3: RobotCalibration(Pose(0.0, 0.0, 0.0), 0.070, 0.001, 0.001, [], 0.0807),
     4: RobotCalibration(Pose(0.0, 0.0, 0.0), 0.070, 0.001, 0.001, []),
+    5: RobotCalibration(Pose(0.0, 0.0, 0.0), 0.070, 0.001, 0.001, [], 0.0915),
 }
 
 
@@ -75,10 +76,18 @@ def test_tags_that_are_higher_than_the_file_says_are_named_in_one_line(calibrate
     assert calibrate("0 1 3")[0] == 0, "0.079 is within the limit"
     assert "tag_height_m is right to 3 mm, as far as tags of this size tell\n" in capsys.readouterr().out
     assert calibrate("1 3")[0] == 1
-    text = "  tags are 80 mm above the floor by their size, not 76: is tag_height_m right, are all printed alike?\n"
+    text = "  tags are 80 mm above the floor by their size, not 76: is tag_height_m right, all printed alike?\n"
     assert capsys.readouterr().out.count(text) == 1
     calibrate("4 0")
     assert "tag_height_m is right to 3 mm" in capsys.readouterr().out, "by those of which it is known"
+
+
+def test_one_tag_that_is_higher_than_others_is_named(calibrate, capsys):
+    assert calibrate("0 1 5")[0] == 1
+    out = capsys.readouterr().out
+    assert "tag_height_m is right to 3 mm" in out
+    text = "  tag 5 is 92 mm above the floor by its size, others 79: printed alike, flat on its robot?\n"
+    assert out.count(text) == 1 and out.count("above the floor") == 1
 
 
 @pytest.mark.parametrize(("focal_px", "error_mm"), [(1391.0, 2.7), (1150.0, 3.2), (900.0, 6.3)])

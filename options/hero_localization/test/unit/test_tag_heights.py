@@ -7,6 +7,7 @@ import pytest
 
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
+from hero_localization.filter.tag_heights import TagHeights
 from hero_node import Pose, transform_pose
 
 CAMERAS_M = {"/track": np.array((-0.7, 0.1, 2.1)), "/track_2": np.array((0.7, -0.1, 2.2))}
@@ -94,12 +95,25 @@ def test_heights_are_not_judged_without_the_places_of_both_cameras(cameras_m):
     assert TwoCameras({0: 0.015}, cameras_m).run(10.0).problem == ""
 
 
-def test_cameras_side_by_side_tell_no_heights():
-    near_m = {"/track": CAMERAS_M["/track"], "/track_2": CAMERAS_M["/track"] + (0.3, 0.0, 0.0)}
-    assert TwoCameras({0: 0.015}, near_m).run(10.0).problem == ""
+@pytest.mark.parametrize("apart_m", [0.0, 0.2])
+def test_cameras_side_by_side_tell_no_heights(apart_m, monkeypatch):
+    monkeypatch.setitem(CAMERAS_M, "/track_2", CAMERAS_M["/track"] + (apart_m, 0.0, 0.0))
+    assert TwoCameras({0: 0.015}).run(10.0).problem == ""
 
 
 def test_a_clock_that_is_off_is_not_taken_for_a_wrong_height():
     cameras = TwoCameras({0: 0.0}, late_s=0.1, speed_m_s=0.3).run(20.0)
     named = [line for line in cameras.lines if "found at" not in line]
     assert cameras.problem == "" and len(named) == 1 and "ms late, which is corrected" in named[0], named
+
+
+@pytest.mark.parametrize(("step_s", "is_told"), [(0.1, True), (0.2, True), (0.3, False)])
+def test_only_poses_a_moment_apart_are_compared(step_s, is_told):
+    heights = TagHeights()
+    heights.cameras_m.update(CAMERAS_M)
+    for index in range(100):
+        name = list(CAMERAS_M)[index % 2]
+        x_m, y_m = see(np.array(START[:2]), CAMERAS_M[name], 0.015)
+        pose = START._replace(x_m=x_m, y_m=y_m)
+        heights.add(0, StampedPose(round(index * step_s, 6), pose, COVARIANCE, f"/t ({name})"), Pose(0.0, 0.0, 0.0))
+    assert bool(heights.describe()) is is_told

@@ -17,9 +17,6 @@ from .pose_sources import LASTING_S
 MAX_STEP_S = 0.2
 """Time between poses from two cameras that are compared."""
 
-MIN_SLOPE = 0.2
-"""Distance between two cameras, by their height above the tags, from which on they tell heights."""
-
 KEPT_PAIRS = 60
 """Comparisons that count, the last ones: clocks that are off are corrected meanwhile."""
 
@@ -45,14 +42,13 @@ class TagHeights:
         before, counted = self._last.get(robot_id, (measurement, odometry))
         self._last[robot_id] = measurement, odometry
         cameras_m = [self.cameras_m[pose.node] for pose in (before, measurement) if pose.node in self.cameras_m]
-        if before.node == measurement.node or len(cameras_m) < 2:
+        is_near = abs(measurement.stamp_s - before.stamp_s) <= MAX_STEP_S
+        if before.node == measurement.node or len(cameras_m) < 2 or not is_near:
             return
         place_m, there = measurement.pose[:2], transform_pose(find_frame(before.pose, counted), odometry)
         slopes = [np.subtract(place_m, camera_m[:2]) / camera_m[2] for camera_m in cameras_m]
         across = slopes[0] - slopes[1]
-        slope = math.hypot(*across)
-        if slope < MIN_SLOPE or abs(measurement.stamp_s - before.stamp_s) > MAX_STEP_S:
-            return
+        slope = max(math.hypot(*across), 1e-6)
         pairs, error_m, since_s = self._errors.get(robot_id, (0, 0.0, math.inf))
         pairs = min(pairs + 1, KEPT_PAIRS)
         error_m += (float(np.subtract(there[:2], place_m) @ across) / slope**2 - error_m) / pairs

@@ -54,16 +54,21 @@ def calibrate_robot_tags(options: argparse.Namespace, images: Images, program: P
         problems += ["hero_%d: %s" % (robot_id, problem) for problem in result.problems]
     if not results:
         raise CalibrationError("; ".join(problems))
-    heights_m = [result.height_m for result in results.values() if math.isfinite(result.height_m)]
-    height_m = float(np.median(heights_m)) if heights_m else math.nan
+    heights_m = {tag_id: result.height_m for tag_id, result in results.items() if math.isfinite(result.height_m)}
+    limit_m = find_height_error(_get_camera(images), layout)
     if layout.references and not heights_m:
         problems.append("tag_height_m is not checked: no reference tag lies well within the image")
-    limit_m = find_height_error(_get_camera(images), layout)
-    if heights_m and abs(height_m - layout.height_m) <= limit_m:
-        say(f"tag_height_m is right to {1e3 * limit_m:.0f} mm, as far as tags of this size tell")
-    elif heights_m:
-        text = "tags are %.0f mm above the floor by their size, not %.0f: is tag_height_m right, are all printed alike?"
-        problems.append(text % (1e3 * height_m, 1e3 * layout.height_m))
+    if heights_m:
+        height_m = float(np.median(list(heights_m.values())))
+        if abs(height_m - layout.height_m) <= limit_m:
+            say(f"tag_height_m is right to {1e3 * limit_m:.0f} mm, as far as tags of this size tell")
+        else:
+            text = "tags are %.0f mm above the floor by their size, not %.0f: is tag_height_m right, all printed alike?"
+            problems.append(text % (1e3 * height_m, 1e3 * layout.height_m))
+        for tag_id, own_m in heights_m.items():
+            if abs(own_m - height_m) > 2.0 * limit_m:  # either may be off
+                text = "tag %d is %.0f mm above the floor by its size, others %.0f: printed alike, flat on its robot?"
+                problems.append(text % (tag_id, 1e3 * own_m, 1e3 * height_m))
     mounts = {**layout.mounts, **{tag_id: result.mount for tag_id, result in results.items()}}
     described = {tag_id: describe_pose(mount) for tag_id, mount in mounts.items()}
     delay_s = float(np.median([result.delay_s for result in results.values()]))
