@@ -61,12 +61,11 @@ def find_unit_tests(paths=()):
 def make_workspace_jobs(results_dir):
     """Return one job for each file."""
     jobs = [make_core_job(results_dir / "core", "not unit_tests")]  # they have run, with all packages
-    environment = {"PATH": run_rostests.make_program_path(results_dir), **run_rostests.DISTUTILS}
     for path in sorted((ROOT / "test" / "workspaces").glob("test_*.py")):
         if path.name != "test_core.py":
-            job = make_pytest_job("workspaces: " + path.name, [str(path)], results_dir / path.stem)
-            jobs.append(job._replace(environment=environment))
-    return jobs
+            jobs.append(make_pytest_job("workspaces: " + path.name, [str(path)], results_dir / path.stem))
+    environment = {"PATH": run_rostests.make_program_path(results_dir), **run_rostests.DISTUTILS}
+    return [job._replace(environment=environment) for job in jobs]
 
 
 def make_core_job(results_dir, selection):

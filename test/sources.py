@@ -109,6 +109,7 @@ def read_cmake(package: str) -> str:
     return text.replace("${PROJECT_NAME}", package)
 
 
+@lru_cache(maxsize=None)
 def package_of(path: Path) -> str:
     """The catkin package that a file belongs to, or the top directory's name."""
     own = [folder.name for folder in path.parents if PACKAGES.get(folder.name) == folder]

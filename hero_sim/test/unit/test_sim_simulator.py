@@ -227,7 +227,7 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("end", ENDS.values(), ids=ENDS)
+@pytest.mark.parametrize("end", ENDS.values(), ids=list(ENDS))
 def test_what_is_on_its_way_ends_with_the_connection_of_this_robot(bench, end):
     simulator, lines, link, _ = bench("--count", "2", "--first-id", "4", "--wifi", "router")
     taken = {index: [] for index in range(2)}
