@@ -25,10 +25,13 @@ from hero_test.screens.monitor_page import MonitorPage  # noqa: E402
 from hero_test.screens.virtual_screen import MISSING, VirtualScreen  # noqa: E402
 
 PICTURES_FOLDER = ROOT / "docs" / "pictures"
+MISSIONS = ROOT / "options" / "hero_swarm" / "examples" / "missions"
+SPOT = str(MISSIONS / "black_spot_arena.yaml")
 WALK_S = 25.0
 SCREEN = (1200, 800)  # the size that the configuration of RViz gives its window
 VIEW = (slice(164, 768), slice(366, 1182))  # rows and columns of the arena in that window
 ROBOT = (slice(250, 590), slice(560, 990))  # the part that shows one robot close up
+DESIGNED = "black_spot_designed.controller"
 CLOSE_UP = ("view:=close", "fixed_frame:=hero_0/base_link")
 GROUND_SHARE = 0.5  # of the view is light ground as soon as RViz draws; its first window is dark
 DRAW_TIMEOUT_S = 60.0
@@ -50,6 +53,15 @@ def wait_while_they_walk(stage):
     stage.wait_for(lambda: time.monotonic() > end_s, "robots that walk", 2.0 * WALK_S)
 
 
+def start_moving(stage, robots, controller):
+    """Let the robots walk, or run a controller's file by their true poses."""
+    if controller is None:
+        stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
+        return
+    launch = ["roslaunch", "--no-summary", "hero_swarm", "behavior.launch", "behavior:=%s" % (MISSIONS / controller)]
+    stage.start([*launch, "robots:=0-%d" % (robots - 1), "frame:=world"], stdout=subprocess.DEVNULL)
+
+
 def film(screen, path, part, stage):
     """Save what a part of the screen shows for FILM_S, half as large, at twice the speed."""
     frames, begin_s = [], time.monotonic()
@@ -61,8 +73,8 @@ def film(screen, path, part, stage):
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=500 / FRAMES_HZ, loop=0)
 
 
-def photograph_rviz(picture, robots, arena, *options, part=VIEW, is_filmed=False):
-    """Let robots walk in an arena, and save a part of the window of RViz, started with these options.
+def photograph_rviz(picture, robots, arena, *options, part=VIEW, is_filmed=False, controller=None):
+    """Let robots move in an arena, and save a part of the window of RViz, started with these options.
 
     is_filmed: save a film beside the picture, too.
     """
@@ -70,7 +82,7 @@ def photograph_rviz(picture, robots, arena, *options, part=VIEW, is_filmed=False
     os.environ.update(screen.environment())
     try:
         with RunningSuite(robots, "arena:=" + arena) as stage:
-            stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
+            start_moving(stage, robots, controller)
             launch = ["roslaunch", "--no-summary", "hero_description", "swarm.launch"]
             launch += [f"{group}:=0-{robots - 1}" for group in ("robots", "simulated")] + list(options)
             stage.start(launch, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -83,11 +95,11 @@ def photograph_rviz(picture, robots, arena, *options, part=VIEW, is_filmed=False
         screen.close()
 
 
-def photograph_monitor(picture, robots, arena):
-    """Let robots walk in an arena, and save the page of the fleet monitor, with one robot chosen."""
+def photograph_monitor(picture, robots, arena, controller=None):
+    """Let robots move in an arena, and save the page of the fleet monitor, with one robot chosen."""
     port = find_free_port()
     with RunningSuite(robots, "arena:=" + arena) as stage:
-        stage.start_example("random_walk", "_robots:=0-%d" % (robots - 1), "_seed:=4")
+        start_moving(stage, robots, controller)
         stage.start(["rosrun", "hero_monitor", "monitor", "_port:=%d" % port, "_control:=true"])
         stage.wait_for(lambda: is_open(port), "the monitor")
         page = MonitorPage("http://127.0.0.1:%d/" % port)
@@ -110,6 +122,8 @@ PICTURES = {
     "monitor": lambda picture: photograph_monitor(picture, 10, "obstacles"),
     "rviz_swarm": lambda picture: photograph_rviz(picture, 4, "empty"),
     "rviz_obstacles": lambda picture: photograph_rviz(picture, 8, "obstacles", is_filmed=True),
+    "rviz_design": lambda picture: photograph_rviz(picture, 8, SPOT, controller=DESIGNED),
+    "monitor_design": lambda picture: photograph_monitor(picture, 8, SPOT, DESIGNED),
 }
 
 

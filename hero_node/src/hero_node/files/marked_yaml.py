@@ -35,8 +35,7 @@ class Entry(NamedTuple):
 
     def refuse(self, text: str) -> NoReturn:
         """Raise EntryError: place, name and value, and what it must be."""
-        kinds: Dict[type, str] = {list: "a list", dict: "a mapping"}
-        shown = kinds.get(type(self.value)) or shorten(self.value)
+        shown = {"list": "a list", "dict": "a mapping"}.get(type(self.value).__name__) or shorten(self.value)
         raise EntryError(f"{self.place}: {self.name} is {shown}, but must be {text}")
 
     def number(self, low: float, high: float, unit: str, may_be_nan: bool = False) -> float:

@@ -11,7 +11,7 @@ from typing import Optional, Sequence
 from hero_node.parameters import within
 
 from .experiments.computing import set_up
-from .experiments.computing.code_version import hash_code
+from .experiments.computing.batch import load_checked
 from .experiments.errors import ExperimentError
 from .experiments.results_folder import read_results
 
@@ -41,10 +41,9 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     if seed not in experiment.seeds:
         first, last = experiment.seeds[0], experiment.seeds[-1]
         raise ExperimentError("--seed %d: the experiment has seeds %d to %d" % (seed, first, last))
-    trial = set_up(experiment, cell).build_trial([seed])
-    if about["code"] != hash_code(experiment.list_code()):
-        text = "note: the results are of other code (%s), so this run may differ from theirs"
-        print(text % about["code"], file=sys.stderr)
+    code, trial = load_checked(experiment), set_up(experiment, cell).build_trial([seed])
+    if about["code"] != code:
+        print(f"note: the results are of other code ({about['code']}): this run may differ from theirs", file=sys.stderr)
     print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
     if options.video:
         from .video import write_video

@@ -13,6 +13,7 @@ import yaml
 
 from hero_node.files import hold_file, read_file, write_file
 from hero_node.parameters import within
+from hero_sim.errors import OptionError
 from hero_sim.world import load_arena
 
 from ..behavior import derive_seed
@@ -110,8 +111,7 @@ def compare(options: Any, mission: Mission, folder: str, finalists: Sequence[str
     content, own = mission.content, os.path.dirname(options.file) or "."
     shared = {key: value for key, value in content.items() if key not in OWN}
     shared.update(seeds={"count": options.tests}, metrics=[content["score"]])
-    names = [*(os.path.relpath(path, own) for path in finalists), content.get("baseline")]
-    names = names if names[-1] else names[:-1]
+    names = [*(os.path.relpath(path, own) for path in finalists), *filter(None, [content.get("baseline")])]
     other = {key: value for key, value in shared.items() if key not in REPLACED and not key.startswith("errors.")}
     worlds: Dict[str, Any] = {"vary": {"behavior": names, "world": [USUAL, WORST]}}
     if options.errors:
@@ -147,10 +147,10 @@ def check(path: str) -> str:
     """Check all that a controller's file names, and draw it, as draw() does. Raises: ExperimentError, HeroError."""
     try:
         arena = find_behavior(path).arena
-    except ValueError as error:
-        raise ExperimentError(str(error)) from None
-    if arena:
-        load_arena(arena)
+        if arena:
+            load_arena(arena)
+    except (OptionError, ValueError) as error:
+        raise ExperimentError(str(error) if path in str(error) else f"{path}: {error}") from None
     return draw(path)
 
 

@@ -16,7 +16,7 @@ from typing import Dict, Optional, Sequence
 from hero_node.files import name_file, read_file
 
 from .computing.batch import load_checked
-from .computing.code_version import hash_code, list_suite
+from .computing.code_version import list_suite
 from .errors import ExperimentError
 from .results_folder import ABOUT, SIMULATED, ResultsFolder, format_table, read_results
 
@@ -26,8 +26,7 @@ EXPERIMENT, RUNS, FILES, SUITE = "experiment", "runs.csv", "files", "suite"
 def collect(path: str) -> Dict[str, bytes]:
     """Return the files of the pack by their names. Raises: ExperimentError if the results cannot be computed again."""
     text, experiment, about = read_results(path)
-    load_checked(experiment)
-    code = hash_code(experiment.list_code())
+    code = load_checked(experiment)
     folder = ResultsFolder(path, experiment, about["code"])
     runs = [run for run in folder.read_runs() if run.kind == SIMULATED]
     if about["code"] != code:

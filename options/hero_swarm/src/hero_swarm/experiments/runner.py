@@ -15,7 +15,7 @@ from hero_node.parameters import explicit_ids_option, within
 
 from .computing import engines
 from .computing.batch import Batch, compute_batch, load_checked
-from .computing.code_version import describe_machine, hash_code, hash_suite
+from .computing.code_version import describe_machine, hash_suite
 from .computing.engines import Engine
 from .computing.progress import Progress
 from .experiment_file import MAX_ROBOTS, MAX_RUNS, Experiment, read_experiment
@@ -44,8 +44,7 @@ def _parse_part(text: str) -> Tuple[int, int]:
 
 def _parse_executor(text: str) -> str:
     if not text.startswith(DASK) or text == DASK:
-        allowed = "dask:tls://HOST:PORT, dask:tcp://127.0.0.1:PORT or dask:SCHEDULER_FILE"
-        raise argparse.ArgumentTypeError(f"{text!r} must be {allowed}")
+        raise argparse.ArgumentTypeError(f"{text!r} must be dask:ADDRESS, as tls://HOST:PORT or tcp://127.0.0.1:PORT")
     return text[len(DASK) :]
 
 
@@ -116,10 +115,10 @@ def open_folder(options: argparse.Namespace) -> Iterator[Tuple[Experiment, Resul
     """
     text, experiment = read_experiment(options.file)
     experiment = experiment._replace(seeds=experiment.seeds[: options.seeds])
-    load_checked(experiment)
+    code = load_checked(experiment)
     experiment.sources.complete()
     path, kind = options.out or os.path.splitext(options.file)[0], SIMULATED if options.robots is None else REAL
-    folder = ResultsFolder(path, experiment, hash_code(experiment.list_code()))
+    folder = ResultsFolder(path, experiment, code)
     about = {**describe_machine(), FOLDER: os.path.relpath(experiment.folder or ".", path)}
     if options.fresh:
         with folder.hold(kind):

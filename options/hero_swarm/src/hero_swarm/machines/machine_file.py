@@ -11,7 +11,7 @@ acts until its condition holds, the first after the last; or `behavior: segregat
 
 from typing import Any, Dict, List, NamedTuple
 
-from hero_node.files import Entry, EntryError, decode_text, read_entries
+from hero_node.files import Entry, EntryError, load_entries
 from hero_sim.world import locate_arena
 
 from .modules import DO, LIMITS, MAX_NEXT, WHEN, WHOLE_LIMITS, Kinds, State, follow
@@ -32,8 +32,8 @@ class Controller(NamedTuple):
 
 
 def read_controller(path: str, content: bytes) -> Controller:
-    """Return what a file holds. Raises: EntryError with path and line. YamlError."""
-    root = read_entries(decode_text(content), path, _EXAMPLE)
+    """Return what a file holds. Raises: EntryError with path and line."""
+    root = load_entries(path, _EXAMPLE, lambda _: content)
     kinds = [kind for kind in ("states", "tree", "behavior") if kind in root.mapping()]
     if len(kinds) != 1:
         raise EntryError(f"{path}: needs states, a tree or a behavior, such as {_EXAMPLE}")

@@ -384,12 +384,13 @@ def test_a_worker_that_dies_keeps_what_is_computed(path, light, monkeypatch):
     "text, words",
     [
         ("states: [{name: rest, do: rest}]", "line 1: states.do is 'rest'"),
-        ("arena: none.yaml\nstates: [{name: rest, do: stop}]", "arena none.yaml: cannot be read"),
+        ("arena: none.yaml\nstates: [{name: rest, do: stop}]", "own.controller: arena none.yaml: cannot be read"),
+        ("# \udcff", "own.controller: not YAML: .* invalid start byte"),
         ("behavior: aggregation\nnumbers: {speed: 1}", "own.controller: .* has no parameter 'speed'"),
     ],
 )
 def test_a_wrong_controller_is_named(path, text, words):
-    Path("own.controller").write_text(text + "\n")
+    Path("own.controller").write_bytes((text + "\n").encode(errors="surrogateescape"))
     with pytest.raises(HeroError, match=words):
         program.main(["own.controller"])
 

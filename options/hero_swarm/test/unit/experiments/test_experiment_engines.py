@@ -180,7 +180,8 @@ class Cluster:
 def test_dask_clusters_that_cannot_be_used_are_refused_with_the_remedy(monkeypatch):
     stub = types.SimpleNamespace(Client=Cluster, TimeoutError=ArrivalError)
     monkeypatch.setitem(sys.modules, "distributed", stub)
-    with pytest.raises(ExperimentError, match="no Dask scheduler file no.json: start .* --scheduler-file no.json$"):
+    text = "no Dask scheduler file no.json .an address is tls:.*: start .* --scheduler-file no.json$"
+    with pytest.raises(ExperimentError, match=text):
         engines.open_dask("no.json", lambda: "abc")
     with pytest.raises(ExperimentError, match="at tcp://127.0.0.1:1 .Only 0/1 .*: start dask-scheduler and .*worker$"):
         engines.open_dask("tcp://127.0.0.1:1", lambda: "abc")

@@ -473,8 +473,22 @@ def test_a_run_is_shown_at_speeds_that_its_options_name(capsys):
     assert "--speed: 0 must be a number from 0.01 to 100" in capsys.readouterr().err
 
 
+def test_a_run_of_one_of_several_behaviors_is_shown_without_a_note(tmp_path, monkeypatch, capsys, ahead):
+    for name in ("first.py", "second.py"):
+        (tmp_path / name).write_text(ahead)
+    (tmp_path / "own.py").write_text("def zero(state):\n    return 0.0 * state.poses[:, 0, 0]\n")
+    path = tmp_path / "two.yaml"
+    metrics_of_both = "robots: 2\ntime_s: 1\nseeds: {count: 1}\nmetrics: [own.py:zero]\n"
+    path.write_text("vary: {behavior: [first.py, second.py]}\n" + metrics_of_both)
+    folder = run(path)
+    monkeypatch.setattr("hero_swarm.video.write_video", lambda *arguments: None)
+    for cell in (1, 2):
+        replay(folder, "--cell", cell, "--video", tmp_path / "run.gif")
+    assert "may differ" not in capsys.readouterr().err
+
+
 def test_a_run_of_other_code_is_shown_with_a_note(finished, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(show, "hash_code", lambda behavior: "0ther")
+    monkeypatch.setattr(show, "load_checked", lambda experiment: "0ther")
     monkeypatch.setattr("hero_swarm.video.write_video", lambda *arguments: None)
     replay(finished, "--video", tmp_path / "run.gif")
     assert "may differ" in capsys.readouterr().err

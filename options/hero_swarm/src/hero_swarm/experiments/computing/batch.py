@@ -23,7 +23,7 @@ from ..errors import report_place
 from ..experiment_file import Experiment, Metric
 from ..results_folder import METRICS_ENDING, POSES_ENDING, Run
 from .cell_setup import check_setup, set_up
-from .code_version import check_suite
+from .code_version import check_suite, hash_code
 
 SAMPLE_S = 1.0
 """Time between two samples of the metrics."""
@@ -50,8 +50,8 @@ one_at_a_time = threading.RLock()
 """Modules of users are those of one batch."""
 
 
-def load_checked(experiment: Experiment) -> None:
-    """Build the first run of all cells that differ in it, to report errors before anything runs: ExperimentError."""
+def load_checked(experiment: Experiment) -> str:
+    """Check all cells by the begin of a run, before all runs; return a digest of the code. Raises: ExperimentError."""
     check_setup(experiment, filter(is_own, list_sources(experiment)))
     built = set()
     for cell in tqdm(experiment.cells, "checking", unit=" cells", leave=False, disable=None, file=sys.stderr):
@@ -64,6 +64,7 @@ def load_checked(experiment: Experiment) -> None:
             with report_place(f"{cell.behavior}, {cell.label}", experiment.sources):
                 measure(experiment, trial.state)
             built.add(settings)
+    return hash_code(experiment.list_code())
 
 
 def compute_batch(experiment: Experiment, suite: str, cell: int, seeds: Sequence[int], stem: str) -> List[Run]:
