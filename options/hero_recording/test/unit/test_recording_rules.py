@@ -331,7 +331,7 @@ def test_the_recorder_is_told_folder_split_compression_and_topics(recording):
 
 
 @pytest.mark.parametrize(("missing", "package"), [("find_node", "python3-rosbag"), ("which", "util-linux")])
-def test_a_program_that_a_recording_needs_is_named_with_its_package(recording, monkeypatch, missing, package):
+def test_a_program_that_recordings_need_is_named_with_its_package(recording, monkeypatch, missing, package):
     owner = {"find_node": record.roslib.packages, "which": record.shutil}[missing]
     monkeypatch.setattr(owner, missing, lambda *_: None)
     with pytest.raises(record.RecordingError, match=f"is missing: apt install {package}"):
