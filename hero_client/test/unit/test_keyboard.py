@@ -4,10 +4,11 @@ import os
 import pty
 import signal
 import sys
+import termios
 
 import pytest
 
-from hero_client.apps.keyboard import Keyboard
+from hero_client.apps.keyboard import Keyboard, split_keys
 
 
 @pytest.fixture
@@ -28,3 +29,39 @@ def test_reading_keys_that_ctrl_c_has_discarded_does_not_wait(terminal):
         os.write(terminal, b"w")
         assert keyboard.read_keys() == ["w"]
     signal.alarm(0)
+
+
+def test_the_terminal_has_its_settings_back_also_after_an_error(terminal):
+    before = termios.tcgetattr(sys.__stdin__)
+    with pytest.raises(ZeroDivisionError), Keyboard() as keyboard:
+        inside = termios.tcgetattr(sys.__stdin__)
+        assert not inside[3] & (termios.ICANON | termios.ECHO) and inside[3] & termios.ISIG, "Ctrl-C is a signal still"
+        assert inside[6][termios.VSUSP] == b"\0", "Ctrl-Z is a key"
+        raise ZeroDivisionError
+    assert termios.tcgetattr(sys.__stdin__) == before and keyboard.file.closed
+
+
+def test_an_arrow_that_comes_in_two_pieces_is_one_key(terminal):
+    with Keyboard() as keyboard:
+        for sent, keys in ((b"w\x1b[", ["w"]), (b"Ad", ["up", "d"]), (b"\x1bO", []), (b"D", ["left"])):
+            os.write(terminal, sent)
+            assert keyboard.read_keys() == keys
+
+
+@pytest.mark.parametrize(
+    ("text", "keys", "rest"),
+    [
+        ("", [], ""),
+        ("wxW ", ["w", "x", "W", " "], ""),
+        ("\x1b[A\x1b[B\x1b[C\x1b[D\x1bOA", ["up", "down", "right", "left", "up"], ""),
+        ("ab\x1b[", ["a", "b"], "\x1b["),
+        ("b\x1bO", ["b"], "\x1bO"),
+        ("\x1b", [], ""),
+        ("a\x1bb", ["a", "b"], ""),
+        ("\x1b[3~q", ["q"], ""),
+        ("\x1b[1;5Cq", ["q"], ""),
+        ("\r\n\t\x04", ["\r", "\n", "\t", "\x04"], ""),
+    ],
+)
+def test_sequences_of_terminals_are_keys_or_nothing(text, keys, rest):
+    assert split_keys(text) == (keys, rest)

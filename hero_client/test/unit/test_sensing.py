@@ -43,6 +43,21 @@ def test_a_beam_of_endless_range_touches_a_body_by_its_radius():
             assert not sense_binary(poses, Binary())[1] or bearing_rad == math.pi
 
 
+def test_compiled_loops_are_told_what_is_computed_here():
+    told, poses = [], pair(0.5, 0.25, yaw_rad=0.75)
+
+    def find_touched(places_m, cosine, sine, radius_m, range_m, sees):
+        told.append((radius_m, range_m))
+        assert places_m.flags.c_contiguous and places_m.tolist() == np.moveaxis(poses[..., :2], 2, 0).tolist()
+        assert (cosine.tolist(), sine.tolist()) == (np.cos(poses[..., 2]).tolist(), np.sin(poses[..., 2]).tolist())
+        sees[0, 1] = True
+
+    assert sense_binary(poses, Binary(range_m=0.4), find_touched=find_touched).tolist() == [False, True]
+    assert told == [(BODY_RADIUS_M, 0.4)]
+    sense_binary(poses, Binary(half_angle_rad=0.3), find_touched=find_touched)
+    assert len(told) == 1, "for beams alone"
+
+
 def test_the_robot_behind_sees_the_one_in_front_and_not_the_reverse():
     assert sense_binary(pair(0.5, 0.0), Binary()).tolist() == [True, False]
     assert sense_binary(pair(0.5, math.pi), Binary()).tolist() == [False, True]

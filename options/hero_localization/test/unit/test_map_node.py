@@ -60,7 +60,7 @@ def make_bench(monkeypatch, tmp_path):
     return Bench(monkeypatch, tmp_path)
 
 
-def test_robots_draw_where_they_are_measured_and_not_where_they_are_thought(bench):
+def test_robots_draw_where_they_are_measured_alone(bench):
     swarm_map = bench.node._map = create_autospec(SwarmMap, instance=True)
     bench.see(
         (2, RobotPose.LOST, 0.1), (3, RobotPose.UNKNOWN, 0.1), (5, RobotPose.TRACKED, math.nan),
