@@ -1,6 +1,7 @@
 """One robot in virtual time: what its methods send, when, and which errors they raise."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 from linkless_robot import FakeSwarm, make_robot
@@ -11,6 +12,7 @@ from hero_client.values.errors import GoalError, NotCalibratedError, RobotNotRea
 from hero_client.values.readings import FRESH_S, NOT_CALIBRATED
 from hero_node import Pose, Velocity
 from hero_node.robot_constants import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S, MODELS
+from hero_test.nonempty import nonempty
 
 
 def test_data_count_until_they_are_a_second_old():
@@ -322,6 +324,25 @@ def test_a_motion_in_the_background_ends_by_cancel_stop_or_the_next():
         with pytest.raises(GoalError, match=r"hero_3 did not reach \(1, 0\): cancelled"):
             motion.result()
         assert any(velocity == [0.0, 0.0] for _, *velocity in link.sent)
+
+
+@pytest.mark.parametrize(
+    ("drive", "is_of_the_next"),
+    [
+        (lambda robot: robot.turn(1.0), lambda linear_m_s, angular_rad_s: linear_m_s == 0.0 <= angular_rad_s),
+        (lambda robot: robot.forward(-0.1), lambda linear_m_s, angular_rad_s: linear_m_s <= 0.0),
+        (lambda robot: robot.drive(-0.1, 0.0, duration_s=0.5), lambda linear_m_s, angular_rad_s: linear_m_s <= 0.0),
+        (lambda robot: robot.go_to(0.0, 0.0), lambda linear_m_s, angular_rad_s: True),
+    ],
+)
+def test_a_motion_that_is_waited_for_begins_when_the_one_before_has_ended(drive, is_of_the_next):
+    robot, link = make_robot()
+    motion = robot.start_go_to(1.0, 0.0)
+    robot.sleep(0.5)
+    count = len(link.sent)
+    link.clock.joined.append(SimpleNamespace(advance=lambda step_s: motion.done() or pytest.fail("it goes on")))
+    drive(robot)
+    assert all(is_of_the_next(*velocity) for _, *velocity in nonempty(link.sent[count:]))
 
 
 def test_what_ends_a_wait_stops_the_robot_before_it_goes_on():

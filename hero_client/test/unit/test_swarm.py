@@ -153,7 +153,8 @@ def test_robots_that_do_not_arrive_are_named_and_all_are_stopped():
         motion = swarm[0].start_go_to(9.0, 0.0)
         started_s = swarm.now_s
 
-        def spoil_later(step_s, swarm=swarm, spoil=spoil):
+        def spoil_later(step_s, swarm=swarm, spoil=spoil, motion=motion):
+            assert motion.done(), "it ended before the swarm began"
             if swarm.now_s > 101.0:
                 spoil(swarm)
 

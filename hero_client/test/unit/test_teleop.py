@@ -173,6 +173,13 @@ def test_a_key_that_repeats_through_a_stop_drives_after_a_new_press(shown, other
     for now_s in (5.2, 5.3):
         teleop.step(now_s)
     assert hold(5.4, 6.0)[0] == (0.1, 0.0) and len(shown) == 2
+    for now_s in (6.5, 7.0, 7.5):  # let go
+        swarm.links[other].is_stopped = now_s > 6.5
+        teleop.step(now_s)
+    velocities(swarm.links[0])
+    hold(8.0, 9.0)
+    swarm.links[other].is_stopped = False
+    assert (0.1, 0.0) not in hold(9.0, 10.0), "a key that is held at the release was pressed before"
 
 
 def test_the_live_line_tells_the_robot_or_what_keeps_it_from_driving():

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from hero_node.geometry import (
+    STOP,
     Pose,
     clamp,
     find_frame,
@@ -62,3 +63,7 @@ def test_angles_and_values_are_cut_to_their_limits():
     for turns in (-2, 0, 1):
         assert wrap_angle(1.0 + turns * math.tau) == pytest.approx(1.0)
     assert [clamp(value, 2.0) for value in (-3.0, -2.0, -1.0, 1.0, 2.0, 3.0)] == [-2.0, -2.0, -1.0, 1.0, 2.0, 2.0]
+
+
+def test_a_stop_asks_for_no_motion_at_all():
+    assert STOP == (0.0, 0.0) and repr(STOP) == "Velocity(linear_m_s=0.000, angular_rad_s=0.000)"

@@ -122,9 +122,10 @@ def test_a_connection_that_is_served_slowly_delays_no_other(server):
     assert address == second.getsockname()
 
 
-def test_a_header_that_does_not_come_in_time_ends_the_connection(server):
+@pytest.mark.parametrize("sent", [b"", b"\x10\x00", HEADER[:-1]])
+def test_a_header_that_does_not_come_in_time_ends_the_connection(server, sent):
     server.open(timeout_s=0.1)
-    client = server.connect(b"\x10\x00")
+    client = server.connect(sent)
     assert is_closed(client)
 
 

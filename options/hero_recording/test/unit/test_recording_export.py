@@ -2,12 +2,15 @@
 
 import csv
 import math
+from unittest.mock import create_autospec
 
 import pytest
 import rosbag
 from synthetic_bag import DELAY_S, START_S, make_localized, write_bag
 
+from hero_node.files import ExtraTopic, FleetFile
 from hero_recording import export
+from hero_recording.bags.tables import declare_tables
 from hero_recording.errors import RecordingError
 
 
@@ -97,8 +100,20 @@ def test_each_message_is_a_row(bag, tmp_path, capsys):
         assert len(read_csv(tmp_path / "out" / robot / "odometry.csv")) == 117
 
 
+def test_topics_of_the_fleet_are_exported_beside_the_first_bag(tmp_path, capsys, monkeypatch):
+    topic = ExtraTopic("charge", "battery", "std_msgs/Float32", "data", "V")
+    declare = create_autospec(declare_tables)
+    monkeypatch.setattr(export, "declare_tables", declare)
+    monkeypatch.setattr(export, "read_fleet_file", lambda: FleetFile(topics=(topic,)))
+    monkeypatch.chdir(tmp_path)
+    write_bag(tmp_path / "day.bag", robot_ids=(3,), seconds=1.0)
+    assert run_export(capsys, "day.bag").startswith(f"{tmp_path / 'day'}: 1 robots, ")
+    declare.assert_called_once_with((topic,))
+    assert (tmp_path / "day" / "hero_3").is_dir()
+
+
 def test_wrong_options_of_export_are_refused_by_name(bag, capsys):
     with pytest.raises(SystemExit) as caught:
         export.parse_options([str(bag), "--robots", "-3"])
     assert caught.value.code == 2
-    assert "--robots" in capsys.readouterr().err
+    assert capsys.readouterr().err.splitlines()[-1].startswith("export: error: argument --robots: ")
