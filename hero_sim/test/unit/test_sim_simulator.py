@@ -1,12 +1,14 @@
 """Robots in real time: the pace of the clock, pauses of the machine, and what is told of connections."""
 
 import inspect
+from unittest.mock import create_autospec
 
 import pytest
 from driver_side import parse_options
 
 from hero_sim import simulator as simulators
 from hero_sim.build import build_simulator
+from hero_sim.errors import OptionError
 from hero_sim.link.tcp_link import TcpLink
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 from hero_sim.simulator import _FLAPPING_MS, _LATE_S, _MAX_WAIT_S, _MIN_WAIT_S
@@ -258,3 +260,11 @@ def test_a_connection_that_is_made_without_power_reaches_no_robot(bench):
     for index in range(2):
         simulator.connection_made(index)
     assert made == ["hero_1"]
+
+
+def test_a_fault_of_a_robot_that_is_not_there_leaves_no_connection_open(monkeypatch):
+    close_all = create_autospec(TcpLink.close_all)
+    monkeypatch.setattr(TcpLink, "close_all", close_all)
+    with pytest.raises(OptionError, match="robot 9 is not simulated here"):
+        build_simulator(parse_options("--port", "9", "--fault", "stall", "--fault", "reboot:robot=9"), print)
+    assert close_all.call_count == 1

@@ -120,6 +120,7 @@ def test_what_waits_is_limited_and_can_be_dropped(driver, monkeypatch):
     received = driver.socket.recv(len(sent))
     driver.link.send(0, b"end")
     received += driver.read_to(b"end")
+    assert driver.events.seen == ["made", "blocked"], "nothing waits that could go on"
     assert sent.startswith(received[:-3]) and len(received) < len(sent) + 3, "whole until there, nothing twice"
 
 

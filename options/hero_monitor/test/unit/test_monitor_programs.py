@@ -219,8 +219,10 @@ def test_a_program_whose_guard_is_killed_ends_too(started, monkeypatch):
 
 @pytest.mark.slow
 def test_why_a_program_failed_is_shown_until_another_one_starts(started):
+    opened = len(os.listdir("/proc/self/fd"))
     started.start("import sys; sys.exit('swarm_go_to: no way')")
     started.wait()
+    assert len(os.listdir("/proc/self/fd")) == opened, "pipe and output are closed with it"
     assert [row["failure"] for row in started.programs.describe()] == ["swarm_go_to: no way"]
     started.start("print()")
     started.wait()

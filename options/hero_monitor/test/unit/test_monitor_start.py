@@ -129,3 +129,15 @@ def test_limits_of_what_pages_may_set_are_the_ends_of_their_fields():
     assert led_show["fields"][0]["choices"] == ("rainbow", "chase", "blink") and not led_show["fields"][0]["limits"]
     assert (follow["fields"][0]["limits"], follow["fields"][0]["step"]) == ((0.1, 2.0), "any")
     assert describe_offers(["behavior_segregation"])[0]["fields"][0]["step"] == 1
+
+
+def test_only_a_page_that_was_opened_is_told_of_when_it_closes():
+    closed, pages = [], []
+    for number in (1, 2):
+        page = PageSocket.__new__(PageSocket)
+        page.pages, page.number, page.actions = pages, number, SimpleNamespace(close_page=closed.append)
+        if number == 2:
+            pages.append(page)
+        for _ in range(2):
+            page.on_close()
+    assert closed == [2] and pages == []
