@@ -148,7 +148,8 @@ def test_a_robot_that_fails_is_stopped_and_the_others_go_on(capsys):
     assert [probe.robot_id for probe in session.active] == [0, 2]
     assert session.probes[1].failure == "motors: bad data"
     assert session.probes[1].sent == ["stop"] and not session.probes[0].sent
-    assert "hero_1 once more: motors: bad data" in capsys.readouterr().out
+    told = capsys.readouterr().out.splitlines()
+    assert "hero_1 once more: motors: bad data" in told and told[-1] == "hero_1 failed: motors: bad data"
 
     def fail_again(probe):
         raise CalibrationError("silent")
@@ -465,9 +466,13 @@ def test_parts_follow_each_other_and_robots_are_placed_where_they_need_it(calls,
 def test_a_folder_that_is_full_fails_the_robot_in_its_line(calls, tmp_path, monkeypatch, capsys):
     def refuse(*arguments):
         assert [probe.sent[-1:] for probe in session.probes] == [["stop"]] * 2, "robots stand before what may fail"
-        raise CalibrationError("hero_0.yaml cannot be written: disk full")
+        raise OSError(28, "No space left on device", "what replaces it")
 
     monkeypatch.setattr(store, "save", refuse)
     session = FakeSession(2)
     assert calibrate_parts(session, (MOTORS,), str(tmp_path), None) == 1
-    assert "hero_1: FAILED: hero_0.yaml cannot be written: disk full\n  motors    measured\n" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    for number in range(2):
+        path = store.name_file(str(tmp_path), number)
+        line = f"hero_{number}: FAILED: {path} cannot be written: No space left on device\n  motors    measured\n"
+        assert line in told

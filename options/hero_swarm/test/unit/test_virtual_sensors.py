@@ -205,5 +205,7 @@ def test_the_program_publishes_what_each_robot_senses(tmp_path, monkeypatch):
     assert sent["/hero_7/neighbors"] == [], "none listens"
     assert sent["/hero_7/messages"][-1].data == [] and sent["/hero_9/floor"] == []
     clock[0] = 5.0
-    node.step()
-    assert sent["/hero_7/pheromone"][-1].x < 1.0, "its program has fallen silent"
+    for amount in (math.nan, math.inf):
+        receivers["/hero_7/deposit"](Float32(amount))
+        node.step()
+    assert 0.0 < sent["/hero_7/pheromone"][-1].x < 1.0, "its program has fallen silent, or tells no number"

@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import io
 import json
+import math
 from types import SimpleNamespace
 
 import pytest
@@ -132,6 +133,10 @@ def test_robots_are_listened_to_while_they_are_there_and_not_refused(world):
     assert world.closed == ["/hero_0"] and set(program._listeners) == {"/hero_2"}
     refused = next(row for row in program._rows if row.robot.id == 1)
     assert refused.track.pose is None and not refused.is_heard
+    world.reports_s = math.inf
+    program._read()
+    assert sorted(row.robot.id for row in program._rows) == [1, 2], "as they were last known"
+    assert program._make_lines(100, 20)[0] != world.start()._make_lines(100, 20)[0], "no driver yet"
 
 
 class Keyboard:
