@@ -11,7 +11,7 @@ from std_msgs.msg import Float32
 from hero_client.ros import extra_topics, ros_link
 from hero_client.ros.extra_topics import load_fleet_file
 from hero_client.ros.ros_link import RosLink
-from hero_node import ProgramError
+from hero_node import HeroError
 from hero_node.files import ExtraTopic
 
 BATTERY = "{name: battery, topic: power, type: std_msgs/Float32, field: data, unit: V}"
@@ -46,7 +46,7 @@ def test_a_declared_topic_has_a_class_and_a_field(write):
 )
 def test_a_wrong_declaration_ends_a_program_with_one_line(write, wrong, right, words):
     write(BATTERY.replace(right, wrong))
-    with pytest.raises(ProgramError, match=words):
+    with pytest.raises(HeroError, match=words):
         load_fleet_file()
 
 

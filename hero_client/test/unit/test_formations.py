@@ -7,7 +7,8 @@ import random
 import numpy as np
 import pytest
 
-from hero_client.apps.formations import FormationError, assign_goals, place_formation
+from hero_client.apps.formations import assign_goals, place_formation
+from hero_node.files import EntryError
 from hero_test.bad_yaml import make_bad_yaml
 
 
@@ -81,7 +82,7 @@ def test_a_formation_has_its_spacing_and_its_center(shape):
     ],
 )
 def test_a_wrong_formation_is_told_in_one_line(formation, says):
-    with pytest.raises(FormationError, match=says) as raised:
+    with pytest.raises(EntryError, match=says) as raised:
         place_formation(formation, 3, 0.2)
     assert "\n" not in str(raised.value)
 
@@ -92,5 +93,5 @@ def test_no_formation_breaks_its_reader(key):
     for content in make_bad_yaml(key):
         try:
             place_formation(content.decode("utf-8", "replace") + "\nshape: grid\n" * (key == "columns"), 4, 0.1)
-        except FormationError as error:
+        except EntryError as error:
             assert str(error).isprintable() and len(str(error)) < 400

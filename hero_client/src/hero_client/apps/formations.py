@@ -14,7 +14,6 @@ from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
 
-from hero_node import ProgramError
 from hero_node.files import Entry, EntryError, mark_values, read_entries
 from hero_node.parameters import MAX_COORDINATE_M
 
@@ -35,24 +34,17 @@ ROUNDING = 1e-9
 """Share of the largest cost by which a swap must help: sums are this exact."""
 
 
-class FormationError(ProgramError):
-    """A formation that cannot be taken; the text names the key, the value and what it must be."""
-
-
 def place_formation(formation: Any, count: int, min_spacing_m: float) -> List[Point]:
     """Return count places [x, y], m, in the frame in which center is given.
 
     formation: a table, or its text in YAML. min_spacing_m: closer together robots could not reach their places.
-    Raises: FormationError.
+    Raises: EntryError with the key, the value and what it must be.
     """
-    try:
-        if isinstance(formation, str):
-            root = read_entries(formation, "formation", "shape: circle")
-        else:
-            root = mark_values(formation, "formation")
-        return _place(root.mapping(KEYS), count, min_spacing_m)
-    except EntryError as error:
-        raise FormationError(str(error)) from None
+    if isinstance(formation, str):
+        root = read_entries(formation, "formation", "shape: circle")
+    else:
+        root = mark_values(formation, "formation")
+    return _place(root.mapping(KEYS), count, min_spacing_m)
 
 
 def _place(fields: Dict[str, Entry], count: int, min_spacing_m: float) -> List[Point]:
@@ -70,11 +62,11 @@ def _place(fields: Dict[str, Entry], count: int, min_spacing_m: float) -> List[P
     else:
         places = [_read_point(entry) for entry in fields["points"].entries()] if "points" in fields else []
         if len(places) < count:
-            raise FormationError("formation: points must be a list of at least %d places [x, y] in m" % count)
+            raise EntryError("formation: points must be a list of at least %d places [x, y] in m" % count)
     apart_m = min((math.dist(*pair) for pair in combinations(places, 2)), default=math.inf)
     if apart_m < min_spacing_m:
         text = "formation: two places are %.3f m apart, but robots need %.2f m: make spacing_m larger"
-        raise FormationError(text % (apart_m, min_spacing_m))
+        raise EntryError(text % (apart_m, min_spacing_m))
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
     return [(center[0] + x * cos - y * sin, center[1] + x * sin + y * cos) for x, y in places]
 

@@ -6,16 +6,13 @@ from typing import Any, Optional, Type
 import roslib.message
 
 from hero_node import ProgramError
-from hero_node.files import EntryError, ExtraTopic, FleetFile, read_fleet_file
+from hero_node.files import ExtraTopic, FleetFile, read_fleet_file
 
 
 @lru_cache(maxsize=None)
 def load_fleet_file() -> FleetFile:
-    """Return fleet.yaml, read once. Raises: ProgramError for a mistake in the file, or a type that is missing."""
-    try:
-        found = read_fleet_file()
-    except EntryError as error:
-        raise ProgramError(str(error)) from error
+    """Return fleet.yaml, read once. Raises: EntryError for a mistake in the file. ProgramError for a missing type."""
+    found = read_fleet_file()
     for topic in found.topics:
         read_field(find_class(topic)(), topic)
     return found

@@ -8,7 +8,7 @@ import pytest
 
 cv2 = pytest.importorskip("cv2")
 
-from hero_localization.errors import SettingsError  # noqa: E402 - without OpenCV there is no camera
+from hero_localization.errors import LocalizationError, SettingsError  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.prints.tag_images import draw_tag  # noqa: E402 - without OpenCV there is no camera
 from hero_localization.simulated_camera.renderer import CameraRenderer  # noqa: E402
 from hero_localization.simulated_camera.view import (  # noqa: E402  # noqa: E402
@@ -79,7 +79,7 @@ def test_tags_are_upright_as_in_apriltags_own_pictures():
 
 @pytest.mark.parametrize(("family", "tag_id"), [("36h11", 587), ("16h5", 30), ("16h5", -1)])
 def test_tags_that_do_not_exist_are_refused(family, tag_id):
-    with pytest.raises(ValueError, match=family):
+    with pytest.raises(LocalizationError, match=family):
         draw_tag(family, tag_id)
 
 

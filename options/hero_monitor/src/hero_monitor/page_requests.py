@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, Optional, Sequence, Tuple
 
 import rospy
 
-from hero_client.apps.formations import FormationError
 from hero_node import Pose
+from hero_node.files import EntryError
 
 from .background import Background
 from .control.activity import Activity
@@ -80,13 +80,13 @@ class PageRequests:
             self._carry_out(page, request)
             if do in ("stop", "release"):
                 page.acknowledge(do)
-        except (RefusedError, FormationError) as error:
+        except (RefusedError, EntryError) as error:
             page.tell("error", str(error))
             if do == "drive":
                 page.end_hold(request["pressed_ms"])
 
     def _carry_out(self, page: "PageSocket", request: Request) -> None:
-        """Carry out a request, if its user may make it. Raises: RefusedError or FormationError."""
+        """Carry out a request, if its user may make it. Raises: RefusedError or EntryError."""
         do, robots = request["do"], request.get("robots", ())
         refusal = page.user.role.find_refusal(
             do, self.programs.find_robots(request["number"]) if do == "end" else robots

@@ -14,11 +14,11 @@ import pytest
 import yaml
 
 import sources
-from hero_client.apps.formations import FormationError
 from hero_monitor.control import programs as programs_module
 from hero_monitor.control.offers import OFFERS, check_values, make_arguments, place_robots
 from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import RequestError
+from hero_node.files import EntryError
 from hero_swarm.behaviors import list_names
 from hero_test.waiting import wait_for
 
@@ -95,7 +95,7 @@ def test_a_formation_is_placed_where_the_map_was_clicked():
     assert first == pytest.approx((1.0, -0.35))
     assert second == pytest.approx((1.0, -0.65))
     assert place_robots({"linear_m_s": 0.1}, 2) == []
-    with pytest.raises(FormationError):
+    with pytest.raises(EntryError):
         place_robots({**CIRCLE, "spacing_m": 0.05}, 2)
 
 

@@ -7,7 +7,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from hero_client.apps.formations import FormationError
 from hero_client.ros import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import drive_requests as commander_module
@@ -20,6 +19,7 @@ from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.page_requests import GOALS_AT_ONCE, INERT_S, PageRequests
 from hero_monitor.serving.lesson import TEACHER, User
 from hero_node import NodeError, Pose
+from hero_node.files import EntryError
 
 NOW_MS = 5000000
 
@@ -272,7 +272,7 @@ def test_a_program_is_started_with_its_robots_and_their_topics_open(desk, monkey
     child, arguments = desk.started.pop()
     child.end()
     assert any('"groups": 3,' in argument for argument in arguments), "a whole number, however a page writes it"
-    monkeypatch.setattr(page_requests, "place_robots", Mock(side_effect=FormationError("robots would touch")))
+    monkeypatch.setattr(page_requests, "place_robots", Mock(side_effect=EntryError("robots would touch")))
     assert desk.ask("start", **wide) == ["robots would touch"]
     desk.programs.count = PROGRAMS_MAX
     assert desk.ask("start", **wide) == ["20 programs run: end one first"] and len(desk.started) == 3

@@ -36,7 +36,6 @@ def run_check(port: int) -> Dict[str, Finding]:
         "workspace": computer.check_workspace,
         "disk": computer.check_disk,
         "clock": computer.check_clock,
-        "battery": computer.check_battery,
         "camera": localization.check_camera,
         "ros_environment": lambda: graph.check_variables(addresses),
         "own_name": lambda: graph.check_own_name(own),

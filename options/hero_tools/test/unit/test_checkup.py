@@ -177,18 +177,6 @@ def test_a_clock_that_is_not_synchronized_is_told(monkeypatch, answer, state):
     assert finding.state == state and ("unknown" in finding.text) == (answer is None)
 
 
-@pytest.mark.parametrize(
-    "status, percent, state", [("Discharging", 20, WARN), ("Discharging", 80, OK), ("Charging", 5, OK)]
-)
-def test_a_battery_that_runs_out_is_told(tmp_path, status, percent, state):
-    supply = tmp_path / "BAT0"
-    supply.mkdir()
-    (supply / "status").write_text(status + "\n")
-    (supply / "capacity").write_text(f"{percent}\n")
-    assert computer.check_battery(tmp_path).state == state
-    assert computer.check_battery(tmp_path / "none").state == OK
-
-
 WIFI, LAN, DOCKER = (
     Address("wlan0", "10.42.0.1"),
     Address("eth0", "192.168.7.2"),

@@ -206,11 +206,6 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     sheets = list_sheets(options, FAMILIES[options.family].cells)
     if not sheets and not options.board:
         raise LocalizationError("nothing to print: name --robots 0-9, --references 100-103, or --board")
-    for sheet in sheets:
-        try:
-            draw_tag(options.family, sheet.tag_id)
-        except ValueError as error:
-            raise LocalizationError(str(error)) from None
     paper_mm = PAPERS_MM[options.paper]
     pages = list(split_pages(sheets, paper_mm))
     with replace_file(options.out) as file, PdfPages(file) as pdf:

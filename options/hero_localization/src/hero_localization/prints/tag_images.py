@@ -8,6 +8,8 @@ from typing import Dict, NamedTuple
 
 import numpy as np
 
+from ..errors import LocalizationError
+
 DEFAULT_SIZE_M = 0.040
 """Side of the black square of robots' tags, unless a file or an option names another."""
 REFERENCE_SIZE_M = 0.1
@@ -33,11 +35,11 @@ FAMILIES: Dict[str, Family] = {
 def draw_tag(family: str, tag_id: int) -> np.ndarray:
     """Return the cells of a tag with its black border, (C, C), 0 or 255; the white margin around it is left out.
 
-    Raises: ValueError for an unknown id.
+    Raises: LocalizationError for an unknown id.
     """
     known = FAMILIES[family]
     if not 0 <= tag_id < known.size:
-        raise ValueError("tag %d: family %s has 0 to %d" % (tag_id, family, known.size - 1))
+        raise LocalizationError("tag %d: family %s has 0 to %d" % (tag_id, family, known.size - 1))
     is_upright = bool(_draw(known, 0)[1, 1]) == known.begins_white
     cells = _draw(known, tag_id)
     return cells if is_upright else np.rot90(cells, 2).copy()

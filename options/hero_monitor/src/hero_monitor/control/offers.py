@@ -111,7 +111,7 @@ def check_values(program: str, values: Dict[str, Any]) -> Dict[str, Any]:
 
 
 def place_robots(values: Dict[str, Any], count: int) -> List[Point]:
-    """Return the places that robots of a program drive to, m; none if it has no formation. Raises: FormationError."""
+    """Return the places that robots of a program drive to, m; none if it has no formation. Raises: EntryError."""
     if "shape" not in values:
         return []
     return place_formation(_make_formation(values), count, AvoidanceLaw().min_spacing_m)

@@ -1,4 +1,4 @@
-"""Python, packages, disk, clock and battery of this PC."""
+"""Python, packages, disk and clock of this PC."""
 
 import importlib.util
 import os
@@ -44,7 +44,6 @@ MODULES = {
 
 AUTHOR = "HeRo suite maintainers"
 LOW_DISK_GB, FULL_DISK_GB = 2.0, 0.2
-LOW_BATTERY_PERCENT = 30
 INSTALL = "elsewhere: rosdep install --from-paths src --ignore-src -y"
 SOURCE = "source the workspace in this terminal: source devel/setup.bash"
 
@@ -154,14 +153,3 @@ def check_clock() -> Finding:
     if answer.strip() == "yes":
         return ok("the clock is synchronized")
     return warn("the clock is not synchronized: several PCs disagree", "sudo timedatectl set-ntp true; or chrony")
-
-
-def check_battery(power: Path = Path("/sys/class/power_supply")) -> Finding:
-    """Check that this PC is not about to run out of power."""
-    for supply in sorted(power.glob("*/capacity")):
-        status = (supply.parent / "status").read_text().strip()
-        percent = int(supply.read_text())
-        if status == "Discharging":
-            text = f"this PC runs on its battery, {percent} %"
-            return warn(text, "plug it in") if percent < LOW_BATTERY_PERCENT else ok(text)
-    return ok("this PC has no battery that discharges")
