@@ -8,15 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Mapping
 
 from hero_node.files import read_calibrations
-from hero_node.parameters import (
-    check_parameters,
-    choice,
-    declare,
-    find_declared,
-    number,
-    string,
-    whole_number,
-)
+from hero_node.parameters import check_parameters, choice, declare, find_declared, number, string, whole_number
 
 from .commands.command_queue import CommandSettings
 from .corrections.correction_settings import CorrectionSettings

@@ -79,11 +79,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
         default=CORE_2,
         help="timing of ESP8266 core 2.x or 3.x, or drawn for each robot (core2)",
     )
-    add(
-        "--flash-dir",
-        metavar="DIR",
-        help="keep the robots' parameters in this folder, a file per robot (in memory)",
-    )
+    add("--flash-dir", metavar="DIR", help="keep the robots' parameters in this folder, a file per robot (in memory)")
 
 
 def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[str]]) -> argparse.Namespace:

@@ -34,12 +34,7 @@ class Simulator(LinkHandler):
     """
 
     def __init__(
-        self,
-        swarm: Swarm,
-        link: TcpLink,
-        radios: List[Radio],
-        report: Callable[[str], None],
-        speed: float = 1.0,
+        self, swarm: Swarm, link: TcpLink, radios: List[Radio], report: Callable[[str], None], speed: float = 1.0
     ) -> None:
         """Join a swarm, its radios and their link; speed is simulated seconds per second of wall clock."""
         self.swarm = swarm

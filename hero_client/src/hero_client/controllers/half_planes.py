@@ -42,11 +42,7 @@ def steer(
 
 
 def nearest_allowed(
-    wanted: np.ndarray,
-    normals: np.ndarray,
-    bounds: np.ndarray,
-    max_speed_m_s: float,
-    softness: float = 0.0,
+    wanted: np.ndarray, normals: np.ndarray, bounds: np.ndarray, max_speed_m_s: float, softness: float = 0.0
 ) -> np.ndarray:
     """Return the allowed velocities (R, 2) nearest to wanted (R, 2).
 

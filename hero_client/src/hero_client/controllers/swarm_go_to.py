@@ -43,11 +43,7 @@ class SwarmGoToController:
     """
 
     def __init__(
-        self,
-        goals: Sequence[Tuple[float, float]],
-        law: AvoidanceLaw,
-        step_s: float,
-        tolerance_m: float = 0.01,
+        self, goals: Sequence[Tuple[float, float]], law: AvoidanceLaw, step_s: float, tolerance_m: float = 0.01
     ) -> None:
         """goals: x, y (m) of each robot, in its order; step_s: planned time between two calls of step()."""
         self.goals = [(float(x), float(y)) for x, y in goals]

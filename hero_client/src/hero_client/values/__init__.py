@@ -25,16 +25,7 @@ from .object_sensing import (
     sense_objects,
     sense_sight,
 )
-from .readings import (
-    FRESH_S,
-    MAX_POSITION_M,
-    Obstacle,
-    finite,
-    front_first,
-    is_blind,
-    is_plausible,
-    read_pose,
-)
+from .readings import FRESH_S, MAX_POSITION_M, Obstacle, finite, front_first, is_blind, is_plausible, read_pose
 from .robot_link import MAP, RobotLink
 from .robot_states import STATES, STOP_STATES, describe_counts, describe_gone, describe_stop_origin, name_state
 from .sensing import Binary, Neighbor, Neighborhood, Neighbors, list_neighbors, sense_binary, sense_neighbors

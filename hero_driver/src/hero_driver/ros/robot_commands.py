@@ -128,12 +128,7 @@ class RobotCommands:
         return functools.partial(self._receive_motion, name, source, check, stop_payload)
 
     def _receive_motion(
-        self,
-        name: str,
-        source: str,
-        check: Callable[[bytes], Optional[bytes]],
-        stop_payload: bytes,
-        payload: bytes,
+        self, name: str, source: str, check: Callable[[bytes], Optional[bytes]], stop_payload: bytes, payload: bytes
     ) -> None:
         command = check(payload)
         if command is None:

@@ -50,8 +50,7 @@ HERO = RobotModel("Firmware: v3.8 | Hardware: v2.5 | Config: v2.3")
 MODELS: Dict[str, RobotModel] = {
     "hero": HERO,
     "v3.0": RobotModel(
-        "Firmware: v3.0 | Hardware: v2.5",
-        tuple(topic for topic in STOCK_TOPICS if topic.key not in _NEWER_NAMES),
+        "Firmware: v3.0 | Hardware: v2.5", tuple(topic for topic in STOCK_TOPICS if topic.key not in _NEWER_NAMES)
     ),
     "hero_plus": RobotModel(
         HERO.versions,

@@ -67,12 +67,7 @@ class Monitor:
         declared = [[topic.name, topic.unit] for topic in self._feed.lab_file.topics]
         hello = {"control": parameters.control, "topics": declared, "node": rospy.get_name().strip("/")}
         self._feed.page_state.put("hello", hello)
-        actions = Actions(
-            self._enter,
-            self._requests.receive,
-            self._leave,
-            lambda: self._feed.picture.jpeg,
-        )
+        actions = Actions(self._enter, self._requests.receive, self._leave, lambda: self._feed.picture.jpeg)
         # The other half of the files is for ROS: some per robot.
         limits = ClientLimits(min(CONNECTIONS_MAX, raise_file_limit() // 2))
         token = read_token(parameters.host, parameters.token_file)

@@ -9,13 +9,7 @@ import numpy as np
 from hero_client import Program
 from hero_node import say
 
-from ..calibration.lens_calibration import (
-    BoardView,
-    LensCalibration,
-    calibrate_lens,
-    find_board,
-    load_lens,
-)
+from ..calibration.lens_calibration import BoardView, LensCalibration, calibrate_lens, find_board, load_lens
 from ..tracking.settings import describe_lens
 from .calibration_images import Images, finish
 

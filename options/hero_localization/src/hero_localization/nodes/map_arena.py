@@ -153,10 +153,7 @@ PARAMETERS = {
     "bounds_m": string("-1.1 -1.1 1.1 1.1", "x min, y min, x max, y max"),
     "cell_m": number(0.01, 0.005, 0.1, "m", "side of a cell"),
     "poses_topic": string("/localization/poses", "hero_msgs/RobotPoses of `localize`"),
-    "file": string(
-        "~/hero_maps/arena.yaml",
-        "written by the service `~save`, with an image, for map_server",
-    ),
+    "file": string("~/hero_maps/arena.yaml", "written by the service `~save`, with an image, for map_server"),
 }
 
 

@@ -333,10 +333,7 @@ class Server:
             websocket_max_message_size=MAX_REQUEST_LENGTH,
         )
         self._http = LimitedServer(
-            application,
-            max_body_size=MAX_REQUEST_LENGTH,
-            max_header_size=16384,
-            idle_connection_timeout=60.0,
+            application, max_body_size=MAX_REQUEST_LENGTH, max_header_size=16384, idle_connection_timeout=60.0
         )
         self._http.limits = limits
         self._expiry = tornado.ioloop.PeriodicCallback(

@@ -75,12 +75,7 @@ TABLES: Dict[str, Columns] = {
     "velocity_command": _TWIST,
     "position_command": _TWIST,
     "motor_command": {"left_us": attrgetter("left_motor_pwm"), "right_us": attrgetter("right_motor_pwm")},
-    "led": {
-        "red": attrgetter("r"),
-        "green": attrgetter("g"),
-        "blue": attrgetter("b"),
-        "alpha": attrgetter("a"),
-    },
+    "led": {"red": attrgetter("r"), "green": attrgetter("g"), "blue": attrgetter("b"), "alpha": attrgetter("a")},
     "imu": {
         "stamp_s": _read_stamp,
         **{"orientation_" + axis: attrgetter("orientation." + axis) for axis in "xyzw"},

@@ -8,15 +8,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    wait,
-)
+from concurrent import futures
 from typing import Any, Callable, Deque, Dict, Iterable, Iterator, Tuple
 
 from hero_node import import_optional, is_loopback, one_line
@@ -37,9 +29,9 @@ _WAITING = 2
 Task = Tuple[Any, ...]
 
 
-def open_pool(jobs: int) -> ProcessPoolExecutor:
+def open_pool(jobs: int) -> futures.ProcessPoolExecutor:
     """Return a pool of jobs workers that start from nothing: threads of this process are no danger to them."""
-    return ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _prepare_worker)
+    return futures.ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn"), _prepare_worker)
 
 
 def _prepare_worker() -> None:
@@ -55,7 +47,7 @@ def _prepare_worker() -> None:
     threading.Thread(target=follow, name="end with the program", daemon=True).start()
 
 
-def open_dask(address: str, check: Callable[[], str]) -> Tuple[Executor, int]:
+def open_dask(address: str, check: Callable[[], str]) -> Tuple[futures.Executor, int]:
     """Return an executor on the cluster at address (tls://HOST:PORT, or the path of a scheduler file), and its workers.
 
     check() returns which code a process runs; a worker on which it differs is refused.
@@ -106,7 +98,7 @@ def _check_reach(addresses: Iterable[str]) -> None:
 class Engine:
     """Workers that compute tasks; the executor that open_executor gives is replaced when it breaks."""
 
-    def __init__(self, open_executor: Callable[[], Executor], workers: int) -> None:
+    def __init__(self, open_executor: Callable[[], futures.Executor], workers: int) -> None:
         """Start nothing yet; workers: how many an executor has."""
         self.workers, self._open = workers, open_executor
 
@@ -125,18 +117,18 @@ class Engine:
         left: Deque[Task] = collections.deque(tasks)
         replaced = 0
         while left:
-            running: Dict[Future[Any], Task] = {}
+            running: Dict[futures.Future[Any], Task] = {}
             try:
                 while left or running:
                     while left and len(running) < self.workers * _WAITING:
                         running[self._executor.submit(function, *left[0])] = left[0]
                         left.popleft()
-                    done = wait(running, return_when=FIRST_COMPLETED).done
+                    done = futures.wait(running, return_when=futures.FIRST_COMPLETED).done
                     # Errors last: what is done beside them is kept.
                     for future in sorted(done, key=lambda one: one.cancelled() or one.exception() is not None):
                         result = future.result()
                         yield running.pop(future), result
-            except BrokenExecutor as error:
+            except futures.BrokenExecutor as error:
                 replaced += 1
                 if replaced > MAX_NEW_POOLS:
                     text = "worker processes died %d times (out of memory?): use fewer --jobs; what is done is kept"
@@ -144,7 +136,7 @@ class Engine:
                 left.extendleft(running.values())
                 self.__exit__()
                 self.__enter__()
-            except CancelledError as error:
+            except futures.CancelledError as error:
                 text = "the Dask cluster ended: start it again, and then this; what is done is kept"
                 raise ExperimentError(text) from error
             except Exception as error:
