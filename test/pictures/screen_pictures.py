@@ -104,6 +104,7 @@ def photograph_monitor(picture, robots, arena, controller=None):
         stage.wait_for(lambda: is_open(port), "the monitor")
         page = MonitorPage("http://127.0.0.1:%d/" % port)
         try:
+            page.open()
             wait_while_they_walk(stage)
             page.choose("hero_0")
             page.browser.save_screenshot(str(picture))

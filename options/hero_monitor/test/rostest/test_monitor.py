@@ -41,11 +41,6 @@ class PageTest(unittest.TestCase):
         cls.stuck = PageClient(HOST)
         cls.page = MonitorPage("http://%s/" % HOST)
 
-        def all_are_ready():
-            return [row["State"] for row in cls.page.rows()] == ["READY"] * 3
-
-        wait_for(all_are_ready, "three robots that are ready")
-
     @classmethod
     def tearDownClass(cls):
         cls.page.close()

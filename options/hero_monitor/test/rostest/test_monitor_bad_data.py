@@ -39,6 +39,7 @@ class BadDataTest(unittest.TestCase):
         wait_until_it_answers(HOST)
         cls.driver = start_scripted_driver("hero_driver", [0, 1], twin_of=0)
         cls.page = MonitorPage("http://%s/" % HOST)
+        cls.page.open()
         cls.page.wait_for_text("#ready", "2 of 2")
         cls.good = cls.advertise("/hero_0/odom", Odometry)
 

@@ -96,6 +96,7 @@ class MapTest(unittest.TestCase):
         wait_until_it_answers(HOST)
         cls.driver = start_scripted_driver("hero_driver", [0, 1])
         cls.page = MonitorPage("http://%s/" % HOST)
+        cls.page.open()
         cls.page.wait_for_text("#ready", "2 of 2")
         odometry = Odometry()
         odometry.pose.pose.position, odometry.pose.pose.orientation = Point(0.25, 0.0, 0.0), Quaternion(w=1.0)

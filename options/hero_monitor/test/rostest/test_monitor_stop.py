@@ -47,7 +47,6 @@ class StopTest(unittest.TestCase):
         cls.behave = rospy.Publisher("/hero_driver/behave", String, queue_size=5)
         cls.requests = [rospy.Publisher("/%s/stop_request" % name, Bool, queue_size=5) for name in DRIVERS]
         cls.page, cls.other = (MonitorPage("http://%s/" % HOST) for _ in range(2))
-        cls.other.leave()
 
     @classmethod
     def tearDownClass(cls):
@@ -101,6 +100,7 @@ class StopTest(unittest.TestCase):
 
     def wait_for_banner(self, level, text):
         for page in self.pages:
+            page.wait_for_text("#stopping", text)
             is_shown = lambda page=page: page.banner()[0] == level and page.banner()[1].startswith(text)  # noqa: E731
             wait_for(is_shown, lambda page=page: page.banner())
 

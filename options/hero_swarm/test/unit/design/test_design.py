@@ -255,6 +255,7 @@ def test_candidates_of_a_batch_score_as_they_do_alone(path):
         assert together == alone and len(set(together)) > 1
 
 
+@pytest.mark.slow
 def test_no_state_of_a_machine_leads_to_itself(path):
     kind = Machines(read_mission("m.yaml"))
     shares, seen = np.random.RandomState(2).random_sample((50, len(kind.genes.low))), 0

@@ -38,6 +38,7 @@ def solve_two_states(genome):
     return float(genome[0] == 2) + float(genome[1] == 4) + genome[2] - abs(genome[3] - 7) / 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_racing_finds_the_machine_of_two_states(seed):
     evaluate = Counted(solve_two_states, noise=0.1)

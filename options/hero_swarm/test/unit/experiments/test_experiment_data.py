@@ -88,6 +88,7 @@ def test_series_and_poses_end_with_their_runs(folder):
         assert np.nanmax(np.hypot(*poses[cell, seed, 0, :, :2].T)) == pytest.approx(farthest[cell, seed, 0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_index_names_the_file_and_place_of_each_run(folder):
     rows = read(folder / "series.csv")
     named = [(int(row["cell"]), int(row["seed"])) for row in rows]

@@ -258,6 +258,7 @@ def test_the_folder_says_what_made_it(tmp_path):
     assert json.loads((tmp_path / "about.json").read_text()) == {"code": "c0de", "numpy": "1"}
 
 
+@pytest.mark.slow
 def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, capsys):
     pages = []
     monkeypatch.setattr(report, "draw_page", lambda *arguments: pages.append(arguments) or "<html>")

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from hero_test.screens.browser import open_browser, set_page_size
-from hero_test.waiting import wait_for
+from hero_test.waiting import TIMEOUT_S, wait_for
 
 KEEP_NOTICES = (
     "window.notices = []; const keep = (one) => window.notices.push(one.textContent);"
@@ -18,16 +18,28 @@ CLICK_ROW = (
     "const found = rows.find((one) => one.textContent === arguments[0]);"
     "if (found) found.click(); return !!found"
 )
+# By no timer: a test may have taken the page's clock.
+AWAIT_TEXT = (
+    "const [selector, text, done] = arguments;"
+    "const look = () => {"
+    "  if (!document.querySelector(selector)?.textContent.includes(text)) return;"
+    "  observer.disconnect();"
+    "  done();"
+    "};"
+    "const observer = new MutationObserver(look);"
+    "observer.observe(document, { subtree: true, childList: true, characterData: true });"
+    "look();"
+)
 READ_BANNER = "const banner = document.getElementById('stopping'); return [banner.dataset.level, banner.textContent]"
 
 
 class MonitorPage:
-    """Chromium, showing the page at an address."""
+    """Chromium, which shows the page at an address from open() on."""
 
     def __init__(self, url):
         self.browser = open_browser(1440, 900)
+        self.browser.set_script_timeout(TIMEOUT_S)
         self.url = url
-        self.open()
 
     def open(self):
         self.browser.get(self.url)
@@ -117,7 +129,13 @@ class MonitorPage:
         self.browser.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, "code": code, "key": code, **more})
 
     def wait_for_text(self, selector, text):
-        wait_for(lambda: text in self.text(selector), "%r in %s" % (text, selector))
+        """Wait until an element holds a text; the page says when, which costs less than asking it again and again."""
+        from selenium.common.exceptions import WebDriverException
+
+        try:
+            self.browser.execute_async_script(AWAIT_TEXT, selector, text)
+        except WebDriverException:  # it was loaded anew meanwhile, or the time is over
+            wait_for(lambda: text in self.text(selector), "%r in %s" % (text, selector))
 
     def wait_for_notice(self, text):
         """Wait until a notice with this text was shown since the page was opened: notices vanish after some seconds."""
