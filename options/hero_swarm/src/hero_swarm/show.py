@@ -39,11 +39,10 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
     cell = experiment.cells[options.cell - 1]
     seed = experiment.seeds[0] if options.seed is None else options.seed
     if seed not in experiment.seeds:
-        first, last = experiment.seeds[0], experiment.seeds[-1]
-        raise ExperimentError("--seed %d: the experiment has seeds %d to %d" % (seed, first, last))
+        raise ExperimentError(f"--seed {seed}: there are seeds {experiment.seeds[0]} to {experiment.seeds[-1]}")
     code, trial = load_checked(experiment), set_up(experiment, cell).build_trial([seed])
     if about["code"] != code:
-        print(f"note: the results are of other code ({about['code']}): this run may differ from theirs", file=sys.stderr)
+        print(f"note: results are of other code ({about['code']}): this run may differ from theirs", file=sys.stderr)
     print("%s, seed %d, %g s" % (cell.label, seed, experiment.time_s))
     if options.video:
         from .video import write_video

@@ -14,7 +14,7 @@ import yaml
 from hero_node.files import hold_file, read_file, write_file
 from hero_node.parameters import within
 from hero_sim.errors import OptionError
-from hero_sim.world import load_arena
+from hero_sim.world import load_arena, read_known
 
 from ..behavior import derive_seed
 from ..behaviors import find_behavior
@@ -64,6 +64,8 @@ def main(arguments: Optional[Sequence[str]] = None) -> None:
         raise ExperimentError("--budget %d: %s needs %d runs or more" % (options.budget, options.method, least))
     mission = read_mission(options.file)
     load_checked(mission.experiment)
+    if options.errors:
+        read_known(options.errors, ())  # it is used last, perhaps hours later
     kind, folder = plan(mission), f"{os.path.splitext(options.file)[0]}_{options.method}"
     mission.experiment.sources.complete()
     os.makedirs(folder, exist_ok=True)

@@ -362,6 +362,12 @@ def test_a_budget_below_the_least_is_refused(path, method, least):
         program.main(["m.yaml", "--method", method, "--budget", str(least - 1)])
 
 
+def test_missing_errors_of_robots_are_named_before_a_design_begins(path):
+    with pytest.raises(HeroError, match="errors none.errors cannot be read"):
+        program.main(["m.yaml", "--budget", "200", "--errors", "none.errors"])
+    assert not Path("m_chocolate").exists()
+
+
 def test_cma_needs_numbers_that_the_behavior_has(path):
     for text, words in (
         ("behavior: aggregation", "aggregation, such as ranges"),

@@ -455,7 +455,7 @@ def test_a_run_is_replayed_as_a_video_that_ends_as_the_run_did(finished, tmp_pat
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--seed", 10], "--seed 10: the experiment has seeds 11 to 15"),
+        (["--seed", 10], "--seed 10: there are seeds 11 to 15"),
         (["--cell", 5], "--cell 5: must be one of 1: robots 3, errors perfect; 2:"),
         (["--video", "/nowhere/run.gif"], "cannot be written"),
     ],
