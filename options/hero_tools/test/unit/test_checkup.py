@@ -1,6 +1,7 @@
 """Points of the check: findings in order whatever hangs or breaks, ports, names, addresses."""
 
 import socket
+import subprocess
 import threading
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
@@ -272,11 +273,15 @@ def test_a_tracker_that_reports_nothing_is_named():
     assert "rosnode ping track" in finding.remedy[0]
 
 
-def test_a_command_that_is_missing_fails_or_hangs_is_no_error():
+def test_a_command_that_is_missing_fails_or_hangs_is_no_error(monkeypatch, capfd):
     assert ask_system(["no-such-command-here"]) is None
     assert ask_system(["false"]) is None
     assert ask_system(["sleep", "100"], timeout_s=0.1) is None
     assert ask_system(["echo", "yes"]) == "yes\n"
+    run = create_autospec(subprocess.run, side_effect=subprocess.run)
+    monkeypatch.setattr(subprocess, "run", run)
+    assert ask_system(["sh", "-c", "echo $LC_ALL; echo an error >&2"]) == "C\n" and capfd.readouterr().err == ""
+    assert run.call_args[1]["stdin"] == subprocess.DEVNULL, "it may ask nothing"
 
 
 @pytest.mark.parametrize(("option", "words"), [("--port=0", "from 1 to 65535"), ("--color", "--color")])

@@ -19,8 +19,6 @@ from hero_tools.fleet import (
     DRIVER_TIMEOUT_S,
     ENTER_SCREEN,
     LEAVE_SCREEN,
-    LISTEN_MAX_S,
-    LISTEN_S,
     PRINT_PERIOD_S,
     FleetProgram,
     RobotRow,
@@ -79,6 +77,7 @@ class World:
         return listener
 
     def sleep(self, duration_s):
+        assert self.now_s < 1000.0, "it goes on without end"
         self.now_s += max(duration_s, 1e-3)
         return self.running
 
@@ -97,7 +96,7 @@ def make_world(monkeypatch):
 
 
 def test_once_waits_for_drivers_and_then_for_what_robots_send(world, capsys):
-    for hears_s, ends_s in ((0.0, LISTEN_S), (3.0, 3.0), (99.0, LISTEN_MAX_S)):
+    for hears_s, ends_s in ((0.0, 1.5), (3.0, 3.0), (99.0, 5.0)):
         world.now_s, world.reports_s, world.settles_s, world.hears_s = 100.0, 2.0, 4.0, 4.0 + hears_s
         assert world.start(once=True).run_once() == 0
         assert world.now_s == pytest.approx(104.0 + ends_s, abs=0.25)
@@ -225,6 +224,15 @@ def test_cells_have_units_and_the_table_its_words():
         1.234,
         None,
     )
+
+
+def test_the_table_is_as_high_as_the_terminal_and_leaves_robots_out(world):
+    world.robots = [(number, Robot.READY) for number in range(30)]
+    program = world.start()
+    program._read()
+    for height in (8, 20):
+        assert len(program._make_lines(100, height)) == height
+    assert len(program._make_lines(100, 10000)) > 30
 
 
 class Terminal(io.StringIO):

@@ -54,6 +54,28 @@ def test_rows_are_sorted_by_id_those_without_one_last():
     assert [row.robot.id for row in rows] == [2, 3, 10, -1]
 
 
+def test_each_option_of_fleet_is_taken_and_none_is_needed():
+    plain = vars(fleet.parse_options([]))
+    assert plain == {
+        "once": False,
+        "json": False,
+        "seconds": None,
+        "expect": None,
+        "inventory": None,
+        "calibrations": "~/hero_calibration",
+    }
+    for words, changed in (
+        (["--once"], {"once": True}),
+        (["--json"], {"json": True}),
+        (["--seconds", "2.5"], {"seconds": 2.5}),
+        (["--expect", "3"], {"expect": 3}),
+        (["--inventory"], {"inventory": "table", "once": True}),
+        (["--inventory", "csv"], {"inventory": "csv", "once": True}),
+        (["--calibrations", "/lab"], {"calibrations": "/lab"}),
+    ):
+        assert vars(fleet.parse_options(words)) == {**plain, **changed}
+
+
 @pytest.mark.parametrize(
     "option", ["--seconds=-1", "--seconds=inf", "--seconds=nan", "--expect=2000000", "--expect=many", "--color"]
 )

@@ -16,7 +16,7 @@ from PIL import Image
 from hero_client.values import BODY_RADIUS_M
 from hero_sim.world import load_arena
 from hero_swarm import metrics, show
-from hero_swarm.experiments import report, runner
+from hero_swarm.experiments import report, results_folder, runner
 from hero_swarm.experiments.computing import set_up
 from hero_swarm.experiments.computing.starts import place_all
 from hero_swarm.experiments.errors import ExperimentError
@@ -232,6 +232,10 @@ def test_changed_code_of_the_behavior_is_noticed(tmp_path):
     own.write_text(source.replace("0.1", "0.05"))
     with pytest.raises(ExperimentError, match="computed by other code"):
         run(path)
+    lock = str(tmp_path / "e" / "simulated.lock")
+    with results_folder.hold_file(lock), pytest.raises(ExperimentError, match="another"):
+        run(path, "--fresh")
+    assert list((tmp_path / "e" / "batches").iterdir()), "another run may be adding to it"
     run(path, "--fresh")
 
 
