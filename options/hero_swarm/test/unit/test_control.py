@@ -45,7 +45,8 @@ def test_robots_of_old_poses_are_kept_apart_where_they_have_driven_to(age_s):
     assert np.abs(expected[0] - 0.1).max() > 0.1, "or they would not have met"
 
 
-def test_each_command_since_the_pose_counts_for_its_time():
+@pytest.mark.parametrize("late_s", [0.0, 0.4])
+def test_each_command_since_the_pose_counts_for_its_time_as_it_was_sent(late_s):
     speeds_m_s = iter((0.1, 0.0, 0.05, 0.2))
 
     class Change(Behavior):
@@ -55,12 +56,12 @@ def test_each_command_since_the_pose_counts_for_its_time():
     safe = SafetyFilter(FENCE, np.array((-9.0, -9.0, 1.0, 9.0)))
     safe.sidestep = 0.0
     control = Control(Change(), Random([1], 1), safe)
-    for time_s in (0.0, 0.1, 0.15):
-        control.step(time_s, FAR[:, :1] - 8.0, ages_s=np.zeros((1, 1)))
+    sent_m_s = [control.step(t_s, FAR[:, :1] - 8.0, ages_s=np.full((1, 1), late_s))[0][0] for t_s in (0.0, 0.1, 0.15)]
+    assert (sent_m_s == pytest.approx([0.1, 0.0, 0.05])) == (late_s == 0.0), "robots whose poses are late are slowed"
     x_m = 1.0 - BODY_RADIUS_M - 2.0 * 0.03 - 0.012 - 0.05
     linear_m_s, _ = control.step(0.2, np.array([[(x_m, 0.0, 0.0)]]), ages_s=np.full((1, 1), 0.15 - LAG_S))
-    # Since 0.05 s: 0.05 s at 0.1 m/s, 0.05 s at rest, 0.05 s at 0.05 m/s. It closes twice what is left in 1 s.
-    assert linear_m_s == pytest.approx([2.0 * (0.05 - 0.0075)], abs=1e-6)
+    # Since 0.05 s: 0.05 s at up to 0.1 m/s, 0.05 s at rest, 0.05 s at up to 0.05 m/s. It closes twice what is left in 1 s.
+    assert linear_m_s / control.share == pytest.approx([2.0 * (0.05 - 0.05 * sum(sent_m_s))], abs=1e-6)
 
 
 def test_a_simulation_that_begins_again_moves_no_robot_to_elsewhere():
