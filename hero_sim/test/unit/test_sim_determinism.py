@@ -38,7 +38,7 @@ def drive(*seeds, steps=STEPS):
     for step in range(steps):
         if step % COMMAND_STEPS == 0:
             # At random, and every fifth stops.
-            world.write_pulses(everybody, np.concatenate([rng.randint(1250, 1751, (ROBOTS, 2)) for rng in rngs]))
+            world.write_pulses(True, np.concatenate([rng.randint(1250, 1751, (ROBOTS, 2)) for rng in rngs]).T)
             world.release(everybody[step // COMMAND_STEPS % 5 :: 5])
         world.step()
         logs = [world.poses, world.travels_m]

@@ -107,7 +107,7 @@ def test_wifi_delays_readings_but_changes_none_of_them():
 
         robots.on_cycle.append(note)
         # Straight to the servos: a command would be late.
-        robots.world.write_pulses(np.arange(2), np.array([(1440, 1400), (1300, 1390)]))
+        robots.world.write_pulses(True, np.array([(1440, 1300), (1400, 1390)]))
         robots.advance(20000)
     for row, received in nonempty(readings[1].items()):
         assert received == readings[0][row][: len(received)] and len(received) > 450
@@ -180,7 +180,7 @@ def test_no_command_is_sent_while_another_is_on_its_way():
 
 def test_readings_from_before_odometry_was_set_are_not_received_after():
     robots = RobotRows(build_world(1, 0, scale=0.0), [FixedDelays([100], [1])])
-    robots.world.write_pulses(np.arange(1), np.array([(1300, 1300)]))
+    robots.world.write_pulses(True, np.array([[1300], [1300]]))
     robots.advance(1000)
     assert abs(robots.odometry[0, 2]) > 0.5
     robots.set_odometry(0, 1.0, 2.0, 0.5)
@@ -205,7 +205,7 @@ def test_odometry_does_not_depend_on_how_often_it_is_read():
 
 def test_the_velocity_is_reset_when_odometry_is_set():
     robots = RobotRows(build_world(1, 0, scale=0.0))
-    robots.world.write_pulses(np.arange(1), np.array([(1300, 1700)]))
+    robots.world.write_pulses(True, np.array([[1300], [1700]]))
     robots.advance(2000)
     speed_m_s = robots.velocities[0, 0]
     robots.set_odometry(0, 0.0, 0.0, 0.0)

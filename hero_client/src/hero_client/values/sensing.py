@@ -120,7 +120,7 @@ def sense_binary(
     find_touched: does for beams, faster, what is done here: that of hero_swarm.sensors.pair_loops.
     """
     if find_touched is not None and sensor.half_angle_rad == 0.0:
-        places_m, sees = np.ascontiguousarray(np.moveaxis(poses[..., :2], 2, 0)), np.zeros(poses.shape[:2], dtype=bool)
+        places_m, sees = np.ascontiguousarray(poses[..., :2].transpose(2, 0, 1)), np.zeros(poses.shape[:2], dtype=bool)
         headings = np.cos(poses[..., 2]), np.sin(poses[..., 2])
         find_touched(places_m, *headings, BODY_RADIUS_M, float(sensor.range_m), sees)
         sees = sees.ravel()

@@ -62,7 +62,7 @@ CONTACT_ROWS = 14
 about each body's center, and how many contacts the two bodies have; forces (N) and give (m/N), with which the next step
 starts; what was found in this step."""
 
-OF_PLACE = np.dtype([(name, int) for name in ("first", "second", "starts", "seen")])
+OF_PLACE = np.dtype([("first", np.uintp), ("second", np.uintp), ("starts", int), ("seen", int)])
 OF_BODY = np.dtype([("stamp", int), *((name, float) for name in ("x", "y", "turn", "a", "u_x", "u_y", "h"))])
 _ENDS = [f"{how}_{part}_{end}" for end in (1, 2) for how in ("pressed", "dragged") for part in ("x", "y", "turn")]
 _FOUND = "normal_x normal_y gap slide arm_1 lever_1 arm_2 lever_2 friction share pressure drag give".split()
@@ -292,8 +292,7 @@ def solve_contacts(
             press.give = give_m
         clock = 1
         for _ in range(_PASSES[kind]):
-            is_settled = True
-            skips = False
+            is_settled, skips = True, False
             for n in range(active_count):
                 place = places[n]
                 one, two = moving[place.first], moving[place.second]
@@ -326,10 +325,12 @@ def solve_contacts(
                 two.x += more * press.pressed_x_2 + more_drag * press.dragged_x_2
                 two.y += more * press.pressed_y_2 + more_drag * press.dragged_y_2
                 two.turn += more * press.pressed_turn_2 + more_drag * press.dragged_turn_2
-                if abs(more) * press.give + abs(more_drag) * press.drag_give > enough:
-                    is_settled = False
+                moves = abs(more) * press.give + abs(more_drag) * press.drag_give > enough
+                if IS_COMPILED or moves:
+                    is_settled &= not moves
                     # Pressure and drag depend on each other: this contact, too, is looked at again.
-                    one.stamp = two.stamp = clock + 1 if most > 0.0 else clock
+                    stamp = (clock + (most > 0.0)) * moves
+                    one.stamp, two.stamp = max(one.stamp, stamp), max(two.stamp, stamp)
                     fixed.stamp = 0
             if is_settled:
                 break
@@ -477,8 +478,7 @@ def move_worlds(
             gap_m[world] -= fastest_m
             for i in range(begin, end):
                 travel_m, turn = (ground[0, i] + ground[1, i]) / 2.0, (ground[1, i] - ground[0, i]) / separations_m[i]
-                half_tangent, bend, length_m = shape_arc(travel_m, turn)
-                d_x, d_y, cosine[i], sine[i] = follow_arc(cosine[i], sine[i], half_tangent, bend, length_m)
+                d_x, d_y, cosine[i], sine[i] = follow_arc(cosine[i], sine[i], *shape_arc(travel_m, turn))
                 x[i] += d_x
                 y[i] += d_y
                 theta[i] += turn

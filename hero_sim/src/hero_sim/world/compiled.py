@@ -23,8 +23,8 @@ def _compile_loops(module: ModuleType) -> Optional[Any]:
     loops, names = SimpleNamespace(), {**vars(module), "IS_COMPILED": True}
     for name, loop in vars(module).items():
         if isinstance(loop, FunctionType):
-            # In these names, for it to call the others compiled.
-            names[name] = numba.njit(cache=True)(FunctionType(loop.__code__, names, name))
+            # In these names, for it to call the others compiled. Divisions by zero give inf or nan, as in arrays.
+            names[name] = numba.njit(cache=True, error_model="numpy")(FunctionType(loop.__code__, names, name))
             setattr(loops, name, names[name])
     return loops
 

@@ -145,7 +145,7 @@ class World:
         # Below its center the left wheel rolls forward.
         self.servo_gains_m_s_us = np.asfortranarray(errors.servo_gain * (-SERVO_GAIN_M_S_US, SERVO_GAIN_M_S_US))
         servos = errors.servo_center_us, errors.dead_zone_us, self.servo_gains_m_s_us
-        self._servos = [np.asfortranarray(values) for values in servos]  # robots last, as in what is computed with them
+        self._servos = [np.ascontiguousarray(values.T) for values in servos]
         # The share of the difference to its command by which a servo's speed changes in one step.
         shares = -np.expm1(-_STEP_S / errors.servo_lag_s.T).astype(np.float32).astype(float)
         each = errors.ripple_m_s.T, errors.slip.T, errors.wheel_scale.T * _STEP_S, shares
@@ -173,9 +173,9 @@ class World:
             self._wheel_rows = self._wheels.T.tolist()
         return self._wheel_rows
 
-    def write_pulses(self, rows: Rows, pulses_us: np.ndarray) -> None:
-        """Set the servos' pulses, left and right (..., 2), of rows: one or several."""
-        self.commands_m_s[rows] = drive_servos(pulses_us, *(values[rows] for values in self._servos))
+    def write_pulses(self, which: Union[bool, np.ndarray], pulses_us: np.ndarray) -> None:
+        """Set the servos' pulses, left and right (2, R), of the robots which: a mask (R,), or True for all."""
+        np.copyto(self._commands, drive_servos(pulses_us, *self._servos), where=which)
 
     def release(self, rows: Rows) -> None:
         """Stop the pulses of rows: their wheels come to rest."""

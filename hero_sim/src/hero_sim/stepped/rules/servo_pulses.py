@@ -3,8 +3,6 @@
 Pure: numpy only, arrays (2, R), left wheels and right wheels; the rules of MotorDriver in robot/motor_control.py.
 """
 
-from typing import Union
-
 import numpy as np
 
 from hero_node.robot_constants import PULSE_RANGE_US
@@ -44,10 +42,9 @@ class ServoPulses:
         if which is not True:
             changes &= which
         if np.count_nonzero(changes):
-            rows: Union[slice, np.ndarray] = slice(None) if which is True else np.flatnonzero(which)
-            written_us = self._pulses_us[:, rows] = pulses_us[:, rows]
+            assign(self._pulses_us, pulses_us, which)
             least_us, most_us = PULSE_RANGE_US
-            self._world.write_pulses(rows, np.minimum(np.maximum(written_us.T, least_us), most_us))
+            self._world.write_pulses(which, np.minimum(np.maximum(pulses_us, least_us), most_us))
 
     def drive(self, now_ms: int, outputs_us: np.ndarray, which: RobotMask) -> None:
         """Write outputs (2, R) of a controller beyond the centers, forward positive, to the robots which."""

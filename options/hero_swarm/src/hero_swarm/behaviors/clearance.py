@@ -17,6 +17,6 @@ def keep_clear(ranges_m: np.ndarray, distance_m: float, gain_1_s: float) -> np.n
 
     ranges_m: of each robot (R, 8), front first, counter-clockwise, from its center; nan where it is not known.
     """
-    push_m_s = gain_1_s * np.nan_to_num(np.maximum(distance_m - ranges_m, 0.0))
+    push_m_s = gain_1_s * np.fmax(distance_m - ranges_m, 0.0)
     angles_rad = np.arange(ranges_m.shape[1]) * (2.0 * np.pi / ranges_m.shape[1])
     return -np.array([(push_m_s * part).sum(axis=1) for part in (np.cos(angles_rad), np.sin(angles_rad))])

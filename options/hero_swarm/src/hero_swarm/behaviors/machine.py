@@ -48,7 +48,8 @@ class Machine(Behavior):
         do = tables.do[row]
         explores = do == EXPLORATION
         turns = turns * (explores & (state == last))
-        is_blocked = explores & (turns == 0.0) & (ranges_m[:, [7, 0, 1]] < self.clear_m).any(axis=1)
+        is_near = ranges_m < self.clear_m
+        is_blocked = explores & (turns == 0.0) & (is_near[:, 7] | is_near[:, 0] | is_near[:, 1])
         turns = np.where(is_blocked, np.floor(draws[:, -1] * (tables.turn_steps[row] + 1.0)), turns)
         near_m = np.fmax(ranges_m, 0.0)  # a range that is not known is none
         is_left = np.minimum(near_m[:, 1], near_m[:, 2]) < np.minimum(near_m[:, 7], near_m[:, 6])
