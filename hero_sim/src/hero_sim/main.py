@@ -39,46 +39,23 @@ def _add_link_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
     add("--host", default="127.0.0.1", help="host of the driver (%(default)s)")
     add("--port", type=within(1, 65535, int), default=DEFAULT_PORT, help="port of the driver (%(default)s)")
-    add(
-        "--fault",
-        type=parse_fault,
-        action="append",
-        default=[],
-        metavar="KIND[@S][:key=value]",
-        help="inject a fault S simulated seconds after the start, e.g. vanish@5:robot=1,for=3; may be repeated",
-    )
+    text = "inject a fault S simulated seconds after the start, e.g. vanish@5:robot=1,for=3; may be repeated"
+    add("--fault", type=parse_fault, action="append", default=[], metavar="KIND[@S][:key=value]", help=text)
 
 
 def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
     add = group.add_argument
     add("--imu-hat", action="store_true", help="robots have the IMU hat")
-    add(
-        "--error",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE,..[,robot=ID]",
-        help="a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated",
-    )
+    text = "a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated"
+    add("--error", action="append", default=[], metavar="KEY=VALUE,..[,robot=ID]", help=text)
     add("--errors", metavar="FILE", help="lines as --error takes them, such as `fit` of hero_swarm writes")
     add("--print-errors", action="store_true", help="print the robots' differences as --error takes them, and exit")
-    add(
-        "--ir",
-        choices=("calibrated", "factory", "erased"),
-        default="calibrated",
-        help="infrared calibration in the flash: measured at 10 cm, 0.5 for all, or none: NaN (calibrated)",
-    )
-    add(
-        "--motors",
-        choices=("calibrated", "factory"),
-        default="calibrated",
-        help="servo centers in the flash: the true ones, or 1500 (calibrated)",
-    )
-    add(
-        "--servo-timing",
-        choices=SERVO_TIMINGS,
-        default=CORE_2,
-        help="timing of ESP8266 core 2.x or 3.x, or drawn for each robot (core2)",
-    )
+    text = "infrared calibration in the flash: measured at 10 cm, 0.5 for all, or none: NaN (calibrated)"
+    add("--ir", choices=("calibrated", "factory", "erased"), default="calibrated", help=text)
+    text = "servo centers in the flash: the true ones, or 1500 (calibrated)"
+    add("--motors", choices=("calibrated", "factory"), default="calibrated", help=text)
+    text = "timing of ESP8266 core 2.x or 3.x, or drawn for each robot (core2)"
+    add("--servo-timing", choices=SERVO_TIMINGS, default=CORE_2, help=text)
     add("--flash-dir", metavar="DIR", help="keep the robots' parameters in this folder, a file per robot (in memory)")
 
 

@@ -52,21 +52,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("--count", type=int, default=1, metavar="N", help="number of robots (%(default)s)")
     add("--seed", type=int, default=0, help="seed of all random numbers (%(default)s)")
     add("--arena", metavar="FILE", help="YAML file, or empty, obstacles, maze, box, discs (a square that fits them)")
-    add(
-        "--wifi",
-        default="ideal",
-        metavar="PROFILE[,channels=C]",
-        help=f"quality of the network: {', '.join(PROFILES)}; robots of a channel share its airtime (ideal; 1 channel)",
-    )
+    text = f"quality of the network: {', '.join(PROFILES)}; robots of a channel share its airtime (ideal; 1 channel)"
+    add("--wifi", default="ideal", metavar="PROFILE[,channels=C]", help=text)
     add("--seconds", type=within(0.001, MAX_DURATION_S), metavar="S", help="end after S simulated seconds")
     add("--perfect", action="store_true", help="identical robots: no wheel errors or slip (sensors stay noisy)")
-    add(
-        "--model",
-        action="append",
-        default=[],
-        metavar="MODEL[,robot=ID]",
-        help="model of all robots or of one: hero, hero_plus, or v3.0 (older stock firmware); may be repeated (hero)",
-    )
+    text = "model of all robots or of one: hero, hero_plus, or v3.0 (older stock firmware); may be repeated (hero)"
+    add("--model", action="append", default=[], metavar="MODEL[,robot=ID]", help=text)
 
 
 def check_population(options: argparse.Namespace, worlds: int = 1) -> None:

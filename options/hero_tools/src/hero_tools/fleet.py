@@ -221,12 +221,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--once", action="store_true", help="print the fleet once and quit")
     parser.add_argument("--json", action="store_true", help="print JSON, one line each time, instead of a table")
     parser.add_argument("--seconds", type=within(0.0, MAX_OPTION), metavar="S", help="quit after S seconds")
-    parser.add_argument(
-        "--expect",
-        type=within(0, MAX_OPTION, int),
-        metavar="N",
-        help="at the end list each of hero_0 to hero_(N-1) that did not join or move, and exit with 1",
-    )
+    text = "at the end list each of hero_0 to hero_(N-1) that did not join or move, and exit with 1"
+    parser.add_argument("--expect", type=within(0, MAX_OPTION, int), metavar="N", help=text)
     text = "print every robot once with versions, run time, calibration and notes of fleet.yaml: table or csv"
     parser.add_argument("--inventory", nargs="?", choices=("table", "csv"), const="table", help=text)
     text = "folder of calibrations (%(default)s)"

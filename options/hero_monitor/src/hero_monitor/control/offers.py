@@ -33,46 +33,29 @@ _SAFETY = choice("fence and robots", ("off", "fence and robots"))
 _PLACE = {"turn_deg": number(0.0, -360.0, 360.0, "deg"), "x_m": _COORDINATE, "y_m": _COORDINATE}
 """Parameters of a formation: a click on the map sets it."""
 
-OFFERS: Dict[str, ProgramDescription] = {
-    "swarm_go_to": ProgramDescription(
-        "hero_examples",
-        "swarm_go_to",
-        "formation",
-        {
-            "shape": choice("circle", ("circle", "line", "grid")),
-            "spacing_m": number(0.3, AvoidanceLaw().min_spacing_m, 2.0, "m"),
-            **_PLACE,
-            "linear_m_s": _SPEED,
-        },
-        has_frame=True,
-    ),
-    "go_to_goal": ProgramDescription("hero_examples", "go_to_goal", "take goals from the map", {"avoid": flag(False)}),
-    "random_walk": ProgramDescription(
-        "hero_examples",
-        "random_walk",
-        "random walk",
-        {"linear_m_s": _SPEED._replace(default=0.1), "angular_rad_s": number(1.5, 0.1, 4.0, "rad/s")},
-    ),
-    "follow": ProgramDescription(
-        "hero_examples",
-        "follow",
-        "follow the first one",
-        {"gap_m": number(0.15, 0.1, 2.0, "m"), "linear_m_s": _SPEED._replace(default=0.15)},
-        has_frame=True,
-        drives=slice(1, None),
-    ),
-    "led_show": ProgramDescription(
-        "hero_examples",
-        "led_show",
-        "light show",
-        {
-            "pattern": choice("rainbow", ("rainbow", "chase", "blink")),
-            "period_s": number(4.0, 0.5, 60.0, "s"),
-            "brightness": number(1.0, 0.0, 1.0),
-        },
-        drives=slice(0, 0),
-    ),
+_FORMATION = {
+    "shape": choice("circle", ("circle", "line", "grid")),
+    "spacing_m": number(0.3, AvoidanceLaw().min_spacing_m, 2.0, "m"),
+    **_PLACE,
+    "linear_m_s": _SPEED,
 }
+_WALK = {"linear_m_s": _SPEED._replace(default=0.1), "angular_rad_s": number(1.5, 0.1, 4.0, "rad/s")}
+_ROW = {"gap_m": number(0.15, 0.1, 2.0, "m"), "linear_m_s": _SPEED._replace(default=0.15)}
+_LIGHTS = {
+    "pattern": choice("rainbow", ("rainbow", "chase", "blink")),
+    "period_s": number(4.0, 0.5, 60.0, "s"),
+    "brightness": number(1.0, 0.0, 1.0),
+}
+
+_EXAMPLES = (
+    ProgramDescription("hero_examples", "swarm_go_to", "formation", _FORMATION, has_frame=True),
+    ProgramDescription("hero_examples", "go_to_goal", "take goals from the map", {"avoid": flag(False)}),
+    ProgramDescription("hero_examples", "random_walk", "random walk", _WALK),
+    ProgramDescription("hero_examples", "follow", "follow the first one", _ROW, has_frame=True, drives=slice(1, None)),
+    ProgramDescription("hero_examples", "led_show", "light show", _LIGHTS, drives=slice(0, 0)),
+)
+
+OFFERS: Dict[str, ProgramDescription] = {offer.program: offer for offer in _EXAMPLES}
 """The programs, in the order in which pages list them. Pages send "values" for the fields of one.
 
 Programs adds the behaviors that are installed.

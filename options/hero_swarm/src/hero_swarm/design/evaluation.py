@@ -14,7 +14,6 @@ from ..experiments.computing.batch import one_at_a_time, run_trial, take_values
 from ..experiments.computing.cell_setup import set_up
 from ..experiments.computing.code_version import check_suite, hash_suite
 from ..experiments.computing.engines import Engine
-from ..experiments.computing.progress import Progress
 from ..experiments.errors import ExperimentError, report_place
 from ..experiments.experiment_file import Experiment
 from ..experiments.runner import choose_batch
@@ -100,9 +99,9 @@ class Evaluation:
     """Scores of candidates, larger ones better."""
 
     def __init__(
-        self, mission: Mission, kind: Kind, history: History, engine: Engine, seed: int, progress: Progress
+        self, mission: Mission, kind: Kind, history: History, engine: Engine, seed: int, progress: Any
     ) -> None:
-        """Begin; kind: of the candidates; seed: before the first one."""
+        """Begin; kind: of the candidates; seed: before the first one; progress: see show_progress()."""
         self._mission, self._kind, self._history, self._engine = mission, kind, history, engine
         self._seed, self._is_first, self._progress, self._best = seed, True, progress, ""
 
@@ -114,7 +113,8 @@ class Evaluation:
         for own in self._compute(np.repeat(genomes, len(seeds), axis=0), keys, len(scores), len(seeds)):
             self._history.add(keys[len(scores) : len(scores) + len(own)], own)
             scores += own
-            self._progress.add(len(own), self._best)
+            self._progress.set_postfix_str(self._best, refresh=False)
+            self._progress.update(len(own))
         values = self._mission.sign * np.array(scores).reshape(len(genomes), len(seeds))
         if self._is_first and len(genomes) > 1 and (values == values[0, 0]).all():
             text = "%s: score is %g in all %d runs of %d controllers: change score or mission, or try a larger --budget"

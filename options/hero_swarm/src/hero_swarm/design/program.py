@@ -22,7 +22,7 @@ from ..experiments import runner
 from ..experiments.computing.batch import load_checked
 from ..experiments.computing.code_version import hash_code
 from ..experiments.computing.engines import Engine
-from ..experiments.computing.progress import Progress
+from ..experiments.computing.progress import show_progress
 from ..experiments.errors import ExperimentError
 from ..experiments.phantoms import REPLACED
 from ..experiments.report import write_report
@@ -91,7 +91,7 @@ def design(options: Any, mission: Mission, kind: Kind, stem: str, engine: Engine
             if options.fresh:
                 os.truncate(path, 0)
             history = History(path, about)
-            with Progress(options.budget, len(history.runs), path) as progress:
+            with show_progress(options.budget, len(history.runs), path) as progress:
                 evaluate = Evaluation(mission, kind, history, engine, number * SEEDS, progress)
                 random = np.random.RandomState(derive_seed(options.seed, "design %d" % number))
                 found = METHODS[options.method][1](evaluate, kind.genes, options.budget, random)

@@ -17,7 +17,7 @@ from .computing import engines
 from .computing.batch import Batch, compute_batch, load_checked
 from .computing.code_version import describe_machine, hash_suite
 from .computing.engines import Engine
-from .computing.progress import Progress
+from .computing.progress import show_progress
 from .experiment_file import MAX_ROBOTS, MAX_RUNS, Experiment, read_experiment
 from .results_folder import FOLDER, REAL, SIMULATED, ResultsFolder, Run, RunKey
 
@@ -142,11 +142,11 @@ def _run_missing(options: argparse.Namespace, experiment: Experiment, folder: Re
     missing = [key for key in folder.list_missing(runs) if key in own]
     if missing:
         began_s = time.monotonic()
-        with choose_engine(options) as engine, Progress(len(missing) + len(runs), len(runs)) as progress:
+        with choose_engine(options) as engine, show_progress(len(missing) + len(runs), len(runs)) as progress:
             batches = list_batches(experiment, missing, options.batch, engine.workers, folder)
             for _, computed in engine.compute(compute_batch, batches):
                 folder.write_batch(computed)
-                progress.add(len(computed))
+                progress.update(len(computed))
         print(f"{len(missing)} runs in {time.monotonic() - began_s:.1f} s", file=sys.stderr)
     runs = folder.read_runs()
     left = folder.list_missing(runs)

@@ -197,11 +197,18 @@ def test_only_whole_results_of_this_code_are_packed(folder, tmp_path):
     own.write_text(OWN)
 
 
-def test_without_a_terminal_lines_say_how_far_a_run_is(capsys, monkeypatch):
-    clock = iter(range(0, 1000, 6))
-    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
-    with progress.Progress(16, 4, "design") as shown:
+def test_a_file_is_told_seldom_how_far_a_run_is(capsys):
+    with progress.show_progress(16, 4, "design") as shown:
+        assert shown.mininterval == progress.REPORT_S
+        shown.set_postfix_str("best 3", refresh=False)
         for _ in range(6):
-            shown.add(2, "best 3")
-    lines = ["design: 8 of 16 runs, about 24 s left; best 3", "design: 12 of 16 runs, about 12 s left; best 3"]
-    assert capsys.readouterr().err.splitlines() == lines
+            shown.update(2)
+    first, last = capsys.readouterr().err.strip().split("\r")
+    assert first.startswith("design:  25%") and "4/16" in first
+    assert last.startswith("design: 100%") and "16/16" in last and "best 3" in last
+
+
+def test_a_terminal_is_told_at_once_how_far_a_run_is(monkeypatch):
+    monkeypatch.setattr(progress.sys.stderr, "isatty", lambda: True)
+    with progress.show_progress(2, 0) as shown:
+        assert shown.mininterval < 1.0
