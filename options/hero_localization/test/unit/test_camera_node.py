@@ -2,7 +2,6 @@
 
 import math
 import sys
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -75,12 +74,15 @@ def test_options_are_taken_up_to_their_limits():
                 camera_node.parse_options(["--" + name, str(value)])
 
 
-def test_robots_whose_tags_would_be_reference_tags_are_refused(monkeypatch):
-    monkeypatch.setattr(camera_node, "check_master", mock.Mock(side_effect=KeyError("master")))
-    for first_id, error in (("90", KeyError), ("91", SettingsError)):
-        monkeypatch.setattr(sys, "argv", ["simulated_camera", "--first-id", first_id, "--count", "10"])
-        with pytest.raises(error, match="master|tags from 100 on"):
-            camera_node.main()
+def test_references_are_printed_for_the_camera_file(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--arena", "empty"])
+    camera_node.main()
+    assert capsys.readouterr().out.startswith("references: {100: [-1.120, -0.800, 0], 101: ")
+    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--first-id", "90", "--count", "10"])
+    camera_node.main()
+    monkeypatch.setattr(sys, "argv", ["simulated_camera", "--print-references", "--first-id", "91", "--count", "10"])
+    with pytest.raises(SettingsError, match="tags from 100 on"):
+        camera_node.main()
 
 
 def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):

@@ -14,6 +14,7 @@ from hero_localization.simulated_camera.renderer import CameraRenderer  # noqa: 
 from hero_localization.simulated_camera.view import (  # noqa: E402  # noqa: E402
     CameraOptions,
     PrintedTag,
+    describe_references,
     find_part,
     hang_above,
     list_frames,
@@ -317,7 +318,7 @@ def test_noise_is_centered_and_never_repeats_in_place():
         assert all((field != other).mean() > 0.5 for other in noise[:index])
 
 
-def test_reference_tags_lie_beside_the_arena():
+def test_reference_tags_lie_beside_the_arena_and_are_described_by_place():
     arena = build_rectangle(2.0, 1.0, 1)
     arena = arena._replace(bounds_m=np.array([-0.5, 0.25, 1.5, 1.25]))
     tags = list_references(arena)
@@ -326,6 +327,7 @@ def test_reference_tags_lie_beside_the_arena():
         (103, 1.62, 0.35), (104, 1.62, 0.75), (105, 1.62, 1.15),
     ]  # fmt: skip
     assert {(tag.size_m, tag.height_m, tag.yaw_rad) for tag in tags} == {(0.1, 0.0, 0.0)}
+    assert describe_references(tags[:2]) == "references: {100: [-0.620, 0.350, 0], 101: [-0.620, 0.750, 0]}"
 
 
 def test_two_cameras_overlap_and_see_five_references_each():

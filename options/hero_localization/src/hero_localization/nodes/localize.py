@@ -123,7 +123,7 @@ class LocalizationNode:
         with self._lock:
             is_due = not self._next_diagnostics_s - DIAGNOSTICS_PERIOD_S <= now_s < self._next_diagnostics_s
             robots = self._localizer.list_robots(now_s, self._is_extrapolating, is_due)
-            problems = self._localizer.list_source_problems()
+            problems = self._localizer.list_source_problems() if is_due else {}
         self._outputs.publish(robots)
         if is_due:
             self._next_diagnostics_s = now_s + DIAGNOSTICS_PERIOD_S

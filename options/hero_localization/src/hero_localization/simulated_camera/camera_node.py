@@ -19,7 +19,7 @@ from tf2_msgs.msg import TFMessage
 
 from hero_node.parameters import within
 from hero_node.ros import check_master, read_duration_clock_s
-from hero_sim.world import build_default, load_arena
+from hero_sim.world import Arena, build_default, load_arena
 
 from ..camera.frame_source import keep_freed_memory
 from ..errors import SettingsError
@@ -28,6 +28,7 @@ from .view import (
     FIRST_REFERENCE_ID,
     CameraOptions,
     PrintedTag,
+    describe_references,
     find_part,
     hang_above,
     list_frames,
@@ -92,7 +93,7 @@ class CameraNode:
         camera = scale(CameraOptions(), *size)._replace(
             rate_hz=options.rate, delay_s=options.delay, exposure_s=options.exposure
         )
-        arena = load_arena(options.arena) if options.arena else build_default(options.count)
+        arena = _load_arena(options)
         lain = list_references(arena, options.part[1])
         self._options = camera = hang_above(camera, find_part(arena, *options.part), lain, options.tag_size)
         self._stamps_arrival = options.stamps == "arrival"
@@ -178,6 +179,10 @@ def scale(camera: CameraOptions, width_px: int, height_px: int) -> CameraOptions
     )
 
 
+def _load_arena(options: argparse.Namespace) -> Arena:
+    return load_arena(options.arena) if options.arena else build_default(options.count)
+
+
 def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(prog=PROGRAM, description="A simulated camera above the simulated robots.")
@@ -194,6 +199,8 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("--tag-size", type=within(0.01, 0.2), default=0.04, metavar="M", help="side of the robots' tags (%(default)s)")
     text = "see part K of N of the arena along x, and 0.2 m beyond (1 1)"
     add("--part", type=within(1, 4, int), nargs=2, default=(1, 1), metavar=("K", "N"), help=text)
+    text = "print the reference tags for the camera file, and exit"
+    add("--print-references", action="store_true", help=text)
     add("--write-file", metavar="FILE", help="write a camera file, calibrated without error")
     add("--seed", type=int, default=0, help="seed of noise, dropped images and tag placement (%(default)s)")
     options = parser.parse_args(arguments)
@@ -207,6 +214,9 @@ def main() -> None:
     options = parse_options(rospy.myargv(sys.argv)[1:])
     if options.first_id + options.count > FIRST_REFERENCE_ID:
         raise SettingsError("tags from %d on are reference tags: take lower ids" % FIRST_REFERENCE_ID)
+    if options.print_references:
+        print(describe_references(list_references(_load_arena(options), options.part[1])))
+        return
     check_master()
     keep_freed_memory()
     rospy.init_node(NODE)

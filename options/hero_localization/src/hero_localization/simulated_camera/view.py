@@ -148,6 +148,12 @@ def find_part(arena: Arena, number: int, cameras: int) -> Arena:
     return arena._replace(bounds_m=np.array((low_m, y_min_m, high_m, y_max_m)))
 
 
+def describe_references(references: Sequence[PrintedTag]) -> str:
+    """Return the line of a camera file that holds the places of reference tags."""
+    places = ["%d: [%.3f, %.3f, 0]" % (tag.tag_id, tag.x_m, tag.y_m) for tag in references]
+    return "references: {%s}" % ", ".join(places)
+
+
 def hang_above(
     camera: CameraOptions, arena: Arena, references: Sequence[PrintedTag], tag_size_m: float
 ) -> CameraOptions:
