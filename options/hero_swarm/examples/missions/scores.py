@@ -33,10 +33,12 @@ def freshness_s(state, cells=10):
     return visits_s.mean(axis=(1, 2)) - state.time_s
 
 
-def sortedness(state):
-    """Return the share of robots whose nearest robot shows their color."""
+def sortedness(state, groups=2):
+    """Return the share of robots whose nearest robot is of their group, by number, as segregation colors them.
+
+    Not by what they show: robots that all show one color would be sorted best.
+    """
     off_m = state.poses[:, :, None, :2] - state.poses[:, None, :, :2]
     apart_m = np.hypot(off_m[..., 0], off_m[..., 1]) + 1e9 * np.eye(off_m.shape[1])
-    colors = state.by_world(state.colors)
-    nearest = np.take_along_axis(colors, apart_m.argmin(axis=2)[..., None], axis=1)
-    return (colors == nearest).all(axis=2).mean(axis=1)
+    own = np.arange(off_m.shape[1]) % groups
+    return (own == own[apart_m.argmin(axis=2)]).mean(axis=1)

@@ -110,6 +110,8 @@ def test_scores_count_what_they_say():
     assert measure("black_spot", [source], areas=()) == 0.0, "no area counts"
     assert measure("grid_exploration", [(0.0, 0.0, 0.0)]) == 0.0, "no cell is old at the start"
     assert measure("sorting", [(0.0, 0.0, 0.0)]) == 0.45, "all are near robot 0, which is near robot 1"
+    apart = np.where(np.arange(20)[:, None] % 2, (0.5, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert measure("sorting", [apart]) == 1.0, "even and odd numbers are groups"
 
 
 @pytest.mark.slow
