@@ -182,7 +182,7 @@ def test_points_that_need_one_that_failed_are_skipped(monkeypatch, capsys):
     report = json.loads(capsys.readouterr().out)
     assert (
         report["ok"]
-        and len(report["points"]) == 17
+        and len(report["points"]) == 16
         and ran[1:] == [["node"], ["commands", "diagnostics", "return_path", "robots"]]
     )
     states["node"] = FAIL
@@ -194,7 +194,7 @@ def test_points_that_need_one_that_failed_are_skipped(monkeypatch, capsys):
     assert len(ran) == 1 and findings["node"].text == "skipped: needs the point master"
     assert findings["robots"].text == "skipped: needs the point node"
     assert check.run(check.parse_options([])) == 1
-    assert capsys.readouterr().out.splitlines()[-1] == "11 OK, 5 WARN, 1 FAIL"
+    assert capsys.readouterr().out.splitlines()[-1] == "10 OK, 5 WARN, 1 FAIL"
 
 
 def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
