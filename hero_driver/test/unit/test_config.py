@@ -199,7 +199,8 @@ def test_a_damaged_file_leaves_its_robot_alone_uncalibrated(tmp_path):
     (tmp_path / "hero_9.yaml").write_text("robot: hero_9\nwheels_m: [0.049, 0.049, 0.0641]\n")
     settings = read_config({"calibration_folder": str(tmp_path)})
     assert list(settings.calibration_problems) == ["hero_3", "hero_4"]
-    assert "hero_3.yaml, line 2: wheels_m is 49, but must be a number from 0.01 to 1" in settings.calibration_problems["hero_3"]
+    refusal = "hero_3.yaml, line 2: wheels_m is 49, but must be a number from 0.01 to 1"
+    assert refusal in settings.calibration_problems["hero_3"]
     assert settings.find_geometry("hero_3", "hero") == DriverConfig().find_geometry("hero_3", "hero")
     assert settings.find_geometry("hero_7", "hero_plus").wheel_separation_m == 0.0652
     assert settings.find_geometry("hero_9", "hero").wheel_separation_m == 0.0641

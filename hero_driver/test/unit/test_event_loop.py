@@ -6,6 +6,7 @@ import os
 import socket
 import struct
 import threading
+from unittest.mock import create_autospec
 
 import pytest
 
@@ -453,3 +454,10 @@ def test_whatever_ends_the_loop_robots_stop_before_connections_close(monkeypatch
     with pytest.raises(raised) if raised else contextlib.nullcontext():
         loop.run()
     assert steps == ["stop", "close"]
+
+
+def test_all_robots_of_a_lab_may_connect_at_once(monkeypatch):
+    create = create_autospec(socket.create_server, side_effect=socket.create_server)
+    monkeypatch.setattr(event_loop.socket, "create_server", create)
+    event_loop._listen("127.0.0.1", 0).close()
+    assert create.call_args[1]["backlog"] >= 200

@@ -1,6 +1,8 @@
 """What the driver changes in rospy: who may connect at once, and what a log line holds."""
 
 import logging
+import socket
+from types import SimpleNamespace
 
 import pytest
 from rospy.impl import rosout
@@ -41,3 +43,16 @@ def test_a_log_line_holds_no_names_of_topics_and_is_published_once(rosout_publis
     assert line.header.stamp.secs == 7
     logging.getLogger("rosout").error("another line")
     assert [line.msg for line in rosout_publisher.lines] == ["a line about hero_3", "another line"]
+
+
+def test_what_is_sent_is_counted_and_what_does_not_fit_comes_back():
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        connection = SimpleNamespace(socket=ours, stat_bytes=5, stat_num_msg=7)
+        assert rospy_internals.send(connection, b"word") == b""
+        assert (connection.stat_bytes, connection.stat_num_msg) == (9, 8)
+        large = bytes(1 << 24)
+        left = rospy_internals.send(connection, large)
+        assert 0 < len(left) < len(large) and connection.stat_bytes == 9 + len(large) - len(left)
+        ours.setblocking(True)
+        assert rospy_internals.send(connection, left) == left, "it waits for nobody"

@@ -69,6 +69,12 @@ def test_a_stop_that_cannot_be_kept_is_answered_with_what_is_lost(stops):
     assert "will not survive a restart of the driver: /kept cannot be written (No space left" in answer.message
 
 
+def test_a_fault_of_the_driver_is_not_told_as_one_of_the_disk(stops):
+    stops.store.write.side_effect = TypeError("a fault")
+    with pytest.raises(TypeError):
+        stops.interface._keep()
+
+
 def test_a_stop_is_answered_with_the_states_of_robots(stops):
     assert serve(stops, True).message == "no robot is connected"
     stops.interface._fleet.list_stops = lambda: [StopState.MOVING, None, StopState.AT_REST, StopState.AT_REST]

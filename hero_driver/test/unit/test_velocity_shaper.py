@@ -149,6 +149,17 @@ def test_a_stop_with_other_components_goes_out_as_plain_zero():
     assert shaper.take(0.0) == ZERO_TWIST
 
 
+def test_a_delay_that_ends_before_the_interval_does_not_end_it():
+    shaper = VelocityShaper()
+    shaper.offer(make_motion(1))
+    assert shaper.take(1.0) == make_motion(1)
+    shaper.offer(make_motion(2))
+    shaper.delay_until(1.01)
+    assert shaper.due_in_s(1.0) == pytest.approx(COMMAND_INTERVAL_S)
+    shaper.delay_until(1.5)
+    assert shaper.due_in_s(1.0) == pytest.approx(0.5)
+
+
 def test_discarding_motion_keeps_stops():
     shaper = VelocityShaper()
     shaper.offer(ZERO_TWIST)

@@ -10,7 +10,6 @@ import rospy
 from driver_side import parse_options
 
 from hero_node import Pose, yaw_of
-from hero_sim import ground_truth
 from hero_sim.build import build_swarm
 from hero_sim.ground_truth import GroundTruth
 from hero_sim.scene import START_S

@@ -60,7 +60,7 @@ def test_each_command_since_the_pose_counts_for_its_time_as_it_was_sent(late_s):
     assert (sent_m_s == pytest.approx([0.1, 0.0, 0.05])) == (late_s == 0.0), "robots whose poses are late are slowed"
     x_m = 1.0 - BODY_RADIUS_M - 2.0 * 0.03 - 0.012 - 0.05
     linear_m_s, _ = control.step(0.2, np.array([[(x_m, 0.0, 0.0)]]), ages_s=np.full((1, 1), 0.15 - LAG_S))
-    # Since 0.05 s: 0.05 s at up to 0.1 m/s, 0.05 s at rest, 0.05 s at up to 0.05 m/s. It closes twice what is left in 1 s.
+    # Since 0.05 s: 0.05 s at 0.1 m/s, 0.05 s at rest, 0.05 s at 0.05 m/s. It closes twice what is left in 1 s.
     assert linear_m_s / control.share == pytest.approx([2.0 * (0.05 - 0.05 * sum(sent_m_s))], abs=1e-6)
 
 
