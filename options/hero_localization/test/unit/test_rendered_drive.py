@@ -166,9 +166,7 @@ def make_odometry(stamp_s, pose):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("yaw_rad", "height_m"), [(0.05, 0.076), (math.pi - 0.05, 0.081), (0.05, 0.071)]
-)
+@pytest.mark.parametrize(("yaw_rad", "height_m"), [(0.05, 0.076), (math.pi - 0.05, 0.081), (0.05, 0.071)])
 def test_calibrating_robots_names_tags_upside_down_or_at_a_wrong_height(
     tmp_path, monkeypatch, capsys, yaw_rad, height_m
 ):

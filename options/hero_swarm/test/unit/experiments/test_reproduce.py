@@ -138,9 +138,7 @@ def test_a_name_or_a_file_that_is_wrong_is_told_with_a_remedy(shipped, capsys):
         run(capsys)
     Path("reproduction/ahead.yaml").unlink()
     (shipped / "published.yaml").write_text(FIGURES.replace("[5, 6]", "[5]"))
-    with pytest.raises(
-        EntryError, match=r"published.yaml, line 8: .*published is a list, but must be a number, \[low"
-    ):
+    with pytest.raises(EntryError, match=r"published.yaml, line 8: .*published is a list, but must be a number, \[low"):
         run(capsys)
 
 
