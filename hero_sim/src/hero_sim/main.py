@@ -30,21 +30,12 @@ def build_parser() -> argparse.ArgumentParser:
     add("--first-id", type=int, default=0, metavar="K", help="id of the first robot (0)")
     add("--speed", type=within(0.01, 100.0), default=1.0, metavar="X", help="simulated seconds per second (1)")
     add("--quiet", action="store_true", help="print nothing but errors")
-    _add_link_options(parser.add_argument_group("network"))
-    _add_robot_options(parser.add_argument_group("robots"))
-    return parser
-
-
-def _add_link_options(group: "argparse._ArgumentGroup") -> None:
-    add = group.add_argument
+    add = parser.add_argument_group("network").add_argument
     add("--host", default="127.0.0.1", help="host of the driver (%(default)s)")
     add("--port", type=within(1, 65535, int), default=DEFAULT_PORT, help="port of the driver (%(default)s)")
     text = "inject a fault S simulated seconds after the start, e.g. vanish@5:robot=1,for=3; may be repeated"
     add("--fault", type=parse_fault, action="append", default=[], metavar="KIND[@S][:key=value]", help=text)
-
-
-def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
-    add = group.add_argument
+    add = parser.add_argument_group("robots").add_argument
     add("--imu-hat", action="store_true", help="robots have the IMU hat")
     text = "a known error of a robot, or of all, e.g. robot=1,left_center_us=1530; may be repeated"
     add("--error", action="append", default=[], metavar="KEY=VALUE,..[,robot=ID]", help=text)
@@ -57,6 +48,7 @@ def _add_robot_options(group: "argparse._ArgumentGroup") -> None:
     text = "timing of ESP8266 core 2.x or 3.x, or drawn for each robot (core2)"
     add("--servo-timing", choices=SERVO_TIMINGS, default=CORE_2, help=text)
     add("--flash-dir", metavar="DIR", help="keep the robots' parameters in this folder, a file per robot (in memory)")
+    return parser
 
 
 def parse_options(parser: argparse.ArgumentParser, arguments: Optional[Sequence[str]]) -> argparse.Namespace:

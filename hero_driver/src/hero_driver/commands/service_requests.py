@@ -20,14 +20,11 @@ class _Rule(NamedTuple):
     text: str
 
 
+_GAINS = "gains must be finite, from 0 to 1e6; of a set with a negative one the robot uses none and stores all"
+
 _RULES = {
     "hero_msgs/SetOdom": _Rule(_SET_ODOM, -1e6, 1e6, "x, y (m) and theta (rad) must be finite, within +-1e6"),
-    "hero_msgs/SetPID": _Rule(
-        struct.Struct("<6f"),
-        0.0,
-        1e6,
-        "gains must be finite, from 0 to 1e6; of a set with a negative one the robot uses none and stores all",
-    ),
+    "hero_msgs/SetPID": _Rule(struct.Struct("<6f"), 0.0, 1e6, _GAINS),
     "hero_msgs/SetMotor": _Rule(struct.Struct("<2h"), *PULSE_RANGE_US, "pulses must lie within 1000..2000 us"),
     "hero_msgs/SetIRCalibration": _Rule(
         struct.Struct("<8d"), 1e-6, 1e3, "gains must be finite, above 0 and at most 1e3 counts m^2"

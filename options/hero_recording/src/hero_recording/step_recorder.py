@@ -44,12 +44,9 @@ class StepRecorder(ExitStack):
     def _write(self, topic: str, kind: str, content: bytes, time_ns: int) -> None:
         with name_file(self._path):
             if topic not in self._connections:
+                names = topic, kind.replace("/", "/msg/")
                 self._connections[topic] = self._writer.add_connection(
-                    topic,
-                    kind.replace("/", "/msg/"),
-                    typestore=self._types,
-                    callerid="/hero_sim",
-                    latching=int(topic in LATCHED),
+                    *names, typestore=self._types, callerid="/hero_sim", latching=int(topic in LATCHED)
                 )
             self._writer.write(self._connections[topic], time_ns, content)
 

@@ -92,13 +92,8 @@ class MapNode:
                     self._map.add_pose(robot.id, robot.stamp.to_sec(), pose)
         for robot in report.robots:
             if robot.id not in self._scans:
-                self._scans[robot.id] = rospy.Subscriber(
-                    "/hero_%d/proximity" % robot.id,
-                    LaserScan,
-                    partial(self._receive_ranges, robot.id),
-                    queue_size=5,
-                    tcp_nodelay=True,
-                )
+                topic, receive = "/hero_%d/proximity" % robot.id, partial(self._receive_ranges, robot.id)
+                self._scans[robot.id] = rospy.Subscriber(topic, LaserScan, receive, queue_size=5, tcp_nodelay=True)
 
     def _receive_ranges(self, robot_id: int, scan: LaserScan) -> None:
         ranges_m = front_first(scan)

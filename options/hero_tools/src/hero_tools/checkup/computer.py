@@ -15,25 +15,13 @@ from catkin_pkg.packages import find_package_paths
 from .points import Finding, ask_system, fail, ok, warn
 
 CORE = (
-    "hero_bringup",
-    "hero_client",
-    "hero_driver",
-    "hero_examples",
-    "hero_msgs",
-    "hero_node",
-    "hero_sim",
+    "hero_bringup", "hero_client", "hero_driver", "hero_examples", "hero_msgs", "hero_node", "hero_sim",
     "hero_tutorial",
-)
+)  # fmt: skip
 OPTIONS = (
-    "hero_calibration",
-    "hero_common",
-    "hero_description",
-    "hero_localization",
-    "hero_monitor",
-    "hero_recording",
-    "hero_swarm",
-    "hero_tools",
-)
+    "hero_calibration", "hero_common", "hero_description", "hero_localization", "hero_monitor", "hero_recording",
+    "hero_swarm", "hero_tools",
+)  # fmt: skip
 MODULES = {
     "python3-catkin-pkg": "catkin_pkg",
     "python3-opencv": "cv2",
