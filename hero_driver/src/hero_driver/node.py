@@ -19,17 +19,7 @@ import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
 from hero_msgs.msg import RobotArray
-from hero_node import ProgramError, print_error
-from hero_node.ros import (
-    MasterWatch,
-    end_ros_node,
-    find_running_node,
-    init_ros_node,
-    limit_xmlrpc_connections,
-    open_tcpros_server,
-    read_given,
-    read_master_uri,
-)
+from hero_node import ProgramError, print_error, ros
 
 from .config import DriverConfig, read_config
 from .gateway import STOP_LIMIT_S, Gateway
@@ -89,7 +79,7 @@ class DriverNode:
         )
         self._thread = threading.Thread(target=self._run_loop, name="sockets", daemon=True)
         self._crash: Optional[BaseException] = None
-        self._stop_store = StopStore(rospy.get_name(), read_master_uri())
+        self._stop_store = StopStore(rospy.get_name(), ros.read_master_uri())
         self._stop_interface = StopInterface(self._loop, self._gateway, self._stop_store, self._log)
         self._is_closed = threading.Event()
 
@@ -104,7 +94,7 @@ class DriverNode:
         self._stop_interface.open(since_s is not None or self._config.start_stopped == "always", since_s)
         self._thread.start()
         rospy.Service("~dismiss_gone", Trigger, self._serve_dismissal)
-        MasterWatch().start(
+        ros.MasterWatch().start(
             self._is_closed,
             lambda news: self._log.log("warn", news),
             lambda loss: self._log.log("error", f"{loss}; programs that start now find no robots"),
@@ -233,7 +223,7 @@ def _run(argv: Optional[List[str]], threads: ThreadWatch) -> int:
     log = LogRelay()
     try:
         _enter_ros(argv, log)
-        node = DriverNode(read_config(read_given()), log, threads)
+        node = DriverNode(read_config(ros.read_given()), log, threads)
         sys.setswitchinterval(SWITCH_INTERVAL_S)
         # The driver handles signals itself: robots are stopped before ROS goes down.
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -252,21 +242,21 @@ def _run(argv: Optional[List[str]], threads: ThreadWatch) -> int:
     finally:
         node.close()
         if not threads.failure:
-            end_ros_node("the driver ended", LEAVE_WAIT_S)
+            ros.end_ros_node("the driver ended", LEAVE_WAIT_S)
 
 
 def _enter_ros(argv: Optional[List[str]], log: LogRelay) -> None:
     """Become a ROS node. Raises: ProgramError where the environment does not allow it."""
-    _wait_for_master(read_master_uri())
-    running = find_running_node(NODE_NAME)
+    _wait_for_master(ros.read_master_uri())
+    running = ros.find_running_node(NODE_NAME)
     if running:
         text = "a driver already runs as %s: end it, or start this one with another name:= and port:= (simulated robots"
         raise ProgramError(text % running + " alone: roslaunch hero_sim hero_sim.launch)")
     report_dropped_log_lines()
-    limit_xmlrpc_connections()
-    open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text))
+    ros.limit_xmlrpc_connections()
+    ros.open_tcpros_server(lambda host, text: log.log_throttled("warn", "handshake " + host, text))
     rospy_internals.keep_publishers_connected()
-    init_ros_node(NODE_NAME, arguments=argv)
+    ros.init_ros_node(NODE_NAME, arguments=argv)
     rospy_internals.leave_topics_out_of_rosout()
 
 

@@ -59,14 +59,14 @@ class Run:
         for name in ("open", "spin", "close"):
             getattr(self.node, name).side_effect = self.note(name, failures.get(name, 5 if name == "spin" else None))
         monkeypatch.setattr(node_module, "_enter_ros", self.note("enter", failures.get("enter")))
-        monkeypatch.setattr(node_module, "read_given", dict)
+        monkeypatch.setattr(node_module.ros, "read_given", dict)
         monkeypatch.setattr(node_module, "DriverNode", lambda config, log, threads: self.node)
         monkeypatch.setattr(node_module.sys, "setswitchinterval", lambda interval_s: None)
         self.handlers = {}
         monkeypatch.setattr(node_module.signal, "signal", self.handlers.__setitem__)
         self.hooks = []
         monkeypatch.setattr(node_module.rospy_internals, "call_before_shutdown", self.hooks.append)
-        monkeypatch.setattr(node_module, "end_ros_node", lambda reason, timeout_s: self.steps.append(timeout_s))
+        monkeypatch.setattr(node_module.ros, "end_ros_node", lambda reason, timeout_s: self.steps.append(timeout_s))
 
     def note(self, name, outcome):
         def act(*_):

@@ -6,16 +6,7 @@ from typing import Dict, Iterable, List, Mapping, Sequence
 import numpy as np
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import (
-    Point,
-    PoseWithCovariance,
-    PoseWithCovarianceStamped,
-    Quaternion,
-    Transform,
-    TransformStamped,
-    Vector3,
-)
-from geometry_msgs.msg import Pose as PoseMessage
+from geometry_msgs import msg as geometry
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
@@ -42,7 +33,7 @@ class Outputs:
     def add_robot(self, robot_id: int) -> None:
         """Advertise /hero_N/pose."""
         topic = "/hero_%d/pose" % robot_id
-        self._robots[robot_id] = rospy.Publisher(topic, PoseWithCovarianceStamped, queue_size=2)
+        self._robots[robot_id] = rospy.Publisher(topic, geometry.PoseWithCovarianceStamped, queue_size=2)
 
     def publish(self, robots: Sequence[LocalizedRobot]) -> None:
         """Publish where the robots are. A transform is sent once for each reading of odometry."""
@@ -57,15 +48,15 @@ class Outputs:
                 continue  # tf warns of transforms that come twice with one stamp
             self._stamps[robot.robot_id] = robot.estimate.stamp_s
             header, (x_m, y_m, yaw_rad) = Header(0, described.stamp, self._frame), robot.odom_origin
-            transform = Transform(Vector3(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
-            transforms.append(TransformStamped(header, "hero_%d/odom" % robot.robot_id, transform))
+            transform = geometry.Transform(geometry.Vector3(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
+            transforms.append(geometry.TransformStamped(header, "hero_%d/odom" % robot.robot_id, transform))
             publisher = self._robots[robot.robot_id]
             if publisher.get_num_connections():
                 (x_m, y_m, yaw_rad), entries = robot.estimate.pose, np.zeros((6, 6))
                 entries[IN_PLANE] = robot.estimate.covariance
-                pose = PoseMessage(Point(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
-                message = PoseWithCovariance(pose, entries.ravel().tolist())
-                publisher.publish(PoseWithCovarianceStamped(header, message))
+                pose = geometry.Pose(geometry.Point(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
+                message = geometry.PoseWithCovariance(pose, entries.ravel().tolist())
+                publisher.publish(geometry.PoseWithCovarianceStamped(header, message))
         if transforms:
             self._tf.publish(TFMessage(transforms))
 
@@ -108,5 +99,5 @@ def _describe_robot(robot: LocalizedRobot) -> RobotPose:
     return RobotPose(robot.robot_id, int(robot.state), rospy.Time(), *[math.nan] * 5)
 
 
-def _make_quaternion(yaw_rad: float) -> Quaternion:
-    return Quaternion(0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0))
+def _make_quaternion(yaw_rad: float) -> geometry.Quaternion:
+    return geometry.Quaternion(0.0, 0.0, math.sin(yaw_rad / 2.0), math.cos(yaw_rad / 2.0))
