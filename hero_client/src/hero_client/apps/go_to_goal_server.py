@@ -48,14 +48,12 @@ def read_goal(message: Any, use_heading: bool) -> Tuple[Goal, str]:
     """
     frame = message.header.frame_id
     if not frame.isprintable() or len(frame) > MAX_FRAME_LENGTH:
-        raise InvalidGoalError(
-            "frame_id must be up to %d printable characters, not %s" % (MAX_FRAME_LENGTH, ascii(frame[:40]))
-        )
+        text = "frame_id must be up to %d printable characters, not %s"
+        raise InvalidGoalError(text % (MAX_FRAME_LENGTH, ascii(frame[:40])))
     position, orientation = message.pose.position, message.pose.orientation
     if not (abs(position.x) <= MAX_COORDINATE_M and abs(position.y) <= MAX_COORDINATE_M):
-        raise InvalidGoalError(
-            f"a goal must be finite, not ({position.x:g}, {position.y:g}), and within {MAX_COORDINATE_M:g} m"
-        )
+        text = f"a goal must be finite, not ({position.x:g}, {position.y:g}), and within {MAX_COORDINATE_M:g} m"
+        raise InvalidGoalError(text)
     if not use_heading:
         return Goal(position.x, position.y), frame
     entries = (orientation.x, orientation.y, orientation.z, orientation.w)

@@ -104,9 +104,8 @@ def open_terminal() -> IO[bytes]:
     try:
         return _open_terminal_device("/dev/tty")
     except OSError:
-        raise NoTerminalError(
-            "no terminal to read keys from: start it in a plain terminal, with neither input nor output redirected"
-        ) from None
+        text = "no terminal to read keys from: start it in a plain terminal, with neither input nor output redirected"
+        raise NoTerminalError(text) from None
 
 
 def _open_terminal_device(path: str) -> IO[bytes]:

@@ -46,9 +46,8 @@ def find_lost_commands() -> List[str]:
         elif topic in subscribed:
             continue
         elif name == "goal" and kind == COMMANDS["goal"]:
-            lost.append(
-                f"{says}, but no program takes its goals: roslaunch hero_examples go_to_goal.launch robots:=all"
-            )
+            text = f"{says}, but no program takes its goals: roslaunch hero_examples go_to_goal.launch robots:=all"
+            lost.append(text)
         elif name in COMMANDS and kind == COMMANDS[name]:
             lost.append(f"{says}, but no driver has {robot}: is it on, and its number right?")
         elif kind in USUAL:

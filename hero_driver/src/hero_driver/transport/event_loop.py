@@ -329,9 +329,8 @@ class EventLoop(LinkOwner):
         remedy = ""
         if error.errno in (errno.EMFILE, errno.ENFILE):
             remedy = "; raise the limit of open files (ulimit -n) and start again"
-        self._handler.warn_network(
-            f"cannot take more connections ({describe_error(error)}){remedy}; connected robots are not affected"
-        )
+        text = f"cannot take more connections ({describe_error(error)}){remedy}; connected robots are not affected"
+        self._handler.warn_network(text)
         self._unregister(listener.fileno())
 
         def resume() -> None:

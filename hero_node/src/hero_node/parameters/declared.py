@@ -98,9 +98,8 @@ def check_parameters(declared: Mapping[str, Any], given: Mapping[str, Any]) -> D
     """
     for name in sorted(set(given) - set(declared)):
         shown = name if name.isprintable() else ascii(name)
-        raise ProgramError(
-            f"unknown parameter ~{shown}{suggest(name, declared, '~')}; known are: {', '.join(sorted(declared))}"
-        )
+        text = f"unknown parameter ~{shown}{suggest(name, declared, '~')}; known are: {', '.join(sorted(declared))}"
+        raise ProgramError(text)
     return {
         name: parameter.check(name, given.get(name, parameter.default))
         if isinstance(parameter, Parameter)

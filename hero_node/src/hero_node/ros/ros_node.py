@@ -61,9 +61,8 @@ def init_ros_node(name: str, anonymous: bool = False, arguments: Optional[List[s
     except (rosgraph.roslogging.LoggingException, NotADirectoryError, PermissionError) as error:
         raise NodeError(f"no log can be written ({one_line(error)}): set ROS_LOG_DIR to a directory") from None
     except TypeError:  # of the parameter server, which takes no nil: _x:= and _x:=~ hold none, nor does _x:=::
-        raise NodeError(
-            "a private parameter (_name:=value) has no value for YAML: quote it twice, as in _host:='\"::\"'"
-        ) from None
+        text = "a private parameter (_name:=value) has no value for YAML: quote it twice, as in _host:='\"::\"'"
+        raise NodeError(text) from None
     except (rospy.ROSInitException, OSError, ValueError) as error:
         raise NodeError(one_line(error)) from None
 

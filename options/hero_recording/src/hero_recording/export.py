@@ -72,9 +72,8 @@ def export_tables(bags: BagSet, options: argparse.Namespace, folder: str) -> str
     with name_file(folder), files:
         bags.read(is_exported, receive)
     if not files.rows:
-        raise RecordingError(
-            "%s: nothing of these robots in it; its topics: %s" % (", ".join(bags.paths), bags.describe_topics())
-        )
+        text = "%s: nothing of these robots in it; its topics: %s"
+        raise RecordingError(text % (", ".join(bags.paths), bags.describe_topics()))
     robots = {robot_id for robot_id, _ in files.rows}
     return "%d robots, %d tables, %d rows" % (len(robots), len(files.rows), sum(files.rows.values()))
 

@@ -73,9 +73,8 @@ def find_behavior(name: str, sources: Optional[Sources] = None) -> Type[Behavior
     if class_name in classes:
         return classes[class_name]
     if class_name or len(classes) != 1:
-        raise ValueError(
-            f"behavior {name}: name one class as {path}:CLASS; it has {', '.join(sorted(classes)) or 'none'}"
-        )
+        text = f"behavior {name}: name one class as {path}:CLASS; it has {', '.join(sorted(classes)) or 'none'}"
+        raise ValueError(text)
     return next(iter(classes.values()))
 
 
@@ -118,9 +117,8 @@ def make_behavior(name: str, numbers: Any) -> Behavior:
         raise ValueError("parameters is %r, but must be numbers such as {rate_hz: %g}" % (numbers, kind.rate_hz))
     for key, value in numbers.items():
         if key not in defaults:
-            raise ValueError(
-                f"parameters: {name} has no number {key!r}; it has {', '.join(defaults)}{suggest(key, defaults)}"
-            )
+            text = f"parameters: {name} has no number {key!r}; it has {', '.join(defaults)}{suggest(key, defaults)}"
+            raise ValueError(text)
         low, high = (MIN_RATE_HZ, MAX_RATE_HZ) if key == "rate_hz" else (-MAX_NUMBER, MAX_NUMBER)
         if not is_number(value, low, high):
             raise ValueError(f"parameters: {key} is {value!r}, but must be a number from {low:g} to {high:g}")
