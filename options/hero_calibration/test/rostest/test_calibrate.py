@@ -192,7 +192,7 @@ class CalibrateTest(unittest.TestCase):
         cases = [
             (self.start("motors", "--robots", "1"), "no terminal to answer"),
             (self.start("restore"), "hero_1.yaml, line 3: motor_centers_us is 9000, but"),
-            (self.start("motors", "--folder", file), "hero_1.yaml cannot be created: File exists"),
+            (self.start("motors", "--folder", file), "hero_1.yaml: File exists"),
         ]
         for program, reason in cases:
             self.assertIn(reason, self.finish(program, 1))
