@@ -20,14 +20,7 @@ from .contacts import Contacts
 from .kinematics import join_wheels
 from .pushing.pushing import Pushing
 from .pushing.shapes import PushedBody, list_outlines
-from .range_sensors import (
-    DISTANCE_NOISE_M,
-    DISTANCE_REACH_M,
-    NOISE_COUNTS,
-    Sight,
-    measure_distances,
-    measure_signals,
-)
+from .range_sensors import DISTANCE_NOISE_M, DISTANCE_REACH_M, NOISE_COUNTS, Sight, measure_distances, measure_signals
 from .robot_errors import MAX_WHEEL_M_S, SERVO_GAIN_M_S_US, RobotErrors
 from .wheel_loops import draw_normal_at, drive_wheel, find_place
 

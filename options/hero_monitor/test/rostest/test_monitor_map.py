@@ -11,7 +11,7 @@ import rostest
 from geometry_msgs.msg import Point, Point32, Polygon, PolygonStamped, Quaternion
 from geometry_msgs.msg import Pose as PoseMessage
 from monitor_process import HOST, end, start_scripted_driver, wait_until_it_answers
-from nav_msgs.msg import MapMetaData, OccupancyGrid, Odometry
+from nav_msgs.msg import Odometry
 from PIL import Image
 from sensor_msgs.msg import CompressedImage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -24,13 +24,7 @@ from hero_test.waiting import wait_for
 COLORS = {"red": (255, 0, 0), "green": (0, 160, 0), "blue": (0, 0, 255), "magenta": (255, 0, 255)}
 """Of the picture's quarters: upper left, upper right, lower left, lower right."""
 
-WALL = (123, 134, 150)
-"""The page's color of what is occupied, in light."""
-
 HERO_0 = [255.0 * part for part in colorsys.hls_to_rgb(24 / 360, 0.42, 0.7)]
-
-MIN_WALL_SHARE = 0.15
-"""Of the map; names have pixels of that color, too."""
 
 STEP_PX = 4
 """Between the pixels that are looked at."""
@@ -191,32 +185,6 @@ class MapTest(unittest.TestCase):
         self.assertFalse(hint.is_displayed())
         localization.close()
         self.assertEqual(self.page.errors(), [])
-
-    def test_the_map_that_robots_measure_lies_at_its_place(self):
-        grid = OccupancyGrid(data=([100] * 10 + [0] * 10) * 10)
-        grid.header.frame_id = "map"
-        grid.info = MapMetaData(resolution=0.1, width=20, height=10)
-        grid.info.origin = PoseMessage(Point(-1.0, -0.5, 0.0), Quaternion(0.0, 0.0, 0.0, 1.0))
-        latched = rospy.Publisher("/map", OccupancyGrid, queue_size=1, latch=True)
-        latched.publish(grid)
-        localization = Repeater("/localization/poses", self.poses)
-
-        def is_in_place():
-            # The view fits the whole grid, of which the left half is occupied.
-            share, x, y = self.measure_wall()
-            width, height = self.page.run("return [canvas.width, canvas.height]")
-            side = math.sqrt(share * width * height)
-            off = math.dist((x * width, y * height), (width / 2.0 - side / 2.0, height / 2.0))
-            return share > MIN_WALL_SHARE and off < 0.1 * side
-
-        wait_for(is_in_place, self.measure_wall)
-        self.page.save("monitor_occupancy.png")
-        localization.close()
-        wait_for(lambda: self.measure_wall()[0] < MIN_WALL_SHARE, "a map in its own frame only")
-
-    def measure_wall(self):
-        """Return the share of the map in the color of walls, and their mean place by its width and height."""
-        return self.page.browser.execute_script(MEASURE_COLOR, WALL, STEP_PX)
 
     def test_simulated_robots_are_drawn_where_they_are(self):
         self.page.click("#ghosts")

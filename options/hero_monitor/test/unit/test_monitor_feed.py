@@ -12,7 +12,6 @@ import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Point, PoseStamped, TransformStamped
-from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Log
 from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
@@ -339,31 +338,19 @@ def test_lines_of_the_log_are_counted_and_known_by_their_robot(fleet):
     assert len(fleet.feed._log_bytes) == LOG_LINES_KEPT
 
 
-def test_a_grid_is_drawn_in_its_frame_and_a_replay_while_it_runs(fleet, monkeypatch):
-    encode = create_autospec(feed_module.encode_grid, side_effect=feed_module.encode_grid)
-    monkeypatch.setattr(feed_module, "encode_grid", encode)
+def test_a_replay_is_drawn_while_it_runs(fleet):
     fleet.receive(make_row(0), make_row(1))
     fleet.subscribe()
     for number, feed in enumerate(fleet.feed._feeds.values()):
         feed.listener.track.receive_pose(Pose(0.1 * number, 0.0, 0.0))
-    grid = OccupancyGrid(data=[0, 100])
-    grid.header.frame_id, grid.info.resolution, grid.info.width, grid.info.height = "world", 0.1, 2, 1
-    grid.info.origin.orientation.w = 1.0
-    fleet.put("/map", grid)
     heading = make_marker(Marker.ARROW, 1, 1, 1, ns="headings")
     fleet.put("/hero_sim/replay", MarkerArray([heading, make_marker(9, 1, 1, 1, ns="names", text="hero_7")]))
     state = fleet.read()
     assert state["poses"] == {"hero_0": [-500, 0, 0], "hero_1": [600, 0, 0]}, "side by side"
-    assert fleet.read()["grid"] == state["grid"] and encode.call_count == 1, "large, and the same as before"
-    assert state["grid"]["runs"] == [1, 1, 2, 1] and state["replay"] == {"hero_7": [1000, 0, 0]}
-    report = RobotPoses(robots=[RobotPose(id=0, state=RobotPose.TRACKED)])
-    report.header.frame_id = "map"
-    fleet.put("/localization/poses", report)
-    assert fleet.read()["grid"] is None
+    assert state["replay"] == {"hero_7": [1000, 0, 0]}
     fleet.now_s += FORGOTTEN_S + 0.1
     fleet.feed._scene["/hero_sim/replay"].has_publisher = False
-    state = fleet.read()
-    assert state["grid"]["runs"] == [1, 1, 2, 1] and state["replay"] == {}, "a map_server publishes once"
+    assert fleet.read()["replay"] == {}
 
 
 def test_localization_that_no_page_listened_to_is_not_lost(fleet):

@@ -5,7 +5,6 @@ import math
 
 import pytest
 from geometry_msgs.msg import Point, Point32, Polygon, PolygonStamped
-from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
@@ -15,7 +14,6 @@ from hero_monitor.control.requests import RequestError, read_request
 from hero_monitor.fleet_feed import drawings
 from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
 from hero_monitor.fleet_feed.feed import encode_nearest
-from hero_monitor.fleet_feed.occupancy import MAX_CELLS, encode_grid
 from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_AT_ONCE,
     LOG_LINES_KEPT,
@@ -259,24 +257,6 @@ def test_requests_of_the_page_are_parsed(request_fields):
 def test_an_invalid_request_is_refused(text):
     with pytest.raises(RequestError):
         read_request(text)
-
-
-def make_grid(data, columns, frame="map"):
-    grid = OccupancyGrid(data=data)
-    grid.header.frame_id = frame
-    grid.info = MapMetaData(resolution=0.05, width=columns, height=len(data) // columns)
-    grid.info.origin.position.x, grid.info.origin.orientation.w = -0.5, 1.0
-    return grid
-
-
-def test_an_occupancy_grid_becomes_runs_of_unknown_free_and_occupied_cells():
-    grid = encode_grid(make_grid([-1, -1, -1, 0, 64, 65, 100, -1], 4), "map")
-    assert grid == {"pose": [-500, 0, 0], "cell": 50.0, "columns": 4, "rows": 2, "runs": [0, 3, 1, 2, 2, 2, 0, 1]}
-
-
-@pytest.mark.parametrize("change", [{"frame": "odom"}, {"columns": 3}, {"data": []}, {"data": [0] * (MAX_CELLS + 4)}])
-def test_an_occupancy_grid_without_a_place_or_of_another_size_is_not_drawn(change):
-    assert encode_grid(make_grid(**{"data": [0] * 4, "columns": 4, **change}), "map") is None
 
 
 def make_drawing(name, frame="map", end_m=1.0):

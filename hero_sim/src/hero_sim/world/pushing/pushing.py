@@ -108,10 +108,7 @@ class Pushing:
 
 def _list_arms(contact: Contact, body: PushedBody) -> Arms:
     x_m, y_m = contact.x_m - body.x_m, contact.y_m - body.y_m
-    return (
-        x_m * contact.normal_y - y_m * contact.normal_x,
-        x_m * contact.normal_x + y_m * contact.normal_y,
-    )
+    return x_m * contact.normal_y - y_m * contact.normal_x, x_m * contact.normal_x + y_m * contact.normal_y
 
 
 def _join(first: int, second: int, contacts: Sequence[Contact], arms_m: Sequence[Tuple[Arms, Arms]]) -> List[Touch]:

@@ -17,7 +17,6 @@ import genpy
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PolygonStamped
-from nav_msgs.msg import OccupancyGrid
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CompressedImage
 from tf2_msgs.msg import TFMessage
@@ -42,7 +41,6 @@ from ..background import Background
 from .camera_picture import CameraPicture
 from .drawings import Drawings, encode_rgb
 from .losses import MASTER_PERIOD_S, SILENT_S, LocalizationWatch, Loss, list_losses
-from .occupancy import encode_grid
 from .page_state import LOG_LINES_KEPT, PageState, encode_pose, encode_range, shorten
 from .placement import Placement
 from .robot_feed import RobotFeed
@@ -93,7 +91,6 @@ class FleetFeed:
             "/tf_static": (TFMessage, self._receive_transforms),
             "/localization/poses": (RobotPoses, self._localize),
             "/diagnostics": (DiagnosticArray, self._receive_diagnostics),
-            "/map": (OccupancyGrid, self._receive_grid),
             "/hero_sim/arena": (MarkerArray, self._receive_arena),
             "/hero_sim/object_markers": (MarkerArray, lambda message, now_s: put("objects", describe_arena(message))),
             "/hero_sim/markers": (MarkerArray, lambda message, now_s: put("ground_truth", find_true_poses(message))),
@@ -106,8 +103,6 @@ class FleetFeed:
         self._fleet_stamp_s: Optional[float] = None
         self._answering: Dict[str, bool] = {}
         self._localization = LocalizationWatch()
-        self._grid: Optional[OccupancyGrid] = None
-        self._shown_grid: Tuple[Optional[OccupancyGrid], str] = (None, "")
         self._tracked: Set[str] = set()
         self._master = MasterWatch()
         self._master.start(threading.Event(), background.warn, period_s=MASTER_PERIOD_S)
@@ -312,10 +307,6 @@ class FleetFeed:
         elif not self._localization.is_expected(now_s):
             self.placement.localize("", {})
         frame = self.placement.frame
-        if (self._grid, frame) != self._shown_grid:
-            # A map_server publishes once, perhaps before the robots are localized.
-            self._shown_grid = self._grid, frame
-            put("grid", self._grid and encode_grid(self._grid, frame))
         put("picture", self.picture.describe(frame, now_s))
         put("drawings", self._drawings.describe(frame, now_s))
 
@@ -335,9 +326,6 @@ class FleetFeed:
         arena = describe_arena(message)
         self._extent = measure_extent(**arena)
         self.page_state.put("arena", {**arena, "extent": self._extent})
-
-    def _receive_grid(self, message: OccupancyGrid, now_s: float) -> None:
-        self._grid = message
 
     def _localize(self, report: RobotPoses, now_s: float) -> None:
         self._tracked = {"hero_%d" % robot.id for robot in report.robots if robot.state == RobotPose.TRACKED}

@@ -31,7 +31,6 @@ const state = {
   replay: {},
   picture: null,
   arena: { boxes: [], circles: [], extent: null },
-  grid: null,
   objects: { boxes: [], circles: [] },
   drawings: [],
   isFresh: false,

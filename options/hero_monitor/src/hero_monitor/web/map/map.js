@@ -2,7 +2,6 @@
 
 import { element, make, setPressed } from "../dom.js";
 import { isLate } from "../connection.js";
-import { drawGrid } from "./occupancy.js";
 import { CameraPicture } from "./picture.js";
 import { BODY_MM, MapPainter, TRAIL_MS } from "./painter.js";
 
@@ -212,7 +211,7 @@ export class FleetMap {
   }
 
   fit() {
-    const { poses, replay, arena, grid, drawings } = this.state;
+    const { poses, replay, arena, drawings } = this.state;
     const places = []; // that are to be seen
     const add = ([left, low, right, high]) => places.push([left, low], [right, high]);
     const surround = ([x, y], reach) => places.push([x - reach, y - reach], [x + reach, y + reach]);
@@ -220,7 +219,6 @@ export class FleetMap {
     for (const pose of drawn) if (pose) surround(pose, 150);
     if (arena.extent) add(arena.extent);
     for (const { lines = [], isBeam } of drawings) if (!isBeam) for (const place of lines.flat()) surround(place, 60);
-    if (grid) add([grid.pose[0], grid.pose[1], grid.pose[0] + grid.columns * grid.cell, grid.pose[1] + grid.rows * grid.cell]);
     if (this.picture.shown) add(this.picture.shown.box);
     if (!places.length) return false;
     const [xs, ys] = [0, 1].map((axis) => places.map((place) => place[axis]));
@@ -257,13 +255,12 @@ export class FleetMap {
 
   update(updates) {
     if ("poses" in updates || "ground_truth" in updates) this.keepTrails();
-    if (updates.grid) this.gridImage = drawGrid(updates.grid);
     if ("picture" in updates) this.picture.show(this.shows.picture, this.state.picture);
-    const { poses, ground_truth, replay, fleet, grid, arena, drawings } = this.state;
+    const { poses, ground_truth, replay, fleet, arena, drawings } = this.state;
     const count = Object.keys({ ...poses, ...replay }).length + Object.keys(ground_truth).length;
     const placed = fleet.robots.filter((robot) => robot.source).length;
     // When there is something else to see, the view fits it again.
-    const scene = String([count, fleet.frame, this.picture.shown?.box, grid?.columns, arena.boxes.length, drawings.length > 0, placed]);
+    const scene = String([count, fleet.frame, this.picture.shown?.box, arena.boxes.length, drawings.length > 0, placed]);
     if (!this.pinned && this.fittedFor !== scene && this.fit()) this.fittedFor = scene;
     this.draw();
   }

@@ -1,4 +1,4 @@
-// Paints the map: grid, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
+// Paints the map: floor, arena, trails, goals, beams and robots. Lengths in mm, angles in mrad.
 
 import { colorOf, isDark } from "./colors.js";
 import { sourceOf, stateOf } from "../losses.js";
@@ -37,7 +37,6 @@ export class MapPainter {
     context.translate(this.width / 2, this.height / 2);
     context.scale(view.scale, -view.scale);
     context.translate(-view.x, -view.y);
-    if (state.grid) this.paintOccupancy(state.grid, map.gridImage);
     if (map.picture.shown) this.paintPicture(map.picture.shown);
     this.paintGrid();
     this.paintShapes(state.arena, "--wall");
@@ -92,13 +91,6 @@ export class MapPainter {
     this.context.setLineDash(lengths);
     paint();
     this.context.setLineDash([]);
-  }
-
-  paintOccupancy({ pose, columns, rows, cell }, image) {
-    this.at(pose, () => {
-      this.context.imageSmoothingEnabled = false;
-      this.context.drawImage(image, 0, 0, columns * cell, rows * cell);
-    });
   }
 
   paintPicture({ image, box: [left, low, right, high] }) {
