@@ -6,20 +6,7 @@ from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from hero_client.values import (
-    FRESH_S,
-    MAP,
-    BackgroundMotion,
-    FrameError,
-    Neighbor,
-    Neighbors,
-    RobotLink,
-    RobotModel,
-    StaleDataError,
-    Steps,
-    list_neighbors,
-    sense_neighbors,
-)
+from hero_client import values
 from hero_node import Pose, Velocity, find_frame, say
 
 from .step_clock import StepClock, StepMotion
@@ -27,7 +14,7 @@ from .step_clock import StepClock, StepMotion
 WORLD = "world"
 
 
-class StepLink(RobotLink):
+class StepLink(values.RobotLink):
     """One robot: a row of RobotRows.
 
     Attributes:
@@ -61,12 +48,12 @@ class StepLink(RobotLink):
         return Pose(*self._rows.world.poses[self.row].tolist())
 
     @property
-    def model(self) -> RobotModel:
+    def model(self) -> values.RobotModel:
         return self._rows.models[self.row].dimensions
 
     def missing(self) -> Optional[str]:
         for topic in ("odom", "proximity"):
-            if self.age_s(topic) > FRESH_S:
+            if self.age_s(topic) > values.FRESH_S:
                 return f"no message on /{self._name}/{topic}: is the robot on and in reach?"
         return None
 
@@ -84,7 +71,7 @@ class StepLink(RobotLink):
             last_ms = arrivals_ms[self.row]
             while arrivals_ms[self.row] == last_ms:
                 if self.clock.now_s >= deadline_s:
-                    raise StaleDataError(f"no message on /{self._name}/{topic} within {timeout_s:.1f} s")
+                    raise values.StaleDataError(f"no message on /{self._name}/{topic} within {timeout_s:.1f} s")
                 self.clock.sleep(0.001)
 
     def read_pose(self) -> Pose:
@@ -104,19 +91,19 @@ class StepLink(RobotLink):
     def read_distance(self) -> float:
         return float(self._rows.distance_m[self.row])
 
-    def read_neighbors(self) -> List[Neighbor]:
+    def read_neighbors(self) -> List[values.Neighbor]:
         """All robots of the same world are sensed, where they are."""
         world = self._rows.world
         poses = world.poses.reshape(world.worlds, -1, 3)
         robots = poses.shape[1]
         world_row, number = divmod(self.row, robots)
         first_id = self._robot_id - number
-        near = sense_neighbors(poses[world_row : world_row + 1], Neighbors())
-        return list_neighbors(near, number, range(first_id, first_id + robots))
+        near = values.sense_neighbors(poses[world_row : world_row + 1], values.Neighbors())
+        return values.list_neighbors(near, number, range(first_id, first_id + robots))
 
     def find_localized(self, frame: str, timeout_s: float) -> Optional[Pose]:
         """There is always a localization."""
-        return self.localize() if frame == MAP else None
+        return self.localize() if frame == values.MAP else None
 
     def find_origin(self, frame: str, timeout_s: float) -> Pose:
         """Known are "world" and the robot's own odometry."""
@@ -124,7 +111,7 @@ class StepLink(RobotLink):
             return self._origin
         if frame == self._name + "/odom":
             return Pose(0.0, 0.0, 0.0)
-        raise FrameError(f"no transform from {self._name}/odom to {frame}: robots in process know map and world")
+        raise values.FrameError(f"no transform from {self._name}/odom to {frame}: robots in process know map and world")
 
     def send_velocity(self, linear_m_s: float, angular_rad_s: float) -> None:
         if not self.is_stopped:
@@ -140,7 +127,7 @@ class StepLink(RobotLink):
     def describe_stop(self) -> str:
         return "all robots are stopped. Release them with StepSwarm.release_stop()"
 
-    def start(self, steps: Steps) -> BackgroundMotion:
+    def start(self, steps: values.Steps) -> values.BackgroundMotion:
         """Take steps while the program waits."""
         return StepMotion(self.clock, steps)
 

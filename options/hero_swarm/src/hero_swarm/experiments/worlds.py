@@ -6,6 +6,7 @@ Figures: docs/simulator.md; lag, friction and traction are assumptions there, an
 from typing import Any, Dict
 
 _NOMINAL = {"errors": "perfect", "errors.friction": 0.0, "wifi": "ideal", "delay_s": 0.0}
+_SLIPPERY = {"errors.wheel_friction": 0.4, "errors.wheel_load": 0.8}
 
 NOMINAL, USUAL, WORST = "nominal", "usual", "worst"
 
@@ -13,21 +14,13 @@ WORLDS: Dict[str, Dict[str, Any]] = {
     NOMINAL: _NOMINAL,
     "friction": {**_NOMINAL, "errors.friction": 0.3},
     "strong friction": {**_NOMINAL, "errors.friction": 0.5},
-    "weak traction": {**_NOMINAL, "errors.friction": 0.3, "errors.wheel_friction": 0.4, "errors.wheel_load": 0.8},
+    "weak traction": {**_NOMINAL, "errors.friction": 0.3, **_SLIPPERY},
     "slow motors": {**_NOMINAL, "errors.lag_s": 0.16},
     "unlike robots": {**_NOMINAL, "errors": 2.0},
     "late poses": {**_NOMINAL, "delay_s": 0.2},
     "bad radio": {**_NOMINAL, "wifi": "bad"},
     USUAL: {"errors": "default", "wifi": "router", "delay_s": 0.05},
-    WORST: {
-        "errors": 2.0,
-        "errors.friction": 0.5,
-        "errors.wheel_friction": 0.4,
-        "errors.wheel_load": 0.8,
-        "errors.lag_s": 0.16,
-        "wifi": "bad",
-        "delay_s": 0.2,
-    },
+    WORST: {**_SLIPPERY, "errors": 2.0, "errors.friction": 0.5, "errors.lag_s": 0.16, "wifi": "bad", "delay_s": 0.2},
 }
 """Settings of an experiment by the name of the world."""
 
