@@ -27,9 +27,10 @@ BEAT_S = 0.1
 
 CIRCLE = {"shape": "circle", "spacing_m": 0.3, "turn_deg": 90.0, "x_m": 1.0, "y_m": -0.5, "linear_m_s": 0.08}
 
+# Two programs write into one pipe: unbuffered, print() would write the end of a line apart.
 OBEDIENT = (
-    "import signal; signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]);"
-    "print('runs', flush=True); signal.sigwait([signal.SIGINT]); print('robots are stopped')"
+    "import os, signal; signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT]);"
+    r"os.write(1, b'runs\n'); signal.sigwait([signal.SIGINT]); print('robots are stopped')"
 )
 DEAF = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('deaf', flush=True); time.sleep(900)"
 
