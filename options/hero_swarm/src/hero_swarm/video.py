@@ -73,6 +73,6 @@ def draw_frame(limits_m: np.ndarray, time_s: float, shapes: Sequence[Shape]) -> 
             ahead, left = half * math.cos(yaw_rad), half * math.sin(yaw_rad)
             start, end = (0, 2) if shape.kind == ARROW else (-1, 1)
             pen.line([x + start * ahead, y - start * left, x + end * ahead, y - end * left], color, width)
-    image = image.resize((_SIZE, _SIZE), Image.BOX)
+    image = image.reduce(_FINER)
     ImageDraw.Draw(image).text((12, 12), f"{time_s:.1f} s", "black")
     return image
