@@ -136,9 +136,8 @@ class Tracker:
         points_m = np.full((len(places), 4, 3), layout.height_m)
         points_m[:, :, :2] = np.array(places)[:, None, :2] + layout.size_m / 2.0 * CROSS
         ends = self.camera.project(points_m)
-        diagonals = ends[:, :2] - ends[:, 2:]
-        # Each is as long as a side.
-        sides_px = np.sqrt(np.abs(np.cross(diagonals[:, 0], diagonals[:, 1])))
+        one, other = ends[:, 0] - ends[:, 2], ends[:, 1] - ends[:, 3]  # diagonals, as long as a side
+        sides_px = np.sqrt(np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]))
         found = np.column_stack((ends.mean(axis=1), sides_px)).tolist()
         return {tag_id: (u, v, side) for tag_id, (u, v, side) in zip(tags.values(), found) if math.isfinite(u + v)}
 
