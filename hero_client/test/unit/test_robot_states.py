@@ -14,7 +14,7 @@ from hero_msgs.msg import Robot, RobotArray
 NOON = datetime.datetime(2026, 11, 28, 12, 0, 0)
 NOW_S = NOON.timestamp()
 REPORT_S = 500000
-"""Of the report, by a clock that is not this PC's: that of a simulation."""
+"""Stamp of the report in simulated time (s): not this PC's clock."""
 
 
 def make_report(*states, **others):

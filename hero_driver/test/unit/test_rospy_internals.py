@@ -55,4 +55,4 @@ def test_what_is_sent_is_counted_and_what_does_not_fit_comes_back():
         left = rospy_internals.send(connection, large)
         assert 0 < len(left) < len(large) and connection.stat_bytes == 9 + len(large) - len(left)
         ours.setblocking(True)
-        assert rospy_internals.send(connection, left) == left, "it waits for nobody"
+        assert rospy_internals.send(connection, left) == left, "it does not wait for room"

@@ -326,7 +326,7 @@ def solve_contacts(
                 two.y += more * press.pressed_y_2 + more_drag * press.dragged_y_2
                 two.turn += more * press.pressed_turn_2 + more_drag * press.dragged_turn_2
                 moves = abs(more) * press.give + abs(more_drag) * press.drag_give > enough
-                if IS_COMPILED or moves:
+                if IS_COMPILED or moves:  # compiled, the branch costs more than what it skips
                     is_settled &= not moves
                     # Pressure and drag depend on each other: this contact, too, is looked at again.
                     stamp = (clock + (most > 0.0)) * moves

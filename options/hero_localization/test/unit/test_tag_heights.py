@@ -23,7 +23,7 @@ def see(place_m, camera_m, too_high_m):
 
 
 class TwoCameras:
-    """Robots that drive circles, and two cameras that see them by turns."""
+    """Robots that drive circles, and two cameras that see them alternately."""
 
     def __init__(self, too_high_m, cameras_m=None, late_s=0.0, speed_m_s=0.1):
         """too_high_m: of the tag of each robot, by number."""
