@@ -309,19 +309,23 @@ def test_the_first_message_of_a_publisher_right_after_a_pause_is_old(bench):
     assert bench.old == [b"first"]
 
 
-def test_a_message_that_was_begun_before_a_pause_counts_to_what_is_old():
+@pytest.mark.parametrize("at_once_length", [0, 1, 7, 15])
+def test_a_message_that_was_begun_before_a_pause_counts_to_what_is_old(at_once_length):
     near, far = socket.socketpair()
     with near, far:
         old, subscriber = [], RawSubscriber(lambda payload: old.append((payload, subscriber.is_old)), None)
         long = b"l" * 300
         connection = SimpleNamespace(stat_bytes=0, stat_num_msg=0)
         stream = MessageStream(subscriber, connection, far, frame(long)[:250])
-        near.sendall(frame(long)[250:] + frame(b"short"))
+        near.sendall(frame(long)[250:] + frame(b"short") + frame(b"begun")[:2])
         stream.resume()
-        near.sendall(frame(b"new"))
+        later = frame(b"begun")[2:] + frame(b"newer") + frame(b"newest")
+        near.sendall(later[:at_once_length])
         assert stream.read()
-        assert old == [(long, True), (b"short", True), (b"new", False)]
-        assert (connection.stat_bytes, connection.stat_num_msg) == (54 + 9 + 7, 3)
+        near.sendall(later[at_once_length:])
+        assert stream.read()
+        assert old == [(long, True), (b"short", True), (b"begun", True), (b"newer", False), (b"newest", False)]
+        assert (connection.stat_bytes, connection.stat_num_msg) == (54 + 9 + 9 + 9 + 10, 5)
 
 
 def test_of_motion_commands_of_before_a_pause_all_are_passed_on():

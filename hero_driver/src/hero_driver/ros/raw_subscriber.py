@@ -7,6 +7,7 @@ socket until it ends. After that rospy proceeds by its own rules: it closes, or 
 
 import fcntl
 import functools
+import math
 import socket
 import struct
 import termios
@@ -121,7 +122,7 @@ class MessageStream(Reader):
         self._connection = connection
         self._socket = sock
         self._remainder = remainder
-        self._old_length = 0  # of what is still to be read
+        self._old_length = -math.inf  # of what is still to be read; below 0: length of what was read behind it
         self._is_ahead = False
         self.ended = threading.Event()
         self.error: Optional[OSError] = None
@@ -153,10 +154,9 @@ class MessageStream(Reader):
         subscriber = self._subscriber
         newest_only, self._is_ahead = self._is_ahead, subscriber.moves and length_read >= READ_LENGTH
         newest: Optional[bytes] = None
-        old_end = 0  # a message that starts before it, behind its length, is old
-        if self._old_length:
-            old_end = self._old_length + len(self._remainder) + LENGTH.size
-            self._old_length = max(0, self._old_length - length_read)
+        # A message that starts before it, behind its length, is old: also one that was begun, and is completed later.
+        old_end = self._old_length + len(self._remainder) + LENGTH.size
+        self._old_length -= length_read
         end = 0
         try:
             for start, end in find_messages(data, MESSAGE_LENGTH_MAX):
