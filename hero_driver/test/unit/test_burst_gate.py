@@ -2,7 +2,7 @@
 
 import pytest
 
-from hero_driver.commands.stop_progress import BURST_READINGS_MIN, BURST_WAIT_S, BurstGate
+from hero_driver.commands.stop_progress import BURST_READINGS_MIN, BurstGate
 from hero_driver.corrections.wheel_motion import WheelMotion
 
 
@@ -40,7 +40,7 @@ def test_without_a_further_reading_no_further_burst_goes(wheels):
 
 def test_to_a_robot_without_readings_bursts_go_after_times_that_double():
     gate, now_s = BurstGate(WheelMotion()), 0.0
-    for wait_s in (BURST_WAIT_S, 2 * BURST_WAIT_S, 4 * BURST_WAIT_S):
+    for wait_s in (2.0, 4.0, 8.0):
         gate.note_sent(now_s)
         assert not gate.is_open(True, now_s + 0.99 * wait_s)
         now_s += wait_s

@@ -113,6 +113,14 @@ def test_a_node_that_cannot_start_ends_with_its_status(monkeypatch, part, error,
     assert run() == code and run.steps[-1] == part
 
 
+def test_the_node_goes_on_until_its_end_is_asked_for():
+    node = DriverNode.__new__(DriverNode)
+    node._ends = queue.SimpleQueue()
+    assert not node._has_ended(0.0)
+    node.end()
+    assert node._has_ended(0.0)
+
+
 def make_closing_node(thread_ends):
     """Return a node that is served by a thread, and the steps of its end."""
     steps, alive = [], [True]

@@ -277,7 +277,7 @@ def encode_declaration(topic_id, name, kind):
 
 def test_a_robot_that_joins_while_all_are_stopped_is_stopped(driver):
     driver.gateway.set_stopped(True)
-    link = driver.join(declarations=STOCK_DECLARATIONS)
+    link, _ = driver.join(declarations=STOCK_DECLARATIONS), driver.connect(OTHER_HOST)  # the second is no robot yet
     assert driver.gateway.list_stops() == [StopState.STOPPING]
     before = len(link.sent)
     driver.run_soon()

@@ -1,9 +1,11 @@
 """LogRelay: which lines reach rospy's logger."""
 
 import logging
+from unittest import mock
 
 import pytest
 
+from hero_driver.ros import log_relay
 from hero_driver.ros.log_relay import ROBOT_LINES_MAX, LogRelay
 
 
@@ -62,14 +64,19 @@ def test_a_level_that_is_set_later_counts(rosout):
     assert texts == [("DEBUG", "after")]
 
 
-def test_one_warning_again_and_again_keeps_no_other_out(rosout):
+def test_one_warning_again_and_again_keeps_no_other_out(rosout, monkeypatch):
     _, texts = rosout
     relay = LogRelay()
+    now_s = 1000.0
+    monkeypatch.setattr(log_relay.time, "monotonic", lambda: now_s)
     for _ in range(10 * ROBOT_LINES_MAX):
         relay.log_throttled("error", "same", "the same warning", robot="hero_1")
     relay.log_throttled("error", "other", "another warning", robot="hero_1")
+    now_s += log_relay.THROTTLE_S
+    relay.log_throttled("error", "same", "the same warning", robot="hero_1")
     relay.close()
-    assert texts == [("ERROR", "the same warning"), ("ERROR", "another warning")]
+    more = "the same warning (and %d times more before)" % (10 * ROBOT_LINES_MAX - 1)
+    assert [text for _, text in texts] == ["the same warning", "another warning", more]
 
 
 def test_different_messages_about_one_robot_are_limited(rosout):
@@ -92,6 +99,8 @@ def test_lines_that_were_dropped_are_counted_once(rosout):
     for number in range(2):
         relay.log("warn", "line %d" % number)
     relay._worker.refused = 5
+    with mock.patch.object(relay._worker, "submit", autospec=True, return_value=False):
+        relay.log("warn", "dropped, and told of in the next one")
     relay.log("warn", "line 2")
     relay.close()
     said = ["line 0 (3 log lines before it were dropped)", "line 1", "line 2 (2 log lines before it were dropped)"]

@@ -125,6 +125,13 @@ def test_of_two_declarations_in_a_row_the_later_one_settles(bench):
     bench.declare(message_type="std_msgs/Float32", md5="73fcbf46b49191e672908e50842a83d4", number=101)
     bench.settle()
     assert bench.bridge.ids == {}
+    bench.endpoints.subscribe.return_value = True
+    bench.declare(number=102)
+    bench.run_jobs()
+    bench.declare(message_type="std_msgs/Float32", md5="73fcbf46b49191e672908e50842a83d4", number=103)
+    (settle_first,) = bench.soon
+    settle_first()
+    assert bench.bridge.ids == {}, "the ROS master has not heard of the later one"
 
 
 def test_the_alias_of_velocities_goes_where_the_topic_is_something_else(bench):

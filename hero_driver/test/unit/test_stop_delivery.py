@@ -349,6 +349,8 @@ def test_a_deadline_that_has_come_is_not_waited_for():
     with Clock().is_the_drivers() as clock:
         robot = make_moving(clock, "pulses")
         assert robot.stops.stop_and_wait([robot.peer], clock.now_s, None) == [robot.peer]
+        robot.peer.link.closed = True  # nor is a robot that has left waited for
+        assert robot.stops.stop_and_wait([robot.peer], clock.now_s + 2.0, None) == [robot.peer]
 
 
 def test_the_end_reads_and_advances_until_all_rest_or_its_deadline():

@@ -34,7 +34,12 @@ def make_stops(monkeypatch):
     ros = {name: mock.create_autospec(getattr(rospy, name)) for name in ("Publisher", "Subscriber", "Service")}
     for name, value in ros.items():
         monkeypatch.setattr(interface.rospy, name, value)
-    monkeypatch.setattr(interface, "list_publishers", lambda topic, kind: frozenset({"earlier"}))
+
+    def list_publishers(topic, kind):
+        assert not ros["Subscriber"].called, "publishers that it learns of are there before rospy connects to them"
+        return frozenset({"earlier"})
+
+    monkeypatch.setattr(interface, "list_publishers", list_publishers)
     connections = {}
     monkeypatch.setattr(interface, "find_connection", lambda topic, message: connections.get(id(message)))
     loop = mock.create_autospec(EventLoop, instance=True)

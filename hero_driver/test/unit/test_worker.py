@@ -5,6 +5,7 @@ import threading
 
 import pytest
 
+from hero_driver.transport import call_queue
 from hero_driver.transport.call_queue import CallQueue, Worker
 
 DEADLINE_S = 60.0
@@ -99,11 +100,12 @@ def test_an_error_that_cannot_be_reported_does_not_end_the_thread():
     assert calls.done == [1]
 
 
-def test_a_closed_worker_forgets_what_waits_and_takes_nothing():
+def test_a_closed_worker_forgets_what_waits_and_takes_nothing(monkeypatch):
     calls = Calls()
     calls.hold()
     calls.submit(1)
-    CallQueue.close(calls.worker)
+    monkeypatch.setattr(call_queue, "SHUTDOWN_WAIT_S", 0.0)
+    calls.worker.close()
     assert not calls.submit(2, always=True)
     calls.gate.set()
     assert calls.is_ended()

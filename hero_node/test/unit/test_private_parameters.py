@@ -19,7 +19,7 @@ class Server:
 
 def test_what_the_command_line_gave_is_gone_at_the_end(monkeypatch):
     server = Server(monkeypatch, {"linear": 0.1, "launched": 1})
-    monkeypatch.setattr(sys, "argv", ["walk", "_linear:=0.1", "_missing:=2", "__name:=walk_2", "/launched:=/other"])
+    monkeypatch.setattr(sys, "argv", ["walk", "_missing:=2", "_linear:=0.1", "__name:=walk_2", "/launched:=/other"])
     private_parameters.delete_own_parameters()
     assert server.values == {"launched": 1}
 

@@ -99,7 +99,7 @@ def _is_generated(package: str, kind: str, name: str) -> bool:
     """Return whether package has code for a type, without importing: peers must not choose which modules run here."""
     try:
         spec = importlib.util.find_spec(package)
-    except (ImportError, ValueError):
+    except ValueError:  # a module that was made without one
         return False
     places = [] if spec is None else spec.submodule_search_locations or []
     return any(os.path.isfile(os.path.join(place, kind, f"_{name}.py")) for place in places)
