@@ -39,7 +39,7 @@ class FakeSdk:
 @pytest.fixture(name="ros")
 def fixture_ros(monkeypatch):
     """A ROS master with `published` topics, and the `callbacks` of what is subscribed."""
-    ros = SimpleNamespace(published=[], callbacks={}, warnings=[])
+    ros = SimpleNamespace(published=[], callbacks={}, warnings=[], last={})
 
     def ask(method, subgraph):
         assert (method, subgraph) == ("getPublishedTopics", "")
@@ -50,7 +50,13 @@ def fixture_ros(monkeypatch):
     def subscribe(topic, kind, receive, argument, queue_size, tcp_nodelay):
         assert kind is module.rospy.AnyMsg and topic not in ros.callbacks and queue_size > 1 and tcp_nodelay
         ros.callbacks[topic] = lambda message: receive(message, argument)
-        return SimpleNamespace(unregister=lambda: ros.callbacks.pop(topic))
+
+        def unregister():
+            take = ros.callbacks.pop(topic)
+            if topic in ros.last:  # rospy's thread is just calling
+                take(ros.last.pop(topic))
+
+        return SimpleNamespace(unregister=unregister)
 
     monkeypatch.setattr(module, "ask_master", ask)
     monkeypatch.setattr(module.rospy, "Subscriber", subscribe)
@@ -127,6 +133,21 @@ def test_a_client_that_comes_later_gets_what_is_latched(ros):
     topics.look()
     topics.look()
     assert sdk.logged == [("/a", b"kept"), ("/b", b"passing"), ("/a", b"kept")]
+
+
+def test_what_was_latched_before_a_topic_was_left_is_never_sent_again(ros):
+    sdk = FakeSdk()
+    topics = module.TopicServer(sdk)
+    ros.published, sdk.wanted = [["/a", "std_msgs/String"]], {"/a"}
+    topics.look()
+    ros.callbacks["/a"](make_message(b"first", latching="1"))
+    ros.last["/a"] = make_message(b"last", latching="1")
+    sdk.wanted = set()
+    topics.look()
+    sdk.wanted = {"/a"}
+    topics.on_subscribe(SimpleNamespace(id=2), SimpleNamespace(topic="/a"))
+    topics.look()
+    assert sdk.logged == [("/a", b"first"), ("/a", b"last")]
 
 
 @pytest.mark.option("foxglove")

@@ -17,7 +17,7 @@ from std_msgs.msg import ColorRGBA
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hero_client.ros import RobotTrack, StopStatus, find_lost_commands
+from hero_client.ros import RobotListener, RobotTrack, StopStatus, find_lost_commands
 from hero_monitor.fleet_feed import feed as feed_module
 from hero_monitor.fleet_feed import robot_feed as robot_feed_module
 from hero_monitor.fleet_feed.feed import (
@@ -47,7 +47,8 @@ NOW_S = 100.0
 class Newest:
     """A subscription whose newest message a test gives."""
 
-    def __init__(self, *arguments):
+    def __init__(self, topic, message_class):
+        self.topic, self.message_class = topic, message_class
         self.message, self.is_closed, self.has_publisher = None, False, True
 
     def take(self):
@@ -303,6 +304,9 @@ def test_the_outcome_of_a_stop_is_that_of_a_page_or_a_program(fleet):
     fleet.receive(moving, make_row(1), stopped=True)
     fleet.read()
     assert fleet.read()["stop"]["text"] == "NOT STOPPED: hero_0 moves"
+    for level, has_origin in (("info", True), ("error", False)):
+        fleet.status = StopStatus(level, "the outcome", True)
+        assert fleet.read()["stop"]["text"].startswith("the outcome (") == has_origin
     assert describe_stop_of_others("by x", ["hero_0", "hero_1"]) == ("error", "NOT STOPPED: hero_0, hero_1 move", False)
     assert describe_stop_of_others("by teleop since 18:43", []) == ("info", "stopped by teleop since 18:43", True)
     assert describe_stop_of_others(None, []) is None
@@ -449,7 +453,7 @@ def test_a_light_goes_out_and_a_goal_is_drawn_until_reached(monkeypatch):
     time = SimpleNamespace(now_s=NOW_S)
     monkeypatch.setattr(robot_feed_module, "time", SimpleNamespace(monotonic=lambda: time.now_s))
     monkeypatch.setattr(robot_feed_module, "NewestMessage", Newest)
-    listener = SimpleNamespace(read_newest=lambda: None, track=RobotTrack(), close=lambda: None)
+    listener = create_autospec(RobotListener, instance=True, track=RobotTrack())
     monkeypatch.setattr(robot_feed_module, "RobotListener", lambda namespace: listener)
     feed, placement = RobotFeed("/hero_0"), Placement("world")
     placement.receive_transform("world", "hero_0/odom", Pose(1.0, 0.0, 0.0))
@@ -458,6 +462,9 @@ def test_a_light_goes_out_and_a_goal_is_drawn_until_reached(monkeypatch):
         time.now_s += after_s
         feed.read_newest()
         assert feed.light == ("#ff0000" if is_lit else None)
+    assert listener.read_newest.call_count == 3
+    assert (feed._led.topic, feed._led.message_class) == ("/hero_0/led", ColorRGBA)
+    assert (feed._goals.topic, feed._goals.message_class) == ("/hero_0/goal", PoseStamped)
 
     def send(frame, x_m):
         goal = PoseStamped()

@@ -8,6 +8,7 @@ from unittest import mock
 import pytest
 import tornado.httputil
 import tornado.web
+from tornado.http1connection import HTTP1Connection
 
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import Access
@@ -32,7 +33,12 @@ def ask(
     handler_class, *arguments, headers=(), host="localhost", token=None, method="GET", body=b"", address="::1", **values
 ):
     """Return status, headers and text of the answer to a request."""
-    connection = mock.Mock()
+    connection, written = mock.create_autospec(HTTP1Connection, instance=True), []
+
+    def write_headers(start_line, answered, chunk=None):
+        written.append((start_line.code, answered.copy(), (chunk or b"").decode()))
+
+    connection.write_headers.side_effect = write_headers
     all_headers = tornado.httputil.HTTPHeaders({"Host": host, **dict(headers)})
     request = tornado.httputil.HTTPServerRequest(
         method=method, uri="/", host=host, headers=all_headers, body=body, connection=connection
@@ -45,8 +51,7 @@ def ask(
         await handler._execute([], *arguments)
 
     asyncio.run(execute())
-    (start_line, answered, text), _ = connection.write_headers.call_args
-    return start_line.code, answered, (text or b"").decode()
+    return written[-1]
 
 
 def ask_for_socket(pages=0, headers=OURS, **options):
@@ -79,6 +84,7 @@ def test_every_answer_keeps_foreign_content_out():
         assert headers["Content-Security-Policy"].startswith("default-src 'none'; script-src 'self';")
         assert headers["X-Frame-Options"] == "DENY"
         assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Referrer-Policy"] == "no-referrer" and headers["Cross-Origin-Resource-Policy"] == "same-origin"
         assert headers["Cache-Control"] == "no-store"
         assert "Server" not in headers
 
@@ -96,7 +102,8 @@ def test_files_are_sent_with_their_types_and_no_others():
 
 def test_the_picture_is_for_those_who_are_logged_in():
     actions = mock.Mock(find_picture=lambda: b"jpeg")
-    assert ask(PictureHandler, actions=actions)[::2] == (200, "jpeg")
+    status, headers, text = ask(PictureHandler, actions=actions)
+    assert (status, headers["Content-Type"], text) == (200, "image/jpeg", "jpeg")
     assert ask(PictureHandler, actions=actions, token=TOKEN)[0] == 403
     actions.find_picture = bytes
     assert ask(PictureHandler, actions=actions)[0] == 404

@@ -67,7 +67,7 @@ def make_arena():
 
 
 def make_origins(robot_ids):
-    transforms = []
+    transforms = [TransformStamped(child_frame_id="camera_optical")]  # of another program
     for robot_id in robot_ids:
         transform = TransformStamped(child_frame_id="hero_%d/odom" % robot_id)
         transform.header.frame_id = "world"

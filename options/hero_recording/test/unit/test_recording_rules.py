@@ -99,7 +99,7 @@ def test_origins_count_once_and_walls_lie_as_their_markers():
     seen = Observations({1})
     transforms = synthetic_bag.make_origins((1, 2))
     for time_s, x_m in ((1.0, 1.0), (2.0, 1.0), (3.0, 4.0), (4.0, math.nan)):
-        transforms.transforms[0].transform.translation.x = x_m
+        transforms.transforms[1].transform.translation.x = x_m
         seen.receive(Message("/tf_static", "tf2_msgs/TFMessage", transforms, time_s))
     assert seen.robots[1].origins == [(1.0, 1.0, 0.0, 0.0), (3.0, 4.0, 0.0, 0.0)] and list(seen.robots) == [1]
     wall, post = Marker(type=Marker.CUBE), Marker(type=Marker.CYLINDER)

@@ -67,6 +67,15 @@ def test_a_free_port_passes_and_one_of_another_program_is_named():
     assert any("port:=" in line for line in finding.remedy)
 
 
+def test_the_suites_own_driver_is_known_behind_its_interpreter(monkeypatch):
+    words = b"/usr/bin/python3\0/work/devel/lib/hero_driver/hero_driver\0__name:=hero_driver\0"
+    read_bytes = create_autospec(network.Path.read_bytes, return_value=words)
+    monkeypatch.setattr(network.Path, "read_bytes", read_bytes)
+    finding = network.check_port(11411, {"0.0.0.0": 7})
+    assert finding == (OK, "the driver listens on 0.0.0.0:11411 (process 7)", ())
+    read_bytes.assert_called_once_with(network.Path("/proc/7/cmdline"))
+
+
 def test_a_port_held_on_ipv6_is_seen_too():
     with socket.socket(socket.AF_INET6) as holder:
         holder.bind(("::1", 0))
