@@ -4,6 +4,7 @@ import errno
 import math
 import os
 import threading
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -164,6 +165,28 @@ def test_a_file_that_cannot_be_written_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(SettingsError, match="cannot be"):
         settings.update(str(tmp_path / "file" / "camera.yaml"), {})
+
+
+def test_what_another_program_writes_before_the_lock_is_taken_stays(path, monkeypatch):
+    lock_file = settings.lock_file
+
+    @contextmanager
+    def lock_after_another(locked):
+        monkeypatch.setattr(settings, "lock_file", lock_file)
+        settings.update(path, {"decimate": 4.0})
+        with lock_file(locked):
+            yield
+
+    monkeypatch.setattr(settings, "lock_file", lock_after_another)
+    settings.update(path, {"delay_s": 0.07})
+    assert read(path) == {"decimate": 4.0, "delay_s": 0.07}
+
+
+def test_a_file_that_holds_no_names_and_values_is_not_written_over(path):
+    write(path, "- 36h11\n")
+    with pytest.raises(SettingsError, match="must hold names and values, such as family: 36h11"):
+        settings.update(path, {"delay_s": 0.07})
+    assert read(path) == ["36h11"]
 
 
 @pytest.mark.slow

@@ -251,7 +251,7 @@ class TagSearch:
         count = min(int(self._due), len(self._tiles))
         self._due -= int(self._due)
         first, total = self._next_tile, len(self._tiles) * len(self._sweeps)
-        self._next_tile = (first + count) % total
+        self._next_tile = first + count
         turns = [divmod((first + index) % total, len(self._tiles)) for index in range(count)]
         return [(self._sweeps[sweep], self._tiles[tile]) for sweep, tile in turns]
 
