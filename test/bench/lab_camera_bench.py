@@ -34,6 +34,7 @@ from hero_localization.calibration.lens_calibration import BoardView, calibrate_
 from hero_localization.calibration.print_fit import refine_corners
 from hero_localization.camera.camera_model import Camera
 from hero_localization.errors import CalibrationError
+from hero_localization.filter.pose_filter import make_covariance
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState, SwarmLocalizer
 from hero_localization.prints.tag_images import DEFAULT_SIZE_M
@@ -294,7 +295,8 @@ class Lab:
         sightings = self.tracker.take(tags, self.now_s, 0, expected)
         for robot_id, seen in sightings.robots.items():
             if not self.tracker.is_moved:
-                measurement = StampedPose(self.now_s, seen.pose, seen.covariance)
+                covariance = make_covariance(seen.position_sd_m, seen.yaw_sd_rad)
+                measurement = StampedPose(self.now_s, seen.pose, covariance)
                 self.lines += self.localizer.add_measurement(robot_id, measurement, self.now_s)
         if self.tracker.is_moved:
             self.localizer.distrust(self.now_s, list(sightings.robots), self.now_s)

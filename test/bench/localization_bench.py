@@ -22,6 +22,7 @@ from hero_localization.calibration.arena_calibration import average_tags, calibr
 from hero_localization.calibration.lens_calibration import BoardView, calibrate_lens
 from hero_localization.calibration.robot_calibration import CALIBRATION_DRIVE, calibrate_robot
 from hero_localization.camera.camera_model import Camera, Intrinsics
+from hero_localization.filter.pose_filter import make_covariance
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_localization.prints.boards import list_board_corners
@@ -304,7 +305,8 @@ class Localization:
         before = self._list_estimates(now_s)
         lines: Dict[int, List[str]] = {}
         for robot, sighting in locate(self._camera, tags, self._layout).robots.items():
-            measurement = StampedPose(taken_s - self._delay_s, sighting.pose, sighting.covariance)
+            covariance = make_covariance(sighting.position_sd_m, sighting.yaw_sd_rad)
+            measurement = StampedPose(taken_s - self._delay_s, sighting.pose, covariance)
             lines[robot] = self._localizer.add_measurement(robot, measurement, now_s)
         for robot, estimate in self._list_estimates(now_s).items():
             if robot in before and not lines.get(robot):

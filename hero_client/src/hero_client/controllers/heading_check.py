@@ -4,7 +4,7 @@ import math
 from collections import deque
 from typing import Deque, Optional, Tuple
 
-from hero_node import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node import Pose, invert_pose, measure_distance, transform_pose, wrap_angle
 
 MIN_DRIVE_M = 0.04
 """Poses are a millimeter off: over this distance, a direction is right to 2 degrees."""
@@ -30,11 +30,11 @@ class HeadingCheck:
         """Take a measured pose, and that by odometry at the same time, each in any frame."""
         if self._start is not None:
             start_seen, start = self._start
-            drive = transform_pose(invert_pose(start), odometry)
-            if abs(wrap_angle(drive.yaw_rad)) <= MAX_TURN_RAD:
-                driven_m = math.hypot(drive.x_m, drive.y_m)
+            if abs(wrap_angle(odometry.yaw_rad - start.yaw_rad)) <= MAX_TURN_RAD:
+                driven_m = measure_distance(start, odometry)
                 if driven_m < MIN_DRIVE_M:
                     return
+                drive = transform_pose(invert_pose(start), odometry)
                 moved = transform_pose(invert_pose(start_seen), seen)
                 if math.hypot(moved.x_m, moved.y_m) >= MIN_SHARE * driven_m:
                     # Of a heading that exceeds the true one, the same drive leads to the right.

@@ -47,7 +47,7 @@ class Shifted:
             self.frames += 1
             robots = self.tracker.take(tags, self.frames / RATE_HZ, self.frames).robots
         errors_m = [math.dist(robots[index].pose[:2], place_m) for index, place_m in enumerate(ROBOTS_M)]
-        return math.sqrt(np.square(errors_m).mean()), math.sqrt(robots[0].covariance[0, 0])
+        return math.sqrt(np.square(errors_m).mean()), robots[0].position_sd_m
 
     @property
     def texts(self):

@@ -134,8 +134,9 @@ def test_the_process_answers_with_what_it_finds():
     os.close(memory)
     ready, *answers = connection.sent
     assert ready is None
-    for ((tag_id, corners),) in answers:
-        assert tag_id == 5 and corners.mean(axis=0) == pytest.approx((119.5, 219.5), abs=0.5)
+    for tag_ids, corners in nonempty(answers):
+        assert tag_ids == [5] and corners.shape == (1, 4, 2)
+        assert corners[0].mean(axis=0) == pytest.approx((119.5, 219.5), abs=0.5)
     assert len(answers) == 2
 
 

@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 from test_detectors import photograph
 
+from hero_localization.tracking.tag_pose import TagCorners
 from hero_localization.tracking.tracker import ImageQuality
+
+SQUARE = np.array(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)))
 
 
 def list_texts(noise=0.0, **conditions):
     quality, random = ImageQuality(), np.random.RandomState(0)
     image = np.hstack([photograph(index, seed=index, **conditions) for index in range(5)])
     side_px = image.shape[0]
-    tags = [(np.array(((index + 0.5) * side_px, side_px / 2.0)), 26.0) for index in range(5)]
+    centers = [((index + 0.5) * side_px, side_px / 2.0) for index in range(5)]
+    tags = [TagCorners(index, 13.0 * SQUARE + center) for index, center in enumerate(centers)]
     quality.measure(np.clip(image + random.normal(0.0, noise, image.shape), 0, 255).astype(np.uint8), tags)
     return [text for text, _ in quality.list_problems(26.0)]
 

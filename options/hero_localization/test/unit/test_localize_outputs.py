@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import LocalizedRobot, RobotState
 from hero_localization.nodes.outputs import Outputs
-from hero_node import Pose, yaw_of
+from hero_node import Pose, invert_pose, transform_pose, yaw_of
 
 NOW = rospy.Time(50)
 
@@ -51,20 +51,23 @@ def make_bench(monkeypatch):
     return Bench(monkeypatch)
 
 
+ORIGIN = Pose(0.1, 0.2, -0.3)
+
+
 def make_robot(robot_id, stamp_s=40.0, **others):
     estimate = StampedPose(stamp_s, Pose(robot_id, 1.0, 0.5), np.diag((4e-6, 4e-6, 9e-6)))
-    fields = {"state": RobotState.TRACKED, "estimate": estimate, "odom_origin": Pose(0.1, 0.2, -0.3), "problem": ""}
+    odometry = transform_pose(invert_pose(ORIGIN), estimate.pose)
+    fields = {"state": RobotState.TRACKED, "estimate": estimate, "odometry": odometry, "problem": ""}
     return LocalizedRobot(robot_id, **{**fields, **others})
 
 
 def test_robots_without_a_pose_hide_none_of_the_others(bench):
-    unknown = make_robot(2, state=RobotState.UNKNOWN, estimate=None, odom_origin=None)
-    far = make_robot(5, odom_origin=None)
-    assert bench.publish(unknown, far, make_robot(9)) == ["hero_9/odom"]
+    unknown = make_robot(2, state=RobotState.UNKNOWN, estimate=None)
+    assert bench.publish(unknown, make_robot(9)) == ["hero_9/odom"]
     (report,) = bench.sent["~poses"]
     assert (report.header.frame_id, report.header.stamp) == ("map", NOW)
-    assert [robot.id for robot in report.robots] == [2, 5, 9]
-    first, _, last = report.robots
+    assert [robot.id for robot in report.robots] == [2, 9]
+    first, last = report.robots
     assert first.state == RobotState.UNKNOWN and math.isnan(first.x) and math.isnan(first.position_sd)
     assert (last.x, last.y, last.yaw) == (9.0, 1.0, 0.5) and last.stamp == rospy.Time(40)
     assert (last.position_sd, last.yaw_sd) == pytest.approx((0.002, 0.003))
@@ -75,11 +78,18 @@ def test_each_reading_of_odometry_places_its_frame_once(bench):
     (transform, _) = bench.sent["/tf"][0].transforms
     assert (transform.header.frame_id, transform.header.stamp) == ("map", rospy.Time(40))
     place = transform.transform
-    assert (place.translation.x, place.translation.y, yaw_of(place.rotation)) == pytest.approx((0.1, 0.2, -0.3))
+    assert (place.translation.x, place.translation.y, yaw_of(place.rotation)) == pytest.approx(ORIGIN)
     assert bench.publish(make_robot(2), make_robot(5, 40.1)) == ["hero_5/odom"]
     assert len(bench.sent["~poses"]) == 1 and bench.sent["/hero_2/pose"] == []
     assert bench.publish(make_robot(2), make_robot(5, 40.1)) == [] and bench.sent["/tf"] == []
     assert bench.publish(make_robot(2, 39.0)) == ["hero_2/odom"], "time went back"
+
+
+def test_frames_of_odometry_are_placed_for_those_who_listen(bench):
+    bench.unheard = {"/tf"}
+    assert bench.publish(make_robot(2)) == [] and len(bench.sent["/hero_2/pose"]) == 1
+    bench.unheard = set()
+    assert bench.publish(make_robot(2, 40.1)) == ["hero_2/odom"]
 
 
 def test_poses_with_their_covariance_go_to_those_who_listen(bench):

@@ -9,7 +9,7 @@ import pytest
 from hero_client.values import interpolate_pose
 from hero_localization.filter.pose_filter import Outcome, PoseFilter
 from hero_localization.filter.pose_hypothesis import REPLAYED_S, StampedPose
-from hero_node import Pose, invert_pose, transform_pose, wrap_angle
+from hero_node import Pose, find_frame, invert_pose, transform_pose, wrap_angle
 from hero_test.nonempty import maybe_empty, nonempty
 
 ODOMETRY_S = 0.034
@@ -212,7 +212,7 @@ def test_a_restart_of_the_robot_does_not_move_it():
     pose_filter.add_odometry(end_s + 2.0 * ODOMETRY_S, Pose(0.005, 0.0, 0.0))
     moved = pose_filter.estimate().pose
     assert math.hypot(moved.x_m - before.x_m, moved.y_m - before.y_m) == pytest.approx(0.005)
-    np.testing.assert_allclose(pose_filter.find_odom_origin(moved), before, atol=1e-9)
+    np.testing.assert_allclose(find_frame(moved, pose_filter.odometry.raw_pose), before, atol=1e-9)
 
 
 def test_a_robot_unseen_for_minutes_goes_on_by_its_odometry():
@@ -421,10 +421,3 @@ def test_poses_come_late_by_a_second_at_most():
             pose_filter.add_odometry(1.0 + 0.1 * index, ZERO)
             assert pose_filter.add_measurement(StampedPose(1.0 + 0.1 * index, ZERO, COVARIANCE)) is Outcome.USED
         assert pose_filter.add_measurement(StampedPose(4.0 - late_s - 0.001, ZERO, COVARIANCE)) is outcome, late_s
-
-
-def test_the_map_frame_of_odometry_turns_by_less_than_half_a_circle():
-    pose_filter = start_filter(Pose(0.0, 0.0, 3.0))
-    pose_filter.add_odometry(1.1, Pose(0.0, 0.0, -1.0))
-    assert pose_filter.find_odom_origin(pose_filter.pose()).yaw_rad == pytest.approx(3.0)
-    assert pose_filter.find_odom_origin(Pose(0.0, 0.0, 3.0)).yaw_rad == pytest.approx(4.0 - math.tau)

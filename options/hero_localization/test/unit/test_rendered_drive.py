@@ -13,6 +13,7 @@ from std_msgs.msg import Header
 
 from hero_localization.calibration.arena_calibration import average_tags, calibrate_arena
 from hero_localization.camera.frame_source import Frame
+from hero_localization.filter.pose_filter import make_covariance
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_localization.nodes import calibrate_camera, calibrate_robots
@@ -124,7 +125,7 @@ def test_a_robot_that_changes_cameras_keeps_one_continuous_pose(tmp_path, gap_m)
         sightings = [camera.look(scene) for camera in cameras]
         for seen in sightings:
             if seen is not None:
-                measured = StampedPose(scene.taken_s, seen.pose, seen.covariance)
+                measured = StampedPose(scene.taken_s, seen.pose, make_covariance(seen.position_sd_m, seen.yaw_sd_rad))
                 lines += localizer.add_measurement(0, measured, scene.taken_s)
         lines += localizer.find_lost(scene.taken_s)
         seen_by.append(tuple(seen is not None for seen in sightings))

@@ -23,7 +23,7 @@ def test_a_robot_without_new_odometry_keeps_no_other_from_tf(monkeypatch):
     publishers = {}
 
     def advertise(topic, kind, queue_size):
-        publishers[topic] = Mock(**{"get_num_connections.return_value": 0})
+        publishers[topic] = Mock(**{"get_num_connections.return_value": int(topic == "/tf")})
         return publishers[topic]
 
     monkeypatch.setattr(rospy, "Publisher", create_autospec(rospy.Publisher, side_effect=advertise))

@@ -10,7 +10,7 @@ from hero_localization.filter.odometry_history import OdometryHistory
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.source_clocks import SourceClocks
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
-from hero_node import Pose
+from hero_node import Pose, find_frame
 
 COVARIANCE = np.diag((0.0007**2, 0.0007**2, 0.003**2))
 STEP_S, ARRIVES_S = 0.01, 0.07
@@ -161,7 +161,8 @@ def test_wheels_that_slip_in_place_are_no_clock():
 def test_one_clock_is_kept_for_all_topics_of_a_node():
     clocks = SourceClocks(True)
     for robot_id in range(50):
-        clocks.correct(StampedPose(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE, "/hero_%d/pose (/vrpn)" % robot_id), 1.0)
+        measurement = StampedPose(1.0, Pose(0.0, 0.0, 0.0), COVARIANCE, "/hero_%d/pose (/vrpn)" % robot_id)
+        clocks.correct(robot_id, measurement, OdometryHistory(), 1.0)
     assert len(clocks._sources) == 1
 
 
@@ -182,8 +183,7 @@ def add_drive(clocks, begin_s, duration_s, delay_s, robots):
         odometry.add(begin_s + time_s, pose)
         measurement = StampedPose(begin_s + time_s + delay_s, pose, COVARIANCE, TRACK)
         for robot_id in range(robots):
-            clocks.add(robot_id, measurement, odometry)
-        clocks.correct(measurement, begin_s + time_s)
+            clocks.correct(robot_id, measurement, odometry, begin_s + time_s)
 
 
 @pytest.mark.parametrize(("robots", "set_clock"), [(1, lambda clocks: None), (20, SourceClocks.forget_poses)])
@@ -199,7 +199,7 @@ def test_poses_from_before_a_clock_was_set_back_are_not_waited_for(robots, set_c
 
 @pytest.mark.slow
 def test_poses_at_the_present_are_not_behind_the_robot():
-    errors_m = {False: [], True: []}
+    errors_m, origins = {False: [], True: []}, []
     drive = Drive([0.0])
     drive.run(3.0)
     for linear_m_s, angular_rad_s in ((0.2, 0.0), (0.2, 1.5), (-0.15, 1.0), (0.0, 2.0)):
@@ -214,8 +214,10 @@ def test_poses_at_the_present_are_not_behind_the_robot():
                     pose = drive._move(pose, speed)
                 off_m.append(math.dist(robot.estimate.pose[:2], pose[:2]))
                 assert is_present is (robot.estimate.stamp_s == drive.now_s + 0.03)
+                origins.append(find_frame(robot.estimate.pose, robot.odometry))
     behind_m, present_m = (np.sqrt(np.mean(np.square(errors_m[key]))) for key in (False, True))
     assert behind_m > 0.003 and present_m < 0.0015
+    assert np.ravel(origins[::2]) == pytest.approx(np.ravel(origins[1::2])), "odometry's frame stays where it is"
 
 
 def test_a_robot_that_is_silent_is_not_moved_on():

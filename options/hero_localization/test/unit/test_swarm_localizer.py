@@ -1,12 +1,14 @@
 """All robots together: what is known of each, and what people are told."""
 
+from unittest import mock
+
 import numpy as np
 import pytest
 
 from hero_localization.filter.pose_hypothesis import StampedPose
-from hero_localization.filter.swarm_localizer import NAMED_S, RobotState, SwarmLocalizer
+from hero_localization.filter.swarm_localizer import LOOK_PERIOD_S, LOST_S, NAMED_S, RobotState, SwarmLocalizer
 from hero_msgs.msg import RobotPose
-from hero_node import Pose
+from hero_node import Pose, find_frame
 from hero_test.nonempty import nonempty
 
 COVARIANCE = np.diag((1e-6, 1e-6, 1e-4))
@@ -39,6 +41,22 @@ class Swarm:
         return {robot.robot_id: robot for robot in self.localizer.list_robots(self.now_s)}[robot_id]
 
 
+def find_origin(robot):
+    return find_frame(robot.estimate.pose, robot.odometry)
+
+
+def test_robots_are_looked_for_ten_times_a_second_whatever_the_rate(monkeypatch):
+    swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)})
+    look = mock.create_autospec(swarm.localizer.list_source_problems, return_value={})
+    monkeypatch.setattr(swarm.localizer, "list_source_problems", look)
+    measured_s = swarm.now_s
+    lines = {index: swarm.localizer.find_lost(measured_s + 0.005 * index) for index in range(1, 260)}
+    (lost_s,) = (0.005 * index for index, said in lines.items() if said)
+    assert LOST_S < lost_s <= LOST_S + LOOK_PERIOD_S
+    assert look.call_count in (13, 14)
+    assert swarm.localizer.find_lost(measured_s) and look.call_count in (14, 15), "time went back"
+
+
 def test_a_lost_robot_is_not_found_by_poses_that_come_a_second_late():
     swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}).run(2.0)
     for late_s, state, count in ((1.1, RobotState.LOST, 2), (0.9, RobotState.TRACKED, 3)):
@@ -53,7 +71,7 @@ def test_robots_are_found_once_and_then_tracked_silently():
     swarm = Swarm(0, 1).run(1.0, {0: (1.0, 2.0, 0.0)}, robots=(0, 1))
     assert swarm.lines == ["hero_0 found at (1.000, 2.000) m, 0 degrees"]
     assert swarm[0].state is RobotState.TRACKED and swarm[0].problem == ""
-    assert swarm[0].odom_origin == pytest.approx((1.0, 2.0, 0.0))
+    assert find_origin(swarm[0]) == pytest.approx((1.0, 2.0, 0.0))
     assert swarm[1].state is RobotState.UNKNOWN and swarm[1].estimate is None
     assert swarm[1].problem == "its pose was never measured: is its tag in view?"
 
@@ -118,7 +136,7 @@ def test_a_tag_that_is_on_upside_down_is_named_once_the_robot_drives():
 def test_a_restart_is_said_and_does_not_move_the_robot():
     swarm = Swarm(0).run(1.0, {0: (1.0, 2.0, 0.0)}, (0.5, 0.0, 0.0)).run(0.2, None, (0.0, 0.0, 0.0))
     assert swarm[0].estimate.pose == pytest.approx((1.0, 2.0, 0.0))
-    assert swarm[0].odom_origin == pytest.approx((1.0, 2.0, 0.0))
+    assert find_origin(swarm[0]) == pytest.approx((1.0, 2.0, 0.0))
     assert swarm.lines[1:] == ["hero_0: its odometry was set or it restarted; its place in the map stays"]
 
 
@@ -282,7 +300,7 @@ def test_robots_are_listed_by_id_each_with_the_origin_of_its_odometry():
     assert [robot.robot_id for robot in robots] == [2, 5, 9]
     cos, sin = np.cos(0.3), np.sin(0.3)
     expected = (1.0 - 0.3 * cos + 0.1 * sin, 2.0 - 0.3 * sin - 0.1 * cos, 0.3)
-    assert robots[0].odom_origin == pytest.approx(expected) and robots[1].odom_origin is None
+    assert find_origin(robots[0]) == pytest.approx(expected) and robots[1].estimate is None
     swarm.localizer.add_robots([2])
     assert swarm[2].state is RobotState.TRACKED, "one that is expected already goes on"
 

@@ -60,24 +60,25 @@ def test_robots_pose_is_that_of_its_center_not_of_the_tag(yaw_rad):
 
 
 @pytest.mark.slow
-def test_covariance_holds_what_noise_of_the_corners_does():
+def test_standard_deviations_hold_what_noise_of_the_corners_does():
     random, pose = np.random.RandomState(0), Pose(0.9, -0.3, 1.0)
     tags = [see(1, pose, noise_px=random.normal(0.0, 0.1, (4, 2))) for _ in range(2000)]
     found = fit_squares(CAMERA, tags, 0.076)
     spread = np.std([fit.pose for fit in found], axis=0)
-    systematic = np.array((SYSTEMATIC_M, SYSTEMATIC_M, SYSTEMATIC_RAD))
-    modeled = np.sqrt(np.diagonal(found[0].covariance) - systematic**2)
+    noise_m2 = found[0].position_sd_m ** 2 - SYSTEMATIC_M**2
+    modeled = np.sqrt((noise_m2, noise_m2, found[0].yaw_sd_rad ** 2 - SYSTEMATIC_RAD**2))
     assert spread == pytest.approx(modeled, rel=0.2)
 
 
-def test_tag_off_the_robots_center_makes_its_place_depend_on_the_heading():
+def test_tag_off_the_robots_center_makes_its_place_less_certain():
     near, far = (
-        locate(CAMERA, [see(1, Pose(0.0, 0.0, 0.0))], TagLayout(mounts={1: Pose(x_m, 0.0, 0.0)})).robots[1].covariance
-        for x_m in (0.0, 0.1)
+        locate(CAMERA, [see(1, Pose(0.0, 0.0, 0.0))], TagLayout(mounts={1: mount})).robots[1]
+        for mount in (Pose(0.0, 0.0, 0.0), Pose(0.06, -0.08, 2.0))
     )
-    assert far[1, 1] - near[1, 1] == pytest.approx(0.1**2 * near[2, 2])
-    assert far[1, 2] == pytest.approx(-0.1 * near[2, 2])
-    assert (np.linalg.eigvalsh(far) > 0.0).all()
+    assert far.yaw_sd_rad == near.yaw_sd_rad > 0.0
+    # In x and y together by as much as the heading moves the center, 0.1 m from the tag.
+    both_m2 = 2.0 * (far.position_sd_m**2 - near.position_sd_m**2)
+    assert both_m2 == pytest.approx((0.1 * near.yaw_sd_rad) ** 2)
 
 
 def test_ids_are_looked_up_among_references_objects_and_robots():
@@ -200,7 +201,7 @@ def test_uncertainty_is_that_of_the_corners_and_what_calibration_leaves():
     side_px = np.linalg.norm(tag.corners - np.roll(tag.corners, 1, axis=0), axis=1).mean()
     corner_m = 0.1 * 0.04 / side_px
     place_m2, yaw_rad2 = corner_m**2 / 4.0 + 0.0007**2, (corner_m / 0.04) ** 2 / 2.0 + 0.003**2
-    np.testing.assert_allclose(found.covariance, np.diag((place_m2, place_m2, yaw_rad2)))
+    assert (found.position_sd_m, found.yaw_sd_rad) == pytest.approx((math.sqrt(place_m2), math.sqrt(yaw_rad2)))
 
 
 def test_the_smallest_side_is_that_of_the_tag_seen_from_farthest():

@@ -75,7 +75,7 @@ def test_a_moved_camera_is_told_from_a_moved_reference_tag():
 @pytest.mark.parametrize(("shade", "word"), [(10, "dark"), (250, "bright"), (128, None)])
 def test_dark_and_bright_pictures_are_named(shade, word):
     tracker = make_tracker()
-    tracker.measure_shade(np.full((48, 64), shade, np.uint8))
+    tracker.quality.measure(np.full((48, 64), shade, np.uint8), [])
     assert [word in problem.text for problem in tracker.list_problems()] == ([True] if word else [])
 
 
@@ -150,7 +150,7 @@ def test_reference_tags_that_are_not_seen_for_long_are_named(seen, name, text):
 @pytest.mark.parametrize(("shade", "count"), [(34, 1), (35, 0), (36, 0), (225, 0), (226, 1)])
 def test_images_may_be_as_dark_and_bright_as_the_limits(shade, count):
     tracker = make_tracker()
-    tracker.measure_shade(np.full((48, 64), shade, np.uint8))
+    tracker.quality.measure(np.full((48, 64), shade, np.uint8), [])
     assert len(tracker.list_problems()) == count
 
 

@@ -52,16 +52,15 @@ class OdometryHistory:
     """Odometry increment of a robot.
 
     jumps: how often the robot's odometry jumped, by a restart or because a program set it.
-    raw_pose: the newest reading itself, in hero_N/odom; None before the first.
+    raw_pose: the newest reading itself, in hero_N/odom.
     """
 
     def __init__(self) -> None:
         self.jumps = 0
-        self.raw_pose: Optional[Pose] = None
         self._readings: StampedHistory[Odometry] = StampedHistory(KEPT_S, _interpolate)
         self._found: Tuple[float, Optional[Odometry]] = (math.nan, None)
         """The last that was asked for: all that a measured pose goes through asks for the same."""
-        self._offset = Pose(0.0, 0.0, 0.0)
+        self.raw_pose = self._offset = Pose(0.0, 0.0, 0.0)
         self._counted = self._offset
         """Up to where the length of the path is counted."""
 

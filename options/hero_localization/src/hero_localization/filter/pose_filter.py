@@ -14,7 +14,7 @@ from typing import List, Optional, Tuple
 
 import numpy as np
 
-from hero_node import Pose, find_frame, measure_distance, wrap_angle
+from hero_node import Pose, measure_distance, wrap_angle
 
 from .odometry_history import KEPT_S, OdometryHistory
 from .pose_hypothesis import Hypothesis, StampedPose
@@ -117,7 +117,7 @@ class PoseFilter:
             self._main = self._rival
         self._rival = None
         # Of a motion capture system that claims less, no more than it claims.
-        told = np.diagonal(measurement.covariance)
+        told = measurement.covariance.diagonal()
         self._systematic = told if measurement.is_systematic else np.minimum(SYSTEMATIC, told)
         return outcome
 
@@ -152,15 +152,11 @@ class PoseFilter:
         estimate.covariance.ravel()[::4] += self._systematic
         return estimate
 
-    def find_odom_origin(self, pose: Pose) -> Pose:
-        """Return where the frame hero_N/odom is in `map` if the robot is at pose, that of estimate()."""
-        assert self.odometry.raw_pose is not None, "no pose is measured before the first reading"
-        return find_frame(pose, self.odometry.raw_pose)
-
 
 def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
     """Return the covariance of x, y and yaw, (3, 3), of independent errors; position_sd_m: in x and y each."""
-    return np.diag((position_sd_m**2, position_sd_m**2, yaw_sd_rad**2))
+    position_m2 = position_sd_m**2
+    return np.array(((position_m2, 0.0, 0.0), (0.0, position_m2, 0.0), (0.0, 0.0, yaw_sd_rad**2)))
 
 
 def is_near(one: Pose, other: Pose) -> bool:

@@ -58,11 +58,13 @@ class PoseSources:
     def note(self, measurement: StampedPose, outcome: Outcome) -> Optional[Conflict]:
         """Note what became of a pose of a source; return the conflict that this source has with another one."""
         conflict = self.find_conflict() if outcome is Outcome.MOVED else None
-        source = self._sources.setdefault(measurement.source, _Source(measurement.source))
+        source = self._sources.get(measurement.source) or _Source(measurement.source)
         source.measured_s = max(source.measured_s, measurement.stamp_s)
-        oldest_s = max(other.measured_s for other in self._sources.values()) - KEPT_S
-        recent = {name: other for name, other in self._sources.items() if other.measured_s > oldest_s}
-        self._sources = {**recent, source.name: source}
+        self._sources[source.name] = source
+        if len(self._sources) > 1:
+            oldest_s = max(other.measured_s for other in self._sources.values()) - KEPT_S
+            recent = {name: other for name, other in self._sources.items() if other.measured_s > oldest_s}
+            self._sources = {**recent, source.name: source}
         if outcome is not Outcome.OUTLIER:
             for other in [source] if outcome is Outcome.USED else self._sources.values():
                 other.outliers = 0  # of all, where the estimate is another one

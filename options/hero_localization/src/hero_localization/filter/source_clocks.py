@@ -89,9 +89,13 @@ class SourceClocks:
                 off[source.name] = text + ": run chrony on all machines, or set its delay_s"
         return off
 
-    def correct(self, measurement: StampedPose, now_s: float) -> StampedPose:
-        """Return a measured pose with the time at which it was true, as far as that is known."""
+    def correct(self, robot_id: int, measurement: StampedPose, odometry: OdometryHistory, now_s: float) -> StampedPose:
+        """Take a measured pose with its own stamp; return it with the time at which it was true, as far as known.
+
+        odometry: that of its robot.
+        """
         index = self._find_source(measurement.node)
+        self._add(robot_id, index, measurement, odometry)
         source, delay_s = self._sources[index], self._delays_s.item(index)
         if SURE_SDS * math.sqrt(self._covariance.item(index, index)) < max(abs(delay_s), NAMED_S):
             was_off, source.is_off = source.is_off, abs(delay_s) > (SETTLED_S if source.is_off else NAMED_S)
@@ -123,10 +127,8 @@ class SourceClocks:
         self._poses.clear()
         self._due_s.clear()
 
-    def add(self, robot_id: int, measurement: StampedPose, odometry: OdometryHistory) -> None:
-        """Take a measured pose with its own stamp; odometry: that of its robot."""
-        source, stamp_s = self._find_source(measurement.node), measurement.stamp_s
-        key = (robot_id, source)
+    def _add(self, robot_id: int, source: int, measurement: StampedPose, odometry: OdometryHistory) -> None:
+        key, stamp_s = (robot_id, source), measurement.stamp_s
         if stamp_s < self._due_s.get(key, -math.inf):
             return
         poses = self._poses.setdefault(key, [])

@@ -5,7 +5,7 @@ now_s and stamps are ROS time. now_s is that of this computer; other computers' 
 
 import enum
 import math
-from typing import Dict, Iterable, List, NamedTuple, Optional
+from typing import Dict, Iterable, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -44,6 +44,9 @@ BACK_S = 0.1
 MAX_AHEAD_S = 0.15
 """Time for which poses are extrapolated: speeds change, and a robot that is silent for longer may have stopped."""
 
+LOOK_PERIOD_S = 0.1
+"""Time between two looks for robots that are lost: images may come 60 times a second."""
+
 NAMED_S = 30.0
 """A cause is named once while it lasts; after this long without it, again."""
 
@@ -67,8 +70,8 @@ class LocalizedRobot(NamedTuple):
     robot_id: int
     state: RobotState
     estimate: Optional[StampedPose]
-    odom_origin: Optional[Pose]
-    """Pose of the frame hero_N/odom in map."""
+    odometry: Pose
+    """Pose in the frame hero_N/odom at the time of the estimate."""
     problem: str
 
 
@@ -102,7 +105,7 @@ class SwarmLocalizer:
     def __init__(self, is_correcting_clocks: bool = True) -> None:
         self.clocks, self.heights = SourceClocks(is_correcting_clocks), TagHeights()
         self._robots: Dict[int, _Robot] = {}
-        self._now_s = -math.inf
+        self._now_s = self._looked_s = -math.inf
         self._named_s: Dict[str, float] = {}
 
     def add_robots(self, robot_ids: Iterable[int]) -> None:
@@ -148,8 +151,7 @@ class SwarmLocalizer:
             robot.clock_offset_s = offset_s
             text = "poses from %s come with stamps %.1f s ahead, and are not used: do the clocks agree?"
             return lines + self._name(measurement.source, text % (measurement.source, offset_s))
-        self.clocks.add(robot_id, measurement, robot.filter.odometry)
-        measurement = self.clocks.correct(measurement, now_s)
+        measurement = self.clocks.correct(robot_id, measurement, robot.filter.odometry, now_s)
         before = robot.filter.pose()
         used_s = robot.filter.used_s
         outcome = robot.filter.add_measurement(measurement)
@@ -232,7 +234,9 @@ class SwarmLocalizer:
     def find_lost(self, now_s: float) -> List[str]:
         """Notice robots that are not measured any more; return lines for users. Call it some times a second."""
         lines = self._follow_clock(now_s)
-        lost = []
+        if self._looked_s <= now_s < self._looked_s + LOOK_PERIOD_S:
+            return lines
+        lost, self._looked_s = [], now_s
         for name, text in self.list_source_problems().items():
             lines += self._name(name, text)
         for robot_id, robot in sorted(self._robots.items()):
@@ -264,20 +268,17 @@ class SwarmLocalizer:
         """
         robots = []
         for robot_id, robot in sorted(self._robots.items()):
-            problem = self._find_problem(robot, now_s) if has_problems else ""
-            robots.append(self._describe(robot_id, robot, problem))
-        return [self._extrapolate(robot, now_s) for robot in robots] if is_extrapolating else robots
-
-    def _extrapolate(self, robot: LocalizedRobot, now_s: float) -> LocalizedRobot:
-        estimate = robot.estimate
-        if estimate is None or not 0.0 < now_s - estimate.stamp_s <= MAX_AHEAD_S:
-            return robot
-        motion = self._robots[robot.robot_id].filter.odometry.find_motion(now_s - estimate.stamp_s)
-        pose = transform_pose(estimate.pose, motion)
-        return robot._replace(estimate=estimate._replace(stamp_s=now_s, pose=pose))
+            state, estimate = self._estimate(robot)
+            odometry, problem = robot.filter.odometry.raw_pose, self._find_problem(robot, now_s) if has_problems else ""
+            if is_extrapolating and estimate is not None and 0.0 < now_s - estimate.stamp_s <= MAX_AHEAD_S:
+                motion = robot.filter.odometry.find_motion(now_s - estimate.stamp_s)
+                estimate = estimate._replace(stamp_s=now_s, pose=transform_pose(estimate.pose, motion))
+                odometry = transform_pose(odometry, motion)
+            robots.append(LocalizedRobot(robot_id, state, estimate, odometry, problem))
+        return robots
 
     @staticmethod
-    def _describe(robot_id: int, robot: _Robot, problem: str) -> LocalizedRobot:
+    def _estimate(robot: _Robot) -> Tuple[RobotState, Optional[StampedPose]]:
         estimate, off = robot.filter.estimate(), robot.sources.find_disagreement()
         state = RobotState.TRACKED
         if estimate is None:
@@ -286,8 +287,7 @@ class SwarmLocalizer:
             state = RobotState.LOST
         if estimate is not None and off is not None:  # it may be at either place
             estimate = estimate._replace(covariance=estimate.covariance + np.diag(np.square(off)))
-        origin = None if estimate is None else robot.filter.find_odom_origin(estimate.pose)
-        return LocalizedRobot(robot_id, state, estimate, origin, problem)
+        return state, estimate
 
     @staticmethod
     def _find_problem(robot: _Robot, now_s: float) -> str:

@@ -41,9 +41,10 @@ class TagHeights:
         """Take a measured pose, and the one by odometry at its time."""
         before, counted = self._last.get(robot_id, (measurement, odometry))
         self._last[robot_id] = measurement, odometry
+        if before.source == measurement.source or abs(measurement.stamp_s - before.stamp_s) > MAX_STEP_S:
+            return
         cameras_m = [self.cameras_m[pose.node] for pose in (before, measurement) if pose.node in self.cameras_m]
-        is_near = abs(measurement.stamp_s - before.stamp_s) <= MAX_STEP_S
-        if before.node == measurement.node or len(cameras_m) < 2 or not is_near:
+        if before.node == measurement.node or len(cameras_m) < 2:
             return
         place_m, there = measurement.pose[:2], transform_pose(find_frame(before.pose, counted), odometry)
         slopes = [np.subtract(place_m, camera_m[:2]) / camera_m[2] for camera_m in cameras_m]

@@ -6,7 +6,7 @@ rosrun hero_localization localize _pose_topic:=/vrpn_client_node/hero_{id}/pose
 
 import threading
 from functools import partial
-from typing import Any, Callable, Dict, List, Optional
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -96,7 +96,7 @@ class LocalizationNode:
             text = "%s is in the frame %r, but must be in %r: give its publisher and this node the same ~frame"
             rospy.logwarn_throttle(10.0, text % (self._swarm_topic, report.header.frame_id, self._frame))
             return
-        source = describe_source(self._swarm_topic, report)
+        source, measured = describe_source(self._swarm_topic, report), []
         for robot in report.robots:
             pose = Pose(robot.x, robot.y, robot.yaw)
             if robot.id not in self._inputs:
@@ -104,12 +104,17 @@ class LocalizationNode:
             if robot.id in self._inputs and robot.state == RobotPose.TRACKED and is_plausible(pose):
                 is_told = 0.0 < robot.position_sd < MAX_SD and 0.0 < robot.yaw_sd < MAX_SD
                 covariance = make_covariance(robot.position_sd, robot.yaw_sd) if is_told else self._covariance
-                measurement = StampedPose(robot.stamp.to_sec(), pose, covariance, source, is_told)
-                self._call(self._localizer.add_measurement, robot.id, measurement)
-        with self._lock:
-            lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
-            self._localizer.distrust(report.header.stamp.to_sec(), lost, rospy.get_time())
+                measured.append((robot.id, StampedPose(robot.stamp.to_sec(), pose, covariance, source, is_told)))
+        lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
+        self._call(self._use_image, measured, report.header.stamp.to_sec(), lost)
         self._image_used.set()
+
+    def _use_image(
+        self, measured: List[Tuple[int, StampedPose]], stamp_s: float, lost: List[int], now_s: float
+    ) -> List[str]:
+        lines = [line for pair in measured for line in self._localizer.add_measurement(*pair, now_s)]
+        self._localizer.distrust(stamp_s, lost, now_s)
+        return lines
 
     def step(self, period_s: float) -> None:
         """Wait for the poses of an image, or for period_s, and publish."""

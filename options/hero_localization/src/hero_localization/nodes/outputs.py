@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node import Pose
+from hero_node import Pose, find_frame
 
 from ..filter.swarm_localizer import LocalizedRobot
 
@@ -40,16 +40,16 @@ class Outputs:
         report = RobotPoses(robots=[_describe_robot(robot) for robot in robots])
         report.header.stamp, report.header.frame_id = rospy.get_rostime(), self._frame
         self._poses.publish(report)
-        transforms = []
+        transforms, is_heard = [], self._tf.get_num_connections() > 0
         for robot, described in zip(robots, report.robots):
-            if robot.estimate is None or robot.odom_origin is None:
-                continue
-            if self._stamps.get(robot.robot_id) == robot.estimate.stamp_s:
+            if robot.estimate is None or self._stamps.get(robot.robot_id) == robot.estimate.stamp_s:
                 continue  # tf warns of transforms that come twice with one stamp
             self._stamps[robot.robot_id] = robot.estimate.stamp_s
-            header, (x_m, y_m, yaw_rad) = Header(0, described.stamp, self._frame), robot.odom_origin
-            transform = geometry.Transform(geometry.Vector3(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
-            transforms.append(geometry.TransformStamped(header, "hero_%d/odom" % robot.robot_id, transform))
+            header = Header(0, described.stamp, self._frame)
+            if is_heard:
+                x_m, y_m, yaw_rad = find_frame(robot.estimate.pose, robot.odometry)
+                transform = geometry.Transform(geometry.Vector3(x_m, y_m, 0.0), _make_quaternion(yaw_rad))
+                transforms.append(geometry.TransformStamped(header, "hero_%d/odom" % robot.robot_id, transform))
             publisher = self._robots[robot.robot_id]
             if publisher.get_num_connections():
                 (x_m, y_m, yaw_rad), entries = robot.estimate.pose, np.zeros((6, 6))

@@ -32,7 +32,7 @@ from ..tracking.detector_process import DetectorProcess
 from ..tracking.floor_view import FloorView
 from ..tracking.tag_pose import Sightings
 from ..tracking.tracker import Tracker
-from .outputs import make_robot_pose, make_status, publish_statuses
+from .outputs import make_status, publish_statuses
 
 SILENT_S = 2.0
 DIAGNOSTICS_PERIOD_S = 1.0
@@ -172,7 +172,7 @@ class TrackNode:
             return  # by now the image is a second old
         expected = tracker.project(self._expected)
         tags = self._process.search(frame.gray, frame.stamp_s, expected)
-        tracker.measure_shade(frame.gray)
+        tracker.quality.measure(frame.gray, tracker.found)
         self._publish(tracker, tracker.take(tags, frame.stamp_s, frame.number, expected), frame.stamp_s)
         self._pictures.show(tracker, frame, rospy.get_time())
 
@@ -182,7 +182,7 @@ class TrackNode:
         report.header.stamp, report.header.frame_id = stamp, self._frame_id
         for robot_id, seen in sorted(sightings.robots.items()):
             state = RobotPose.LOST if tracker.is_moved else RobotPose.TRACKED
-            report.robots.append(make_robot_pose(robot_id, state, stamp, seen.pose, seen.covariance))
+            report.robots.append(RobotPose(robot_id, state, stamp, *seen.pose, seen.position_sd_m, seen.yaw_sd_rad))
         self._publisher.publish(report)
         if self._objects.get_num_connections():
             objects = [ObjectPose(name, *seen.pose) for name, seen in sorted(sightings.objects.items())]

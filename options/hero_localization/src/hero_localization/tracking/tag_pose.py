@@ -10,7 +10,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from hero_node import Pose, find_frame
+from hero_node import Pose, find_frame, measure_distance
 
 from ..camera.camera_model import Camera
 from ..prints.tag_images import DEFAULT_SIZE_M, REFERENCE_SIZE_M
@@ -93,13 +93,14 @@ class TagLayout(NamedTuple):
 class TagPose(NamedTuple):
     """The measured pose in `map` of a tag, or of the robot or object that wears it, and the tag's size as measured.
 
-    covariance: of x, y and yaw, (3, 3), m and rad.
+    position_sd_m, yaw_sd_rad: standard deviations, the first in x and y each.
     """
 
     tag_id: int
     pose: Pose
     size_m: float
-    covariance: np.ndarray
+    position_sd_m: float
+    yaw_sd_rad: float
 
 
 class Sightings(NamedTuple):
@@ -134,14 +135,10 @@ def fit_squares(
     centers, turns = places.mean(axis=1), places @ square.conj() / 8.0
     sides_px = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
     sizes_m, corner_shares = 2.0 * np.abs(turns), CORNER_PX / np.maximum(sides_px, CORNER_PX)
-    covariances = np.zeros((len(tags), 9))
-    covariances[:, :5:4] = (corner_shares * sizes_m)[:, None] ** 2 / 4.0 + SYSTEMATIC_M**2 + calibration_sd_m**2
-    covariances[:, 8] = corner_shares**2 / 2.0 + SYSTEMATIC_RAD**2
-    found = np.column_stack((centers.real, centers.imag, np.angle(turns), sizes_m)).tolist()
-    return [
-        TagPose(tag.tag_id, Pose(x_m, y_m, yaw_rad), size_m, covariance.reshape(3, 3))
-        for tag, (x_m, y_m, yaw_rad, size_m), covariance in zip(tags, found, covariances)
-    ]
+    position_sds_m = np.sqrt((corner_shares * sizes_m) ** 2 / 4.0 + SYSTEMATIC_M**2 + calibration_sd_m**2)
+    yaw_sds_rad = np.sqrt(corner_shares**2 / 2.0 + SYSTEMATIC_RAD**2)
+    found = np.column_stack((centers.real, centers.imag, np.angle(turns), sizes_m, position_sds_m, yaw_sds_rad))
+    return [TagPose(tag.tag_id, Pose(*numbers[:3]), *numbers[3:]) for tag, numbers in zip(tags, found.tolist())]
 
 
 def find_smallest_side(camera: Camera, size_m: float, height_m: float) -> float:
@@ -189,7 +186,5 @@ def locate(camera: Camera, tags: Sequence[TagCorners], layout: TagLayout, calibr
 def _find_base(tag: TagPose, mount: Pose) -> TagPose:
     pose = find_frame(tag.pose, mount)
     # A wrong heading moves the robot's center round the tag's.
-    round_tag = np.array((tag.pose.y_m - pose.y_m, pose.x_m - tag.pose.x_m, 1.0))
-    covariance = tag.covariance.item(8) * (round_tag[:, None] * round_tag)
-    covariance.ravel()[:5:4] += tag.covariance.item(0)
-    return tag._replace(pose=pose, covariance=covariance)
+    round_tag_m = tag.yaw_sd_rad * measure_distance(tag.pose, pose)
+    return tag._replace(pose=pose, position_sd_m=math.hypot(tag.position_sd_m, round_tag_m / math.sqrt(2.0)))

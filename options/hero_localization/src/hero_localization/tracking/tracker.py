@@ -76,6 +76,7 @@ class Tracker:
     found: the tags in the last image.
     sightings: what they stand for.
     smallest_px: side of the smallest robot's tag that lies wholly in the image.
+    quality: light, noise and blur of its images.
     is_moved: whether most reference tags were not at their places when they were seen last: no pose is right.
     """
 
@@ -87,17 +88,13 @@ class Tracker:
         self.camera = camera
         self.smallest_px = find_smallest_side(camera, settings.layout.size_m, settings.layout.height_m)
         self._images: Deque[Tuple[float, int]] = deque(maxlen=RATE_FRAMES)
-        self._quality = ImageQuality()
+        self.quality = ImageQuality()
         self._shift = CameraShift(camera, settings.seen_references)
         self._tag_problems: Dict[int, Tuple[float, str]] = {}
         self.is_moved = False
         self._expected: Dict[int, Deque[bool]] = {}
         self._moved_since_s: Dict[int, float] = {}
         self._reference_seen_s: Dict[int, float] = {}
-
-    def measure_shade(self, gray: np.ndarray) -> None:
-        """Look at the light, noise and blur of an image (H, W), 8 bit, before take() has its tags."""
-        self._quality.measure(gray, [(tag.center, tag.side_px) for tag in self.found])
 
     def take(
         self,
@@ -199,7 +196,7 @@ class Tracker:
             add(f"{self.describe_rate()} are used: this computer is busy, or too slow for more")
         sides_px = [tag.side_px for tag in self.found if self._settings.layout.find_robot(tag.tag_id) is not None]
         smallest_px = min(sides_px, default=self.smallest_px)
-        for text, is_error in self._quality.list_problems(smallest_px):
+        for text, is_error in self.quality.list_problems(smallest_px):
             add(text, is_error=is_error)
         if self._shift.shift_m > SHIFTED_M:
             text = f"the camera has moved by {1e3 * self._shift.shift_m:.0f} mm at the field's rim, which is corrected"
@@ -251,13 +248,13 @@ class ImageQuality:
         self._shade = self._noise = self._blur_px = math.nan
         self._images = 0
 
-    def measure(self, gray: np.ndarray, tags: Sequence[Tuple[np.ndarray, float]]) -> None:
-        """Look at an image (H, W), 8 bit; tags: centers and sides of tags in the one before, px."""
+    def measure(self, gray: np.ndarray, tags: Sequence[TagCorners]) -> None:
+        """Look at an image (H, W), 8 bit; tags: those in the one before."""
         self._shade = float(gray[::16, ::16].mean())
         self._images += 1
         if self._images % PERIOD_IMAGES == 1:
             self._noise = float(np.median(np.abs(np.diff(gray[::16].astype(np.int16), axis=1)))) / 0.954
-            blurs_px = [_measure_blur(gray, *tag) for tag in tags[:MAX_TAGS]]
+            blurs_px = [_measure_blur(gray, tag.center, tag.side_px) for tag in tags[:MAX_TAGS]]
             self._blur_px = float(np.median(blurs_px)) if len(blurs_px) >= MIN_TAGS else math.nan
 
     def list_problems(self, smallest_px: float) -> List[Tuple[str, bool]]:
