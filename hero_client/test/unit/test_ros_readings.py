@@ -8,17 +8,22 @@ import pytest
 
 pytest.importorskip("rospy", reason="topics are rospy's")
 import rospy
+from geometry_msgs.msg import Point, PoseWithCovariance, Quaternion, Twist, TwistWithCovariance, Vector3
+from geometry_msgs.msg import Pose as RosPose
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import ColorRGBA
 
 from hero_client.ros import frames, localized_poses, robot_topics, ros_link
+from hero_client.ros.drivers import Drivers
 from hero_client.ros.frames import find_origin
 from hero_client.ros.localized_poses import PoseListener
 from hero_client.ros.robot_topics import CommandTopic, NewestMessages
 from hero_client.ros.ros_link import RosLink, ThreadMotion
 from hero_client.values.background_motion import FullWait
 from hero_client.values.errors import FrameError, GoalError, RobotError, StaleDataError
-from hero_msgs.msg import RobotPose, RobotPoses
+from hero_msgs.msg import Neighbor, RobotPose, RobotPoses
 from hero_node import Pose
+from hero_node.files import FleetFile
 
 
 class Time:
@@ -163,6 +168,64 @@ def test_why_a_robot_cannot_be_driven_is_told_in_order():
     assert link.missing() is None
     assert "the driver lab/driver has stopped all robots" in link.describe_stop()
     assert "rosservice call /lab/driver/stop false" in link.describe_stop()
+
+
+@pytest.fixture(name="linked")
+def make_linked(monkeypatch):
+    """Give the link of robot 7, and what its topics and its driver are."""
+    ros = SimpleNamespace(commands={}, subscribed={}, drivers=create_autospec(Drivers, instance=True))
+
+    def make_topic(name, message_class, explain_absence):
+        ros.commands[name] = message_class, create_autospec(CommandTopic, instance=True, connected=True)
+        assert explain_absence() is ros.drivers.explain_absence.return_value
+        return ros.commands[name][1]
+
+    def subscribe(name, message_class, receive, topic, queue_size, tcp_nodelay):
+        ros.subscribed[name] = lambda message: receive(message_class(**message), topic)
+
+    monkeypatch.setattr(ros_link, "CommandTopic", make_topic)
+    monkeypatch.setattr(robot_topics.rospy, "Subscriber", subscribe)
+    monkeypatch.setattr(ros_link, "share_drivers", lambda: ros.drivers)
+    monkeypatch.setattr(ros_link, "load_fleet_file", FleetFile)
+    return RosLink(7), ros
+
+
+def test_a_robot_is_reached_by_its_own_topics_and_its_own_driver(linked):
+    link, ros = linked
+    velocity, led = "/hero_7/velocity_controller/cmd_vel", "/hero_7/led"
+    assert {name: kind for name, (kind, _) in ros.commands.items()} == {velocity: Twist, led: ColorRGBA}
+    ros.drivers.explain_absence.assert_called_with("/hero_7")
+    link.send_color((1.0, 0.5, 0.0))
+    (_, topic) = ros.commands[led]
+    assert [call[0] for call in topic.method_calls] == ["wait_until_connected", "publish"]
+    topic.publish.assert_called_once_with(ColorRGBA(1.0, 0.5, 0.0, 1.0))
+    link.send_velocity(0.0, -0.5)
+    ros.commands[velocity][1].publish.assert_called_once_with(Twist(angular=Vector3(z=-0.5)), is_stop=False)
+    for name, radius_m in (("hero_plus", 0.060), ("hero", 0.036835), ("another", 0.036835)):
+        ros.drivers.find_model.return_value = name
+        assert link.model.body_radius_m == radius_m
+    ros.drivers.find_model.assert_called_with("/hero_7")
+    assert link.is_stopped is ros.drivers.is_robot_stopped.return_value
+    ros.drivers.is_robot_stopped.assert_called_once_with("/hero_7")
+
+
+def test_what_a_robot_sends_is_read_from_the_topic_of_its_name(linked):
+    link, ros = linked
+    for topic in ("odom", "distance", "neighbors"):
+        link.subscribe(topic)
+    assert sorted(ros.subscribed) == ["/hero_7/distance", "/hero_7/neighbors", "/hero_7/odom"]
+    place = PoseWithCovariance(pose=RosPose(Point(1.0, 2.0, 0.0), Quaternion(0.0, 0.0, 1.0, 0.0)))
+    twist = TwistWithCovariance(twist=Twist(Vector3(0.1, 0.2, 0.0), Vector3(0.0, 0.3, 0.4)))
+    ros.subscribed["/hero_7/odom"]({"pose": place, "twist": twist})
+    assert link.read_pose() == pytest.approx((1.0, 2.0, math.pi)) and link.read_velocity() == (0.1, 0.4)
+    ros.subscribed["/hero_7/distance"]({"data": 0.25})
+    assert link.read_distance() == 0.25
+    found = [Neighbor(id=3, range=0.5, bearing=-1.0, heading=2.0)]
+    ros.subscribed["/hero_7/neighbors"]({"is_known": True, "neighbors": found})
+    assert link.read_neighbors() == [(3, 0.5, -1.0, 2.0)]
+    ros.subscribed["/hero_7/neighbors"]({"is_known": False})
+    with pytest.raises(StaleDataError, match="hero_7 senses no neighbors, as its own pose is not known"):
+        link.read_neighbors()
 
 
 def test_only_a_stop_is_sent_without_a_warning():

@@ -348,6 +348,26 @@ def test_a_button_chooses_one_robot_after_the_other_and_all_again(shown, numbers
     assert MAPPING[6:] == (5,), "as the documents say"
 
 
+def test_a_joystick_is_heard_until_the_end_and_its_stop_checked(monkeypatch):
+    swarm, steps = make_swarm(0), []
+
+    def subscribe(topic, kind, receive, queue_size, tcp_nodelay):
+        assert (topic, kind, tcp_nodelay) == ("/joy", Joy, True) and queue_size > 1
+        steps.append(receive)
+
+    def rate(hz):
+        assert hz == 10.0
+        for _ in range(3):
+            steps.append("turn")
+            steps[0](Joy(axes=[0.0, 1.0], buttons=[0, 1, 0, 0, 1, 0]))
+            yield
+
+    monkeypatch.setattr(joystick_teleop.rospy, "Subscriber", subscribe)
+    swarm.drivers.check_stop = lambda: steps.append("checked")
+    JoystickTeleop(swarm, MAPPING).run(SimpleNamespace(rate=rate))
+    assert steps[1:] == ["turn", "turn", "turn", "checked"] and swarm.drivers.requests == [True]
+
+
 def test_a_program_with_a_keyboard_ends_and_reads_as_it_should(shown, monkeypatch):
     monkeypatch.setattr(keyboard_teleop, "show_live_line", lambda *line: None)
     swarm = make_swarm(0)

@@ -14,6 +14,8 @@ from hero_driver.config import read_config
 from hero_driver.gateway import Gateway
 from hero_driver.node import LEAVE_WAIT_S, REPORT_CHECK_S, DriverNode
 from hero_driver.reports.reporter import Reporter
+from hero_driver.ros.log_relay import LogRelay
+from hero_driver.ros.thread_watch import ThreadWatch
 from hero_driver.transport.event_loop import EventLoop, NoAnswerError
 from hero_node import ProgramError
 
@@ -102,6 +104,69 @@ def test_without_threads_nothing_waits_for_ros(monkeypatch):
     run = Run(monkeypatch)
     run.threads.failure = "no more threads"
     assert run() == 5 and run.steps == ["enter", "open", "spin", "close"]
+
+
+def test_rospy_is_changed_before_the_node_starts(monkeypatch):
+    steps = []
+
+    def note(module, *names):
+        for name in names:
+            fake = create_autospec(getattr(module, name), side_effect=lambda *_, name=name, **__: steps.append(name))
+            monkeypatch.setattr(module, name, fake)
+
+    note(node_module, "_wait_for_master", "report_dropped_log_lines")
+    note(node_module.ros, "read_master_uri", "find_running_node", "limit_xmlrpc_connections", "open_tcpros_server")
+    note(node_module.rospy_internals, "keep_publishers_connected", "leave_topics_out_of_rosout")
+    note(node_module.ros, "init_ros_node")
+    log = create_autospec(LogRelay, instance=True)
+    node_module._enter_ros(["_port:=1"], log)
+    before = ["read_master_uri", "_wait_for_master", "find_running_node", "report_dropped_log_lines"]
+    changes = ["limit_xmlrpc_connections", "open_tcpros_server", "keep_publishers_connected"]
+    assert steps == [*before, *changes, "init_ros_node", "leave_topics_out_of_rosout"]
+    node_module.ros.init_ros_node.assert_called_once_with("hero_driver", arguments=["_port:=1"])
+    (warn,) = node_module.ros.open_tcpros_server.call_args[0]
+    warn("10.0.0.7", "refused")
+    log.log_throttled.assert_called_once_with("warn", "handshake 10.0.0.7", "refused")
+    node_module.ros.find_running_node.side_effect = ["/hero_driver"]
+    with pytest.raises(ProgramError, match="a driver already runs as /hero_driver: end it, or start this one with"):
+        node_module._enter_ros([], log)
+    assert steps[-2:] == before[:2] and node_module.ros.init_ros_node.call_count == 1
+
+
+def test_a_master_is_waited_for_with_one_line(monkeypatch, capsys):
+    answers, waits = [False, False, False, True, True], []
+    monkeypatch.setattr(node_module.rosgraph, "is_master_online", lambda: answers.pop(0))
+    monkeypatch.setattr(node_module, "time", SimpleNamespace(sleep=waits.append))
+    for _ in range(2):
+        node_module._wait_for_master("http://lab:11311")
+    assert waits == [0.5, 0.5] and capsys.readouterr().err.count("no ROS master at http://lab:11311 yet") == 1
+
+
+@pytest.mark.parametrize(
+    ("outcome", "failure", "exits"),
+    [
+        (5, "", []),
+        (3, "no thread", [3]),
+        (MemoryError(), "", [1]),
+        (RuntimeError("can't start new thread"), "", [1]),
+        (ProgramError("no ROS master"), "no thread", [1]),
+        (RuntimeError("a bug"), "", None),
+        (ProgramError("no ROS master"), "", None),
+    ],
+)
+def test_a_driver_without_threads_does_not_wait_for_those_it_has(monkeypatch, capsys, outcome, failure, exits):
+    threads, exited = ThreadWatch.__new__(ThreadWatch), []  # the whole one changes Python's threads
+    threads.failure = failure
+    monkeypatch.setattr(node_module, "ThreadWatch", lambda: threads)
+    monkeypatch.setattr(node_module, "_run", create_autospec(node_module._run, side_effect=[outcome]))
+    monkeypatch.setattr(node_module.os, "_exit", exited.append)
+    if exits is None:
+        with pytest.raises(type(outcome)):
+            node_module.main([])
+    else:
+        assert node_module.main([]) == (exits or [outcome])[0]
+    assert exited == (exits or [])
+    assert ("cannot run: " in capsys.readouterr().err) == (exits == [1])
 
 
 @pytest.mark.parametrize(

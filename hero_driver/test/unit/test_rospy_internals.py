@@ -3,9 +3,12 @@
 import logging
 import socket
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 from rospy.impl import rosout
+from rospy.impl.masterslave import ROSHandler
+from rospy.topics import _SubscriberImpl
 
 from hero_driver.ros import rospy_internals
 from hero_driver.ros.rospy_internals import leave_topics_out_of_rosout
@@ -43,6 +46,49 @@ def test_a_log_line_holds_no_names_of_topics_and_is_published_once(rosout_publis
     assert line.header.stamp.secs == 7
     logging.getLogger("rosout").error("another line")
     assert [line.msg for line in rosout_publisher.lines] == ["a line about hero_3", "another line"]
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_publisher_is_looked_for_again_when_its_connection_ends(monkeypatch, is_there):
+    steps, ended, other = [], object(), object()
+    pubsub, registration = rospy_internals.tcpros_pubsub, rospy_internals.registration
+
+    def connect(connection, address, port, uri, receive, topic):
+        steps.append("connected until it ended")
+
+    # As rospy's own, which this replaces; what was before comes back.
+    monkeypatch.setattr(pubsub, "robust_connect_subscriber", create_autospec(connect, side_effect=connect))
+    monkeypatch.setattr(
+        pubsub,
+        "check_if_still_publisher",
+        create_autospec(pubsub.check_if_still_publisher, side_effect=lambda topic, uri: is_there),
+    )
+    impl = create_autospec(_SubscriberImpl, instance=True, connections=[ended, other])
+    impl.remove_connection.side_effect = lambda connection: steps.append(connection)
+    topics = {"/topic": impl}
+    monkeypatch.setattr(registration, "get_topic_manager", lambda: SimpleNamespace(get_subscriber_impl=topics.get))
+    manager = create_autospec(registration.RegManager, instance=True)
+    manager.handler = create_autospec(ROSHandler, instance=True)
+    manager.handler._connect_topic.side_effect = lambda topic, uri: steps.append((topic, uri))
+    monkeypatch.setattr(
+        registration, "get_registration_listeners", lambda: SimpleNamespace(listeners=[object(), manager])
+    )
+    monkeypatch.setattr(rospy_internals, "time", SimpleNamespace(sleep=steps.append))
+    rospy_internals.keep_publishers_connected()
+
+    def run():
+        steps.clear()
+        pubsub.robust_connect_subscriber(ended, "10.0.0.2", 40000, "http://10.0.0.2:50000/", None, "/topic")
+        return steps[1:]
+
+    again = [("/topic", "http://10.0.0.2:50000/")] if is_there else []
+    assert run() == [ended, 0.5, *again]
+    impl.connections = [other]
+    assert run() == [0.5, *again], "rospy has removed it already"
+    monkeypatch.setattr(rospy_internals.rospy, "is_shutdown", lambda: True)
+    assert run() == []
+    topics.clear()
+    assert run() == []
 
 
 def test_what_is_sent_is_counted_and_what_does_not_fit_comes_back():

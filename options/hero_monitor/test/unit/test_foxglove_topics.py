@@ -4,7 +4,9 @@ import asyncio
 import json
 import struct
 import threading
+from contextlib import nullcontext
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 
@@ -12,7 +14,8 @@ pytest.importorskip("rospy", reason="the program needs ROS")
 from std_msgs.msg import ColorRGBA, String
 
 from hero_monitor import foxglove as module
-from hero_node import NodeError
+from hero_node import NodeError, ProgramError
+from hero_node.parameters import check_parameters
 
 
 class FakeSdk:
@@ -148,6 +151,57 @@ def test_what_was_latched_before_a_topic_was_left_is_never_sent_again(ros):
     topics.on_subscribe(SimpleNamespace(id=2), SimpleNamespace(topic="/a"))
     topics.look()
     assert sdk.logged == [("/a", b"first"), ("/a", b"last")]
+
+
+class Program:
+    """Runs for three looks."""
+
+    def __init__(self, name):
+        assert name == "foxglove"
+        self.pauses_s = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        self.is_over = True
+
+    def sleep(self, duration_s):
+        self.pauses_s.append(duration_s)
+        return len(self.pauses_s) <= 3
+
+
+@pytest.mark.parametrize("error", [None, KeyboardInterrupt()])
+def test_the_server_ends_with_the_program_whatever_ends_that(monkeypatch, error):
+    steps, programs = [], []
+    server = SimpleNamespace(stop=lambda: steps.append("stopped"))
+
+    def start_server(*, name, host, port, server_listener):
+        assert (host, port) == ("127.0.0.1", 8765) and isinstance(server_listener, module.TopicServer)
+        return server
+
+    def look(topics):
+        steps.append("looked")
+        if error is not None:
+            raise error
+
+    sdk = SimpleNamespace(start_server=start_server)
+    monkeypatch.setattr(module, "Program", lambda name: programs.append(Program(name)) or programs[-1])
+    monkeypatch.setattr(module, "read_parameters", lambda declared: check_parameters(declared, {}))
+    monkeypatch.setattr(module, "import_optional", create_autospec(module.import_optional, return_value=sdk))
+    monkeypatch.setattr(module.TopicServer, "look", look)
+    with pytest.raises(KeyboardInterrupt) if error else nullcontext():
+        module.main()
+    assert steps == ["looked"] * (1 if error else 3) + ["stopped"] and programs[0].is_over
+    module.import_optional.assert_called_once_with("foxglove", "foxglove-sdk")
+
+    def refuse(**options):
+        raise RuntimeError("Address already in use")
+
+    sdk.start_server = refuse
+    with pytest.raises(ProgramError, match="ws://127.0.0.1:8765 cannot be served: Address already in use"):
+        module.main()
+    assert steps[-1] == "stopped" and len(steps) < 5 and programs[1].is_over
 
 
 @pytest.mark.option("foxglove")

@@ -3,12 +3,15 @@
 import asyncio
 import json
 import logging
+import socket
 from unittest import mock
 
 import pytest
 import tornado.httputil
 import tornado.web
 from tornado.http1connection import HTTP1Connection
+from tornado.httpserver import HTTPServer
+from tornado.iostream import IOStream
 
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import Access
@@ -107,6 +110,46 @@ def test_the_picture_is_for_those_who_are_logged_in():
     assert ask(PictureHandler, actions=actions, token=TOKEN)[0] == 403
     actions.find_picture = bytes
     assert ask(PictureHandler, actions=actions)[0] == 404
+
+
+def test_a_server_listens_asks_its_limits_and_closes_its_pages(monkeypatch, clock):
+    sockets = [mock.create_autospec(socket.socket, instance=True)]
+    sockets[0].getsockname.return_value = ("0.0.0.0", 40123)
+    bind = mock.create_autospec(tornado.netutil.bind_sockets, return_value=sockets)
+    monkeypatch.setattr(server_module.tornado.netutil, "bind_sockets", bind)
+    callbacks = mock.create_autospec(tornado.ioloop.PeriodicCallback)
+    monkeypatch.setattr(server_module.tornado.ioloop, "PeriodicCallback", callbacks)
+    for name in ("add_sockets", "stop", "handle_stream"):
+        monkeypatch.setattr(HTTPServer, name, mock.create_autospec(getattr(HTTPServer, name)))
+    limits = mock.create_autospec(ClientLimits, instance=True)
+    server = Server(Access(TOKEN, []), limits, mock.Mock())
+    assert server.listen("0.0.0.0", 0) == 40123
+    bind.assert_called_once_with(0, "0.0.0.0", backlog=server_module.LISTEN_BACKLOG)
+    HTTPServer.add_sockets.assert_called_once_with(server._http, sockets)
+    expire, period_ms = callbacks.call_args[0]
+    assert period_ms == 1000.0 and callbacks.return_value.start.called and not limits.expire.called
+    expire()
+    limits.expire.assert_called_once_with(1000.0)
+
+    fair = mock.create_autospec(server_module.FairStream, instance=True)
+    make = mock.create_autospec(server_module.FairStream, return_value=fair)
+    monkeypatch.setattr(server_module, "FairStream", make)
+    stream = mock.create_autospec(IOStream, instance=True, socket="socket", max_buffer_size=7)
+    for is_admitted in (False, True):
+        limits.admit.return_value = is_admitted
+        server._http.handle_stream(stream, ("10.0.0.2", 50000))
+        limits.admit.assert_called_with(fair, "10.0.0.2", 1000.0)
+        assert fair.close.call_count == 1 and HTTPServer.handle_stream.called == is_admitted
+    make.assert_called_with("socket", max_buffer_size=7)
+    HTTPServer.handle_stream.assert_called_once_with(server._http, fair, ("10.0.0.2", 50000))
+
+    server.pages += [mock.create_autospec(PageSocket, instance=True) for _ in range(3)]
+    for page in server.pages:
+        page.close.side_effect = lambda *_, page=page: server.pages.remove(page)
+    pages = list(server.pages)
+    server.close()
+    assert callbacks.return_value.stop.called and HTTPServer.stop.called
+    assert [page.close.call_args[0] for page in pages] == [(1001, "the monitor ends")] * 3
 
 
 RIGHT = json.dumps({"token": TOKEN})
