@@ -7,7 +7,7 @@ from test_swarm_localizer import COVARIANCE, PERIOD_S, Swarm
 
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import RobotState
-from hero_localization.nodes.outputs import make_robot_pose
+from hero_localization.nodes.outputs import describe_robot
 from hero_node import Pose
 
 HOME = (1.0, 2.0, 0.0)
@@ -23,7 +23,7 @@ def measure(swarm, place, ahead_s=0.0, source=TRACK, robot_id=0):
 
 
 def read_sd_m(robot):
-    return make_robot_pose(0, 1, None, *robot.estimate[1:3]).position_sd
+    return describe_robot(robot).position_sd
 
 
 def see_with_both(swarm, duration_s, offset):

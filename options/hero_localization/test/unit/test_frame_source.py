@@ -1,6 +1,7 @@
 """Images from topics become gray; what cannot be used or opened is named; the newest image counts."""
 
 import ctypes
+import io
 import os
 import re
 import subprocess
@@ -15,7 +16,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from hero_localization.camera import frame_source
 from hero_localization.camera.device_controls import DeviceControls
-from hero_localization.camera.frame_source import TopicSource, open_source
+from hero_localization.camera.frame_source import MAX_HEAD_BYTES, TopicSource, UncopiedImage, open_source
 from hero_localization.errors import FrameSourceError
 
 TIMEOUT_S = 30.0
@@ -85,6 +86,21 @@ def test_compressed_pictures_are_decoded_and_broken_ones_named(receivers):
     receive(message)
     np.testing.assert_array_equal(source.poll(0.0).gray, GRAY)
     assert source.problem == ""
+
+
+@pytest.mark.parametrize(("rows", "frame_id"), [(3, "camera"), (3, ""), (MAX_HEAD_BYTES, "c" * 300), (0, "camera")])
+def test_the_data_of_a_message_is_not_copied(source, rows, frame_id):
+    sent = Image(height=rows, width=4, encoding="mono8", step=4, data=bytes(index % 251 for index in range(4 * rows)))
+    sent.header.stamp, sent.header.seq, sent.header.frame_id = rospy.Time(7, 5), 9, frame_id
+    stream = io.BytesIO()
+    sent.serialize(stream)
+    received = UncopiedImage().deserialize(stream.getvalue())
+    assert isinstance(received.data, memoryview) and bytes(received.data) == sent.data
+    for field in ("header", "height", "width", "encoding", "is_bigendian", "step"):
+        assert getattr(received, field) == getattr(sent, field)
+    source.receive(received)
+    frame = source.poll(0.0)
+    assert (frame is None) == (rows == 0) and (frame is None or frame.gray.tobytes() == sent.data)
 
 
 def test_only_the_newest_picture_is_decoded_and_counts_once(source):
@@ -167,7 +183,7 @@ def test_a_device_that_is_neither_in_dev_nor_an_address_is_refused():
 
 
 def test_topics_are_subscribed_by_their_kind(monkeypatch):
-    for topic, kind in (("/camera/image_raw", Image), ("/camera/image_raw/compressed", CompressedImage)):
+    for topic, kind in (("/camera/image_raw", UncopiedImage), ("/camera/image_raw/compressed", CompressedImage)):
         kinds = {}
         monkeypatch.setattr(rospy, "Subscriber", lambda name, kind, receive, **_: kinds.update({name: kind}))  # noqa: B023
         TopicSource(topic)

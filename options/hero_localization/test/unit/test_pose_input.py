@@ -137,11 +137,11 @@ def test_poses_name_topic_and_node_that_they_came_from(pose_input):
 
 def test_a_pose_that_the_filter_refuses_is_named(pose_input):
     def refuse(measurement):
-        raise ValueError("a covariance must be positive definite")
+        raise ValueError("holds a covariance that is not positive definite")
 
     pose_input._receive = refuse
     pose_input._receive_message(make_raw(PoseStamped(pose=Pose(Point(0.0, 0.0, 0.0), UPRIGHT))))
-    assert pose_input.lines == ["/hero_0/pose: a covariance must be positive definite"]
+    assert pose_input.lines == ["/hero_0/pose holds a covariance that is not positive definite"]
 
 
 def test_odometry_is_read_from_its_bytes(monkeypatch):

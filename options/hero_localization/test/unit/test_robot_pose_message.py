@@ -8,13 +8,14 @@ import rospy
 
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import LocalizedRobot, RobotState
-from hero_localization.nodes.outputs import Outputs, make_robot_pose
+from hero_localization.nodes.outputs import Outputs, describe_robot
 from hero_node import Pose
 
 
 def test_the_published_deviations_are_those_of_one_axis_and_of_yaw():
     covariance = np.diag([4e-6, 16e-6, 9e-4])
-    message = make_robot_pose(3, 0, rospy.Time(1, 0), Pose(0.1, 0.2, 0.3), covariance)
+    pose = Pose(0.1, 0.2, 0.3)
+    message = describe_robot(LocalizedRobot(3, RobotState.TRACKED, StampedPose(1.0, pose, covariance), pose, ""))
     assert message.position_sd == pytest.approx(10e-6**0.5)
     assert message.yaw_sd == pytest.approx(0.03)
 

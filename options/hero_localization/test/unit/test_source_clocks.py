@@ -199,7 +199,8 @@ def test_poses_from_before_a_clock_was_set_back_are_not_waited_for(robots, set_c
 
 @pytest.mark.slow
 def test_poses_at_the_present_are_not_behind_the_robot():
-    errors_m, origins = {False: [], True: []}, []
+    errors_m = {False: [], True: []}
+    origins = []
     drive = Drive([0.0])
     drive.run(3.0)
     for linear_m_s, angular_rad_s in ((0.2, 0.0), (0.2, 1.5), (-0.15, 1.0), (0.0, 2.0)):

@@ -9,7 +9,8 @@ from test_pose_filter import start_filter
 
 from hero_localization.filter.pose_filter import Outcome, PoseFilter, make_covariance
 from hero_localization.filter.pose_hypothesis import StampedPose
-from hero_localization.nodes.outputs import make_robot_pose
+from hero_localization.filter.swarm_localizer import LocalizedRobot, RobotState
+from hero_localization.nodes.outputs import describe_robot
 from hero_node import Pose, transform_pose, wrap_angle
 from hero_sim.stepped import StepSwarm
 
@@ -26,6 +27,10 @@ DRIVES = {
     "turn": lambda now_s: (0.0, 2.0),
     "curves": lambda now_s: (0.15, 1.5 * math.sin(1.3 * now_s)),
 }
+
+
+def report_of(estimate):
+    return describe_robot(LocalizedRobot(3, RobotState.TRACKED, estimate, estimate.pose, ""))
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +76,7 @@ class CoveredSwarm:
         """Return errors of place and yaw, rms over the robots, by what is reported of them."""
         shares = []
         for pose_filter, true in zip(self.filters, self.true):
-            pose, covariance = pose_filter.estimate()[1:3]
-            report = make_robot_pose(0, 0, None, pose, covariance)
+            pose, report = pose_filter.estimate().pose, report_of(pose_filter.estimate())
             off_m = math.hypot(pose.x_m - true[0], pose.y_m - true[1])
             off_rad = wrap_angle(pose.yaw_rad - true[2])
             shares.append((off_m / (math.sqrt(2.0) * report.position_sd), off_rad / report.yaw_sd))
@@ -92,12 +96,6 @@ def test_the_reported_uncertainty_is_the_true_error(name, arena):
     assert covered.min() > 0.65 and covered.max() < 1.3
     # Nobody touched them.
     assert [outcomes[1:] for outcomes in swarm.outcomes] == [[Outcome.USED] * len(o[1:]) for o in swarm.outcomes]
-
-
-def test_position_sd_is_that_of_one_axis():
-    report = make_robot_pose(0, 0, None, Pose(0.0, 0.0, 0.0), np.diag((4e-6, 16e-6, 9e-4)))
-    assert report.position_sd == pytest.approx(math.sqrt(10e-6))
-    assert report.yaw_sd == pytest.approx(0.03)
 
 
 def drive_on(pose_filter, steps, step, start_s=1.0):
@@ -196,6 +194,6 @@ def test_correlated_poses_are_joined_as_the_kalman_filter_has_it():
 
 
 def test_rounding_below_zero_is_no_uncertainty():
-    report = make_robot_pose(3, 1, None, Pose(0.1, 0.2, 0.3), np.diag((-1e-18, 0.0, -1e-18)))
+    report = report_of(StampedPose(1.5, Pose(0.1, 0.2, 0.3), np.diag((-1e-18, 0.0, -1e-18))))
     assert (report.position_sd, report.yaw_sd) == (0.0, 0.0)
     assert (report.id, report.state, report.x, report.y, report.yaw) == (3, 1, 0.1, 0.2, 0.3)

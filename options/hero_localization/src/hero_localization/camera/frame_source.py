@@ -43,6 +43,9 @@ MIN_BACKOFF_S, MAX_BACKOFF_S = 0.5, 8.0
 READ_BYTES = 2**20
 """At once: of an image in smaller parts, each costs a turn of the interpreter; a larger buffer costs page faults."""
 
+MAX_HEAD_BYTES = 2**14
+"""Length of an image's message before its data, at most: the names of frame and encoding."""
+
 _MEMORY = ((-3, 2**25), (-1, 2**29), (-8, 1))
 """Options of glibc's mallopt: M_MMAP_THRESHOLD, M_TRIM_THRESHOLD (bytes), M_ARENA_MAX."""
 
@@ -100,11 +103,21 @@ class FrameSource:
 def keep_freed_memory() -> None:
     """Keep memory of this process that images have used for the next ones.
 
-    rospy copies each image four times, of which new memory, mapped page by page, takes two thirds of the time.
+    rospy copies each image three times, of which new memory, mapped page by page, takes two thirds of the time.
     """
     mallopt: Any = getattr(ctypes.CDLL(None), "mallopt", None)
     for option, value in _MEMORY if mallopt else ():  # other C libraries have none
         mallopt(option, value)
+
+
+class UncopiedImage(Image):  # type: ignore[misc]
+    """A sensor_msgs/Image whose data is a part of the message as it came: a copy takes a third of receiving it."""
+
+    def deserialize(self, data: bytes) -> "UncopiedImage":
+        """Take the fields of a message, of which the data comes last."""
+        super().deserialize(data[:MAX_HEAD_BYTES])
+        self.data: Any = memoryview(data)[min(len(data), MAX_HEAD_BYTES) - len(self.data) :]
+        return self
 
 
 class TopicSource(FrameSource):
@@ -115,7 +128,7 @@ class TopicSource(FrameSource):
         super().__init__()
         keep_freed_memory()
         self._is_compressed = topic.endswith("/compressed")
-        kind = CompressedImage if self._is_compressed else Image
+        kind = CompressedImage if self._is_compressed else UncopiedImage
         rospy.Subscriber(topic, kind, self._keep, queue_size=1, buff_size=READ_BYTES, tcp_nodelay=True)
         base = topic[: -len("/compressed")] if self._is_compressed else topic
         rospy.Subscriber(base.rpartition("/")[0] + "/camera_info", CameraInfo, self._read_info, queue_size=1)

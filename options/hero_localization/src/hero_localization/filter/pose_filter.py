@@ -155,8 +155,7 @@ class PoseFilter:
 
 def make_covariance(position_sd_m: float, yaw_sd_rad: float) -> np.ndarray:
     """Return the covariance of x, y and yaw, (3, 3), of independent errors; position_sd_m: in x and y each."""
-    position_m2 = position_sd_m**2
-    return np.array(((position_m2, 0.0, 0.0), (0.0, position_m2, 0.0), (0.0, 0.0, yaw_sd_rad**2)))
+    return np.array(((position_sd_m**2, 0.0, 0.0), (0.0, position_sd_m**2, 0.0), (0.0, 0.0, yaw_sd_rad**2)))
 
 
 def is_near(one: Pose, other: Pose) -> bool:
@@ -167,10 +166,10 @@ def is_near(one: Pose, other: Pose) -> bool:
 
 def _check(measurement: StampedPose) -> None:
     if not all(map(math.isfinite, (measurement.stamp_s, *measurement.pose))):
-        raise ValueError(f"a measured pose must be finite, not {measurement.pose!r}")
+        raise ValueError(f"holds a pose that is not finite: {measurement.pose!r}")
     entries = measurement.covariance.ravel().tolist()
     if measurement.covariance.shape != (3, 3) or not all(map(math.isfinite, entries)) or min(entries[::4]) <= 0.0:
-        raise ValueError("a covariance of x, y and yaw must be 3 by 3 with variances above 0")
+        raise ValueError("holds a covariance of x, y and yaw that is not 3 by 3 with variances above 0")
     a, b, c, _, d, e, _, _, f = entries
     if a * d <= b * b or a * (d * f - e * e) <= b * (b * f - c * e) - c * (b * e - c * d):
-        raise ValueError(f"a covariance must be positive definite, not {measurement.covariance.tolist()}")
+        raise ValueError(f"holds a covariance that is not positive definite: {measurement.covariance.tolist()}")

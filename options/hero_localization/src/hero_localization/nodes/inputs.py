@@ -122,16 +122,11 @@ class PoseInput:
 
     def _receive_message(self, message: rospy.AnyMsg) -> None:
         try:
-            measurement = self._read(message)
+            self._receive(self._read(message))
         except genpy.DeserializationError:
             return
         except ValueError as error:
             self._warn(f"{self._topic} {error}")
-            return
-        try:
-            self._receive(measurement)
-        except ValueError as error:
-            self._warn(f"{self._topic}: {error}")
 
     def _read(self, message: rospy.AnyMsg) -> StampedPose:
         """Return the pose in a message. Raises: ValueError with what is wrong with it; genpy.DeserializationError."""

@@ -105,15 +105,13 @@ class LocalizationNode:
                 is_told = 0.0 < robot.position_sd < MAX_SD and 0.0 < robot.yaw_sd < MAX_SD
                 covariance = make_covariance(robot.position_sd, robot.yaw_sd) if is_told else self._covariance
                 measured.append((robot.id, StampedPose(robot.stamp.to_sec(), pose, covariance, source, is_told)))
-        lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
-        self._call(self._use_image, measured, report.header.stamp.to_sec(), lost)
+        self._call(self._use_image, report, measured)
         self._image_used.set()
 
-    def _use_image(
-        self, measured: List[Tuple[int, StampedPose]], stamp_s: float, lost: List[int], now_s: float
-    ) -> List[str]:
+    def _use_image(self, report: RobotPoses, measured: List[Tuple[int, StampedPose]], now_s: float) -> List[str]:
         lines = [line for pair in measured for line in self._localizer.add_measurement(*pair, now_s)]
-        self._localizer.distrust(stamp_s, lost, now_s)
+        lost = [robot.id for robot in report.robots if robot.state == RobotPose.LOST]
+        self._localizer.distrust(report.header.stamp.to_sec(), lost, now_s)
         return lines
 
     def step(self, period_s: float) -> None:

@@ -11,7 +11,7 @@ from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from hero_msgs.msg import RobotPose, RobotPoses
-from hero_node import Pose, find_frame
+from hero_node import find_frame
 
 from ..filter.swarm_localizer import LocalizedRobot
 
@@ -37,7 +37,7 @@ class Outputs:
 
     def publish(self, robots: Sequence[LocalizedRobot]) -> None:
         """Publish where the robots are. A transform is sent once for each reading of odometry."""
-        report = RobotPoses(robots=[_describe_robot(robot) for robot in robots])
+        report = RobotPoses(robots=[describe_robot(robot) for robot in robots])
         report.header.stamp, report.header.frame_id = rospy.get_rostime(), self._frame
         self._poses.publish(report)
         transforms, is_heard = [], self._tf.get_num_connections() > 0
@@ -86,17 +86,14 @@ def publish_statuses(publisher: rospy.Publisher, statuses: List[DiagnosticStatus
     publisher.publish(message)
 
 
-def make_robot_pose(robot_id: int, state: int, stamp: rospy.Time, pose: Pose, covariance: np.ndarray) -> RobotPose:
-    """Return the message; covariance: of x, y and yaw, (3, 3), m and rad."""
-    position_m2, yaw_rad2 = (covariance.item(0) + covariance.item(4)) / 2.0, covariance.item(8)
-    return RobotPose(robot_id, state, stamp, *pose, math.sqrt(max(0.0, position_m2)), math.sqrt(max(0.0, yaw_rad2)))
-
-
-def _describe_robot(robot: LocalizedRobot) -> RobotPose:
-    if robot.estimate is not None:
-        stamp_s, pose, covariance = robot.estimate[:3]
-        return make_robot_pose(robot.robot_id, int(robot.state), rospy.Time.from_sec(stamp_s), pose, covariance)
-    return RobotPose(robot.robot_id, int(robot.state), rospy.Time(), *[math.nan] * 5)
+def describe_robot(robot: LocalizedRobot) -> RobotPose:
+    """Return the message; of a robot without an estimate, all numbers are nan."""
+    if robot.estimate is None:
+        return RobotPose(robot.robot_id, int(robot.state), rospy.Time(), *[math.nan] * 5)
+    stamp_s, pose, covariance = robot.estimate[:3]
+    variances = ((covariance.item(0) + covariance.item(4)) / 2.0, covariance.item(8))
+    sds = [math.sqrt(max(0.0, variance)) for variance in variances]
+    return RobotPose(robot.robot_id, int(robot.state), rospy.Time.from_sec(stamp_s), *pose, *sds)
 
 
 def _make_quaternion(yaw_rad: float) -> geometry.Quaternion:
