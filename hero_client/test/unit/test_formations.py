@@ -78,6 +78,7 @@ def test_a_formation_has_its_spacing_and_its_center(shape):
         ({"turn_deg": True}, "turn_deg is True"),
         ({"shape": "grid", "columns": 0}, "columns is 0"),
         ({"shape": "points", "points": [[0, 0]]}, "at least 3 places"),
+        ({"shape": "points", "points": [[0, 0], [0, 0.5], [0, 0.1]]}, "two places are 0.100 m apart"),
         ({"shape": "points", "points": [[0, 0], [0, 0.5], [0, "x"]]}, "points is 'x'"),
     ],
 )

@@ -192,6 +192,10 @@ def test_a_goal_fails_with_the_robots_reason():
     link.ready_s, link.ranges = 0.0, [0.06] + [math.inf] * 7
     server.put(ask(0.5))
     assert drive(server, link) and "an obstacle is in the way" in server.outcomes[1].reason
+    server.put(ask(0.5))
+    with pytest.raises(ZeroDivisionError):
+        drive(server, link, [(0.1, lambda: 1 // 0)])
+    assert len(server.outcomes) == 2, "a bug is not the robot's reason"
 
 
 def test_only_a_queue_that_avoids_drives_around_obstacles():

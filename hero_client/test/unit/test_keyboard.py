@@ -5,10 +5,11 @@ import pty
 import signal
 import sys
 import termios
+from unittest import mock
 
 import pytest
 
-from hero_client.apps.keyboard import Keyboard, split_keys
+from hero_client.apps.keyboard import Keyboard, NoTerminalError, split_keys
 
 
 @pytest.fixture
@@ -39,6 +40,15 @@ def test_the_terminal_has_its_settings_back_also_after_an_error(terminal):
         assert inside[6][termios.VSUSP] == b"\0", "Ctrl-Z is a key"
         raise ZeroDivisionError
     assert termios.tcgetattr(sys.__stdin__) == before and keyboard.file.closed
+
+
+@pytest.mark.parametrize(("raised", "told"), [(OSError, NoTerminalError), (ValueError, ValueError)])
+def test_only_a_terminal_that_does_not_open_counts_as_none(monkeypatch, raised, told):
+    for name in ("__stdin__", "__stdout__", "__stderr__"):
+        monkeypatch.setattr(sys, name, None)
+    monkeypatch.setattr(os, "open", mock.create_autospec(os.open, side_effect=raised))
+    with pytest.raises(told):
+        Keyboard()
 
 
 def test_an_arrow_that_comes_in_two_pieces_is_one_key(terminal):

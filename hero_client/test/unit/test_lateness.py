@@ -1,5 +1,7 @@
 """Loops that drive by poses, as late as a test says: how fast robots still drive, and what users read."""
 
+import math
+
 import pytest
 
 from hero_client.controllers.lateness import HOLD_S, REPORT_PERIOD_S, Lateness
@@ -40,6 +42,9 @@ def test_the_age_of_a_pose_slows_its_robot_alone():
     assert lateness.find_share(1.0) == 0.0
     text = "poses are 1.0 s old: is Wi-Fi or this PC overloaded?; robots are stopped meanwhile"
     assert lateness.take_warning() == text
+    lateness = Lateness()
+    lateness.step(0.0)
+    assert lateness.find_shares([0.0, math.inf, math.nan]) == [1.0] * 3 and lateness.take_warning() == "", "no pose"
 
 
 def test_one_late_step_slows_for_a_while_and_the_loop_recovers():

@@ -114,6 +114,8 @@ def test_a_blocked_motion_fails_after_two_seconds_without_a_break():
         # Every second there is room to creep on.
         controller.step(Pose(0.01 * index, 0.0, 0.0), see(0.04 if index % 10 == 9 else 0.02), STEP_S * index)
     assert controller.state is State.ACTIVE
+    turning = step_until_end(Steady(0.0, 0.3), lambda now_s: Pose(0.0, 0.0, 0.3 * now_s), 9.0, see(0.0))
+    assert turning == 9.0, "nothing is in the way of a turn on the spot"
 
 
 def test_wheels_that_stand_still_are_told_from_slow_commands_and_noise():

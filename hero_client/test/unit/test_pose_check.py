@@ -44,6 +44,7 @@ def test_drives_that_show_no_direction_do_not_count():
         ([wrong, (0.05, math.pi, 0.29, 1.0)], True),
         ([wrong, (0.05, math.pi, 0.0, 0.69)], False),
         ([wrong, (0.05, math.pi, 0.0, 0.71)], True),
+        ([wrong, (0.05, math.pi, 0.0, 5.0), wrong], False),  # it was carried meanwhile: a jump begins anew
         ([(0.039, math.pi, 0.0, 1.0)], False),
         ([(0.021, math.pi, 0.0, 1.0)] * 4, True),  # four short ones are two of the length
         ([(0.021, math.pi, 0.0, 1.0)] * 3, False),

@@ -8,7 +8,7 @@ import true_paths
 from hero_client import CommonFrame
 from hero_client.controllers import State
 from hero_client.values.readings import NOT_CALIBRATED
-from hero_node import Pose
+from hero_node import Pose, transform_pose
 from hero_sim.stepped import StepSwarm
 
 pytest.importorskip("rospy", reason="the program imports rospy")
@@ -85,6 +85,19 @@ def test_a_robot_without_ranges_stops_and_goes_on_when_they_come(swarm, monkeypa
         explorer.step([LEFT], [], 0.0)
         assert (explorer.common.missing["hero_0"] == NOT_CALIBRATED) == all(map(math.isnan, known))
     assert driven[0] == (0.0, 0.0) and driven[1] != (0.0, 0.0)
+
+
+@pytest.mark.parametrize("has_goal", [False, True])
+def test_before_an_obstacle_a_bump_shield_is_slower(monkeypatch, has_goal):
+    speeds_m_s = []
+    with StepSwarm(2, model="hero_plus,robot=1") as swarm:
+        for robot in swarm:
+            monkeypatch.setattr(robot, "fresh_proximity", lambda: [0.12, *[math.inf] * 7])
+            monkeypatch.setattr(robot, "drive", lambda *command: speeds_m_s.append(command[0]))
+            ahead = transform_pose(robot.true_pose, Pose(1.0, 0.0, 0.0))
+            Explorer(robot, CommonFrame("map"), seed=0).step([ahead[:2]] if has_goal else [], [], swarm.now_s)
+    stock_m_s, plus_m_s = speeds_m_s
+    assert 0.0 <= plus_m_s < stock_m_s
 
 
 @pytest.mark.slow

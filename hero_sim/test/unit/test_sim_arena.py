@@ -225,9 +225,11 @@ def test_a_pipe_as_arena_is_refused_at_once(tmp_path):
 
 @pytest.mark.slow
 def test_more_starts_than_robots_can_be_are_refused(tmp_path):
-    rows = ", ".join("[%d, %d, 0]" % (number % 100, number // 100) for number in range(1001))
+    rows = ["[%d, %d, 0]" % (number % 100, number // 100) for number in range(1001)]
+    text = "bounds_m: [-1, -1, 101, 101]\nstarts_m_deg: [%s]\n"
+    assert len(load_arena(write(tmp_path, text % ", ".join(rows[:1000]))).starts) == 1000
     with pytest.raises(OptionError, match="starts_m_deg has 1001 starts, more than 1000"):
-        load_arena(write(tmp_path, "bounds_m: [-1, -1, 101, 101]\nstarts_m_deg: [%s]\n" % rows))
+        load_arena(write(tmp_path, text % ", ".join(rows)))
 
 
 def test_an_area_covers_its_border_and_nothing_beyond():

@@ -6,7 +6,7 @@ from driver_side import RECEIVED, SENT, VELOCITY, DriverSide
 
 from hero_driver.rosserial import packets
 from hero_sim.errors import OptionError
-from hero_sim.link.channel import Channel
+from hero_sim.link.channel import Channel, _find_collisions
 from hero_sim.link.wifi import MAX_CHANNELS, build_network, parse_wifi
 from hero_sim.stepped.rules import radio_rows, readings
 from hero_sim.stepped.swarm import StepSwarm
@@ -50,6 +50,14 @@ def test_frames_collide_more_often_the_more_stations_wait():
     assert one < five < forty
     # Half of the frames of 40 stations collide, and two share the time of each collision.
     assert 1.2 * one < forty < 1.6 * one
+
+
+@pytest.mark.parametrize("stations", [2, 10, 50])
+def test_collisions_are_those_of_bianchis_model_of_saturated_stations(stations):
+    collides, window, doubled = _find_collisions(stations), 16, 6
+    sends = 2.0 * (1.0 - 2.0 * collides)
+    sends /= (1.0 - 2.0 * collides) * (window + 1) + collides * window * (1.0 - (2.0 * collides) ** doubled)
+    assert collides == pytest.approx(1.0 - (1.0 - sends) ** (stations - 1))
 
 
 def test_a_segment_that_collides_eight_times_arrives_a_tick_of_tcp_later():

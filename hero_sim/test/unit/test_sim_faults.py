@@ -1,9 +1,13 @@
+from types import SimpleNamespace
+from unittest.mock import call, create_autospec
+
 import pytest
 from driver_side import parse_options
 
 from hero_sim import faults
 from hero_sim.build import build_simulator
 from hero_sim.errors import OptionError
+from hero_sim.simulator import Simulator
 
 
 def test_a_fault_is_read_with_time_robot_and_values():
@@ -45,6 +49,23 @@ def test_every_kind_of_fault_can_be_injected():
         injector.run(0)
     simulator.link.close_all()
     assert reports[1:] == ["fault %s for hero_0" % kind for kind in faults.KINDS]
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "acts"),
+    [
+        ("vanish", 0.0, [call.switch_off(1)]),
+        ("vanish", 1.5, [call.switch_off(1), call.reboot(1, after_ms=1500)]),
+        ("duplicate", -1.0, [call.reboot(1, 4)]),
+        ("duplicate", 0.0, [call.reboot(1, 0)]),
+        ("leave", 0.25, [call.leave(1, 250)]),
+    ],
+)
+def test_a_fault_does_to_its_robot_what_its_value_says(kind, value, acts):
+    simulator = create_autospec(Simulator, instance=True)
+    simulator.swarm = SimpleNamespace(robots=[SimpleNamespace(robot_id=4), SimpleNamespace(robot_id=5)])
+    faults.KINDS[kind].act(simulator, 1, value)
+    assert simulator.mock_calls == acts
 
 
 def test_faults_come_in_order_of_time_to_the_robots_that_they_name():

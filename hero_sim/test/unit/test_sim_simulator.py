@@ -128,7 +128,7 @@ def test_it_lingers_until_a_connection_ends_or_the_time_is_over(bench):
 
 
 def test_a_robot_that_left_connects_again_only_after_its_time(bench):
-    simulator, _, link, _ = bench()
+    simulator, lines, link, _ = bench()
     robot, start_ms = simulator.swarm.robots[0], simulator.swarm.now_ms
     simulator.leave(0, 500)
     assert ("close", 0) in link.calls
@@ -141,7 +141,9 @@ def test_a_robot_that_left_connects_again_only_after_its_time(bench):
     simulator.serve_robot(0)
     assert link.calls == [("connect", 0)]
     link.connecting.add(0)
+    assert lines == []
     simulator.serve_robot(0)
+    assert len(lines) == 1 and "(no answer within 5 s)" in lines[0]
     assert link.calls == [("connect", 0)], "one attempt is under way"
 
 
@@ -212,6 +214,7 @@ def test_a_robot_blocked_by_its_channel_and_its_link_waits_for_both(bench):
         simulator._send_up(0, [bytes(1000)])
         if not has_unsent:
             simulator.writing_resumed(0)
+        simulator._carry(simulator.swarm.now_ms)
         assert resumed == [], "the channel blocks it"
         simulator.swarm.now_ms += 10000
         simulator._carry(simulator.swarm.now_ms)

@@ -126,6 +126,14 @@ def test_robots_and_places_are_those_of_the_command_line():
     assert swarm.rows.world.errors.servo_center_us[1, 0] == 1540.0
 
 
+def test_places_drawn_have_room_for_the_widest_robot():
+    options = "--count 20 --arena obstacles --model hero_plus,robot=3"
+    world = build_world(parse_options(*options.split()))
+    assert world.errors.radius_m.argmax() == 3 and world.errors.radius_m.max() == 0.06
+    gaps_m = arena.measure_clearance(world.poses[:, :2], world.arena)
+    assert gaps_m[len(world.arena.starts) :].min() >= 0.06 + arena.START_GAP_M
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("wifi", ["ideal", "hotspot"])
 def test_hero_plus_beside_a_stock_robot_drives_and_measures_ahead(wifi):

@@ -97,7 +97,7 @@ def test_robots_objects_and_arena_are_drawn():
 
 
 def test_only_the_first_world_is_shown_and_nothing_after_close():
-    swarm, topics, messages = drive(worlds=2, wifi="hotspot")
+    swarm, topics, messages = drive(worlds=2, wifi="hotspot", model="hero_plus")
     assert len(messages[MARKERS][-1].markers) == 6
     received = []
     topics._pass_on = lambda *message: received.append(message)
