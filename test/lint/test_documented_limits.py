@@ -74,3 +74,28 @@ def test_documented_numbers_are_those_of_the_constants(page, text, unit, package
     assert documented, f"{page} no longer says: {text}"
     for number in documented:
         assert (WORDS.get(number) or float(number)) * unit == pytest.approx(read_constant(package, name), rel=0.002)
+
+
+OPTION = re.compile(r"`(--[a-z-]+)(?: [A-Z]+)?` \((\d+(?:\.\d+)?)[;,)]")
+
+
+def read_defaults(package):
+    """Return the numbers that programs of a package take for options that are left out: (option, number)."""
+    paths = [path for name, path in sources.list_source_modules().items() if name.partition(".")[0] == package]
+    calls = [node for path in paths for node in sources.walk(path) if isinstance(node, ast.Call)]
+    for call in calls:
+        given = {keyword.arg: keyword.value for keyword in call.keywords}
+        if call.args and isinstance(call.args[0], ast.Constant) and isinstance(given.get("default"), ast.Constant):
+            yield call.args[0].value, given["default"].value
+
+
+def test_documented_defaults_of_options_are_those_of_programs():
+    found = 0
+    for package, folder in sources.PACKAGES.items():
+        documented = OPTION.findall((folder / "README.md").read_text(encoding="utf-8"))
+        defaults = list(read_defaults(package)) if documented else []
+        for option, number in documented:
+            if option in dict(defaults):
+                found += 1
+                assert (option, float(number)) in defaults, f"README of {package}: {option} is not {number}"
+    assert found > 10

@@ -275,6 +275,18 @@ def test_launch_files_set_exactly_the_parameters_that_programs_read():
     assert found > 5
 
 
+def test_what_has_the_name_of_a_launch_argument_has_its_value():
+    others = {("hero_description", "robots", "simulated")}  # of the node that shows true poses
+    for path in LAUNCH_FILES:
+        root = ElementTree.parse(path).getroot()
+        names = {argument.get("name") for argument in root.findall("arg")}
+        for entry in (*root.iter("param"), *root.iter("arg")):
+            given = re.fullmatch(r"\$\(arg (\w+)\)", entry.get("value", ""))
+            name = entry.get("name")
+            if given and name in names - {given[1]}:
+                assert (sources.package_of(path), name, given[1]) in others, f"{sources.name_of(path)}: {name}"
+
+
 def test_launched_nodes_say_where_their_output_goes():
     for path in LAUNCH_FILES:
         for node in ElementTree.parse(path).getroot().iter("node"):

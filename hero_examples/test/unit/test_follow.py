@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import true_paths
+from program_runs import run_main
 
 from hero_client import CommonFrame
 from hero_client.controllers import FollowLaw, Lateness
@@ -88,3 +89,12 @@ def test_robots_without_poses_in_the_frame_are_named():
         common = CommonFrame("nowhere")
         true_paths.run(swarm, lambda time_s: follow.step(swarm, common, FollowLaw(), Lateness()), 0.2)
         assert all("nowhere" in common.missing[name] for name in ("hero_0", "hero_1"))
+
+
+@pytest.mark.parametrize(("parameters", "linear_m_s"), [((), 0.02), (("_gap_m:=0.5",), 0.0)])
+def test_the_program_follows_as_its_parameters_say(monkeypatch, tmp_path, parameters, linear_m_s):
+    arena = tmp_path / "row.yaml"
+    arena.write_text(ARENA)
+    with StepSwarm(3, seed=1, arena=str(arena), perfect=True) as swarm:
+        _, log = run_main(monkeypatch, swarm, follow, "_robots:=0 2", "_linear_m_s:=0.02", *parameters)
+        assert log.command[10, 0, :, 0] == pytest.approx([0.0, 0.0, linear_m_s])

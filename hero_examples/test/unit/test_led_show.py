@@ -2,6 +2,7 @@
 
 import pytest
 import true_paths
+from program_runs import run_main
 
 from hero_sim.stepped import StepSwarm
 
@@ -47,6 +48,14 @@ def test_blink_alternates_between_red_and_blue_together():
 
 def test_brightness_dims_every_color():
     assert max(max(light) for lights in show("rainbow", 0.25) for light in lights) == 0.25
+
+
+def test_the_program_shows_what_its_parameters_say(monkeypatch):
+    for duration_s, color in ((0.5, (0.25, 0.0, 0.0)), (1.5, (0.0, 0.0, 0.25))):
+        with StepSwarm(3) as swarm:
+            parameters = ("_robots:=0 2", "_pattern:=blink", "_period_s:=2", "_brightness:=0.25")
+            run_main(monkeypatch, swarm, led_show, *parameters, duration_s=duration_s)
+            assert [robot.light == color for robot in swarm] == [True, False, True]
 
 
 def test_patterns_go_through_their_colors_once_a_period():

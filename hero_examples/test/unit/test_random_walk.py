@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import true_paths
+from program_runs import run_main
 
 from hero_client.controllers import WanderLaw, WanderMemory
 from hero_client.values import BODY_RADIUS_M
@@ -13,6 +14,7 @@ from hero_sim.stepped import StepSwarm
 from hero_sim.world import build_default, load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
+from hero_examples.driving import random_walk
 from hero_examples.driving.random_walk import Walker
 from hero_test.nonempty import nonempty
 
@@ -85,3 +87,21 @@ def test_a_walker_that_lost_its_ranges_forgets_where_it_turned():
     walker.memory = WanderMemory(1, 2, 0.3)
     assert walker.step() == "no laser" and sent == [(0.0, 0.0), "blue"]
     assert walker.memory == WanderMemory()
+
+
+def test_the_program_walks_as_its_parameters_say(monkeypatch):
+    commands = []
+    for seed in (5, 5, 6):
+        with StepSwarm(3, arena="empty", seed=1) as swarm:
+            parameters = ("_robots:=0 2", "_linear_m_s:=0.04", f"_seed:={seed}")
+            commands.append(run_main(monkeypatch, swarm, random_walk, *parameters)[1].command[10, 0])
+    first, again, other = commands
+    assert first[:, 0] == pytest.approx([0.04, 0.0, 0.04]) and (first == again).all()
+    assert (first[::2, 1] != other[::2, 1]).all() and first[0, 1] != first[2, 1], "each robot has a seed of its own"
+
+
+def test_the_program_turns_away_as_fast_as_told(monkeypatch):
+    with StepSwarm(1) as swarm:
+        monkeypatch.setattr(swarm[0], "fresh_proximity", lambda: [0.05, *[math.inf] * 7])
+        _, log = run_main(monkeypatch, swarm, random_walk, "_angular_rad_s:=0.7")
+        assert np.abs(log.command[10, 0, 0]) == pytest.approx((0.0, 0.7))

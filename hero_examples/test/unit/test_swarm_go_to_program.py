@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import true_paths
+from program_runs import run_main
 
-from hero_client import CommonFrame, ProgramError
+from hero_client import CommonFrame, HeroError, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_client.controllers import AvoidanceLaw
 from hero_client.values.errors import GoalError
@@ -15,6 +16,7 @@ from hero_sim.stepped import StepSwarm
 from hero_sim.world import load_arena
 
 pytest.importorskip("rospy", reason="the program imports rospy")
+from hero_examples.swarm import swarm_go_to
 from hero_examples.swarm.swarm_go_to import STEP_HZ, Formation
 
 CIRCLE = str(Path(__file__).resolve().parents[3] / "test" / "hero_test" / "arenas" / "circle_arena.yaml")
@@ -91,6 +93,22 @@ def test_robots_that_are_not_in_place_in_time_are_named():
     swarm = StepSwarm(2, arena="empty")
     with pytest.raises(ProgramError, match="after 2 s not in place: hero_0, hero_1"):
         form(swarm, [(0.0, 50.0), (50.0, 0.0)], timeout_s=2.0)
+
+
+def test_places_of_robots_with_a_bump_shield_are_farther_apart(monkeypatch):
+    swarm = StepSwarm(2, arena="empty", model="hero_plus,robot=1")
+    with pytest.raises(HeroError, match=r"two places are 0\.200 m apart, but robots need 0\.22 m"):
+        run_main(monkeypatch, swarm, swarm_go_to, "_formation:={shape: line, spacing_m: 0.2}")
+
+
+def test_robots_take_the_nearest_places_unless_told_otherwise(monkeypatch):
+    with StepSwarm(2, arena="empty") as swarm:
+        parameters = ["_formation:={shape: points, points: [[%f, %f], [%f, %f]]}", "_once:=true", "_timeout_s:=2"]
+        parameters[0] %= (*swarm[1].true_pose[:2], *swarm[0].true_pose[:2])
+        status, log = run_main(monkeypatch, swarm, swarm_go_to, *parameters, duration_s=9.0)
+        assert status == 0 and true_paths.measure_lengths(true_paths.split_worlds(log)[0]).max() < 0.01
+        with pytest.raises(HeroError, match="after 2 s not in place: hero_0, hero_1"):
+            run_main(monkeypatch, swarm, swarm_go_to, *parameters, "_assign:=false", duration_s=9.0)
 
 
 def freeze_first(swarm):

@@ -1,9 +1,11 @@
 """What the configuration of RViz displays, and which robots it takes."""
 
 import math
+import os
 import re
 from colorsys import hls_to_rgb
 from pathlib import Path
+from unittest.mock import create_autospec
 
 import pytest
 import yaml
@@ -188,3 +190,22 @@ def test_only_errors_of_localized_places_are_drawn_around_robots():
     }
     (path,) = [display for display in manager["Displays"] if display["Name"] == "hero_0 path"]
     assert path["Unreliable"] is False and path["Keep"] > 100 > path["Position Tolerance"] > 0
+
+
+def test_the_program_becomes_rviz_with_what_its_parameters_say(monkeypatch, tmp_path):
+    rviz = pytest.importorskip("hero_description.rviz", reason="imports rospy")
+    ids = {"robots": [4, 6, 7], "hero_plus": [6], "simulated": [4, 6]}
+    parameters = {**ids, "fixed_frame": "odom", "view": "above", "picture": True}
+    monkeypatch.setattr(rviz, "read_parameters", lambda declared: {name: parameters[name] for name in declared})
+    monkeypatch.setattr(rviz, "Program", create_autospec(rviz.Program))
+    monkeypatch.setattr(rviz.shutil, "which", lambda name: "/opt/" + name)
+    monkeypatch.setattr(rviz.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(rviz.sys, "argv", ["rviz", "--fullscreen"])
+    monkeypatch.setattr(rviz.os, "execv", create_autospec(os.execv))
+    monkeypatch.setenv("DISPLAY", ":7")
+    rviz.main()
+    program, (name, option, path, *others) = rviz.os.execv.call_args.args
+    assert (program, name, option, others) == ("/opt/rviz", "/opt/rviz", "-d", ["--fullscreen"])
+    groups = {group: ["hero_%d" % robot_id for robot_id in numbers] for group, numbers in ids.items()}
+    names = groups.pop("robots")
+    assert Path(path).read_text() == make_config(names, "odom", "above", True, **groups)

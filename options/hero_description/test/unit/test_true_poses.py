@@ -39,23 +39,41 @@ def test_the_base_is_where_the_ground_truth_says():
     assert (place.x, place.y, place.z, turn.z, turn.w) == (0.3, -0.2, 0.0, 0.6, 0.8)
 
 
-@pytest.mark.parametrize(("module", "messages"), [(true_poses, [Odometry(), LaserScan()]), (lights, [ColorRGBA()])])
-def test_what_comes_while_the_node_ends_is_dropped_silently(module, messages, monkeypatch):
-    closed = create_autospec(rospy.Publisher, instance=True)
-    closed.publish.side_effect = rospy.ROSException("topic was closed during publish()")
+def run_main(monkeypatch, module, publisher, steps=(), **parameters):
+    """Run the program with these parameters; return the type, callback and argument of each subscription."""
     received = []
-    monkeypatch.setattr(rospy, "Publisher", lambda *arguments, **options: closed)
+    monkeypatch.setattr(rospy, "Publisher", lambda *arguments, **options: publisher)
     monkeypatch.setattr(
         rospy, "Subscriber", lambda topic, kind, *receive, queue_size: received.append((kind, *receive))
     )
     monkeypatch.setattr(rospy, "get_param", lambda name: URDF)
     monkeypatch.setattr(true_poses, "StaticTransformBroadcaster", Mock)
-    parameters = {"robots": [7], "hero_plus": (), "simulated": ()}
-    monkeypatch.setattr(module, "read_parameters", lambda declared: parameters)
-    ended = SimpleNamespace(running=False, rate=lambda rate_hz: ())
-    monkeypatch.setattr(module, "Program", lambda name: nullcontext(ended))
+    monkeypatch.setattr(module, "read_parameters", lambda declared: {name: parameters[name] for name in declared})
+    program = SimpleNamespace(running=False, rate=lambda rate_hz: steps)
+    monkeypatch.setattr(module, "Program", lambda name: nullcontext(program))
     module.main()
+    return received
+
+
+@pytest.mark.parametrize(("module", "messages"), [(true_poses, [Odometry(), LaserScan()]), (lights, [ColorRGBA()])])
+def test_what_comes_while_the_node_ends_is_dropped_silently(module, messages, monkeypatch):
+    closed = create_autospec(rospy.Publisher, instance=True)
+    closed.publish.side_effect = rospy.ROSException("topic was closed during publish()")
+    received = run_main(monkeypatch, module, closed, robots=[7], hero_plus=(), simulated=())
     assert [kind for kind, *_ in received] == [type(message) for message in messages]
     for (_, receive, argument), message in zip(received, messages):
         receive(message, argument)
     assert closed.publish.call_count == len(messages)
+
+
+def test_names_rings_and_lights_are_those_of_each_robots_model_and_place(monkeypatch):
+    publisher = create_autospec(rospy.Publisher, instance=True)
+    received = run_main(monkeypatch, lights, publisher, [0.0], robots=[4, 6, 7], hero_plus=[6], simulated=[6, 7])
+    _, receive, robot_id = received[2]
+    receive(ColorRGBA(1.0, 0.0, 0.0, 1.0), robot_id)
+    (identities,), (lit,) = (call.args for call in publisher.publish.call_args_list)
+    rings = [marker for marker in identities.markers if marker.ns == "rings"]
+    assert [ring.points[0].x - lights.RING_GAP_M for ring in rings] == pytest.approx([0.036835, 0.06, 0.036835])
+    frames = ["hero_4/base_link", "hero_6/true/base_link", "hero_7/true/base_link"]
+    assert [marker.header.frame_id for marker in identities.markers] == [frame for frame in frames for _ in range(2)]
+    assert [marker.header.frame_id for marker in lit.markers] == ["hero_7/true/hat_link"]
