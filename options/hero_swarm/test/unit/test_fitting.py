@@ -3,6 +3,7 @@
 import functools
 import math
 import re
+from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
@@ -197,6 +198,8 @@ def test_a_recording_is_cut_and_samples_lie_within_the_odometry():
     assert np.array_equal(first.odometry[:, 0], first.poses[:, 0])
     assert recording.time_s == pytest.approx(2.0)
     assert sample_times(recording) == pytest.approx(np.arange(1, 40) * 0.05)
+    ends = np.array(((0.0, 0.5, 0.5, 0.0), (1.5, 0.5, 0.5, 0.0)))
+    assert find_slips(recording._replace(poses=ends)) == pytest.approx(np.arange(21, 31) * 0.05), "until the last pose"
 
 
 def test_poses_are_interpolated_the_short_way_round():
@@ -223,6 +226,7 @@ def test_a_body_is_fitted_to_stretches_that_have_poses_throughout():
 def test_a_robot_that_was_told_nothing_is_predicted_where_it_began():
     recording = make_recording(13.0, yaw_rad=1.0)._replace(commands=np.array([(0.0, PULSES, 1500.0, 1500.0)]))
     for start_share, paths in ((0.5, 3), (0.0, 6), (0.9, 0)):
+        assert Motors({}) == Motors({}, delay_s=0.0, phase_s=0.0), "as in the simulator"
         fits = [(Motors({}), np.ones(3)), (Motors({"lag_s": 0.2}, 0.1), np.ones(3))]
         ends_m = predict_ends(recording, fits, start_share, 2.0)
         assert ends_m == pytest.approx(np.full((2, paths), 0.2), abs=1e-6)
@@ -313,6 +317,15 @@ def test_a_fit_that_predicts_worse_is_refused_and_nothing_is_written(tmp_path, m
         "hero_3: left out: held-out paths of 5 s end 45.0 mm off after the fit, 31.0 mm before: nothing is told"
         in capsys.readouterr().err
     )
+
+
+def test_robots_after_one_that_cannot_be_fitted_are_fitted(tmp_path, monkeypatch, capsys):
+    fits = [ValueError("too short"), robot_fit.Fit({"slip": 0.02}, 0.0, 0.02, 0.01), ValueError("turned by 1 rad only")]
+    monkeypatch.setattr(fit_program, "fit_robot", create_autospec(fit_robot, side_effect=fits))
+    status, text = write_fit(tmp_path, monkeypatch, {3: ["a"], 4: ["b", "c"], 6: ["d"]})
+    assert status == 1 and [line for line in text.splitlines() if line[0] != "#"] == ["robot=4,slip=0.02"]
+    assert capsys.readouterr().err == "hero_3: left out: too short\nhero_6: left out: turned by 1 rad only\n"
+    assert [given.args for given in fit_program.fit_robot.call_args_list] == [(["a"],), (["b", "c"],), (["d"],)]
 
 
 @pytest.mark.slow

@@ -154,6 +154,13 @@ def test_a_full_center_keeps_its_own_and_molecules_have_no_rings():
     assert shared[1] == [0]
 
 
+def test_at_first_molecules_bind_as_robots_that_were_not_bound():
+    starts = np.array([[(0.0, 0.0, 0.0), (0.2, 0.0, 0.0), (0.0, 0.2, 0.0)]])
+    trial = Trial(Molecules(), OPEN, 3, [1], starts=starts)
+    trial.step()
+    assert trial.memory[:, 2:-1].tolist() == [[1, 2], [0, -1], [0, -1]]
+
+
 def test_molecules_and_their_missing_bonds_are_counted_as_published():
     # Water; a pair of hydrogens; a center that binds one which binds another one.
     bound = [[1, 2], [0, -1], [0, -1], [4, -1], [3, -1], [1, -1]]

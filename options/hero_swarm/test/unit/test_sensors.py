@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hero_client.values import sense_binary
+from hero_sim.stepped import StepSwarm
 from hero_sim.world import compiled
 from hero_sim.world.arena import build_rectangle
 from hero_swarm.behavior import Behavior, Binary, Distance, NeighborColors, Neighbors, Odometry, Proximity, Random
@@ -51,6 +52,23 @@ def test_odometry_is_what_the_wheels_rolled():
     moved_m = np.hypot(*(trial.poses - STARTS)[..., :2].reshape(-1, 2).T)
     assert np.hypot(*sensed.wheels.poses[:, :2].T)[1::2] == pytest.approx(moved_m[1::2], abs=0.01)
     assert sensed.wheels.angular_rad_s[1] > 0.5 > abs(sensed.wheels.angular_rad_s[0])
+
+
+def test_readings_over_ros_are_those_of_the_rows_but_of_silent_robots(monkeypatch):
+    own_readings = pytest.importorskip("hero_swarm.ros.own_readings", reason="readings of robots need ROS")
+    with StepSwarm(4, first_id=3, seed=2, model="hero_plus,robot=5") as swarm:
+        swarm.drive(0.1, 0.5, duration_s=0.5)
+        asked = {robot: [] for robot in swarm}
+        for robot in swarm:
+            monkeypatch.setattr(robot._link, "subscribe", asked[robot].append)
+        readings = own_readings.OwnReadings(swarm, Sensing().sensors())
+        assert {tuple(sorted(topics)) for topics in asked.values()} == {("distance", "laser", "odom", "proximity")}
+        monkeypatch.setattr(swarm[4]._link, "age_s", lambda topic: 1.1)
+        for name in ("proximity_m", "counts", "distance_m", "odometry", "velocities"):
+            expected = np.array(getattr(swarm.rows, name), dtype=float)
+            expected[1] = np.nan
+            np.testing.assert_array_equal(getattr(readings, name), expected, name)
+        assert np.isfinite(readings.distance_m).tolist() == [False, False, True, False]
 
 
 def test_colors_of_neighbors_are_those_of_the_last_step():
@@ -130,8 +148,9 @@ def test_compiled_beams_see_what_others_see(monkeypatch, sensor):
 
 @pytest.mark.parametrize("range_m", [0.3, float("inf")])
 def test_loops_over_pairs_see_what_arrays_do(range_m):
-    poses = np.random.RandomState(1).uniform(-0.4, 0.4, (4, 9, 3)) * (1.0, 1.0, 10.0)
+    poses = np.random.RandomState(1).uniform(-0.4, 0.4, (5, 9, 3)) * (1.0, 1.0, 10.0)
     poses[0, 3] = np.nan
+    poses[4] = (0.1, 0.2, 0.0)  # in each other: the sensors are right on the rims
     sees = sense_binary(poses, Binary(range_m=range_m), None, find_touched)
     assert sees.tolist() == sense_binary(poses, Binary(range_m=range_m)).tolist() and len(set(sees.tolist())) == 2
 

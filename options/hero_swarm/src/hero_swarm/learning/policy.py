@@ -105,5 +105,4 @@ class _Policy(Behavior):
             text = "policy %s takes %d numbers, but its sensors give %d: save it again"
             raise ValueError(text % (path, inputs, observed.shape[1]))
         shares = run_network(layers, observed.reshape(*worlds, -1, inputs)).reshape(-1, 2)
-        shares = np.where(sensed.is_known[:, None], shares, 0.0)
         return MAX_LINEAR_M_S * shares[:, 0], MAX_LEARNED_ANGULAR_RAD_S * shares[:, 1], memory

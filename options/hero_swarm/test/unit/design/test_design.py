@@ -116,8 +116,10 @@ def test_scores_count_what_they_say():
 
 @pytest.mark.slow
 def test_a_mission_becomes_controllers_that_are_compared(path, capsys, monkeypatch):
+    chosen = []
     monkeypatch.setattr(program, "write_report", print)
-    options = ["m.yaml", "--budget", "200", "--tests", "2"]
+    monkeypatch.setattr(runner, "choose_engine", lambda own: chosen.append(own) or Engine(InProcess, 2))
+    options = ["m.yaml", "--budget", "200", "--tests", "2", "--jobs", "3", "--executor", "dask:tcp://127.0.0.1:1"]
     program.main(options)
     output = capsys.readouterr().out
     lines = output[output.index("right_mean_of_last_1_s    ") :].splitlines()
@@ -128,6 +130,7 @@ def test_a_mission_becomes_controllers_that_are_compared(path, capsys, monkeypat
     best = lines[4].split()[3].rstrip(";")
     assert find_behavior(best).arena == "m_chocolate/../arena.yaml" and os.path.isfile(best + ".dot")
     assert output.splitlines()[:2] == ["m_chocolate_simulated", "m_chocolate_pseudo_reality"], "reports are written"
+    assert [(own.jobs, own.executor) for own in chosen] == [(3, "tcp://127.0.0.1:1")] * 3
     program.main(options)  # nothing is computed again
     assert "runs in" not in capsys.readouterr().err
     Path(best).write_text("states: [{name: rest, do: stop}]\n")
@@ -283,6 +286,8 @@ def test_files_do_what_candidates_did(path):
         (own, Numbers),
     ):
         kind = plan(one)
+        is_network = kind.ending == ".npz"
+        assert not is_network or {*kind.genes.low, *-kind.genes.high} == {-5.0}, "weights as those of EvoStick"
         (genome,) = kind.genes.place(np.random.RandomState(3).random_sample((1, len(kind.genes.low))))
         file = "one" + kind.ending
         Path(file).write_bytes(kind.dump(genome, "arena.yaml", "# mine\n"))

@@ -10,13 +10,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hero_swarm.experiments import report
+from hero_swarm.experiments import report, runner
 from hero_swarm.experiments.computing import code_version
 from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.statistics import correct_by_holm
 from hero_swarm.experiments.reporting.summary import build_report
-from hero_swarm.experiments.results_folder import METRICS_ENDING, REAL, SIMULATED, ResultsFolder, Run
+from hero_swarm.experiments.results_folder import (
+    EXPERIMENT,
+    METRICS_ENDING,
+    REAL,
+    SIMULATED,
+    ResultsFolder,
+    Run,
+    read_results,
+)
 
 FILE = """\
 behavior: a.B
@@ -61,6 +69,21 @@ def test_the_table_does_not_depend_on_batches_or_their_order(batches, tmp_path):
     assert lines[0] == "robots,seed,kind,dispersion,time_until_dispersion_1_s,remark"
     assert lines[1] == "2,5,simulated,0.5,inf,"
     assert len(lines) == 9
+
+
+def test_a_folder_without_an_experiment_is_none_of_run(tmp_path):
+    open_folder(tmp_path)
+    assert read_results(str(tmp_path))[2]["numpy"] == "1"
+    (tmp_path / EXPERIMENT).unlink()
+    with pytest.raises(ExperimentError, match=f"no {EXPERIMENT} in it, so not a folder of run"):
+        read_results(str(tmp_path))
+
+
+def test_a_run_reads_no_file_that_it_did_not_need_when_it_began(tmp_path):
+    (tmp_path / "e.yaml").write_text(FILE.replace("a.B", "dispersion"))
+    options, words = runner.parse_options([str(tmp_path / "e.yaml")]), "needed now, but was not when the run began"
+    with runner.open_folder(options) as (experiment, _, _), pytest.raises(OSError, match=words):
+        experiment.sources.read(__file__)
 
 
 def test_a_resumed_experiment_lacks_only_what_is_missing(tmp_path):
