@@ -178,7 +178,8 @@ def test_self_tuning_is_known_by_calls_and_for_a_while_by_its_log(monkeypatch):
     bench.commands.note_tuning(False)
     assert not bench.commands.tunes(bench.now_s)
     bench.commands.note_tuning(True)
-    for after_s, tunes in ((TUNING_SILENCE_S - 0.1, True), (0.2, False)):
+    assert not bench.commands.is_commanded, "no program has asked for it since the last one ended"
+    for after_s, tunes in ((TUNING_SILENCE_S - 0.125, True), (0.125, False)):
         bench.now_s += after_s
         assert bench.commands.tunes(bench.now_s) == tunes
     assert bench.commands.offer_request("/hero_1/set_pid", "hero_msgs/SetPID", request) is None and bench.take() == [

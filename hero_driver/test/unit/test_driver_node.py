@@ -30,7 +30,7 @@ def test_a_report_that_meets_closed_topics_is_left_out_at_the_end_only(monkeypat
     # rosnode kill: rospy closes topics while it is going down, and says that it is down after that.
     monkeypatch.setattr(rospy.core, "_in_shutdown", True)
     assert not rospy.is_shutdown()
-    node._report(SimpleNamespace(publish=publish), False)
+    node._report(SimpleNamespace(publish=publish, measure_rates=lambda status: None), True)
     monkeypatch.setattr(rospy.core, "_in_shutdown", False)
     with pytest.raises(rospy.ROSException):
         node._report(SimpleNamespace(publish=publish), False)

@@ -380,6 +380,20 @@ def test_what_woke_the_loop_is_taken_and_wakes_it_once(still_loop):
         loop._wake_receiver.recv(1)
 
 
+def test_calls_that_pile_up_do_not_keep_the_loop_from_ending(still_loop):
+    loop, _ = still_loop
+    ran = []
+    loop._thread_id = None  # as another thread
+    for _ in range(event_loop.CALLS_MAX + 1):
+        loop.call_soon(lambda: ran.append("other"))
+    loop._thread_id = threading.get_ident()
+    loop.call_soon(lambda: ran.append("own"))
+    loop._thread_id = None
+    loop.stop()
+    loop._run_once()
+    assert ran == ["other"] * event_loop.CALLS_MAX + ["own"] and not loop._is_running
+
+
 def test_a_loop_that_does_not_run_answers_nobody():
     loop = EventLoop("127.0.0.1", 0, 1.0)
     with pytest.raises(NoAnswerError, match="the driver did not answer within 0.0 s"):

@@ -178,7 +178,7 @@ class EventLoop(LinkOwner):
 
     def stop(self) -> None:
         """Make run() return; from any thread."""
-        self.call_soon(self._end)
+        self._calls.submit(self._end, always=True)
 
     def call_soon(self, call: Callable[[], None]) -> None:
         """Run call on the loop's thread, soon; from any thread. Dropped if CALLS_MAX others wait already."""
