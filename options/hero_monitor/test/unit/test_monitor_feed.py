@@ -33,7 +33,7 @@ from hero_monitor.fleet_feed.feed import (
     measure_extent,
 )
 from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S
-from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH, encode_range, shorten
+from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH
 from hero_monitor.fleet_feed.placement import Placement
 from hero_monitor.fleet_feed.robot_feed import LIGHT_S, REACHED_M, RobotFeed
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
@@ -307,6 +307,12 @@ def test_the_outcome_of_a_stop_is_that_of_a_page_or_a_program(fleet):
     for level, has_origin in (("info", True), ("error", False)):
         fleet.status = StopStatus(level, "the outcome", True)
         assert fleet.read()["stop"]["text"].startswith("the outcome (") == has_origin
+    fleet.status, fleet.feed.stopper = None, "Ada"
+    for name, shown in (("/hero_monitor", "Ada"), ("/hero_monitor_2", "hero_monitor_2"), ("/teleop", "teleop")):
+        fleet.receive(make_row(0), stopped=True)
+        fleet.report.stopped_by, fleet.report.stopped_since = name, rospy.Time(1000)
+        fleet.read()
+        assert fleet.read()["stop"]["text"].startswith(f"stopped by {shown} since ")
     assert describe_stop_of_others("by x", ["hero_0", "hero_1"]) == ("error", "NOT STOPPED: hero_0, hero_1 move", False)
     assert describe_stop_of_others("by teleop since 18:43", []) == ("info", "stopped by teleop since 18:43", True)
     assert describe_stop_of_others(None, []) is None
@@ -424,6 +430,12 @@ def test_a_lost_master_is_told_until_it_answers(fleet):
     assert [loss["source"] for loss in fleet.read()["losses"]] == ["master"]
     fleet.master.is_lost = False
     assert fleet.read()["losses"] == []
+    fleet.receive(make_row(0))
+    fleet.report.gone = [make_row(7, since=rospy.Time(1000))]
+    (loss,) = fleet.read()["losses"]
+    assert loss["source"] == "robots" and loss["cause"].startswith("7 gone since ")
+    fleet.answering["/hero_driver"] = False
+    assert [loss["source"] for loss in fleet.read()["losses"]] == ["driver"], "it cannot tell who is gone"
 
 
 def test_arena_and_ground_truth_are_drawn_in_millimeters():
@@ -439,7 +451,7 @@ def test_arena_and_ground_truth_are_drawn_in_millimeters():
     areas = describe_arena(MarkerArray(painted))
     assert areas == {"boxes": [[1000, 0, 0, 500, 200, "#ff8000"]], "circles": [[1000, 0, 250, "#ff8000"]]}
     walls = [[0, -900, 0, 1800, 20, None], [900, 0, 1571, 1800, 20, None]]
-    assert measure_extent(walls, [[-500, 950, 100, None]]) == [-900, -900, 900, 1050]
+    assert measure_extent(walls, [[-500, 950, 100, None], [0, -950, 70, None]]) == [-900, -1020, 900, 1050]
     assert len(describe_arena(MarkerArray([box] * (MARKERS_MAX + 1)))["boxes"]) == MARKERS_MAX
     heading, name = (
         make_marker(Marker.ARROW, 1, 1, 1, ns="headings", id=3),
@@ -485,9 +497,3 @@ def test_a_light_goes_out_and_a_goal_is_drawn_until_reached(monkeypatch):
     for x_m, is_shown in ((0.5 - REACHED_M - 0.001, True), (0.5 - REACHED_M + 0.001, False), (0.3, False)):
         listener.track.receive_pose(Pose(x_m, 0.0, 0.0))
         assert (feed.find_goal(placement) is not None) == is_shown, "once reached, it is no longer drawn"
-
-
-def test_texts_and_ranges_are_cut_at_their_limits():
-    assert shorten("x" * MAX_LINE_LENGTH) == "x" * MAX_LINE_LENGTH
-    assert shorten("x" * (MAX_LINE_LENGTH + 1)) == "x" * (MAX_LINE_LENGTH - 3) + "..."
-    assert [encode_range(range_m) for range_m in [100.0, 100.1, -0.5, 0.0]] == [100000, -1, -1, 0]

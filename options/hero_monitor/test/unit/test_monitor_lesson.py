@@ -100,7 +100,8 @@ class Background:
 def test_who_drove_and_who_stopped_is_in_the_log_and_a_file(monkeypatch, tmp_path):
     clock = SimpleNamespace(monotonic=lambda: clock.now_s, strftime=time.strftime, now_s=100.0)
     monkeypatch.setattr(activity_module, "time", clock)
-    monkeypatch.setattr(rospkg, "get_ros_home", lambda: str(tmp_path))
+    home = tmp_path / "new" / "ros"
+    monkeypatch.setattr(rospkg, "get_ros_home", lambda: str(home))
     background = Background()
     activity = Activity(background)
     for elapsed_s in (0.0, 0.1, QUIET_S, QUIET_S + 0.1):  # the last one: a new drive
@@ -108,7 +109,7 @@ def test_who_drove_and_who_stopped_is_in_the_log_and_a_file(monkeypatch, tmp_pat
         activity.note_drive("Ada", ["hero_3"])
     activity.note_drive("Bob", ["hero_3"])
     activity.note("Bob", "stop")
-    (path,) = (tmp_path / "hero_monitor").iterdir()
+    (path,) = (home / "hero_monitor").iterdir()
     with path.open(encoding="utf-8", newline="") as opened:
         rows = [row[1:] for row in csv.reader(opened)]
     ada = ["Ada", "drive", "hero_3"]

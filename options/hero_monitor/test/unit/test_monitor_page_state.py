@@ -17,10 +17,12 @@ from hero_monitor.fleet_feed.feed import encode_nearest
 from hero_monitor.fleet_feed.page_state import (
     LOG_LINES_AT_ONCE,
     LOG_LINES_KEPT,
+    MAX_LINE_LENGTH,
     PageState,
     encode_color,
     encode_pose,
     encode_range,
+    shorten,
 )
 from hero_monitor.fleet_feed.placement import APART_M, Placement
 from hero_node import Pose
@@ -307,3 +309,9 @@ def test_codes_for_drivers_reach_teachers_only():
     assert set(json.loads(state.take_updates(pupil, "lesson"))) == {"fleet"}
     assert state.take_updates(pupil, "lesson") is None
     assert set(json.loads(state.take_updates(teacher))) == {"fleet", "lesson"}
+
+
+def test_texts_and_ranges_are_cut_at_their_limits():
+    assert shorten("x" * MAX_LINE_LENGTH) == "x" * MAX_LINE_LENGTH
+    assert shorten("x" * (MAX_LINE_LENGTH + 1)) == "x" * (MAX_LINE_LENGTH - 3) + "..."
+    assert [encode_range(range_m) for range_m in [100.0, 100.1, -0.5, 0.0]] == [100000, -1, -1, 0]

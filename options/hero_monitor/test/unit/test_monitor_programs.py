@@ -1,6 +1,7 @@
 """Which programs pages may start, with what, and how they end: with the monitor, by a stop, or by themselves."""
 
 import contextlib
+import io
 import os
 import queue
 import select
@@ -33,6 +34,15 @@ OBEDIENT = (
     r"os.write(1, b'runs\n'); signal.sigwait([signal.SIGINT]); print('robots are stopped')"
 )
 DEAF = "import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('deaf', flush=True); time.sleep(900)"
+
+
+@pytest.mark.parametrize(
+    ("printed", "line"),
+    [(b"", ""), (b"x", "x"), (b"first\nlast\x07 one \n\n", "last? one"), (b"x" * 1999 + b"\n", "x" * 1999)],
+)
+def test_the_last_line_of_a_program_tells_why_it_failed(printed, line):
+    assert programs_module.read_last_line(io.BytesIO(printed)) == line
+    assert programs_module.read_last_line(io.BytesIO(b"y" * 9000 + b"\n" + printed)) in (line, "y" * 1999)
 
 
 def read_launch_arguments(package, program):

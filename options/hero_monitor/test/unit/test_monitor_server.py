@@ -123,6 +123,8 @@ def test_a_server_listens_asks_its_limits_and_closes_its_pages(monkeypatch, cloc
         monkeypatch.setattr(HTTPServer, name, mock.create_autospec(getattr(HTTPServer, name)))
     limits = mock.create_autospec(ClientLimits, instance=True)
     server = Server(Access(TOKEN, []), limits, mock.Mock())
+    params = server._http.conn_params
+    assert (params.max_header_size, params.max_body_size, params.header_timeout) == (16384, 16384, 60.0)
     assert server.listen("0.0.0.0", 0) == 40123
     bind.assert_called_once_with(0, "0.0.0.0", backlog=server_module.LISTEN_BACKLOG)
     HTTPServer.add_sockets.assert_called_once_with(server._http, sockets)

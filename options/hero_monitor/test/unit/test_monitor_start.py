@@ -85,6 +85,8 @@ def test_a_slow_page_keeps_its_newest_notices():
     page = Socket()
     page.tell("info", "hello")
     assert page.written == [{"notice": {"level": "info", "text": "hello"}}] and page.ready
+    page.acknowledge("stop")
+    assert page.written.pop() == {"received": "stop"}
     page.is_done = False
     page.acknowledge("stop")
     for number in range(WAITING_MAX + 2):

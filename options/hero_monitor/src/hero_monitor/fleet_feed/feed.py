@@ -289,8 +289,8 @@ class FleetFeed:
     def _describe_origin(self) -> str:
         """Return who stopped all robots, and since when."""
         origin = describe_stop_origin(self._report, time.time())
-        own = "by " + rospy.get_name().strip("/")
-        return shorten(f"by {self.stopper}" + origin[len(own) :] if self.stopper and origin.startswith(own) else origin)
+        is_own = self.stopper and self._report.stopped_by == rospy.get_name()
+        return shorten(f"by {self.stopper}" + origin[len("by " + rospy.get_name().strip("/")) :] if is_own else origin)
 
     def _read_scene(self) -> None:
         now_s, put = time.monotonic(), self.page_state.put
