@@ -305,7 +305,12 @@ def test_a_connection_that_is_being_closed_takes_no_request(monkeypatch):
 def run_finder(ros, monkeypatch, looks):
     """Let the thread that finds drivers look so many times, until the program ends."""
     waits_s = []
-    ros.drivers._end = SimpleNamespace(is_set=lambda: len(waits_s) >= looks, wait=waits_s.append)
+
+    def wait(duration_s):
+        waits_s.append(duration_s)
+        assert ros.drivers._looks == len(waits_s), "a look counts before the wait for the next one"
+
+    ros.drivers._end = SimpleNamespace(is_set=lambda: len(waits_s) >= looks, wait=wait)
     ros.drivers._links = {}
     ros.drivers._find()
     return waits_s

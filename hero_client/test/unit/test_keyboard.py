@@ -51,6 +51,16 @@ def test_only_a_terminal_that_does_not_open_counts_as_none(monkeypatch, raised, 
         Keyboard()
 
 
+def test_a_terminal_that_is_gone_gives_no_keys_and_is_closed(terminal, monkeypatch):
+    with Keyboard() as keyboard:
+        for given, keys in ((b"", None), (OSError, None), (BlockingIOError, []), ([b"w"], ["w"])):
+            with monkeypatch.context() as patched:
+                patched.setattr(os, "read", mock.Mock(side_effect=given or [b""]))
+                assert keyboard.read_keys() == keys
+        monkeypatch.setattr(termios, "tcsetattr", mock.Mock(side_effect=termios.error))
+    assert keyboard.file.closed
+
+
 def test_an_arrow_that_comes_in_two_pieces_is_one_key(terminal):
     with Keyboard() as keyboard:
         for sent, keys in ((b"w\x1b[", ["w"]), (b"Ad", ["up", "d"]), (b"\x1bO", []), (b"D", ["left"])):

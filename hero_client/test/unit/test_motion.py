@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from hero_client.controllers.go_to_goal import FREE_S, PROGRESS_S, Goal, GoToGoalController
+from hero_client.controllers.go_to_goal import PROGRESS_S, Goal, GoToGoalController
 from hero_client.controllers.motion import (
     BLOCKED_S,
     DEFAULT_TIMEOUT_S,
@@ -196,7 +196,7 @@ def test_another_goal_on_the_way_has_its_own_time_and_place():
 
 
 def test_the_side_of_a_detour_is_kept_for_a_while():
-    for free_s, is_kept in ((FREE_S - 0.2, True), (FREE_S + 0.2, False)):
+    for free_s, is_kept in ((1.3, True), (1.7, False)):
         controller = GoToGoalController(Goal(1.0, 0.0), 0.0, avoid=True)
         left, right = list(FREE), list(FREE)
         left[1] = right[7] = 0.1

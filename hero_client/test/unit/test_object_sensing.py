@@ -30,6 +30,8 @@ def test_a_beam_tells_what_it_touches_first():
     assert sense([(0, 0, 0)], [(1, 0.049, 0)]) == [OBJECT]
     assert sense([(0, 0, 0)], [(1, 0.051, 0), (1, -0.051, 0), (-1, 0, 0)]) == [NOTHING]
     assert sense([(0, 0, 0), (2, 0, 0)], [(1, 0, 0)]) == [OBJECT, NOTHING]
+    assert sense([(0, 0, 0)], [(BODY_RADIUS_M - 0.01, 0, 0)]) == [OBJECT], "it lies over the sensor"
+    assert sense([(0, 0, 0)], [(BODY_RADIUS_M - 0.051, 0, 0)]) == [NOTHING], "it ends behind the sensor"
     for objects in ([(1, 0, 0)], []):
         assert sense([(0, 0, 0), (0.5, 0, 0)], objects)[0] == ROBOT
 
@@ -50,8 +52,9 @@ def test_robots_without_a_pose_see_nothing_and_are_not_seen():
 
 def test_objects_are_sensed_in_the_body_frame():
     things = PlacedObjects(np.array([[(1.0, 2.0, math.pi), (5.0, 1.0, 0.0)]]), np.array([0.1, 0.2]))
-    seen = sense_objects(np.array([[(1.0, 1.0, math.pi / 2.0)]]), things, Objects(range_m=2.0))
-    assert seen.seen.tolist() == [[True, False]]
+    poses = np.array([[(1.0, 1.0, math.pi / 2.0), (5.0, 0.0, 0.0)]])
+    seen = sense_objects(poses, things, Objects(range_m=2.0))
+    assert seen.seen.tolist() == [[True, False], [False, True]] and seen.left_m[1, 1] == 1.0
     np.testing.assert_allclose((seen.forward_m[0, 0], seen.left_m[0, 0]), (1.0, 0.0), atol=1e-12)
     assert seen.heading_rad[0, 0] == pytest.approx(math.pi / 2.0)
     assert seen.radii_m.tolist() == [0.1, 0.2]

@@ -120,6 +120,8 @@ def test_a_transform_is_waited_for_until_its_time_is_out(time, monkeypatch):
     assert time.now_s == pytest.approx(100.5, abs=0.021)
     assert find_origin("hero_0/odom", "map", 2.0) == pytest.approx((1.0, 2.0, math.pi))
     assert asked[0] == ("map", "hero_0/odom")
+    stamped = rospy.Time(51)
+    assert find_origin("hero_0/odom", "map", 2.0) == pytest.approx((1.0, 2.0, math.pi)), "1 s ahead"
     stamped = rospy.Time(3650)
     with pytest.raises(StaleDataError, match="from map to hero_0/odom is stamped 3600.0 s ahead"):
         find_origin("hero_0/odom", "map", 2.0)

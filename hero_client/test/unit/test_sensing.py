@@ -113,6 +113,10 @@ def test_robots_of_another_world_are_not_sensed():
     assert sense_neighbors(both, Neighbors()).rows.tolist() == [[0, 1], [0, 1], [2, 3], [2, 3]]
 
 
+def test_without_worlds_nothing_is_sensed():
+    assert sense_binary(np.empty((0, 3, 3)), Binary()).tolist() == []
+
+
 def test_permuted_robots_sense_the_same():
     rng = np.random.RandomState(0)
     poses = rng.uniform(-0.5, 0.5, (1, 12, 3)) * (1.0, 1.0, 6.0)

@@ -1,7 +1,7 @@
 """What a Swarm is made of: numbers of robots, or an error that says so before anything is connected."""
 
 from types import SimpleNamespace
-from unittest.mock import create_autospec
+from unittest.mock import call, create_autospec
 
 import pytest
 
@@ -83,3 +83,12 @@ def test_robots_are_waited_for_until_all_drivers_are_known(monkeypatch):
 def test_a_swarm_of_no_list_is_refused_with_what_to_write(wrong):
     with pytest.raises(ValueError, match=r"such as \[0, 1, 2\] or range\(3\), not by %r" % (wrong,)):
         Swarm(wrong)
+
+
+def test_a_swarm_stops_and_releases_all_drivers_and_tells_the_outcome():
+    swarm = Swarm.__new__(Swarm)
+    swarm.drivers = create_autospec(Drivers, instance=True)
+    for change, stopped in ((swarm.emergency_stop, True), (swarm.release_stop, False)):
+        swarm.drivers.reset_mock()
+        assert change() is swarm.drivers.wait_for_stop.return_value
+        assert swarm.drivers.mock_calls == [call.request_stop(stopped), call.wait_for_stop()]

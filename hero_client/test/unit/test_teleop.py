@@ -219,7 +219,9 @@ def test_a_joystick_drives_only_while_enabled_and_finite(shown):
         return MAPPING.read(Joy(axes=axes, buttons=[int(index in pressed) for index in range(buttons)]))
 
     assert read([0.5, -1.0]) == (-0.1, 1.0)
-    assert read([0.5, -1.0], ()) == (0.0, 0.0) == read([0.5, math.nan]) == read([math.inf, 0.0])
+    assert read([0.5, -1.0], ()) == (0.0, 0.0) and not shown
+    assert read([0.5, math.nan]) == read([math.inf, 0.0]) == (0.0, 0.0)
+    assert {name for name, _ in shown} == {"logwarn_once"} and "are not finite: the robot is stopped" in shown[0][1]
     for axes, buttons in (([0.5], 6), ([0.5, 1.0], 4)):
         with pytest.raises(ProgramError, match="the joystick has %d axes and %d buttons" % (len(axes), buttons)):
             read(axes, buttons=buttons)

@@ -122,3 +122,57 @@ def test_the_safety_filter_of_a_trial_knows_the_robots_that_are_not_in_it(stage)
     others = SimpleNamespace(read=lambda: places, describe_missing=lambda: "")
     assert robot_runs._drive(stage, stage, stage, stage, (stage, stage, others))
     assert stage.safety.others_m is places
+
+
+def test_a_stop_of_all_robots_ends_the_drive_to_the_starts(stage, monkeypatch):
+    drive = mock.create_autospec(robot_runs.StartDrive, instance=True)
+    drive.done, drive.lateness = False, SimpleNamespace(take_warning=lambda: "")
+    drive.step.return_value = np.array([[0.1], [0.2]])
+    monkeypatch.setattr(robot_runs, "StartDrive", lambda starts, radius_m: drive)
+    driven, told, warned = [], [], []
+    stage.max_body_radius_m, stage.stop_s, stage.describe_missing = 0.06, 51.0, lambda: "hero_9 has no pose"
+    stage.report_missing, stage.fresh_proximity, stage.warn = told.append, lambda: None, warned.append
+    stage.drive, stage.warn_if_blind = lambda *speed: driven.append(speed), lambda: driven.append("checked")
+    robot_runs._drive_to_starts(stage, stage, np.zeros((1, 3)), stage, "seed 1")
+    assert stage.now_s == pytest.approx(51.0, abs=0.11) and stage.stops == 1
+    assert driven[:2] == [(0.1, 0.2), "checked"] and len(driven) == 2 * (len(told) - 1)
+    assert set(warned) == {"hero_9 has no pose"}
+
+
+@pytest.mark.parametrize(
+    ("answers", "expected"),
+    [
+        (["x", "D", robot_runs.START], robot_runs.START),
+        ([robot_runs.START, robot_runs.DRIVE], robot_runs.START),
+        ([robot_runs.DRIVE, robot_runs.START], robot_runs.DRIVE),
+        (["x", robot_runs.END, robot_runs.START], robot_runs.END),
+        ([None, robot_runs.START], robot_runs.END),
+    ],
+)
+def test_a_trial_starts_when_the_operator_says_so(stage, answers, expected):
+    left, stage.running, stage.robots = iter(answers), True, [stage]
+    stage.ask = lambda question: next(left)
+    assert robot_runs._ask(stage, stage, np.zeros((1, 3)), stage, "seed 1") == expected
+    stage.running = False
+    assert robot_runs._ask(stage, stage, np.zeros((1, 3)), stage, "seed 1") == robot_runs.END
+
+
+def test_no_trial_starts_before_all_robots_are_ready(stage, capsys):
+    states = [{"stop_s": 0.0}, {"stop_s": np.inf, "lost": "has gone"}]
+    states += [{"lost": None, "unseen": "no pose"}, {"unseen": ""}]
+    poses = [np.array([[3e-3, 4e-3, 6.3]])] + [np.full((1, 3), np.nan)] * 3
+    questions, stage.running, stage.robots, stage.describe_missing = [], True, [stage], lambda: stage.unseen
+    stage.read = lambda: (poses[min(len(questions), 3)], np.zeros(1))
+
+    def ask(question):
+        vars(stage).update(states[len(questions)])
+        questions.append(question.partition(". Enter")[0])
+        return robot_runs.START
+
+    stage.ask = ask
+    assert robot_runs._ask(stage, stage, np.zeros((1, 3)), stage, "seed 1") == robot_runs.START
+    first = "seed 1: robots are up to 5 mm (hero_3) and 1 degrees (hero_3) from their places"
+    assert questions == [first] + ["seed 1: hero_3 has no pose"] * 3
+    assert capsys.readouterr().err.splitlines() == [
+        f"seed 1: cannot start: {reason}" for reason in ("stopped", "hero_3: has gone", "no pose")
+    ]

@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
@@ -209,3 +210,31 @@ def test_the_program_publishes_what_each_robot_senses(tmp_path, monkeypatch):
         receivers["/hero_7/deposit"](Float32(amount))
         node.step()
     assert 0.0 < sent["/hero_7/pheromone"][-1].x < 1.0, "its program has fallen silent, or tells no number"
+
+
+def test_robots_that_join_a_driver_later_are_added_once(monkeypatch):
+    rospy = pytest.importorskip("rospy", reason="the program needs ROS")
+    from hero_client.ros.drivers import Drivers
+    from hero_node.parameters import check_parameters
+    from hero_swarm.ros import virtual_sensors_node as module
+
+    drivers, made, told = create_autospec(Drivers, instance=True), [], []
+    for name in ("Publisher", "Subscriber"):
+        made_by = create_autospec(getattr(rospy, name), side_effect=lambda topic, *_, **__: made.append(topic))
+        monkeypatch.setattr(rospy, name, made_by)
+    monkeypatch.setattr(module, "share_drivers", lambda: drivers)
+    node = module.VirtualSensorsNode(check_parameters(module.PARAMETERS, {"arena": "empty"}))
+    source = create_autospec(module.PoseSource, instance=True)
+    source.describe_missing.return_value, source.warn.side_effect, node._source = "no poses", told.append, source
+    node._publish = create_autospec(node._publish)
+    source.read.side_effect = lambda: (node._ids[:], np.zeros(0))
+    made.clear()
+    for ready in ([], [3], [3, 7], [7]):
+        drivers.list_ready.return_value = ready
+        node.step()
+    assert told[0] == "no robot has joined a driver yet: are the robots on?"
+    assert told[1:] == ["no poses; who has no pose senses nothing"] * 3
+    assert [call.args[0] for call in node._publish.call_args_list] == [[3], [3, 7], [3, 7]], "one that left may return"
+    topics = [*module.TOPICS, "send_message", "deposit"]
+    assert sorted(made) == sorted(f"/hero_{number}/{topic}" for number in (3, 7) for topic in topics)
+    assert [call.args[0] for call in source.add_robots.call_args_list] == [[], [3], [7], []]

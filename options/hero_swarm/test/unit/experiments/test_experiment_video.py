@@ -1,16 +1,25 @@
 """Videos of runs: each frame shows robots, objects and walls where they are, and the time."""
 
+import itertools
+from contextlib import nullcontext
+from types import SimpleNamespace
+from unittest.mock import create_autospec
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from hero_client.values import BODY_RADIUS_M
 from hero_node import Pose
+from hero_recording import step_recorder
 from hero_sim.scene import CYLINDER, Shape
 from hero_sim.world import Area, list_outlines, load_arena
-from hero_swarm import video
+from hero_sim.world.arena import build_rectangle
+from hero_swarm import show, video
 from hero_swarm.behavior import Behavior
+from hero_swarm.experiments.computing.cell_setup import CellSetup
 from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.trial import OPEN, Trial
 from hero_test.nonempty import nonempty
 
@@ -106,3 +115,43 @@ def test_a_frame_shows_areas_robots_with_noses_and_lights_and_the_time():
             reach_m = share * BODY_RADIUS_M
             assert look(x_m + reach_m * np.cos(yaw_rad), y_m + reach_m * np.sin(yaw_rad)) == seen, share
     assert (frame[10:30, 10:60] == 0).any(), "the time"
+
+
+def test_a_run_is_replayed_at_its_speed_as_the_simulator_shows_its_world(monkeypatch):
+    replay = pytest.importorskip("hero_swarm.ros.replay", reason="the topics are ROS's")
+    shown, rates_hz = {}, []
+
+    def advertise(topic, kind, queue_size, latch):
+        return SimpleNamespace(publish=shown.setdefault((topic, latch), []).append)
+
+    program = SimpleNamespace(rate=lambda rate_hz: rates_hz.append(rate_hz) or itertools.count())
+    monkeypatch.setattr(replay, "Program", lambda name: nullcontext(program))
+    monkeypatch.setattr(replay.rospy, "Publisher", advertise)
+    replay.replay(make_trial(build_rectangle(3.0, 3.0, 1)), 1.0, 2.0)
+    arenas, objects, robots = (shown["/hero_sim/" + name, True] for name in ("arena", "object_markers", "replay"))
+    assert rates_hz == [10.0] and len(robots) == len(objects) == 5
+    assert len(arenas) == 1 and len(arenas[0].markers) == 4
+    assert {marker.text for marker in robots[-1].markers} == {"", "hero_0", "hero_1"}
+    places = [marker.pose.position for marker in robots[-1].markers if marker.ns == "robots"]
+    after_m = 0.07  # in 0.8 s, from rest
+    assert (places[0].x, places[1].y) == pytest.approx((after_m - 0.5, after_m - 0.7), abs=0.02)
+
+
+@pytest.mark.parametrize("option", ["--video", "--bag", None])
+def test_the_run_that_options_name_is_shown_as_they_say(monkeypatch, option):
+    replay = pytest.importorskip("hero_swarm.ros.replay", reason="the topics are ROS's")
+    text = "behavior: milling\nrobots: 2\ntime_s: 0.5\nseeds: {from: 4, count: 3}\nmetrics: [order]\n"
+    experiment, setup, trial = parse_experiment(text, "e.yaml"), create_autospec(CellSetup, instance=True), make_trial()
+    monkeypatch.setattr(show, "read_results", lambda folder: ("", experiment, {"code": "c0de"}))
+    monkeypatch.setattr(show, "load_checked", lambda checked: "c0de")
+    monkeypatch.setattr(show, "set_up", create_autospec(show.set_up, return_value=setup))
+    for module, name in ((video, "write_video"), (replay, "replay"), (step_recorder, "StepRecorder")):
+        monkeypatch.setattr(module, name, create_autospec(getattr(module, name)))
+    setup.build_trial.return_value = trial
+    show.main(["folder", "--seed", "5", "--speed", "3", *([option, "file"] if option else [])])
+    setup.build_trial.assert_called_once_with([5])
+    calls = {"--video": video.write_video, None: replay.replay, "--bag": step_recorder.StepRecorder}
+    given = {"--video": (trial, 0.5, 3.0, "file"), None: (trial, 0.5, 3.0), "--bag": (trial.rows, range(2), "file")}
+    for kind, shown in calls.items():
+        assert [call.args for call in shown.call_args_list] == ([given[kind]] if kind == option else [])
+    assert trial.rows.now_ms == (500 if option == "--bag" else 0), "the whole run is recorded"
