@@ -106,6 +106,12 @@ def test_one_contradiction_makes_a_robot_uncertain_that_one_pose_found():
     assert swarm[0].state is RobotState.TRACKED and swarm[0].estimate.pose == pytest.approx(HOME, abs=1e-3)
 
 
+def test_poses_of_a_robot_whose_odometry_is_silent_are_not_ahead():
+    swarm = Swarm(0).run(1.0, {0: HOME})
+    swarm.now_s += 1.0
+    assert measure(swarm, HOME, 0.1) == [] and swarm[0].problem == ""
+
+
 @pytest.mark.parametrize("ahead_s", [0.21, 0.5, 0.9, 1.1, 3600.0, 1e9])
 def test_an_image_stamped_ahead_is_named_once_and_freezes_no_robot(ahead_s):
     swarm = Swarm(0, 1).run(1.0, {0: HOME, 1: FAR}, robots=(0, 1))

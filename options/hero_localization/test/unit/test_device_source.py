@@ -37,12 +37,16 @@ class Recording:
     def __init__(self, *openings):
         self.openings, self.reads, self.opened, self.now_s = list(openings), [], 0, 100.0
         self.kept, self.is_played, self.stamp_s = [], threading.Event(), 0.0
+        self.is_taken = False
 
     def __call__(self, path, backend):
         if not self.openings:
             self.is_played.set()
         self.reads = self.openings.pop(0) if self.openings else None
-        self.opened += self.reads is not None
+        if self.is_taken:  # a device opens for one at a time
+            self.reads = None
+        self.opened += self.isOpened()
+        self.is_taken = self.is_taken or self.isOpened()
         return self
 
     def isOpened(self):  # noqa: N802 - OpenCV's name
@@ -62,7 +66,7 @@ class Recording:
         return picture is not None, picture
 
     def release(self):
-        pass
+        self.is_taken = False
 
     def keep(self, source, picture):
         stamp_s, gray, number = picture
