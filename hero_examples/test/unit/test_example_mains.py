@@ -1,11 +1,10 @@
-"""The main functions of the examples on robots in virtual time: which robots they take, how they end, and in what state."""
+"""Programs of the examples that are ended as by Ctrl-C, or end by themselves: exit status, lights, robots at rest."""
 
 from contextlib import nullcontext
 
 import pytest
 import true_paths
 
-from hero_client.controllers import Goal
 from hero_node import Clock, ProgramError
 from hero_node.parameters import check_parameters
 from hero_sim.stepped import StepSwarm
@@ -14,7 +13,7 @@ from hero_sim.stepped.swarm import StepWorld
 pytest.importorskip("rospy", reason="the programs import rospy")
 from geometry_msgs.msg import Point, Pose, PoseArray
 
-from hero_examples.driving import go_to_goal, random_walk, teleop_joy
+from hero_examples.driving import random_walk, teleop_joy
 from hero_examples.swarm import explore, follow, led_show, swarm_go_to
 
 DARK = (0.0, 0.0, 0.0)
@@ -114,48 +113,6 @@ def test_an_exploration_ends_some_time_after_the_last_frontier(monkeypatch, swar
     assert not run() and run.asked == [(None, True, True)]
     assert swarm.now_s - start_s == pytest.approx(end_s, abs=0.35)
     assert {robot.light for robot in swarm} == {DARK} and true_paths.stop_within(swarm)
-
-
-@pytest.mark.parametrize(
-    ("reached", "given", "status", "goals"),
-    [
-        ([True] * 3, {"goals": "1 0; 2 0 90; 3 0", "once": True}, 0, 3),
-        ([True, False, True], {"goals": "1 0; 2 0 90; 3 0", "once": True}, 1, 3),
-        ([False] * 3, {}, 0, 0),
-    ],
-)
-def test_goals_are_given_up_by_all_robots_before_the_first_one_closes(
-    monkeypatch, swarm, reached, given, status, goals
-):
-    steps, start_s = [], swarm.now_s
-
-    class Server:
-        """Drives for a second."""
-
-        busy = property(lambda self: self.is_driving and swarm.now_s < start_s + 1.0)
-
-        def __init__(self, robot, tolerance_m, timeout_s, avoid):
-            assert (tolerance_m, timeout_s, avoid) == (0.01, 120.0, False)
-            self.robot, self.is_driving, self.reached = robot, False, reached[robot.robot_id]
-
-        def put_goal(self, goal, frame):
-            self.is_driving = True
-            steps.append((self.robot.robot_id, goal, frame))
-
-        def give_up(self):
-            steps.append("give up")
-
-        def close(self):
-            steps.append("close")
-
-    monkeypatch.setattr(go_to_goal, "GoToGoalServer", Server)
-    run = Run(monkeypatch, go_to_goal, swarm, 5.0, robots="0-2", frame="map", **given)
-    assert run() == status and run.asked == [([0, 1, 2], True, True)]
-    assert steps[goals:] == ["give up"] * 3 + ["close"] * 3
-    if goals:
-        assert [step[0] for step in steps[:goals]] == [0, 1, 2] and {step[2] for step in steps[:goals]} == {"map"}
-        assert steps[1][1] == Goal(2.0, 0.0, pytest.approx(1.5708, abs=1e-4))
-    assert swarm.now_s - start_s == pytest.approx(1.0 if goals else 5.0, abs=0.11)
 
 
 def test_a_leader_is_never_driven_by_its_followers_program(monkeypatch, swarm):
