@@ -1,24 +1,46 @@
-"""Whole programs with their parameters on stepped robots, in virtual time."""
+"""Main functions of programs on stepped robots, in virtual time."""
 
-import contextlib
-import runpy
-import sys
-
-import hero_client
-from hero_sim import in_process
-from hero_sim.stepped.step_clock import StepMotion
+from hero_node import Clock
+from hero_node.parameters import check_parameters
 
 
-def run_main(monkeypatch, swarm, module, *arguments, duration_s=1.0):
-    """Run main() of a program's module; return its result, None if it was ended after duration_s, and a log of the run.
+class Run:
+    """A main function with robots that begin at id 0, and an end of the program after some time of the robots.
 
-    arguments: `_NAME:=VALUE` of its parameters.
+    Attributes:
+        asked: ids, odom and proximity of the robots that the program opened.
     """
-    log = swarm.log()
-    monkeypatch.setattr(hero_client, "_CHOSEN", {})
-    monkeypatch.setattr(sys, "argv", [module.__file__, *arguments])
-    in_process.replace_ros(swarm)
-    StepMotion(swarm._clock, in_process.end_at(duration_s))
-    with contextlib.suppress(SystemExit):
-        return runpy.run_path(module.__file__)["main"](), log
-    return None, log
+
+    def __init__(self, monkeypatch, module, swarm, seconds=1e9, **given):
+        self.module, self.asked = module, []
+        run = self
+
+        class Program(Clock):
+            def __init__(self, name, anonymous=False):
+                assert name == module.__name__.rpartition(".")[2]
+                self._end_s = swarm.now_s + seconds
+
+            def __enter__(self):
+                return self
+
+            def __exit__(self, *error):
+                run.is_over = True
+
+            @property
+            def now_s(self):
+                return swarm.now_s
+
+            def sleep(self, duration_s):
+                swarm.sleep(duration_s)
+                return swarm.now_s < self._end_s
+
+        def open_swarm(program, robot_ids, odom=True, proximity=True):
+            self.asked.append((robot_ids, odom, proximity))
+            return swarm
+
+        monkeypatch.setattr(module, "Program", Program)
+        monkeypatch.setattr(module, "open_swarm", open_swarm, raising=False)
+        monkeypatch.setattr(module, "read_parameters", lambda declared: check_parameters(declared, given))
+
+    def __call__(self):
+        return self.module.main()

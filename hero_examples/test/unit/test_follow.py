@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import true_paths
-from program_runs import run_main
+from program_runs import Run
 
 from hero_client import CommonFrame
 from hero_client.controllers import FollowLaw, Lateness
@@ -91,10 +91,12 @@ def test_robots_without_poses_in_the_frame_are_named():
         assert all("nowhere" in common.missing[name] for name in ("hero_0", "hero_1"))
 
 
-@pytest.mark.parametrize(("parameters", "linear_m_s"), [((), 0.02), (("_gap_m:=0.5",), 0.0)])
-def test_the_program_follows_as_its_parameters_say(monkeypatch, tmp_path, parameters, linear_m_s):
+@pytest.mark.parametrize(("gap_m", "linear_m_s"), [(0.15, 0.02), (0.5, 0.0)])
+def test_the_program_follows_as_its_parameters_say(monkeypatch, tmp_path, gap_m, linear_m_s):
     arena = tmp_path / "row.yaml"
     arena.write_text(ARENA)
-    with StepSwarm(3, seed=1, arena=str(arena), perfect=True) as swarm:
-        _, log = run_main(monkeypatch, swarm, follow, "_robots:=0 2", "_linear_m_s:=0.02", *parameters)
-        assert log.command[10, 0, :, 0] == pytest.approx([0.0, 0.0, linear_m_s])
+    with StepSwarm(2, seed=1, arena=str(arena), perfect=True) as swarm:
+        log = swarm.log()
+        monkeypatch.setattr(follow, "Swarm", lambda ids, proximity: swarm)
+        Run(monkeypatch, follow, swarm, 0.6, robots="0 1", linear_m_s=0.02, gap_m=gap_m)()
+        assert log.command[10, 0, :, 0] == pytest.approx([0.0, linear_m_s])

@@ -7,7 +7,7 @@ from unittest import mock
 import numpy as np
 import pytest
 import true_paths
-from program_runs import run_main
+from program_runs import Run
 
 from hero_client.controllers import Goal
 from hero_client.values.errors import GoalError
@@ -85,10 +85,9 @@ def test_a_goal_around_obstacles_fails_for_sensors_without_calibration():
 @pytest.mark.parametrize("reached", [True, False])
 def test_the_program_serves_each_robot_with_its_goal_and_the_limits(monkeypatch, reached):
     pytest.importorskip("actionlib", reason="the server of goals is a node's")
-    from hero_client.apps import go_to_goal_server as apps
     from hero_examples.driving import go_to_goal
 
-    real, servers, ends = apps.GoToGoalServer, {}, []
+    real, servers, ends = go_to_goal.GoToGoalServer, {}, []
 
     def serve(robot, *limits):
         server = mock.create_autospec(real, instance=True)
@@ -97,17 +96,12 @@ def test_the_program_serves_each_robot_with_its_goal_and_the_limits(monkeypatch,
         server.close.side_effect = lambda: ends.append("close")
         return servers.setdefault(robot.robot_id, server)
 
-    made = mock.create_autospec(real, side_effect=serve)
-    monkeypatch.setattr(apps, "GoToGoalServer", made)
-    with StepSwarm(3, first_id=4) as swarm:
-        goals = ("_robots:=4 6", "_goals:=0.1 0.2; 0.3 0.4 90", "_frame:=map", "_once:=true")
-        limits = ("_tolerance_m:=0.02", "_timeout_s:=9", "_avoid:=true")
-        status, _ = run_main(monkeypatch, swarm, go_to_goal, *goals, *limits)
-    assert status == (0 if reached else 1)
-    assert [(server.robot.robot_id, server.limits) for server in servers.values()] == [
-        (4, (0.02, 9.0, True)),
-        (6, (0.02, 9.0, True)),
-    ]
+    monkeypatch.setattr(go_to_goal, "GoToGoalServer", mock.create_autospec(real, side_effect=serve))
+    with StepSwarm(2, first_id=4) as swarm:
+        given = {"robots": "4 5", "goals": "0.1 0.2; 0.3 0.4 90", "frame": "map", "once": True}
+        run = Run(monkeypatch, go_to_goal, swarm, 5.0, tolerance_m=0.02, timeout_s=9.0, avoid=True, **given)
+        assert run() == (0 if reached else 1) and run.asked == [([4, 5], True, True)]
+    assert {robot_id: server.limits for robot_id, server in servers.items()} == dict.fromkeys((4, 5), (0.02, 9.0, True))
     assert servers[4].put_goal.mock_calls == [mock.call(Goal(0.1, 0.2), "map")]
-    assert servers[6].put_goal.mock_calls == [mock.call(Goal(0.3, 0.4, math.pi / 2.0), "map")]
+    assert servers[5].put_goal.mock_calls == [mock.call(Goal(0.3, 0.4, math.pi / 2.0), "map")]
     assert ends == ["give up", "give up", "close", "close"], "all stop at the same time"

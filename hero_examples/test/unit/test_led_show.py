@@ -2,7 +2,7 @@
 
 import pytest
 import true_paths
-from program_runs import run_main
+from program_runs import Run
 
 from hero_sim.stepped import StepSwarm
 
@@ -52,10 +52,10 @@ def test_brightness_dims_every_color():
 
 def test_the_program_shows_what_its_parameters_say(monkeypatch):
     for duration_s, color in ((0.5, (0.25, 0.0, 0.0)), (1.5, (0.0, 0.0, 0.25))):
-        with StepSwarm(3) as swarm:
-            parameters = ("_robots:=0 2", "_pattern:=blink", "_period_s:=2", "_brightness:=0.25")
-            run_main(monkeypatch, swarm, led_show, *parameters, duration_s=duration_s)
-            assert [robot.light == color for robot in swarm] == [True, False, True]
+        with StepSwarm(2) as swarm:
+            monkeypatch.setattr(swarm, "led", lambda color: None)  # which ends it
+            Run(monkeypatch, led_show, swarm, duration_s, pattern="blink", period_s=2.0, brightness=0.25)()
+            assert [robot.light for robot in swarm] == [color] * 2
 
 
 def test_patterns_go_through_their_colors_once_a_period():

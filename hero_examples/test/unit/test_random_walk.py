@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import true_paths
-from program_runs import run_main
+from program_runs import Run
 
 from hero_client.controllers import WanderLaw, WanderMemory
 from hero_client.values import BODY_RADIUS_M
@@ -92,16 +92,18 @@ def test_a_walker_that_lost_its_ranges_forgets_where_it_turned():
 def test_the_program_walks_as_its_parameters_say(monkeypatch):
     commands = []
     for seed in (5, 5, 6):
-        with StepSwarm(3, arena="empty", seed=1) as swarm:
-            parameters = ("_robots:=0 2", "_linear_m_s:=0.04", f"_seed:={seed}")
-            commands.append(run_main(monkeypatch, swarm, random_walk, *parameters)[1].command[10, 0])
+        with StepSwarm(2, arena="empty", seed=1) as swarm:
+            log = swarm.log()
+            Run(monkeypatch, random_walk, swarm, 0.6, linear_m_s=0.04, seed=seed)()
+            commands.append(log.command[10, 0])
     first, again, other = commands
-    assert first[:, 0] == pytest.approx([0.04, 0.0, 0.04]) and (first == again).all()
-    assert (first[::2, 1] != other[::2, 1]).all() and first[0, 1] != first[2, 1], "each robot has a seed of its own"
+    assert first[:, 0] == pytest.approx([0.04, 0.04]) and (first == again).all()
+    assert (first[:, 1] != other[:, 1]).all() and first[0, 1] != first[1, 1], "each robot has a seed of its own"
 
 
 def test_the_program_turns_away_as_fast_as_told(monkeypatch):
     with StepSwarm(1) as swarm:
         monkeypatch.setattr(swarm[0], "fresh_proximity", lambda: [0.05, *[math.inf] * 7])
-        _, log = run_main(monkeypatch, swarm, random_walk, "_angular_rad_s:=0.7")
+        log = swarm.log()
+        Run(monkeypatch, random_walk, swarm, 0.6, angular_rad_s=0.7)()
         assert np.abs(log.command[10, 0, 0]) == pytest.approx((0.0, 0.7))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import true_paths
-from program_runs import run_main
+from program_runs import Run
 
 from hero_client import CommonFrame, HeroError, ProgramError
 from hero_client.apps.formations import assign_goals, place_formation
@@ -98,17 +98,17 @@ def test_robots_that_are_not_in_place_in_time_are_named():
 def test_places_of_robots_with_a_bump_shield_are_farther_apart(monkeypatch):
     swarm = StepSwarm(2, arena="empty", model="hero_plus,robot=1")
     with pytest.raises(HeroError, match=r"two places are 0\.200 m apart, but robots need 0\.22 m"):
-        run_main(monkeypatch, swarm, swarm_go_to, "_formation:={shape: line, spacing_m: 0.2}")
+        Run(monkeypatch, swarm_go_to, swarm, 1.0, formation={"shape": "line", "spacing_m": 0.2})()
 
 
 def test_robots_take_the_nearest_places_unless_told_otherwise(monkeypatch):
     with StepSwarm(2, arena="empty") as swarm:
-        parameters = ["_formation:={shape: points, points: [[%f, %f], [%f, %f]]}", "_once:=true", "_timeout_s:=2"]
-        parameters[0] %= (*swarm[1].true_pose[:2], *swarm[0].true_pose[:2])
-        status, log = run_main(monkeypatch, swarm, swarm_go_to, *parameters, duration_s=9.0)
-        assert status == 0 and true_paths.measure_lengths(true_paths.split_worlds(log)[0]).max() < 0.01
+        places, log = [list(robot.true_pose[:2]) for robot in (swarm[1], swarm[0])], swarm.log()
+        given = {"formation": {"shape": "points", "points": places}, "once": True, "timeout_s": 2.0}
+        assert Run(monkeypatch, swarm_go_to, swarm, **given)() == 0
+        assert true_paths.measure_lengths(true_paths.split_worlds(log)[0]).max() < 0.01
         with pytest.raises(HeroError, match="after 2 s not in place: hero_0, hero_1"):
-            run_main(monkeypatch, swarm, swarm_go_to, *parameters, "_assign:=false", duration_s=9.0)
+            Run(monkeypatch, swarm_go_to, swarm, assign=False, **given)()
 
 
 def freeze_first(swarm):
