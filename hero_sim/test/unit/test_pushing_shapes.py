@@ -152,6 +152,13 @@ def test_bodies_touch_where_they_overlap_and_come_apart_along_the_normal(one, ot
     assert near or not isinstance(one, Disc)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_box_that_hangs_over_an_edge_is_held_from_its_corner_to_the_end(side):
+    contacts = find_contacts(put(BOX), put(BOX, side * 0.2, 0.2), 0.001)
+    assert sorted(side * contact.x_m for contact in contacts) == pytest.approx([0.05, 0.15])
+    assert [contact.normal_y for contact in contacts] == pytest.approx([1.0, 1.0])
+
+
 def test_two_boxes_touch_at_their_corners_with_normals_into_the_second():
     for yaw_rad in (0.0, 1.0):
         cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)

@@ -239,3 +239,24 @@ def test_an_area_covers_its_border_and_nothing_beyond():
     circle = arenas.Area("source", (1.0, -1.0, 0.25), (0.0, 0.0, 0.0))
     x_m, y_m = np.array([(1.25, -1.0), (1.0, -0.75), (1.2, -0.8)]).T
     assert circle.covers(x_m, y_m).tolist() == [True, True, False]
+
+
+def test_a_picture_on_the_floor_has_its_upper_row_first():
+    gray = np.array([(0.0, 0.25, 0.5), (0.75, 1.0, 0.125)])
+    picture = arenas.Area("picture", (0.0, -1.0, 3.0, 1.0), (0.0, 0.0, 0.0), gray)
+    x_m, y_m = np.array([(0.5, 0.5), (1.5, 0.5), (2.9, 0.1), (0.5, -0.1), (3.0, -1.0), (0.0, 1.0)]).T
+    colors = picture.find_colors(x_m, y_m)
+    assert colors.tolist() == [[value] * 3 for value in (0.0, 0.25, 0.5, 0.75, 0.125, 0.0)]
+
+
+def test_viewers_draw_areas_as_discs_and_plates_and_pictures_in_strips_of_one_gray():
+    strips = arenas.Area("strips", (0.0, -1.0, 3.0, 1.0), (0.0,) * 3, np.array([(0.0, 0.0, 1.0), (0.5, 0.5, 0.5)]))
+    fine = arenas.Area("fine", (0.0, 0.0, 64.0, 64.0), (0.0,) * 3, np.indices((64, 64)).sum(axis=0) % 2 * 1.0)
+    areas = (arenas.Area("disc", (1.0, 2.0, 0.25), (1.0, 0.0, 0.0)), strips, fine)
+    disc, *plates = scene.draw_arena(arenas.build_rectangle(2.0, 1.0, 1)._replace(areas=areas))[: 4 + 32]
+    assert (disc.kind, disc.pose, disc.size_m[:2]) == (scene.CYLINDER, (1.0, 2.0, 0.0), (0.5, 0.5))
+    drawn = [(plate.color[0], plate.pose[:2], plate.size_m[:2]) for plate in plates]
+    assert drawn[:3] == [(0.0, (1.0, 0.5), (2.0, 1.0)), (1.0, (2.5, 0.5), (1.0, 1.0)), (0.5, (1.5, -0.5), (3.0, 1.0))]
+    assert drawn[3:] == [(0.5, (32.0, 63.0 - 2.0 * row), (64.0, 2.0)) for row in range(32)], "of each 2 x 2 the mean"
+    heights_m = [plate.z_m for plate in (disc, *plates)]
+    assert disc.z_m < plates[0].z_m == plates[2].z_m < plates[3].z_m and heights_m == sorted(heights_m)

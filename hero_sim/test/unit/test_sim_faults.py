@@ -1,6 +1,7 @@
 from types import SimpleNamespace
 from unittest.mock import call, create_autospec
 
+import numpy as np
 import pytest
 from driver_side import parse_options
 
@@ -66,6 +67,15 @@ def test_a_fault_does_to_its_robot_what_its_value_says(kind, value, acts):
     simulator.swarm = SimpleNamespace(robots=[SimpleNamespace(robot_id=4), SimpleNamespace(robot_id=5)])
     faults.KINDS[kind].act(simulator, 1, value)
     assert simulator.mock_calls == acts
+
+
+def test_garbage_is_the_start_of_a_packet_and_random_bytes():
+    simulator, sent = create_autospec(Simulator, instance=True), []
+    robot = SimpleNamespace(send=sent.append, rng=np.random.RandomState(1))
+    simulator.swarm = SimpleNamespace(robots=[None, robot])
+    faults.KINDS["garbage"].act(simulator, 1, 20.0)
+    assert sent[0].startswith(b"\xff\xfe") and len(sent[0]) == 22 and len(set(sent[0])) > 10
+    assert simulator.mock_calls == [call.serve_robot(1)]
 
 
 def test_faults_come_in_order_of_time_to_the_robots_that_they_name():

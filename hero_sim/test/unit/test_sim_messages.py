@@ -207,6 +207,7 @@ def test_an_imu_message_has_its_values_between_symmetric_covariances():
     turn = (0.0, 0.0, math.sin(1.0) * 16383 / 16384, math.cos(1.0) * 16383 / 16384)
     assert values[:4] == pytest.approx(turn, abs=1e-7) and not any(values[4:13])
     assert values[13:16] == (0.0, 0.0, 500.0) and values[25:28] == pytest.approx((0.0, 0.0, 8.192))
+    assert np.array(values, dtype=np.float32).tolist() == list(values), "single precision"
     for first, largest in ((16, 1.7157649993896484), (28, 0.002516058273613453)):
         covariance = np.reshape(values[first : first + 9], (3, 3))
         assert (covariance == covariance.T).all() and covariance.max() == largest

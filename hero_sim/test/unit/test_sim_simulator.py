@@ -68,6 +68,11 @@ def bench(monkeypatch):
     return build
 
 
+def test_robots_that_are_started_together_boot_one_after_the_other(bench):
+    booted_ms = [robot.body.booted_ms for robot in bench("--count", "9")[0].swarm.robots]
+    assert len(set(booted_ms)) > 5 and 0 <= min(booted_ms) and max(booted_ms) < 200
+
+
 @pytest.mark.parametrize("speed", [1.0, 2.0, 0.5])
 def test_robots_keep_the_pace_of_the_clock(bench, speed):
     simulator, lines, link, clock = bench("--speed", str(speed))

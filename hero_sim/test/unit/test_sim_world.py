@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hero_sim.world import world as worlds
+from hero_sim.world import world as worlds
 from hero_sim.world.arena import build_default, place_robots
 from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.kinematics import split_to_wheels
@@ -97,3 +98,11 @@ def test_pulses_written_to_all_robots_at_once_are_those_of_each_alone():
     together.release(np.array([2, 5]))
     assert np.nonzero((together.commands_m_s == 0.0).all(axis=1))[0].tolist() == [2, 5]
     assert np.abs(together.commands_m_s).max() == MAX_WHEEL_M_S
+
+
+def test_random_numbers_are_the_same_however_many_steps_are_drawn_at_once(monkeypatch):
+    keys, drawn = np.arange(4, dtype=np.uint64), []
+    for cached in (10**6, 100, 1):
+        monkeypatch.setattr(worlds, "_CACHED", cached)
+        drawn.append(worlds._draw_block(keys, 32, 3))
+    assert (drawn[0] == drawn[1]).all() and (drawn[0] == drawn[2]).all() and len(np.unique(drawn[0])) > 100
