@@ -249,7 +249,7 @@ def test_a_picture_on_the_floor_has_its_upper_row_first():
     assert colors.tolist() == [[value] * 3 for value in (0.0, 0.25, 0.5, 0.75, 0.125, 0.0)]
 
 
-def test_viewers_draw_areas_as_discs_and_plates_and_pictures_in_strips_of_one_gray():
+def test_viewers_draw_areas_as_plates_and_pictures_in_strips_of_one_gray():
     strips = arenas.Area("strips", (0.0, -1.0, 3.0, 1.0), (0.0,) * 3, np.array([(0.0, 0.0, 1.0), (0.5, 0.5, 0.5)]))
     fine = arenas.Area("fine", (0.0, 0.0, 64.0, 64.0), (0.0,) * 3, np.indices((64, 64)).sum(axis=0) % 2 * 1.0)
     areas = (arenas.Area("disc", (1.0, 2.0, 0.25), (1.0, 0.0, 0.0)), strips, fine)
