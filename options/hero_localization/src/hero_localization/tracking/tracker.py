@@ -139,9 +139,9 @@ class Tracker:
         return {tag_id: (u, v, side) for tag_id, (u, v, side) in zip(tags.values(), found) if math.isfinite(u + v)}
 
     def _note_expected(self, seen: Set[int], expected: Mapping[int, Tuple[float, float, float]]) -> None:
-        size_px = (self.camera.lens.width_px, self.camera.lens.height_px)
-        for tag_id, place in expected.items():
-            if all(MARGIN_PX < at < limit - MARGIN_PX for at, limit in zip(place, size_px)):
+        right_px, low_px = self.camera.lens.width_px - MARGIN_PX, self.camera.lens.height_px - MARGIN_PX
+        for tag_id, (u, v, _) in expected.items():
+            if MARGIN_PX < u < right_px and MARGIN_PX < v < low_px:
                 self._expected.setdefault(tag_id, deque(maxlen=EXPECTED_FRAMES)).append(tag_id in seen)
             else:
                 self._expected.pop(tag_id, None)
@@ -250,9 +250,9 @@ class ImageQuality:
 
     def measure(self, gray: np.ndarray, tags: Sequence[TagCorners]) -> None:
         """Look at an image (H, W), 8 bit; tags: those in the one before."""
-        self._shade = float(gray[::16, ::16].mean())
         self._images += 1
         if self._images % PERIOD_IMAGES == 1:
+            self._shade = float(gray[::16, ::16].mean())
             self._noise = float(np.median(np.abs(np.diff(gray[::16].astype(np.int16), axis=1)))) / 0.954
             blurs_px = [_measure_blur(gray, tag.center, tag.side_px) for tag in tags[:MAX_TAGS]]
             self._blur_px = float(np.median(blurs_px)) if len(blurs_px) >= MIN_TAGS else math.nan
