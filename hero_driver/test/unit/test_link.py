@@ -35,6 +35,8 @@ def test_what_a_robot_sends_is_acknowledged_at_once(pair):
     far.sendall(b"a burst")
     assert link.read() == b"a burst"
     assert read_quick_acknowledge(near) == 1
+    near.setblocking(False)
+    assert link.read() == b"" and not link.closed and link.received_length == 7
 
 
 class Owner:

@@ -135,10 +135,21 @@ def test_of_two_declarations_in_a_row_the_later_one_settles(bench):
 
 
 def test_the_alias_of_velocities_goes_where_the_topic_is_something_else(bench):
+    bench.declare()
+    bench.settle()
+    assert not bench.endpoints.unsubscribe.called
     bench.declare(VELOCITY, "std_msgs/ColorRGBA", COLOR_MD5)
     bench.settle()
-    assert [one.args[0] for one in bench.endpoints.subscribe.call_args_list] == [VELOCITY]
+    assert [one.args[0] for one in bench.endpoints.subscribe.call_args_list] == [LIGHT, VELOCITY]
     bench.endpoints.unsubscribe.assert_called_once_with(ALIAS)
+
+
+def test_a_robot_that_takes_the_alias_itself_gets_it_as_its_own(bench):
+    for number, name in ((101, ALIAS), (102, VELOCITY)):
+        bench.declare(name, TWIST, MD5SUMS[TWIST], number=number)
+        bench.settle()
+    assert [one.args[0] for one in bench.endpoints.subscribe.call_args_list] == [ALIAS, VELOCITY]
+    assert not bench.endpoints.unsubscribe.called and bench.bridge.ids == {ALIAS: 101, VELOCITY: 102}
 
 
 def test_names_are_limited_and_those_that_are_known_stay(bench):

@@ -149,6 +149,9 @@ def test_a_release_from_before_the_driver_was_there_is_refused_once(stops):
 def test_each_change_is_published_kept_and_told_with_who_made_it(stops):
     stops.interface.open(False, None)
     stops.Publisher.return_value.publish.reset_mock()
+    order = []
+    stops.store.write.side_effect = lambda stopped: order.append("kept")
+    stops.Publisher.return_value.publish.side_effect = lambda message: order.append("published")
     for stopped in (False, True, True, False, False):
         request(stops, stopped)
     assert stops.interface._log.lines == ["stopping all robots, by /teleop", "robots may move, by /teleop"]
@@ -157,7 +160,7 @@ def test_each_change_is_published_kept_and_told_with_who_made_it(stops):
     assert stops.interface._log.lines[-1] == "stopping all robots, by ?" and stops.interface.stopped_s is not None
     stops.interface.close()
     published = [call[0][0].data for call in stops.Publisher.return_value.publish.call_args_list]
-    assert published == [True, False, True]
+    assert published == [True, False, True] and order[-6:] == ["kept", "published"] * 3
 
 
 def test_a_disk_that_hangs_is_told_of_in_the_answer(stops, monkeypatch):

@@ -267,6 +267,15 @@ def test_five_readings_of_rest_after_the_fourth_stop_confirm_it(script, is_at_re
     assert stop.is_due(True, 60.0) != is_at_rest
 
 
+def test_a_burst_counts_for_two_of_the_four_stops():
+    stop, wheels = make_progress()
+    for was_burst, is_at_rest in ((True, False), (False, False), (False, True)):
+        stop.note_sent(was_burst, 0.0)
+        rest(wheels, REST_READINGS)
+        stop.is_due(True, 0.1)
+        assert (stop.state is StopState.AT_REST) == is_at_rest
+
+
 def test_wheels_that_turned_though_at_rest_rest_again_after_29_readings():
     stop, wheels = make_progress()
     for _ in range(4):

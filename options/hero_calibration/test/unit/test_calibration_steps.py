@@ -281,15 +281,39 @@ def test_ticks_of_other_models_count_as_those_of_the_stock_robot(model, ticks, m
 
 def test_a_probe_hears_its_topics_and_commands_its_controllers(monkeypatch):
     ros_probe = pytest.importorskip("hero_calibration.robots.ros_probe", reason="imports rospy")
-    heard, sent = [], []
+    heard, sent = {}, []
 
-    def advertise(topic, kind, **options):
-        return SimpleNamespace(publish=lambda message: sent.append((topic.partition("/hero_3/")[2], message)))
+    def advertise(topic, kind, queue_size, tcp_nodelay):
+        assert tcp_nodelay
+
+        def publish(message):
+            assert isinstance(message, kind)
+            sent.append((topic.partition("/hero_3/")[2], message))
+
+        return SimpleNamespace(publish=publish, name=topic, get_num_connections=lambda: topic not in ("", unheard))
+
+    def subscribe(topic, kind, receive, queue_size, tcp_nodelay):
+        assert tcp_nodelay
+        heard[topic] = lambda message: receive(message) if isinstance(message, kind) else pytest.fail(topic)
 
     monkeypatch.setattr(ros_probe.rospy, "Publisher", advertise)
-    monkeypatch.setattr(ros_probe.rospy, "Subscriber", lambda topic, *arguments, **options: heard.append(topic))
-    probe = ros_probe.RosProbe(3, "hero")
-    assert heard == ["/hero_3/encoder", "/hero_3/laser", "/hero_3/odom", "/localization/poses"]
+    monkeypatch.setattr(ros_probe.rospy, "Subscriber", subscribe)
+    monkeypatch.setattr(ros_probe.rospy, "get_time", lambda: 7.0)
+    probe, unheard, odometry = ros_probe.RosProbe(3, "hero"), "", ros_probe.Odometry()
+    odometry.pose.pose.position.x, odometry.pose.pose.position.y, odometry.pose.pose.orientation.w = 1.0, 2.0, 1.0
+    assert list(heard) == ["/hero_3/encoder", "/hero_3/laser", "/hero_3/odom", "/localization/poses"]
+    for missing, message in (("encoder", ros_probe.Encoder()), ("laser", ros_probe.LaserScan()), ("odom", odometry)):
+        assert missing in probe.find_silence(8.0)
+        heard["/hero_3/" + missing](message)
+    assert probe.find_silence(8.0) is None and probe.pose == (1.0, 2.0, 0.0)
+    for topic in ("cmd_motor", "velocity_controller/cmd_vel", "position_controller/cmd_vel"):
+        unheard = "/hero_3/" + topic
+        assert probe.find_silence(8.0) == f"nothing subscribes to {unheard}: is the driver running?"
+    assert probe.find_place(0.0) is None
+    states = (ros_probe.RobotPose.TRACKED, ros_probe.RobotPose.LOST)
+    robots = [ros_probe.RobotPose(id=number, state=state, x=number + state) for number in (3, 4) for state in states]
+    heard["/localization/poses"](ros_probe.RobotPoses(robots=robots))
+    assert probe.find_place(7.0) == (3.0 + states[0], 0.0, 0.0) and probe.find_place(7.1) is None
     probe.drive(1.5, 0.1)
     probe.drive(2.0)
     probe.turn(-0.7)

@@ -86,7 +86,16 @@ def test_references_are_printed_for_the_camera_file(monkeypatch, capsys):
 
 
 def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):
-    monkeypatch.setattr(camera_node.rospy, "Subscriber", lambda *_, **__: None)
+    subscribed, ids = {}, []
+
+    def subscribe(topic, kind, receive, robot_id, queue_size, tcp_nodelay):
+        assert kind is camera_node.Odometry and tcp_nodelay
+        ids.append(robot_id)
+        subscribed[topic] = lambda message: receive(message, robot_id)
+
+    monkeypatch.setattr(camera_node.rospy, "Subscriber", subscribe)
+    camera_node.TrueRobots([9, 3])
+    assert list(subscribed) == ["/hero_9/ground_truth", "/hero_3/ground_truth"] and ids == [9, 3]
     true = camera_node.TrueRobots([7])
 
     def receive(stamp_s, x_m):
@@ -95,7 +104,7 @@ def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):
         message.pose.pose.position.x, message.pose.pose.position.y = x_m, 2.0
         message.pose.pose.orientation.z, message.pose.pose.orientation.w = math.sin(0.5), math.cos(0.5)
         message.twist.twist.linear.x, message.twist.twist.angular.z = 0.2, 1.0
-        true._receive(message, 7)
+        subscribed["/hero_7/ground_truth"](message)
 
     assert true.find(1.0) is None
     for index in range(30):

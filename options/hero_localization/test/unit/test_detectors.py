@@ -15,7 +15,7 @@ from hero_localization.errors import DetectorError
 from hero_localization.prints.tag_images import draw_tag
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag, tag_corners
-from hero_localization.tracking import detectors
+from hero_localization.tracking import detectors, tag_template
 from hero_localization.tracking.detectors import create_detector, create_fine_detectors, find_print_mistake
 from hero_localization.tracking.tag_pose import TagCorners
 from hero_localization.tracking.tag_template import TemplateDetector
@@ -157,6 +157,14 @@ def test_tags_are_found_by_their_print_in_edges_of_shadows(side_px, shade, share
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("edge", [0, 5, 40, 107])
+def test_the_edge_of_a_shadow_over_a_print_leaves_no_rest(edge):
+    template = tag_template.TagTemplate("36h11", 3, 0.3)
+    lit, shadow = 2.0 * template._even[:, 3], tag_template._shade(tag_template.CELL_CENTERS)[edge]
+    contrast, rest, found = template._explain(np.array((lit, lit + 0.7 * shadow)))
+    assert rest == pytest.approx([0.0, 0.0], abs=1e-6) and contrast[0] == pytest.approx(2.0) and found[1] == edge
+
+
 def test_a_print_is_found_neither_by_other_ids_nor_in_noise():
     image, random = photograph(3, 0.4, side_px=17.0), np.random.RandomState(0)
     assert expect_tag(3, image, 17.0).detect(image) != []

@@ -78,11 +78,12 @@ class Fleet:
         monkeypatch.setattr(feed_module, "RobotFeed", self.make_robot_feed)
         self.master = create_autospec(MasterWatch, instance=True, is_lost=False)
         monkeypatch.setattr(feed_module, "MasterWatch", lambda: self.master)
-        monkeypatch.setattr(feed_module.rospy, "Subscriber", lambda *arguments, **options: None)
+        monkeypatch.setattr(feed_module.rospy, "Subscriber", create_autospec(rospy.Subscriber))
         monkeypatch.setattr(feed_module, "time", SimpleNamespace(monotonic=lambda: self.now_s, time=lambda: 1.7e9))
         monkeypatch.setattr(feed_module.rospy, "get_name", lambda: "/hero_monitor")
         monkeypatch.setattr(feed_module, "find_lost_commands", create_autospec(find_lost_commands, return_value=[]))
         self.feed = FleetFeed("world", SimpleNamespace(submit=self.submit, warn=lambda *said: None))
+        rospy.Subscriber.assert_called_once_with("/rosout", rospy.AnyMsg, self.feed._keep_log_line, queue_size=100)
 
     def make_robot_feed(self, namespace):
         listener = SimpleNamespace(track=RobotTrack(), ranges_m=[0.1, math.inf], values={"battery": 3.70414})
@@ -211,12 +212,10 @@ def test_topics_are_subscribed_to_while_pages_show_them(fleet):
     for picture in (False, True):
         fleet.feed.update_subscriptions(True, picture)
         assert set(fleet.feed._feeds) == {"/hero_0", "/hero_1"}
-        assert (
-            ("/track/picture/outline" in fleet.feed._scene)
-            == ("/track/picture/compressed" in fleet.feed._scene)
-            == picture
-        )
-        assert {"/localization/poses", "/hero_sim/markers"} <= set(fleet.feed._scene)
+        pictures = {"/track/picture/outline", "/track/picture/compressed"}
+        assert pictures & set(fleet.feed._scene) == (pictures if picture else set())
+        kinds = {topic: newest.message_class for topic, newest in fleet.feed._scene.items()}
+        assert (kinds["/localization/poses"], kinds["/hero_sim/markers"]) == (RobotPoses, MarkerArray)
     fleet.receive(make_row(1))
     fleet.feed.read()
     fleet.feed.update_subscriptions(True, True)
@@ -443,8 +442,9 @@ def test_arena_and_ground_truth_are_drawn_in_millimeters():
     gone, other = make_marker(Marker.CUBE, 1.0, 1.0, 1.0), make_marker(Marker.SPHERE, 1.0, 1.0, 1.0)
     gone.action = Marker.DELETE
     odd = make_marker(Marker.CUBE, math.nan, 1.0, 1.0)
+    disc.pose.position.y = 2.0
     shown = describe_arena(MarkerArray([box, disc, gone, other, odd]))
-    assert shown == {"boxes": [[1000, 0, 0, 500, 20, None]], "circles": [[1000, 0, 50, None]]}
+    assert shown == {"boxes": [[1000, 0, 0, 500, 20, None]], "circles": [[1000, 2000, 50, None]]}
     painted = [make_marker(kind, 0.5, 0.2, 0.1, ns="areas") for kind in (Marker.CUBE, Marker.CYLINDER)]
     for marker in painted:
         marker.color.r, marker.color.g, marker.color.b = 1.0, 0.5, 0.0

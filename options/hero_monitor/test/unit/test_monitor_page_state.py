@@ -299,6 +299,9 @@ def test_drawings_that_no_page_can_show_are_left_out():
     wrong.markers[2].scale.z = math.nan
     found.receive(wrong, 0.0)
     assert [drawn["color"] for drawn in found.describe("map", 0.0)] == ["#0000ff"]
+    del wrong.markers[1].points[drawings.POINTS_MAX :]
+    found.receive(wrong, 0.0)
+    assert [drawn["color"] for drawn in found.describe("map", 0.0)] == ["#0000ff", "#00ff00"]
     found.receive(MarkerArray(), 0.0)
 
 

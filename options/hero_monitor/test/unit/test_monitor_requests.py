@@ -318,7 +318,8 @@ class Ros:
     def sleep(self, duration_s):
         self.now_s += duration_s
 
-    def open(self, topic, kind, **options):
+    def open(self, topic, kind, queue_size, tcp_nodelay):
+        assert tcp_nodelay and kind.__name__ == ("PoseStamped" if topic.endswith("goal") else "Twist")
         opened_s = self.now_s
         return SimpleNamespace(
             publish=lambda message: self.sent.append((topic, message)),

@@ -190,6 +190,7 @@ def test_wrong_tokens_are_refused_and_counted(body):
     assert status == 204
     assert "HttpOnly" in headers["Set-Cookie"]
     assert "SameSite=Strict" in headers["Set-Cookie"]
+    assert "expires" not in headers["Set-Cookie"], "it ends with the browser"
     assert [log_in(body)[0] for _ in range(5)] == [403] * 5
     status, headers, text = log_in(RIGHT)
     assert status == 429

@@ -3,6 +3,7 @@
 import json
 import sys
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 
@@ -130,15 +131,20 @@ def make_node(monkeypatch):
 
     monkeypatch.setattr(graph, "Drivers", ScriptedDrivers)
     publisher = SimpleNamespace(get_num_connections=lambda: int(made.now_s >= 100.0 + made.connects_s))
-    monkeypatch.setattr(graph.rospy, "init_node", lambda *given, **options: None)
+    monkeypatch.setattr(graph.rospy, "init_node", create_autospec(graph.rospy.init_node))
     monkeypatch.setattr(graph.rospy, "get_name", lambda: "/hero_check")
-    monkeypatch.setattr(graph.rospy, "Publisher", lambda *given, **options: publisher)
+    advertise = create_autospec(graph.rospy.Publisher, return_value=publisher)
+    monkeypatch.setattr(graph.rospy, "Publisher", advertise)
     made.own = OwnNode()
     return made
 
 
 def test_the_way_back_is_tried_and_a_firewall_suspected(node):
     assert node.own.start().state == OK
+    graph.rospy.init_node.assert_called_once_with(
+        "hero_check", anonymous=True, disable_signals=True, disable_rosout=True
+    )
+    graph.rospy.Publisher.assert_called_once_with("/rosout", graph.Log, queue_size=1)
     node.connects_s = CONNECT_TIMEOUT_S - 0.1
     assert node.own.check_return_path().state == OK and node.now_s == pytest.approx(100.0 + CONNECT_TIMEOUT_S, abs=0.13)
     node.now_s, node.connects_s = 100.0, 99.0
