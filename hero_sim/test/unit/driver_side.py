@@ -46,7 +46,8 @@ class DriverSide:
     def run(self, ms):
         end_ms = self.swarm.now_ms + ms
         while self.swarm.now_ms < end_ms:
-            for index in self.swarm.advance(self.swarm.now_ms + 1):
+            next_ms = max(self.swarm.now_ms + 1, self.swarm.next_due_ms)  # before, there is nothing to serve
+            for index in self.swarm.advance(min(next_ms, end_ms)):
                 self._serve(index)
 
     def _serve(self, index):
