@@ -4,46 +4,40 @@ import numpy as np
 import pytest
 
 from hero_node.robot_constants import TICK_M
-from hero_sim.world import kinematics
+from hero_sim.world import body_loops, kinematics
 
-HEADING = np.array([[0.6], [0.8]])
+HEADING = np.array([0.6, 0.8])
+
+
+def follow(heading, travel_m, rotation_rad):
+    """Return the displacement along an arc, and the heading behind it, as arrays (2,)."""
+    moved = body_loops.follow_arc(*heading, *body_loops.shape_arc(travel_m, rotation_rad))
+    return np.array(moved[:2]), np.array(moved[2:])
 
 
 def test_without_rotation_an_arc_is_a_straight_line():
-    displacements_m, heading = kinematics.follow_arcs(HEADING, np.array([[0.25]]), np.array([[0.0]]))
-    assert displacements_m[0] == pytest.approx(np.array([[0.15], [0.2]]))
+    displacement_m, heading = follow(HEADING, 0.25, 0.0)
+    assert displacement_m == pytest.approx(np.array([0.15, 0.2]))
     assert heading.tolist() == HEADING.tolist()
 
 
 def test_without_travel_an_arc_is_a_rotation_on_the_spot():
-    displacements_m, heading = kinematics.follow_arcs(np.array([[1.0], [0.0]]), np.array([[0.0]]), np.array([[0.1]]))
-    assert not displacements_m.any()
-    assert heading == pytest.approx(np.array([[math.cos(0.1)], [math.sin(0.1)]]), abs=1e-12)
+    displacement_m, heading = follow(np.array([1.0, 0.0]), 0.0, 0.1)
+    assert not displacement_m.any()
+    assert heading == pytest.approx(np.array([math.cos(0.1), math.sin(0.1)]), abs=1e-12)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("steps", [70, 360, 100000])
 def test_a_full_circle_comes_back_whatever_the_step(steps):
-    half = np.full((steps // 2, 1), 1.0)
     heading = HEADING
     for sign in (1.0, -1.0):
-        displacements_m, heading = kinematics.follow_arcs(heading, half / steps, half * (2 * math.pi / steps))
-        diameter_m = displacements_m.sum(axis=0)
-        assert diameter_m == pytest.approx(sign * np.array([[-0.8], [0.6]]) / math.pi, abs=1e-9)  # to the left
+        diameter_m = np.zeros(2)
+        for _ in range(steps // 2):
+            displacement_m, heading = follow(heading, 1.0 / steps, 2 * math.pi / steps)
+            diameter_m += displacement_m
+        assert diameter_m == pytest.approx(sign * np.array([-0.8, 0.6]) / math.pi, abs=1e-9)  # to the left
         assert heading == pytest.approx(-sign * HEADING, abs=1e-9)
-
-
-def test_several_arcs_of_several_robots_are_as_one_after_the_other():
-    rng = np.random.RandomState(1)
-    (travels_m, rotations_rad), headings = rng.normal(scale=0.1, size=(2, 5, 20)), rng.normal(size=(2, 20))
-    together_m, ends = kinematics.follow_arcs(headings, travels_m, rotations_rad)
-    for robot in range(20):
-        heading = headings[:, robot, None]
-        for arc in range(5):
-            one = slice(arc, arc + 1), slice(robot, robot + 1)
-            displacements_m, heading = kinematics.follow_arcs(heading, travels_m[one], rotations_rad[one])
-            assert displacements_m[0, :, 0].tolist() == together_m[arc, :, robot].tolist()
-        assert heading[:, 0].tolist() == ends[:, robot].tolist()
 
 
 def test_headings_are_the_cosine_and_sine_of_any_angle():

@@ -5,7 +5,9 @@ import pytest
 from stepped_worlds import build_world
 
 from hero_sim.link.wifi import PROFILES, Radio
+from hero_sim.robot.models import MODELS
 from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.world import compiled
 from hero_test.nonempty import nonempty
 
 
@@ -46,6 +48,33 @@ def test_a_world_of_a_batch_gives_the_same_bytes_as_alone():
         return wander(robots, 8, own)
 
     assert run([1, 2, 3], 1) == run([2], 0)
+
+
+def wander_with_loops(monkeypatch, rows):
+    """Return the readings of two worlds, and the speeds behind the filter; loops are used from so many rows on.
+
+    Robot 2, a HeRo+, is driven a second later than the others: its controller does not run.
+    """
+    monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
+    models = [MODELS["hero"], MODELS["hero"], MODELS["hero_plus"]]
+    robots = RobotRows(build_world(3, 1, 2, models=models), models=models * 2)
+    log = wander(robots, 1, np.array([0, 1, 3, 4, 5])) + wander(robots, 2)
+    robots.set_odometry(2, 0.1, 0.2, 3.0)
+    log += wander(robots, 1)
+    assert robots.ticks.all() and np.abs(robots.odometry[:, 2]).max() > 2.0
+    return log, robots._encoders.filtered_m_s.tobytes()
+
+
+def test_loops_give_the_same_bytes_as_arrays(monkeypatch):
+    monkeypatch.setattr(compiled, "_compile_loops", lambda module: module)
+    with np.errstate(over="ignore"):  # of random bits, which wrap
+        looped = wander_with_loops(monkeypatch, 0)
+    assert looped == wander_with_loops(monkeypatch, 10**9)
+
+
+@pytest.mark.option("numba")
+def test_compiled_loops_give_the_same_bytes_as_arrays(monkeypatch):
+    assert wander_with_loops(monkeypatch, 0) == wander_with_loops(monkeypatch, 10**9)
 
 
 def test_commands_that_are_not_finite_are_refused_with_their_rows():

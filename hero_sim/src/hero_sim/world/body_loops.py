@@ -23,7 +23,7 @@ beside its center, which u stands for. The world without bodies, the last one, i
 """
 
 import math
-from typing import Any, NamedTuple, Tuple
+from typing import Any, Tuple
 
 import numpy as np
 
@@ -62,32 +62,8 @@ CONTACT_ROWS = 14
 about each body's center, and how many contacts the two bodies have; forces (N) and give (m/N), with which the next step
 starts; what was found in this step."""
 
-OF_PLACE = np.dtype([("first", np.uintp), ("second", np.uintp), ("starts", int), ("seen", int)])
-OF_BODY = np.dtype([("stamp", int), *((name, float) for name in ("x", "y", "turn", "a", "u_x", "u_y", "h"))])
-_ENDS = [f"{how}_{part}_{end}" for end in (1, 2) for how in ("pressed", "dragged") for part in ("x", "y", "turn")]
-_FOUND = "normal_x normal_y gap slide arm_1 lever_1 arm_2 lever_2 friction share pressure drag give".split()
-OF_PRESS = np.dtype([(name, float) for name in (*_FOUND, "stiffness", "drag_give", "drag_stiffness", *_ENDS)])
-"""Records of a solution: see Solution."""
-
 IS_COMPILED = False
 """True in loops that numba compiles: a branch that is hard to predict costs a processor more than what it skips."""
-
-
-class Solution(NamedTuple):
-    """Room for what is computed while contacts are solved: records side by side in memory, or in lists.
-
-    Attributes:
-        places: of each active contact, its bodies, whether it is their first one, and when it was looked at last.
-        presses: of each active contact, its rows, the inverse of how it gives, and how a pressure and a drag of 1 N
-            move its first and its second body.
-        bodies: of each body, when it was moved last (0: it is in no contact), by how much, and its a, u and h.
-        members: numbers of the bodies in contacts.
-    """
-
-    places: Any
-    presses: Any
-    bodies: Any
-    members: Any
 
 
 START_X, START_Y, ALONG_X, ALONG_Y, LENGTH2, THICKNESS = range(6)
@@ -96,6 +72,8 @@ START_X, START_Y, ALONG_X, ALONG_Y, LENGTH2, THICKNESS = range(6)
 _WALL_PASSES = 50
 
 _FAR_M = 1e6
+
+_TURN_RAD = 2.0 * math.pi
 
 _SETTLED_M = 1e-4, 1e-7
 _PASSES = 100, 400
@@ -123,6 +101,22 @@ def follow_arc(cosine: Any, sine: Any, half_tangent: Any, bend: Any, length_m: A
     # The direction of the chord, 1 / cos(turn / 2) long.
     chord_x, chord_y = cosine - half_tangent * sine, sine + half_tangent * cosine
     return chord_x * length_m, chord_y * length_m, cosine - bend * chord_y, sine + bend * chord_x
+
+
+def follow_wheels(moved_ticks: Any, tick_m: Any, separation_m: Any, poses: Any, headings: Any) -> None:
+    """Move odometry, poses (3, R) and headings (2, R), on by the ticks (2, R) that both wheels have moved.
+
+    tick_m, separation_m (R,): travel per tick, and distance of the wheels. Does what TickOdometryRows does.
+    """
+    for robot in range(len(tick_m)):
+        left_m, right_m = moved_ticks[0, robot] * tick_m[robot], moved_ticks[1, robot] * tick_m[robot]
+        turn_rad = (right_m - left_m) / separation_m[robot]
+        arc = shape_arc((left_m + right_m) / 2.0, turn_rad)
+        x_m, y_m, headings[0, robot], headings[1, robot] = follow_arc(headings[0, robot], headings[1, robot], *arc)
+        yaw_rad = poses[2, robot] + turn_rad
+        poses[0, robot] += x_m
+        poses[1, robot] += y_m
+        poses[2, robot] = yaw_rad - np.rint(yaw_rad / _TURN_RAD) * _TURN_RAD
 
 
 def find_contacts(
@@ -199,13 +193,14 @@ def leave_walls(
 
 
 def solve_contacts(
-    active: Any, first: Any, second: Any, state: Any, contacts: Any, bodies: Any, solution: Solution, robots: int,
+    active: Any, first: Any, second: Any, state: Any, contacts: Any, bodies: Any, solution: Any, robots: int,
     has_things: bool,
 ) -> Tuple[float, bool]:  # fmt: skip
     """Solve the active contacts of one world, and move its bodies, in place.
 
     Contact k pushes the bodies first[k] and second[k] apart; its normal points from the first to the second. The first
-    bodies are robots. Return how far a body is moved at most, along x or y, and whether a contact presses.
+    bodies are robots. solution: a Solution of contacts.py. Return how far a body is moved at most, along x or y, and
+    whether a contact presses.
     """
     places, presses, moving, members = solution
     cosine, sine, left, right, rear = bodies[COSINE], bodies[SINE], bodies[LEFT], bodies[RIGHT], bodies[REAR]
@@ -444,7 +439,7 @@ def list_near(
 
 def move_worlds(
     ground_m: Any, separations_m: Any, margin_m: float, begun: Any, reach_m: Any, gap_m: Any, ends: Any, numbers: Any,
-    contacts: Any, bodies: Any, obstacles: Any, solution: Solution, spare: Any, spare_forces: Any,
+    contacts: Any, bodies: Any, obstacles: Any, solution: Any, spare: Any, spare_forces: Any,
 ) -> bool:  # fmt: skip
     """Move the robots of all worlds by the steps of their wheels over the ground (K, 2, R); return False without room.
 

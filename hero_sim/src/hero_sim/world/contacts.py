@@ -29,9 +29,6 @@ from .body_loops import (
     LEVER_2,
     MOVED_X,
     MOVING_ROWS,
-    OF_BODY,
-    OF_PLACE,
-    OF_PRESS,
     ON_ROBOT,
     ON_WALL,
     PRESSURE,
@@ -46,7 +43,6 @@ from .body_loops import (
     TURN,
     TURNED,
     WHEEL_N,
-    Solution,
     X,
     follow_arc,
     shape_arc,
@@ -62,6 +58,31 @@ _MARGIN_M = 0.03
 
 _MANY = 12
 """Contacts of a robot for which there is room at the start."""
+
+
+_OF_PLACE = np.dtype([("first", np.uintp), ("second", np.uintp), ("starts", int), ("seen", int)])
+_OF_BODY = np.dtype([("stamp", int), *((name, float) for name in ("x", "y", "turn", "a", "u_x", "u_y", "h"))])
+_ENDS = [f"{how}_{part}_{end}" for end in (1, 2) for how in ("pressed", "dragged") for part in ("x", "y", "turn")]
+_FOUND = "normal_x normal_y gap slide arm_1 lever_1 arm_2 lever_2 friction share pressure drag give".split()
+_OF_PRESS = np.dtype([(name, float) for name in (*_FOUND, "stiffness", "drag_give", "drag_stiffness", *_ENDS)])
+"""Records of a solution: see Solution."""
+
+
+class Solution(NamedTuple):
+    """Room for what is computed while contacts are solved: records side by side in memory, or in lists.
+
+    Attributes:
+        places: of each active contact, its bodies, whether it is their first one, and when it was looked at last.
+        presses: of each active contact, its rows, the inverse of how it gives, and how a pressure and a drag of 1 N
+            move its first and its second body.
+        bodies: of each body, when it was moved last (0: it is in no contact), by how much, and its a, u and h.
+        members: numbers of the bodies in contacts.
+    """
+
+    places: Any
+    presses: Any
+    bodies: Any
+    members: Any
 
 
 class _Near(NamedTuple):
@@ -170,7 +191,7 @@ class Contacts:
         bodies: int = self._bodies.shape[1]
         make: Any = _make_records if self._loops is body_loops else np.zeros
         members = self._hold(np.zeros(bodies, dtype=int))
-        return Solution(make(contacts, OF_PLACE), make(contacts, OF_PRESS), make(bodies, OF_BODY), members)
+        return Solution(make(contacts, _OF_PLACE), make(contacts, _OF_PRESS), make(bodies, _OF_BODY), members)
 
     def move(self, ground_m: np.ndarray) -> None:
         """Move the robots by K steps of their left and right wheels over the ground (K, 2, R)."""

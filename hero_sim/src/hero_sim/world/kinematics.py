@@ -12,8 +12,6 @@ import numpy as np
 
 from hero_node.robot_constants import WHEEL_SEPARATION_M
 
-from .body_loops import follow_arc, shape_arc
-
 # Half pi in two parts, of which the first, with 33 bits, gives exact products with small whole numbers.
 _HALF_PI_HIGH = float.fromhex("0x1.921fb544p+0")
 _HALF_PI_LOW = float.fromhex("0x1.0b4611a626331p-34")
@@ -52,11 +50,3 @@ def find_heading(theta_rad: Number) -> Tuple[np.ndarray, np.ndarray]:
     turn = quarters - 4.0 * np.floor(quarters / 4.0)
     swapped, sign = (turn == 1.0) | (turn == 3.0), np.where(turn >= 2.0, -1.0, 1.0)
     return sign * np.where(swapped, -sine, cosine), sign * np.where(swapped, cosine, sine)
-
-
-def follow_arcs(heading: np.ndarray, travels_m: np.ndarray, rotations_rad: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the displacements (K, 2, R) along K consecutive arcs, and the heading (2, R) after them."""
-    displacements_m, heading = np.empty((len(travels_m), *heading.shape)), np.array(heading)
-    for displacement_m, *arc in zip(displacements_m, *shape_arc(travels_m, rotations_rad)):
-        displacement_m[0], displacement_m[1], heading[0], heading[1] = follow_arc(heading[0], heading[1], *arc)
-    return displacements_m, heading

@@ -1,6 +1,6 @@
-"""Loop over wheels that roll, and the random numbers of their steps.
+"""Loops over wheels that roll, with the random numbers of their steps, and over their encoders.
 
-Pure; numbers or arrays. numba compiles this file where it is installed (compiled.py), so what the loop calls is here.
+Pure; numbers or arrays. numba compiles this file where it is installed (compiled.py), so what the loops call is here.
 """
 
 import math
@@ -50,20 +50,37 @@ def roll_wheels(
     """
     steps, _, rows = ground_m.shape
     robots = rows // len(keys)
-    for row in range(rows):
-        key, robot = keys[row // robots], row % robots
+    for world in range(len(keys)):
+        begin, end = world * robots, (world + 1) * robots
         for wheel in range(2):
-            travel_m, speed_m_s, command_m_s = wheels[wheel, row], wheels[2 + wheel, row], commands_m_s[wheel, row]
-            ripple, slip = spreads[wheel, row], spreads[2 + wheel, row]
-            scale, share = spreads[4 + wheel, row], spreads[6 + wheel, row]
+            travels_m, speeds_m_s = wheels[wheel, begin:end], wheels[2 + wheel, begin:end]
+            ripples, slips = spreads[wheel, begin:end], spreads[2 + wheel, begin:end]
+            scales, shares = spreads[4 + wheel, begin:end], spreads[6 + wheel, begin:end]
+            own_m_s = commands_m_s[wheel, begin:end]
             for step in range(steps):
-                travel_m += speed_m_s * step_s
-                # What is drawn takes most of the time, and matters to wheels that turn.
-                slips = ripples = 0.0
-                if speed_m_s != 0.0:
-                    slips = draw_normal_at(key, find_place(first_step + step, 2 + wheel, robot))
-                if command_m_s != 0.0:
-                    ripples = draw_normal_at(key, find_place(first_step + step, wheel, robot))
-                ground_m[step, wheel, row] = speed_m_s * ((1.0 - abs(slips) * slip) * scale)
-                speed_m_s = drive_wheel(speed_m_s, command_m_s, ripples * ripple, share)
-            wheels[wheel, row], wheels[2 + wheel, row] = travel_m, speed_m_s
+                rolled_m, number = ground_m[step, wheel, begin:end], first_step + step
+                for robot in range(robots):  # without a branch, several at once
+                    speed_m_s = speeds_m_s[robot]
+                    slip = draw_normal_at(keys[world], find_place(number, 2 + wheel, robot)) * slips[robot]
+                    ripple_m_s = draw_normal_at(keys[world], find_place(number, wheel, robot)) * ripples[robot]
+                    travels_m[robot] += speed_m_s * step_s
+                    rolled_m[robot] = speed_m_s * ((1.0 - abs(slip)) * scales[robot])
+                    speeds_m_s[robot] = drive_wheel(speed_m_s, own_m_s[robot], ripple_m_s, shares[robot])
+
+
+def read_encoders(
+    since_s: float, elapsed_s: Any, noise_s_m: float, which: Any, travels_m: Any, speeds_m_s: Any, tick_m: Any,
+    base_ticks: Any, ticks: Any, filtered_m_s: Any, errors: Any,
+) -> None:  # fmt: skip
+    """Do what WheelEncoders.read() does, for the robots which: a mask (R,)."""
+    for wheel in range(2):
+        for robot in range(len(which)):
+            counted = np.floor((speeds_m_s[wheel, robot] * since_s + travels_m[wheel, robot]) / tick_m[robot])
+            counted -= base_ticks[wheel, robot]
+            speed_m_s = (counted - ticks[wheel, robot]) * tick_m[robot] / elapsed_s[robot]
+            gain = errors[wheel, robot] / (errors[wheel, robot] + 1.0)
+            change_m_s = (speed_m_s - filtered_m_s[wheel, robot]) * gain
+            if which[robot]:
+                ticks[wheel, robot] = counted
+                errors[wheel, robot] = abs(change_m_s) * noise_s_m + gain
+                filtered_m_s[wheel, robot] += change_m_s

@@ -1,6 +1,6 @@
 """Which robots take part in something: a mask over robots, or all of them, for which numpy is faster without a mask."""
 
-from typing import Any, Union
+from typing import Union
 
 import numpy as np
 
@@ -14,11 +14,6 @@ def assign(target: np.ndarray, values: Union[int, np.ndarray], which: RobotMask)
         target[...] = values
     else:
         np.copyto(target, values, where=which)
-
-
-def choose(values: Any, others: Any, which: RobotMask) -> Any:
-    """Return values for those that take part, and others for the others: numbers or arrays with robots last."""
-    return values if which is True else np.where(which, values, others)
 
 
 def simplify(which: np.ndarray) -> RobotMask:

@@ -5,30 +5,32 @@ kept as an angle and as its cosine and sine, which give the same bytes on every 
 """
 
 import math
-from typing import List, Optional, Sequence
+from typing import Optional, Sequence
 
 import numpy as np
 
 from hero_driver.corrections import TWIST_WINDOW, WheelGeometry
 
-from ...world.kinematics import find_heading, follow_arcs, join_wheels
+from ...world import body_loops, compile_loops
+from ...world.body_loops import follow_arc, shape_arc
+from ...world.kinematics import find_heading, join_wheels
 
 _TURN_RAD = 2.0 * math.pi
 
-_MAX_WAITING, _CACHED = 32, 16384
-"""Readings that are computed at once at most, and numbers of robots in them: more do not fit the cache."""
-
 
 class TickOdometryRows:
-    """The odometry of all robots; it is computed when it is read, from several readings at once."""
+    """The odometry of all robots.
+
+    Attributes:
+        poses: x m, y m, yaw rad from -pi to pi in hero_N/odom (3, R), changed in place.
+    """
 
     def __init__(self, wheels: Sequence[WheelGeometry]) -> None:
         """Begin at the origin, without a reading; wheels of each robot, the left like the right."""
         rows = len(wheels)
         self._tick_m = np.array([geometry.ticks_m[0] for geometry in wheels])
         self._separation_m = np.array([geometry.wheel_separation_m for geometry in wheels])
-        self._poses = np.zeros((3, rows))
-        self._moved_ticks: List[np.ndarray] = []
+        self.poses = np.zeros((3, rows))
         self._headings = np.array((np.ones(rows), np.zeros(rows)))
         self._window_ticks = np.zeros((TWIST_WINDOW, 2, rows))
         self._window_ms = np.zeros((TWIST_WINDOW, rows), dtype=np.int64)
@@ -36,18 +38,12 @@ class TickOdometryRows:
         self._is_cleared = np.ones(rows, dtype=bool)
         self._any_cleared = True
         self._velocities: Optional[np.ndarray] = None
-
-    @property
-    def poses(self) -> np.ndarray:
-        """x m, y m, yaw rad from -pi to pi in hero_N/odom (3, R). Read again after each reading."""
-        if self._moved_ticks:
-            self._move()
-        return self._poses
+        self._loops = compile_loops(body_loops, rows)
 
     def set_pose(self, row: int, x_m: float, y_m: float, yaw_rad: float) -> None:
         """One robot's odometry was set, which zeroed its counters."""
         self.poses[:, row] = x_m, y_m, math.remainder(yaw_rad, _TURN_RAD)
-        self._headings[:, row] = find_heading(self._poses[2, row])
+        self._headings[:, row] = find_heading(self.poses[2, row])
         self._window_ticks[self._newest, :, row] = 0.0
         self._is_cleared[row] = self._any_cleared = True
         self._velocities = None
@@ -56,9 +52,7 @@ class TickOdometryRows:
         """Take one reading of all counters (2, R), with its stamp."""
         moved_ticks = ticks - self._window_ticks[self._newest]
         if np.count_nonzero(moved_ticks):
-            self._moved_ticks.append(moved_ticks)
-            if len(self._moved_ticks) >= min(_MAX_WAITING, _CACHED / moved_ticks.shape[1]):
-                self._move()
+            self._move(moved_ticks)
         self._velocities = None
         self._newest = (self._newest + 1) % TWIST_WINDOW
         self._window_ticks[self._newest], self._window_ms[self._newest] = ticks, now_ms
@@ -68,16 +62,16 @@ class TickOdometryRows:
             self._window_ms[:, self._is_cleared] = now_ms
             self._is_cleared[:] = self._any_cleared = False
 
-    def _move(self) -> None:
-        moved_m = np.array(self._moved_ticks) * self._tick_m
-        self._moved_ticks.clear()
-        distances_m, turns_rad = join_wheels(moved_m[:, 0], moved_m[:, 1], self._separation_m)
-        displacements_m, self._headings[:] = follow_arcs(self._headings, distances_m, turns_rad)
-        places_m, yaw_rad = self._poses[:2], self._poses[2]
-        for displacement_m, angle_rad in zip(displacements_m, turns_rad):
-            places_m += displacement_m
-            yaw_rad += angle_rad
-            yaw_rad -= np.rint(yaw_rad / _TURN_RAD) * _TURN_RAD
+    def _move(self, moved_ticks: np.ndarray) -> None:
+        if self._loops is not None:
+            self._loops.follow_wheels(moved_ticks, self._tick_m, self._separation_m, self.poses, self._headings)
+            return
+        left_m, right_m = moved_ticks * self._tick_m
+        travels_m, turns_rad = join_wheels(left_m, right_m, self._separation_m)
+        cosine, sine = self._headings
+        step_x_m, step_y_m, cosine[:], sine[:] = follow_arc(cosine, sine, *shape_arc(travels_m, turns_rad))
+        self.poses += step_x_m, step_y_m, turns_rad
+        self.poses[2] -= np.rint(self.poses[2] / _TURN_RAD) * _TURN_RAD
 
     def measure_velocities(self) -> np.ndarray:
         """Return linear m/s and angular rad/s over the last TWIST_WINDOW readings (2, R)."""

@@ -95,15 +95,9 @@ class WheelControllers:
         if due is False:
             return
         error = self.targets - measured
-        sums_us = self._integral_step * error
-        sums_us += self._sums_us
-        self._limit(sums_us)
-        damping_us = measured - self._last_inputs
-        damping_us *= self._derivative_step
-        outputs_us = np.multiply(self._proportional, error, out=error)
-        outputs_us += sums_us
-        outputs_us -= damping_us
-        np.trunc(self._limit(outputs_us), out=outputs_us)
+        sums_us = self._limit(self._integral_step * error + self._sums_us)
+        damping_us = (measured - self._last_inputs) * self._derivative_step
+        outputs_us = np.trunc(self._limit(self._proportional * error + sums_us - damping_us))
         assign(self._sums_us, sums_us, due)
         assign(self._last_inputs, measured, due)
         assign(self.outputs_us, outputs_us, due)
@@ -111,5 +105,4 @@ class WheelControllers:
         self._due_ms = int(self._computed_ms.min()) + SAMPLE_MS
 
     def _limit(self, values_us: np.ndarray) -> np.ndarray:
-        np.minimum(values_us, self._limit_us, out=values_us)
-        return np.maximum(values_us, -self._limit_us, out=values_us)
+        return np.maximum(np.minimum(values_us, self._limit_us), -self._limit_us)

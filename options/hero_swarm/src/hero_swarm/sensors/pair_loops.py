@@ -15,22 +15,21 @@ def find_touched(places_m: Any, cosines: Any, sines: Any, radius_m: float, range
     places_m: x and y (2, W, N); cosines, sines (W, N): of the headings; NaN where a pose is not known.
     """
     _, worlds, robots = places_m.shape
-    x_m, y_m, square_m2 = places_m[0], places_m[1], radius_m * radius_m
+    square_m2 = radius_m * radius_m
     for world in range(worlds):
+        x_m, y_m = places_m[0, world], places_m[1, world]
         for i in range(robots):
-            own_x_m, own_y_m, cosine, sine = x_m[world, i], y_m[world, i], cosines[world, i], sines[world, i]
-            for j in range(robots):
-                to_x_m, to_y_m = x_m[world, j] - own_x_m, y_m[world, j] - own_y_m
+            own_x_m, own_y_m, cosine, sine = x_m[i], y_m[i], cosines[world, i], sines[world, i]
+            is_touched = False
+            for j in range(robots):  # without a branch, several at once
+                to_x_m, to_y_m = x_m[j] - own_x_m, y_m[j] - own_y_m
                 left_m = cosine * to_y_m - sine * to_x_m
-                if i == j or not abs(left_m) <= radius_m:
-                    continue
                 ahead_m = cosine * to_x_m + sine * to_y_m - radius_m
                 gap_m = ahead_m - math.sqrt(max(square_m2 - left_m * left_m, 0.0))
-                if ahead_m * ahead_m + left_m * left_m <= square_m2 or (
-                    abs(left_m) < radius_m and ahead_m > 0.0 and gap_m <= range_m
-                ):
-                    touched[world, i] = True
-                    break
+                is_hit = (abs(left_m) < radius_m) & (ahead_m > 0.0) & (gap_m <= range_m)
+                is_inside = ahead_m * ahead_m + left_m * left_m <= square_m2
+                is_touched |= (is_hit | is_inside) & (i != j)
+            touched[world, i] = is_touched
 
 
 def find_near(poses: Any, cosines: Any, sines: Any, range_m: float, seen: Any, found: Any) -> None:
