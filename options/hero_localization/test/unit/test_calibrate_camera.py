@@ -189,7 +189,7 @@ def test_views_are_taken_until_the_lens_is_known(options, enough, status, calibr
 def test_views_are_still_and_away_from_others(tmp_path, monkeypatch):
     board = Board(0, monkeypatch)
     # Each image by how far the board is moved from the one before: still below 3 px, new from 40 px on.
-    places_px = np.cumsum([0.0, 2.9, 39.0, 2.9, 0.2, 40.0, 3.1, 2.9, 50.0, 2.9])
+    places_px = np.cumsum([0.0, 2.9, 39.0, 2.9, 0.2, 40.0, 3.1, 2.9, 50.0, 2.9, 50.0, 3.1, 50.0])
     taken = []
     monkeypatch.setattr(
         board, "find", lambda gray: BoardView(np.arange(4), np.full((4, 2), (places_px[board.pictures - 1], 0.0)))

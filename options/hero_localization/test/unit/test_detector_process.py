@@ -173,17 +173,20 @@ def test_a_detector_that_cannot_be_made_is_told_to_the_parent(monkeypatch):
 
 
 def test_the_process_ends_with_its_connection(monkeypatch):
-    served = []
+    served, ends = [], [EOFError(), OSError(104, "Connection reset by peer"), ValueError("a bug")]
 
     def serve(connection, memory):
         served.append((connection, memory))
-        raise EOFError
+        raise ends.pop(0)
 
     monkeypatch.setattr(detector_process, "serve", serve)
     monkeypatch.setattr(detector_process, "Connection", lambda number: number)
     monkeypatch.setattr(sys, "argv", ["detector_process", "7", "8"])
-    detector_process.main()
-    assert served == [(7, 8)]
+    for _ in range(2):
+        detector_process.main()
+    with pytest.raises(ValueError, match="a bug"):
+        detector_process.main()
+    assert served == [(7, 8)] * 3
 
 
 def test_a_process_that_hangs_is_named_and_killed():

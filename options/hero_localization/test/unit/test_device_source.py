@@ -112,6 +112,12 @@ def test_damaged_images_are_left_out_without_opening_the_camera_again(play):
     assert (recording.kept, recording.opened) == ([(101.0, 10, 0), (101.4, 20, 4)], 1)
 
 
+def test_three_damaged_images_are_left_out_after_each_opening(play):
+    hanging, damaged = (10.0, DAMAGED, 0), (0.1, DAMAGED, 0)
+    recording, _ = play([hanging], [damaged] * 3 + [(0.1, image(20), 0)], [(0.1, image(30), 0)])
+    assert ([shade for _, shade, _ in recording.kept], recording.opened) == ([20, 30], 3)
+
+
 def test_a_read_that_hangs_opens_the_camera_again_at_once(play):
     recording, _ = play([(1.0, image(10), 0), (10.0, DAMAGED, 0), (0.1, image(15), 0)], [(1.0, image(20), 0)])
     assert [shade for _, shade, _ in recording.kept] == [10, 20]
