@@ -135,14 +135,14 @@ class _Fit(NamedTuple):
 
 def _choose_fit(views: Sequence[BoardView], width_px: int, height_px: int) -> _Fit:
     """Return the fit of plumb_bob, unless another model of a lens explains the views clearly better."""
-    plain = _fit(views, width_px, height_px, PLUMB_BOB)
-    fits = [plain]
-    for model in (RATIONAL, EQUIDISTANT) if plain.rms_px > WIDE_RMS_PX else ():
-        with suppress(CalibrationError):  # the views do not suffice for this model
-            # OpenCV seeks the rational one's many numbers too far away without a guess.
-            fits.append(_fit(views, width_px, height_px, model, plain.lens if model == RATIONAL else None))
+    fits = [_fit(views, width_px, height_px, PLUMB_BOB)]
+    for model in (EQUIDISTANT, RATIONAL) if fits[0].rms_px > WIDE_RMS_PX else ():
+        # OpenCV seeks the rational one's many numbers too far from the focal lengths of one of the others, not of both.
+        for guess in [fit.lens._replace(distortion=np.zeros(0)) if model == RATIONAL else None for fit in fits]:
+            with suppress(CalibrationError):  # the views do not suffice for this model
+                fits.append(_fit(views, width_px, height_px, model, guess))
     best = min(fits, key=lambda fit: fit.rms_px)
-    return best if best.rms_px < WIDE_SHARE * plain.rms_px else plain
+    return best if best.rms_px < WIDE_SHARE * fits[0].rms_px else fits[0]
 
 
 def _fit(
