@@ -10,7 +10,7 @@ import rospkg
 from test_monitor_requests import DRIVE, Desk
 
 from hero_monitor.control import activity as activity_module
-from hero_monitor.control.activity import QUIET_S, Activity
+from hero_monitor.control.activity import Activity
 from hero_monitor.control.requests import REQUESTS
 from hero_monitor.serving import invitation as invitation_module
 from hero_monitor.serving.access import TOKEN_KEY, Access
@@ -104,7 +104,7 @@ def test_who_drove_and_who_stopped_is_in_the_log_and_a_file(monkeypatch, tmp_pat
     monkeypatch.setattr(rospkg, "get_ros_home", lambda: str(home))
     background = Background()
     activity = Activity(background)
-    for elapsed_s in (0.0, 0.1, QUIET_S, QUIET_S + 0.1):  # the last one: a new drive
+    for elapsed_s in (0.0, 0.1, 10.0, 10.125):  # the last one: a new drive
         clock.now_s += elapsed_s
         activity.note_drive("Ada", ["hero_3"])
     activity.note_drive("Bob", ["hero_3"])

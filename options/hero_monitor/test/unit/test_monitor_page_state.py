@@ -290,6 +290,12 @@ def test_beams_and_metric_of_each_behavior_are_drawn_while_it_runs():
     assert found.describe("odom", 11.0) == []
     assert len(found.describe("map", 12.5)) == 4, "the first one has ended"
     assert found.describe("map", 20.0) == []
+    plain = make_drawing("one")
+    plain.markers[0].colors = []
+    plain.markers[0].color = ColorRGBA(1.0, 1.0, 1.0, 1.0)
+    found.receive(plain, 30.0)
+    lines = [[[0, 0], [1000, 0]], [[0, 500], [0, 1000]]]
+    assert found.describe("map", 30.0)[0] == {"lines": lines, "color": "#ffffff", "isBeam": True}
 
 
 def test_drawings_that_no_page_can_show_are_left_out():

@@ -10,13 +10,14 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from unittest.mock import create_autospec
 
 import pytest
 import yaml
 
 import sources
 from hero_monitor.control import programs as programs_module
-from hero_monitor.control.offers import OFFERS, check_values, make_arguments, place_robots
+from hero_monitor.control.offers import OFFERS, check_values, describe_offers, make_arguments, place_robots
 from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.control.requests import RequestError
 from hero_node.files import EntryError
@@ -62,6 +63,8 @@ def test_all_that_pages_may_set_are_parameters_of_the_program(program):
 
 
 def test_all_built_in_behaviors_are_offered():
+    (segregation,) = describe_offers(["behavior_segregation"])
+    assert segregation["sentence"] == OFFERS["behavior_segregation"].sentence != ""
     assert [name for name in OFFERS if name.startswith("behavior_")] == ["behavior_" + name for name in list_names()]
 
 
@@ -98,10 +101,13 @@ def test_numbers_of_a_behavior_are_one_parameter_of_its_program():
 
 
 def test_a_formation_is_placed_where_the_map_was_clicked():
-    (formation,) = [text for text in make_arguments("swarm_go_to", [0], "map", CIRCLE) if "formation" in text]
-    assert yaml.safe_load(formation.split(":=")[1]) == {
-        "shape": "circle", "spacing_m": 0.3, "turn_deg": 90.0, "center": [1.0, -0.5]
-    }  # fmt: skip
+    arguments = dict(text[1:].split(":=", 1) for text in make_arguments("swarm_go_to", [0], "map", CIRCLE))
+    assert {name: yaml.safe_load(value) for name, value in arguments.items()} == {
+        "robots": "0",
+        "formation": {"shape": "circle", "spacing_m": 0.3, "turn_deg": 90.0, "center": [1.0, -0.5]},
+        "linear_m_s": 0.08,
+        "frame": "map",
+    }
     (first, second) = place_robots(CIRCLE, 2)
     assert first == pytest.approx((1.0, -0.35))
     assert second == pytest.approx((1.0, -0.65))
@@ -322,6 +328,13 @@ def test_robots_that_a_program_does_not_drive_are_left_alone(program, driven):
     child = ChildProcess(program, ["hero_0", "hero_1"])
     child.end()
     assert child.driven == driven
+
+
+def test_every_running_program_is_told_that_the_monitor_runs():
+    programs = Programs.__new__(Programs)
+    programs._running = {number: create_autospec(ChildProcess, instance=True) for number in (4, 7)}
+    programs.beat()
+    assert [child.beat.call_count for child in programs._running.values()] == [1, 1]
 
 
 @pytest.mark.parametrize("is_gone", [True, False])
