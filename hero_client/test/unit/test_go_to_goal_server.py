@@ -183,6 +183,22 @@ def test_a_goal_ends_by_its_own_cancellation_only():
     assert not drive(server, link)
 
 
+def test_whatever_comes_wakes_the_servers_thread():
+    server, _ = make_server()
+    invalid = PoseStamped()
+    invalid.pose.position.x = math.nan
+    for come in (
+        lambda: server.put_goal(Goal(0.1, 0.0)),
+        lambda: server._receive_goal(invalid),
+        lambda: server._receive_action(Handle()),
+        lambda: server._receive_cancel(Handle()),
+        server.give_up,
+    ):
+        server._news.clear()
+        come()
+        assert server._news.is_set()
+
+
 def test_a_goal_fails_with_the_robots_reason():
     server, link = make_server()
     link.ready_s = math.inf

@@ -1,11 +1,13 @@
 """Robots in real time: the pace of the clock, pauses of the machine, and what is told of connections."""
 
 import inspect
+import signal
 from unittest.mock import create_autospec
 
 import pytest
 from driver_side import parse_options
 
+from hero_sim import main
 from hero_sim import simulator as simulators
 from hero_sim.build import build_simulator
 from hero_sim.errors import OptionError
@@ -70,7 +72,7 @@ def bench(monkeypatch):
 
 def test_robots_that_are_started_together_boot_one_after_the_other(bench):
     booted_ms = [robot.body.booted_ms for robot in bench("--count", "9")[0].swarm.robots]
-    assert len(set(booted_ms)) > 5 and 0 <= min(booted_ms) and max(booted_ms) < 200
+    assert len(set(booted_ms)) > 5 and min(booted_ms) >= 0 and max(booted_ms) < 200
 
 
 @pytest.mark.parametrize("speed", [1.0, 2.0, 0.5])
@@ -270,9 +272,13 @@ def test_a_connection_that_is_made_without_power_reaches_no_robot(bench):
     assert made == ["hero_1"]
 
 
-def test_a_fault_of_a_robot_that_is_not_there_leaves_no_connection_open(monkeypatch):
+def test_no_end_of_a_run_leaves_a_connection_open(monkeypatch):
     close_all = create_autospec(TcpLink.close_all)
     monkeypatch.setattr(TcpLink, "close_all", close_all)
+    monkeypatch.setattr(signal, "signal", lambda number, act: None)
     with pytest.raises(OptionError, match="robot 9 is not simulated here"):
         build_simulator(parse_options("--port", "9", "--fault", "stall", "--fault", "reboot:robot=9"), print)
     assert close_all.call_count == 1
+    with pytest.raises(ZeroDivisionError), main.simulate(parse_options("--port", "9"), print):
+        raise ZeroDivisionError
+    assert close_all.call_count == 2
