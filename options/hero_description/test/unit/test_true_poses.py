@@ -66,6 +66,16 @@ def test_what_comes_while_the_node_ends_is_dropped_silently(module, messages, mo
     assert closed.publish.call_count == len(messages)
 
 
+def test_scans_are_seen_from_true_places_at_the_newest_pose(monkeypatch):
+    publisher, scan = create_autospec(rospy.Publisher, instance=True), LaserScan(ranges=[0.1])
+    scan.header.frame_id, scan.header.stamp = "hero_7/laser_link", rospy.Time(5)
+    (_, receive, seen) = run_main(monkeypatch, true_poses, publisher, robots=[7])[1]
+    receive(scan, seen)
+    (shown,) = seen.publish.call_args.args
+    assert (shown.header.frame_id, shown.header.stamp) == ("hero_7/true/laser_link", rospy.Time(0))
+    assert seen is publisher and shown.ranges == [0.1]
+
+
 def test_names_rings_and_lights_are_those_of_each_robots_model_and_place(monkeypatch):
     publisher = create_autospec(rospy.Publisher, instance=True)
     received = run_main(monkeypatch, lights, publisher, [0.0], robots=[4, 6, 7], hero_plus=[6], simulated=[6, 7])

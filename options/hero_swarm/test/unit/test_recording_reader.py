@@ -70,7 +70,7 @@ def test_without_localization_ground_truth_counts(tmp_path):
 def test_recordings_that_cannot_be_used_are_refused_in_one_line(tmp_path):
     with pytest.raises(ExperimentError, match="hero_0: its odometry jumps"):
         read_recordings(write(tmp_path / "a.bag", *make_messages(0, jump_m=1.0)))
-    with pytest.raises(ExperimentError, match="no robot with odometry, commands and poses"):
+    with pytest.raises(ExperimentError, match="b.bag: no robot with odometry, commands and poses"):
         read_recordings(write(tmp_path / "b.bag", *make_messages(0)[:2]))
     (tmp_path / "c.bag").write_text("no bag")
     for name in ("c.bag", "none.bag"):

@@ -5,14 +5,15 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hero_client.values import sense_binary
+from hero_client.values import sense_binary, sense_neighbors
 from hero_sim.stepped import StepSwarm
 from hero_sim.world import compiled
 from hero_sim.world.arena import build_rectangle
 from hero_swarm.behavior import Behavior, Binary, Distance, NeighborColors, Neighbors, Odometry, Proximity, Random
 from hero_swarm.sensors import Surroundings, read_sensor
-from hero_swarm.sensors.pair_loops import find_touched
+from hero_swarm.sensors.pair_loops import find_near, find_touched
 from hero_swarm.trial import Trial
+from hero_test.nonempty import nonempty
 
 STARTS = np.array([[(0.1, 0.0, 0.0), (-0.5, 0.3, 1.0)]] * 2)
 
@@ -153,6 +154,9 @@ def test_loops_over_pairs_see_what_arrays_do(range_m):
     poses[4] = (0.1, 0.2, 0.0)  # in each other: the sensors are right on the rims
     sees = sense_binary(poses, Binary(range_m=range_m), None, find_touched)
     assert sees.tolist() == sense_binary(poses, Binary(range_m=range_m)).tolist() and len(set(sees.tolist())) == 2
+    near, others = (sense_neighbors(poses, Neighbors(range_m), None, find) for find in (find_near, None))
+    for name, values, expected in nonempty(zip(near._fields, near, others)):
+        np.testing.assert_array_equal(values, expected, name)
 
 
 @pytest.mark.option("numba")

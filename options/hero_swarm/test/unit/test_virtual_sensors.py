@@ -198,7 +198,7 @@ def test_the_program_publishes_what_each_robot_senses(tmp_path, monkeypatch):
     node.step()
     floor, light = sent["/hero_7/floor"][-1], sent["/hero_3/light"][-1]
     assert (floor.r, floor.g, floor.b) == (1.0, 0.0, 0.0)
-    assert light.x > 0.9 and light.y == pytest.approx(0.0, abs=1e-9), "the lamps are ahead"
+    assert light.x > 0.9 and light.y == pytest.approx(0.0, abs=1e-9) and light.z == 0.0, "the lamps are ahead"
     assert sent["/hero_7/pheromone"][-1].x == pytest.approx(1.0) and sent["/hero_3/pheromone"][-1].x == 0.0
     heard = sent["/hero_3/messages"][-1]
     assert heard.data == pytest.approx([7.0, 0.5, -math.pi / 2.0, 1.5, 2.5]) and heard.layout.dim[0].size == 1

@@ -78,6 +78,20 @@ def test_exploration_turns_away_from_an_obstacle_and_drives_on(folder):
     assert linear_m_s[0] == machine.linear_m_s and angular_rad_s[0] == 0.0
 
 
+def test_a_turn_ends_with_its_state(folder):
+    states = [
+        {"name": name, "do": "exploration", "turn_steps": 100,
+         "next": [{"to": to, "when": "fixed probability", "probability": 1.0}]}
+        for name, to in ("ab", "ba")
+    ]  # fmt: skip
+    machine, random, memory = make_machine([states], False)(), Random([1], 1), None
+    arena = load_arena(str(folder / "arena.yaml"))
+    for eyes, speed_m_s in ((Eyes(1, r0=0.08), 0.0), (Eyes(1), machine.linear_m_s)):
+        sensed = sense(machine, 0.0, np.zeros((1, 1, 3)), random, arena=arena, robots=eyes)
+        linear_m_s, _, memory = machine.step(sensed, memory, random)
+        assert linear_m_s.tolist() == [speed_m_s] and (memory[1] > 1.0) == (speed_m_s == 0.0)
+
+
 @pytest.mark.parametrize("do, sign", [("phototaxis", 1.0), ("anti-phototaxis", -1.0)])
 def test_taxis_turns_to_the_lamp_or_away(folder, do, sign):
     _, angular_rad_s = act(folder, do, [(0, 0, 0.0), (0, 0, np.pi)])
@@ -149,8 +163,9 @@ def test_machines_of_a_batch_do_what_each_does_alone(folder):
 
 def test_numbers_of_another_behavior_are_a_controller(folder):
     path = folder / "apart.controller"
-    path.write_text("behavior: dispersion\nnumbers: {spacing_m: 0.3, near.range_m: 0.7}\n")
+    path.write_text("arena: arena.yaml\nbehavior: dispersion\nnumbers: {spacing_m: 0.3, near.range_m: 0.7}\n")
     behavior = find_behavior(str(path))()
+    assert behavior.arena == str(folder / "arena.yaml")
     assert behavior.spacing_m == 0.3 and behavior.near.range_m == 0.7 and type(behavior).__name__ == "Dispersion"
 
 
@@ -196,7 +211,7 @@ def test_a_machine_is_drawn_with_its_conditions(folder):
             "line 3: states.next.probability is 2, but must be a number from 0 to 1",
         ),
         ("do: stop", "do: stop, gain: 2", "line 4: unknown 'gain'"),
-        ("name: rest", "name: search", "to is 'rest'|states of different names"),
+        ("name: rest, do: stop}", "name: rest, do: stop}\n  - {name: rest, do: stop}", "states of different names"),
         ("states:", "tree: []\nstates:", "needs states, a tree or a behavior"),
         ("states:", "machine:", "needs states, a tree or a behavior"),
         ("states:", "numbers: {linear_m_s: 0.1}\nstates:", "line 2: unknown 'numbers'; allowed are: arena, states"),

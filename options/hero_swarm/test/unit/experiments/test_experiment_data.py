@@ -195,6 +195,11 @@ def test_only_whole_results_of_this_code_are_packed(folder, tmp_path):
     with pytest.raises(ExperimentError, match="computed by other code"):
         pack.main([str(folder), "--out", str(tmp_path / "p.tar.gz")])
     own.write_text(OWN)
+    batch = sorted((folder / "batches").iterdir())[0]
+    batch.rename(tmp_path / batch.name)
+    with pytest.raises(ExperimentError, match=": [12] runs are missing: compute them with run"):
+        pack.collect(str(folder))
+    (tmp_path / batch.name).rename(batch)
 
 
 def test_a_file_is_told_seldom_how_far_a_run_is(capsys):

@@ -16,6 +16,7 @@ from hero_swarm.experiments.errors import ExperimentError
 from hero_swarm.experiments.experiment_file import parse_experiment
 from hero_swarm.experiments.reporting.statistics import correct_by_holm
 from hero_swarm.experiments.reporting.summary import build_report
+from hero_swarm.experiments.results import load
 from hero_swarm.experiments.results_folder import (
     EXPERIMENT,
     METRICS_ENDING,
@@ -84,6 +85,15 @@ def test_a_run_reads_no_file_that_it_did_not_need_when_it_began(tmp_path):
     options, words = runner.parse_options([str(tmp_path / "e.yaml")]), "needed now, but was not when the run began"
     with runner.open_folder(options) as (experiment, _, _), pytest.raises(OSError, match=words):
         experiment.sources.read(__file__)
+
+
+@pytest.mark.parametrize("aside", ["", "e/aside"])
+def test_what_fresh_sets_aside_is_told(tmp_path, monkeypatch, capsys, aside):
+    (tmp_path / "e.yaml").write_text(FILE.replace("a.B", "dispersion"))
+    monkeypatch.setattr(ResultsFolder, "clear", lambda folder, kind: aside)
+    with runner.open_folder(runner.parse_options([str(tmp_path / "e.yaml"), "--fresh"])):
+        told = capsys.readouterr().err
+    assert told.startswith(aside + ": set aside: damaged batches") if aside else not told
 
 
 def test_a_resumed_experiment_lacks_only_what_is_missing(tmp_path):
@@ -289,6 +299,8 @@ def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, 
     folder, _ = open_folder(path)
     folder.write_batch(RUNS[:4])
     folder.write_batch([Run(0, 5, (7.0, 1.0), REAL)])
+    folder.write_batch([Run(0, 7, (9.0, 1.0), REAL, "lost hero_3")])
+    np.testing.assert_array_equal(load(str(path), REAL).metrics["dispersion"], [[7.0, *[np.nan] * 3], [np.nan] * 4])
     np.save(folder.name_series(0, [5, 6, 7, 8]) + METRICS_ENDING, np.arange(12.0).reshape(3, 4, 1))
     report.write_report(str(path))
     for name, median in (("summary.csv", 0.65), ("summary_robots.csv", 7.0)):
@@ -301,6 +313,8 @@ def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, 
     assert text == FILE and about["code"] == "c0de"
     assert "dispersion" in of_robots and "dispersion_over_time" not in of_robots
     assert "report_robots.html" in capsys.readouterr().out
+    figures, of_robots = (set(os.listdir(str(path / name))) for name in ("figures", "figures_robots"))
+    assert of_robots < figures and figures - of_robots >= {"dispersion_over_time.svg", "dispersion_over_time.pdf"}
     only = tmp_path / "robots"
     open_folder(only)[0].write_batch([Run(0, 5, (7.0, 1.0), REAL)])
     report.write_report(str(only))
