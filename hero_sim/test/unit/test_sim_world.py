@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from hero_sim.world import world as worlds
-from hero_sim.world import world as worlds
 from hero_sim.world.arena import build_default, place_robots
 from hero_sim.world.body import Body, SharedReadings
 from hero_sim.world.kinematics import split_to_wheels
