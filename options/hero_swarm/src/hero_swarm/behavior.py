@@ -110,7 +110,7 @@ class Sensed:
         """Take the poses (W, N, 3) and the readings of all sensors by their names."""
         worlds, self.count, _ = poses.shape
         self.time_s = time_s
-        self.poses = lock(poses.reshape(-1, 3).copy())
+        self.poses = lock(poses.reshape(-1, 3).copy("F"))  # see Trial
         self.is_known = lock(np.isfinite(self.poses[:, 0] + self.poses[:, 1] + self.poses[:, 2]))
         self.numbers = lock(np.tile(np.arange(self.count), worlds))
         self._readings = {

@@ -24,7 +24,7 @@ class PointRows:
 
     def __init__(self, world: World) -> None:
         """Take the places of a world's robots."""
-        poses = world.poses.copy()
+        poses = world.poses.copy("K")
         self.now_ms = world.time_ms
         others = {name: getattr(world, name) for name in ("errors", "object_poses", "arena")}
         self.world = SimpleNamespace(poses=poses, **others)

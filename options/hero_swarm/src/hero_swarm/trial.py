@@ -141,7 +141,7 @@ class Trial:
         self.rows: Any = PointRows(world) if is_point else RobotRows(world, radios)
         self._drives_by_pulses = behavior.drive == PULSES and not is_point
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
-        self.poses, self.velocities = lock(np.array(starts)), lock(np.zeros_like(starts))
+        self.poses, self.velocities = self._copy_poses(starts.shape), lock(np.zeros_like(starts))
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
         self._control = Control(behavior, random, filter_commands, arena=arena, robots=self.rows)
         self._arena, self._decided_ms = arena, -1
@@ -151,6 +151,11 @@ class Trial:
         objects = [arena.objects] if objects is None else objects
         self._radii_m = np.array([thing.shape.reach_m for thing in objects[0]])
         self._all = np.arange(starts.shape[0] * robots)
+
+    def _copy_poses(self, shape: Tuple[int, ...]) -> np.ndarray:
+        # All x, then all y, then all yaws, as the world keeps them: where values lie apart, how numpy rounds their
+        # cosines depends on what lies behind them in memory.
+        return lock(self.rows.world.poses.reshape(shape).copy("K"))
 
     @property
     def memory(self) -> Any:
@@ -183,7 +188,7 @@ class Trial:
         for number in range(1, self._control.steps_per_decision + 1):
             self._decide()
             rows.advance(start_ms + round(number * 1000.0 / self._control.rate_hz))
-            self.poses = lock(rows.world.poses.reshape(start.shape).copy())
+            self.poses = self._copy_poses(start.shape)
         self.velocities = lock((self.poses - start) * self.behavior.rate_hz)
         return rows.now_ms / 1000.0
 

@@ -243,3 +243,14 @@ def test_a_place_is_clear_up_to_an_overlap_that_is_allowed():
     places_m = np.array([(0.5 - BODY_RADIUS_M + into_m, 0.0) for into_m in (-0.001, 0.001, 0.003)])
     assert is_clear(places_m, arena).tolist() == [True, False, False]
     assert is_clear(places_m, arena, 0.002).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize("is_point", [False, True])
+def test_yaws_lie_side_by_side_in_memory(is_point):
+    """Else numpy rounds their cosines one way or another, as memory happens to be used: bytes would not be the same."""
+    trial = Trial(Behavior(), OPEN, 3, (1, 2), (1.0, 1.0), is_point=is_point)
+    trial.behavior.step = lambda sensed, memory, random: (0.1, 0.0, memory)
+    for _ in range(2):
+        for yaws_rad in (trial.poses[..., 2], trial.state.poses[..., 2], trial.state.sensed.poses[:, 2]):
+            assert yaws_rad.flags.c_contiguous
+        trial.step()
