@@ -7,6 +7,7 @@ from typing import List, Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
+from hero_node.files import replace_file
 from hero_sim.scene import ARROW, CYLINDER, TEXT, Shape, draw_arena, draw_objects, draw_robots
 from hero_sim.world import Arena
 
@@ -36,7 +37,8 @@ def write_video(trial: Trial, time_s: float, speed: float, path: str) -> None:
     frames = [_list_shapes(trial) for _ in trial.run(time_s, period_s)]
     limits_m = _find_limits(arena, frames)
     images = (draw_frame(limits_m, number * period_s, frame) for number, frame in enumerate(frames))
-    next(images).save(path, save_all=True, append_images=images, duration=1000 // FRAMES_PER_S, loop=0)
+    with replace_file(path) as file:
+        next(images).save(file, "GIF", save_all=True, append_images=images, duration=1000 // FRAMES_PER_S, loop=0)
 
 
 def _list_shapes(trial: Trial) -> List[Shape]:

@@ -135,6 +135,9 @@ class Numbers(Kind):
     def __init__(self, mission: Mission) -> None:
         """Find the numbers. Raises: ExperimentError."""
         experiment, (cell,) = mission.experiment, mission.experiment.cells
+        if "behavior" not in mission.content:
+            text = "%s: cma needs the behavior whose numbers it designs, such as behavior: dispersion"
+            raise ExperimentError(text % experiment.places["behavior"])
         kind = type(set_up(experiment, cell).behavior)
         known = {name: setting.limits for name, setting in kind.settings.items() if setting.limits}
         ranges, numbers = mission.content.get("ranges", known), kind().numbers()

@@ -377,11 +377,12 @@ def test_missing_errors_of_robots_are_named_before_a_design_begins(path):
 
 def test_cma_needs_numbers_that_the_behavior_has(path):
     for text, words in (
-        ("behavior: aggregation", "aggregation, such as ranges"),
-        ("ranges: {speed: [0, 1], a: [0, 1]}", "not speed"),
+        ("", "^m.yaml: cma needs the behavior whose numbers it designs, such as behavior: dispersion$"),
+        ("behavior: aggregation", "cma needs ranges of two or more numbers of aggregation, such as ranges"),
+        ("behavior: aggregation\nranges: {speed: [0, 1], a: [0, 1]}", "of aggregation.*, not speed"),
     ):
         path.write_text(MISSION + text + "\n")
-        with pytest.raises(ExperimentError, match="cma needs ranges of two or more numbers of .*" + words):
+        with pytest.raises(ExperimentError, match=words):
             program.main(["m.yaml", "--method", "cma", "--budget", "250"])
 
 

@@ -64,6 +64,14 @@ def test_frames_are_a_tenth_of_a_second_of_the_video_apart(drawn):
         video.write_video(make_trial(), 0.2, 1.0, "run.mp4")
 
 
+def test_a_video_that_is_stopped_leaves_no_file(tmp_path, monkeypatch):
+    draw = create_autospec(video.draw_frame, side_effect=[Image.new("RGB", (8, 8)), KeyboardInterrupt])
+    monkeypatch.setattr(video, "draw_frame", draw)
+    with pytest.raises(KeyboardInterrupt):
+        video.write_video(make_trial(), 0.5, 1.0, str(tmp_path / "run.gif"))
+    assert draw.call_count == 2 and not list(tmp_path.iterdir())
+
+
 def test_a_video_shows_the_arena_or_where_robots_were():
     shape = Shape("robots", 0, CYLINDER, (0.0, 0.0, 0.0, 1.0), Pose(0.0, 1.0, 0.0), 0.0, (0.1, 0.1, 0.1))
     frames = [[shape, shape._replace(pose=Pose(2.0, -1.0, 0.0))], [shape._replace(pose=Pose(-3.0, 0.5, 0.0))]]
