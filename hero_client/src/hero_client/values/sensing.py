@@ -169,7 +169,7 @@ def sense_neighbors(
     worlds, robots, _ = poses.shape
     rows = np.repeat(np.arange(worlds * robots).reshape(worlds, robots), robots, axis=0)
     if find_near is not None and sensor == Neighbors(range_m=sensor.range_m):
-        seen, found = np.zeros((worlds, robots, robots), dtype=bool), np.zeros((3, worlds, robots, robots))
+        seen, found = np.empty((worlds, robots, robots), dtype=bool), np.empty((3, worlds, robots, robots))
         find_near(poses, np.cos(poses[..., 2]), np.sin(poses[..., 2]), float(sensor.range_m), seen, found)
         forward_m, left_m, heading_rad = found.reshape(3, -1, robots)
         return Neighborhood(seen.reshape(-1, robots), forward_m, left_m, heading_rad, rows)

@@ -8,14 +8,6 @@ RobotMask = Union[bool, np.ndarray]
 """A mask (R,), or True for all robots, or False for none."""
 
 
-def assign(target: np.ndarray, values: Union[int, np.ndarray], which: RobotMask) -> None:
-    """Copy values into target, arrays with robots last, for those that take part."""
-    if which is True:
-        target[...] = values
-    else:
-        np.copyto(target, values, where=which)
-
-
 def simplify(which: np.ndarray) -> RobotMask:
     """Return True or False instead of a mask of all robots or none."""
     count = np.count_nonzero(which)

@@ -10,7 +10,7 @@ from hero_node.robot_constants import PULSE_RANGE_US
 from ...robot.clock import NEVER_MS
 from ...robot_constants import MOTOR_WATCHDOG_MS
 from ...world.world import World
-from .robot_mask import RobotMask, assign
+from .robot_mask import RobotMask
 
 _FORWARD = np.array([[-1.0], [1.0]])
 """The servos are mounted as mirror images: a pulse below the center drives the left wheel forward."""
@@ -36,13 +36,13 @@ class ServoPulses:
     def write(self, now_ms: int, pulses_us: np.ndarray, which: RobotMask) -> None:
         """Write pulses (2, R), limited to 1000..2000 us, to the robots which."""
         stop_at_ms = now_ms + MOTOR_WATCHDOG_MS + 1
-        assign(self._stop_at_ms, stop_at_ms, which)
+        np.copyto(self._stop_at_ms, stop_at_ms, where=which)
         self.check_ms = min(self.check_ms, stop_at_ms)
         changes = pulses_us != self._pulses_us
         if which is not True:
             changes &= which
         if np.count_nonzero(changes):
-            assign(self._pulses_us, pulses_us, which)
+            np.copyto(self._pulses_us, pulses_us, where=which)
             least_us, most_us = PULSE_RANGE_US
             self._world.write_pulses(which, np.minimum(np.maximum(pulses_us, least_us), most_us))
 

@@ -50,9 +50,7 @@ class TickOdometryRows:
 
     def integrate(self, ticks: np.ndarray, now_ms: int) -> None:
         """Take one reading of all counters (2, R), with its stamp."""
-        moved_ticks = ticks - self._window_ticks[self._newest]
-        if np.count_nonzero(moved_ticks):
-            self._move(moved_ticks)
+        self._move(ticks - self._window_ticks[self._newest])
         self._velocities = None
         self._newest = (self._newest + 1) % TWIST_WINDOW
         self._window_ticks[self._newest], self._window_ms[self._newest] = ticks, now_ms

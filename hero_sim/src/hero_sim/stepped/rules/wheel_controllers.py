@@ -11,7 +11,7 @@ import numpy as np
 from ...robot.clock import LONG_AGO_MS
 from ...robot.motor_pid import SAMPLE_MS, Gains
 from ...robot_constants import COMMAND_GAP_MS
-from .robot_mask import RobotMask, assign, simplify
+from .robot_mask import RobotMask, simplify
 
 _SAMPLE_S = SAMPLE_MS / 1000.0
 
@@ -94,15 +94,12 @@ class WheelControllers:
         due = simplify((self._computed_ms <= now_ms - SAMPLE_MS) & active)
         if due is False:
             return
-        error = self.targets - measured
-        sums_us = self._limit(self._integral_step * error + self._sums_us)
+        error, limit_us = self.targets - measured, self._limit_us
+        sums_us = np.clip(self._integral_step * error + self._sums_us, -limit_us, limit_us)
         damping_us = (measured - self._last_inputs) * self._derivative_step
-        outputs_us = np.trunc(self._limit(self._proportional * error + sums_us - damping_us))
-        assign(self._sums_us, sums_us, due)
-        assign(self._last_inputs, measured, due)
-        assign(self.outputs_us, outputs_us, due)
-        assign(self._computed_ms, now_ms, due)
+        outputs_us = np.trunc(np.clip(self._proportional * error + sums_us - damping_us, -limit_us, limit_us))
+        np.copyto(self._sums_us, sums_us, where=due)
+        np.copyto(self._last_inputs, measured, where=due)
+        np.copyto(self.outputs_us, outputs_us, where=due)
+        np.copyto(self._computed_ms, now_ms, where=due)
         self._due_ms = int(self._computed_ms.min()) + SAMPLE_MS
-
-    def _limit(self, values_us: np.ndarray) -> np.ndarray:
-        return np.maximum(np.minimum(values_us, self._limit_us), -self._limit_us)

@@ -8,7 +8,7 @@ import numpy as np
 from ...robot.wheel_odometry import FILTER_FIRST_ERROR, FILTER_PROCESS_NOISE_S_M
 from ...world import compile_loops, wheel_loops
 from ...world.world import World
-from .robot_mask import RobotMask, assign
+from .robot_mask import RobotMask
 
 
 class WheelEncoders:
@@ -41,7 +41,7 @@ class WheelEncoders:
     def read(self, now_ms: int, which: RobotMask) -> None:
         """Read the counters and update the filtered speeds of the robots which."""
         elapsed_s = (now_ms - self._read_at_ms) / 1000.0
-        assign(self._read_at_ms, now_ms, which)
+        np.copyto(self._read_at_ms, now_ms, where=which)
         if self._loops is not None:
             self._loops.read_encoders(
                 (now_ms - self._world.time_ms) / 1000.0, elapsed_s, FILTER_PROCESS_NOISE_S_M, self._all & which,
@@ -55,9 +55,9 @@ class WheelEncoders:
         gains = self._errors / (self._errors + 1.0)
         changes_m_s = (speeds_m_s - self.filtered_m_s) * gains
         errors = np.abs(changes_m_s) * FILTER_PROCESS_NOISE_S_M + gains
-        assign(self.ticks, ticks, which)
-        assign(self._errors, errors, which)
-        assign(self.filtered_m_s, self.filtered_m_s + changes_m_s, which)
+        np.copyto(self.ticks, ticks, where=which)
+        np.copyto(self._errors, errors, where=which)
+        np.copyto(self.filtered_m_s, self.filtered_m_s + changes_m_s, where=which)
 
     def zero(self, row: int) -> None:
         """Zero the counters of one robot, as last read (Odometry.ino:234)."""

@@ -73,13 +73,14 @@ class Machine(Behavior):
         rounds, columns = (MAX_NEXT, 1) if self._is_tree else (1, MAX_NEXT)
         gray, tables, moves = sensed.floor.gray, self._tables, np.ones(len(state), dtype=bool)
         floor = np.where(np.isnan(gray), FLOORS.index("unknown"), (gray >= BLACK) + 1 * (gray > WHITE))
-        count = len(FLOORS) + np.minimum(sensed.near.counts, MAX_COUNT)
+        count, robots = len(FLOORS) + np.minimum(sensed.near.counts, MAX_COUNT), np.arange(len(state))
         for number in range(rounds):
             row = first + state
             chances = tables.chances[row, floor, :columns] + tables.chances[row, count, :columns]
             holds = draws[:, number : number + columns] < chances
-            moves &= holds.any(axis=1)
-            state = np.where(moves, tables.to[row, holds.argmax(axis=1)], state)
+            follows = holds.argmax(axis=1)
+            moves &= holds[robots, follows]  # much faster than holds.any(axis=1)
+            state = np.where(moves, tables.to[row, follows], state)
             moves &= state != 0
         return state
 

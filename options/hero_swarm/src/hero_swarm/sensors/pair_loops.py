@@ -33,20 +33,22 @@ def find_touched(places_m: Any, cosines: Any, sines: Any, radius_m: float, range
 
 
 def find_near(poses: Any, cosines: Any, sines: Any, range_m: float, seen: Any, found: Any) -> None:
-    """Set seen (W, N, N), and in found (3, W, N, N) what is forward and left, and the heading, of those in range.
+    """Set seen (W, N, N), and in found (3, W, N, N) what is forward and left, and the heading, of those in range, or 0.
 
     poses (W, N, 3), NaN where one is not known; cosines, sines (W, N): of the headings.
     """
     worlds, robots, _ = poses.shape
     for world in range(worlds):
         for i in range(robots):
-            own_x_m, own_y_m, own_rad = poses[world, i]
+            own_x_m, own_y_m, own_rad = poses[world, i, 0], poses[world, i, 1], poses[world, i, 2]
             cosine, sine = cosines[world, i], sines[world, i]
-            for j in range(robots):
+            for j in range(robots):  # without a branch, which would be hard to predict
                 to_x_m, to_y_m = poses[world, j, 0] - own_x_m, poses[world, j, 1] - own_y_m
                 forward_m, left_m = cosine * to_x_m + sine * to_y_m, cosine * to_y_m - sine * to_x_m
-                if i != j and math.sqrt(forward_m * forward_m + left_m * left_m) <= range_m:
-                    heading_rad = poses[world, j, 2] - own_rad
-                    seen[world, i, j] = True
-                    found[0, world, i, j], found[1, world, i, j] = forward_m, left_m
-                    found[2, world, i, j] = heading_rad - 2.0 * math.pi * np.rint(heading_rad / (2.0 * math.pi))
+                heading_rad = poses[world, j, 2] - own_rad
+                heading_rad -= 2.0 * math.pi * np.rint(heading_rad / (2.0 * math.pi))
+                is_near = (i != j) & (math.sqrt(forward_m * forward_m + left_m * left_m) <= range_m)
+                seen[world, i, j] = is_near
+                found[0, world, i, j] = forward_m if is_near else 0.0
+                found[1, world, i, j] = left_m if is_near else 0.0
+                found[2, world, i, j] = heading_rad if is_near else 0.0
