@@ -38,7 +38,7 @@ def ask(
     """Return status, headers and text of the answer to a request."""
     connection, written = mock.create_autospec(HTTP1Connection, instance=True), []
 
-    def write_headers(start_line, answered, chunk=None):
+    def write_headers(start_line, answered, chunk=None, **_more):  # Tornado 5 gives a callback, too
         written.append((start_line.code, answered.copy(), (chunk or b"").decode()))
 
     connection.write_headers.side_effect = write_headers
