@@ -35,6 +35,7 @@ def test_at_the_end_lights_are_out_and_robots_rest(monkeypatch, swarm, module, a
     assert {robot.light for robot in swarm} == {DARK} and true_paths.stop_within(swarm)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seconds", "options", "status"),
     [(60.0, {"once": True}, 0), (2.0, {"once": True}, 1), (2.0, {}, 0), (60.0, {"timeout_s": 1.0}, None)],

@@ -165,6 +165,7 @@ def test_the_edge_of_a_shadow_over_a_print_leaves_no_rest(edge):
     assert rest == pytest.approx([0.0, 0.0], abs=1e-6) and contrast[0] == pytest.approx(2.0) and found[1] == edge
 
 
+@pytest.mark.slow
 def test_a_print_is_found_neither_by_other_ids_nor_in_noise():
     image, random = photograph(3, 0.4, side_px=17.0), np.random.RandomState(0)
     assert expect_tag(3, image, 17.0).detect(image) != []
