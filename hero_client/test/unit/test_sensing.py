@@ -113,6 +113,17 @@ def test_robots_of_another_world_are_not_sensed():
     assert sense_neighbors(both, Neighbors()).rows.tolist() == [[0, 1], [0, 1], [2, 3], [2, 3]]
 
 
+def test_a_cone_sees_nothing_beside_and_behind_it():
+    cone = Binary(half_angle_rad=0.3)
+    for x_m, y_m in ((0.0, -1.0), (0.0, 1.0), (-1.0, -0.1), (-1.0, 0.1), (0.5, -0.5), (0.5, 0.5)):
+        assert not sense_binary(np.array([[(0.0, 0.0, 0.0), (x_m, y_m, 0.0)]]), cone)[0]
+
+
+def test_a_beam_sees_in_a_world_of_many_robots():
+    poses = np.column_stack((np.arange(130.0), np.zeros((130, 2))))[None]
+    assert sense_binary(poses, Binary()).tolist() == [True] * 129 + [False]
+
+
 def test_without_worlds_nothing_is_sensed():
     assert sense_binary(np.empty((0, 3, 3)), Binary()).tolist() == []
 
