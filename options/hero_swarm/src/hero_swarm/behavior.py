@@ -92,6 +92,14 @@ def lock(values: np.ndarray) -> np.ndarray:
     return view
 
 
+def copy_poses(poses: np.ndarray, shape: Tuple[int, ...]) -> np.ndarray:
+    """Return poses (R, 3) of a world as (W, N, 3), read-only, as they lie there: all x, then all y, then all yaws.
+
+    Where yaws lie apart, how numpy rounds their cosines depends on what lies behind them in memory.
+    """
+    return lock(poses.reshape(shape).copy("K"))
+
+
 class Sensed:
     """Readings of R robots, as attributes: those below, and one for each sensor of the behavior, by its name.
 
@@ -110,7 +118,7 @@ class Sensed:
         """Take the poses (W, N, 3) and the readings of all sensors by their names."""
         worlds, self.count, _ = poses.shape
         self.time_s = time_s
-        self.poses = lock(poses.reshape(-1, 3).copy("F"))  # see Trial
+        self.poses = lock(poses.reshape(-1, 3).copy("F"))  # see copy_poses()
         self.is_known = lock(np.isfinite(self.poses[:, 0] + self.poses[:, 1] + self.poses[:, 2]))
         self.numbers = lock(np.tile(np.arange(self.count), worlds))
         self._readings = {

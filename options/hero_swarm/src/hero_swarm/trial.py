@@ -13,7 +13,7 @@ from hero_sim.population import place_worlds
 from hero_sim.stepped import RobotRows
 from hero_sim.world import Arena, PushedBody, is_free, measure_clearance
 
-from .behavior import PULSES, Behavior, Random, derive_seed, lock
+from .behavior import PULSES, Behavior, Random, copy_poses, derive_seed, lock
 from .control import Control
 from .metrics.own import State
 from .points import PointRows
@@ -141,7 +141,7 @@ class Trial:
         self.rows: Any = PointRows(world) if is_point else RobotRows(world, radios)
         self._drives_by_pulses = behavior.drive == PULSES and not is_point
         self._dead_zones_us = list_dead_zones(self.rows.world.errors)
-        self.poses, self.velocities = self._copy_poses(starts.shape), lock(np.zeros_like(starts))
+        self.poses, self.velocities = copy_poses(world.poses, starts.shape), lock(np.zeros_like(starts))
         random = Random([derive_seed(seed, "behavior") for seed in seeds], robots)
         self._control = Control(behavior, random, filter_commands, arena=arena, robots=self.rows)
         self._arena, self._decided_ms = arena, -1
@@ -151,11 +151,6 @@ class Trial:
         objects = [arena.objects] if objects is None else objects
         self._radii_m = np.array([thing.shape.reach_m for thing in objects[0]])
         self._all = np.arange(starts.shape[0] * robots)
-
-    def _copy_poses(self, shape: Tuple[int, ...]) -> np.ndarray:
-        # All x, then all y, then all yaws, as the world keeps them: where values lie apart, how numpy rounds their
-        # cosines depends on what lies behind them in memory.
-        return lock(self.rows.world.poses.reshape(shape).copy("K"))
 
     @property
     def memory(self) -> Any:
@@ -188,7 +183,7 @@ class Trial:
         for number in range(1, self._control.steps_per_decision + 1):
             self._decide()
             rows.advance(start_ms + round(number * 1000.0 / self._control.rate_hz))
-            self.poses = self._copy_poses(start.shape)
+            self.poses = copy_poses(rows.world.poses, start.shape)
         self.velocities = lock((self.poses - start) * self.behavior.rate_hz)
         return rows.now_ms / 1000.0
 

@@ -9,7 +9,7 @@ from hero_sim.population import place_worlds
 from hero_sim.stepped import RobotRows
 from hero_sim.world import Arena, build_default, load_arena, place_robots
 
-from ..behavior import Behavior, Random, derive_seed, sense
+from ..behavior import Behavior, Random, copy_poses, derive_seed, sense
 from ..metrics import FALLING
 from ..metrics.own import State, measure_metric
 from ..sources import Sources
@@ -67,8 +67,9 @@ class SwarmVectorEnv:
         self._seed, self.time_s, self.ended = first + self.worlds, 0.0, False
         seeds = range(first, self._seed)
         streams = (np.random.RandomState(derive_seed(one, "places")) for one in seeds)
-        self._poses = np.array([place_robots(self._arena, self.robots, stream) for stream in streams])
-        self._rows = RobotRows(place_worlds(self._arena, self._poses, seeds, self._errors))
+        places = np.array([place_robots(self._arena, self.robots, stream) for stream in streams])
+        self._rows = RobotRows(place_worlds(self._arena, places, seeds, self._errors))
+        self._poses = copy_poses(self._rows.world.poses, places.shape)
         self._random = Random([derive_seed(one, "behavior") for one in seeds], self.robots)
         self._kept: Dict[str, Dict[str, Any]] = {}
         observed = self._observe()
@@ -86,7 +87,7 @@ class SwarmVectorEnv:
         rows.advance(rows.now_ms + self._period_ms)
         self.time_s = rows.now_ms / 1000.0
         self.ended = self.time_s >= self._end_s - 1e-6
-        before, self._poses = self._poses, rows.world.poses.reshape(self._poses.shape).copy()
+        before, self._poses = self._poses, copy_poses(rows.world.poses, self._poses.shape)
         observed = self._observe()
         value = self._measure((self._poses - before) * (1000.0 / self._period_ms))
         reward, self._value = self._sign * (value - self._value), value
