@@ -73,8 +73,6 @@ _WALL_PASSES = 50
 
 _FAR_M = 1e6
 
-_TURN_RAD = 2.0 * math.pi
-
 _SETTLED_M = 1e-4, 1e-7
 _PASSES = 100, 400
 _ROUNDS = 3, 60
@@ -116,7 +114,7 @@ def follow_wheels(moved_ticks: Any, tick_m: Any, separation_m: Any, poses: Any, 
         yaw_rad = poses[2, robot] + turn_rad
         poses[0, robot] += x_m
         poses[1, robot] += y_m
-        poses[2, robot] = yaw_rad - np.rint(yaw_rad / _TURN_RAD) * _TURN_RAD
+        poses[2, robot] = yaw_rad - np.rint(yaw_rad / (2.0 * math.pi)) * (2.0 * math.pi)
 
 
 def find_contacts(

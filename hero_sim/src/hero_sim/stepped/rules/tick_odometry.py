@@ -50,7 +50,16 @@ class TickOdometryRows:
 
     def integrate(self, ticks: np.ndarray, now_ms: int) -> None:
         """Take one reading of all counters (2, R), with its stamp."""
-        self._move(ticks - self._window_ticks[self._newest])
+        moved_ticks = ticks - self._window_ticks[self._newest]
+        if self._loops is not None:
+            self._loops.follow_wheels(moved_ticks, self._tick_m, self._separation_m, self.poses, self._headings)
+        else:
+            left_m, right_m = moved_ticks * self._tick_m
+            travels_m, turns_rad = join_wheels(left_m, right_m, self._separation_m)
+            cosine, sine = self._headings
+            step_x_m, step_y_m, cosine[:], sine[:] = follow_arc(cosine, sine, *shape_arc(travels_m, turns_rad))
+            self.poses += step_x_m, step_y_m, turns_rad
+            self.poses[2] -= np.rint(self.poses[2] / _TURN_RAD) * _TURN_RAD
         self._velocities = None
         self._newest = (self._newest + 1) % TWIST_WINDOW
         self._window_ticks[self._newest], self._window_ms[self._newest] = ticks, now_ms
@@ -59,17 +68,6 @@ class TickOdometryRows:
             self._window_ticks[:, :, self._is_cleared] = ticks[:, self._is_cleared]
             self._window_ms[:, self._is_cleared] = now_ms
             self._is_cleared[:] = self._any_cleared = False
-
-    def _move(self, moved_ticks: np.ndarray) -> None:
-        if self._loops is not None:
-            self._loops.follow_wheels(moved_ticks, self._tick_m, self._separation_m, self.poses, self._headings)
-            return
-        left_m, right_m = moved_ticks * self._tick_m
-        travels_m, turns_rad = join_wheels(left_m, right_m, self._separation_m)
-        cosine, sine = self._headings
-        step_x_m, step_y_m, cosine[:], sine[:] = follow_arc(cosine, sine, *shape_arc(travels_m, turns_rad))
-        self.poses += step_x_m, step_y_m, turns_rad
-        self.poses[2] -= np.rint(self.poses[2] / _TURN_RAD) * _TURN_RAD
 
     def measure_velocities(self) -> np.ndarray:
         """Return linear m/s and angular rad/s over the last TWIST_WINDOW readings (2, R)."""
