@@ -254,3 +254,11 @@ def test_yaws_lie_side_by_side_in_memory(is_point):
         for yaws_rad in (trial.poses[..., 2], trial.state.poses[..., 2], trial.state.sensed.poses[:, 2]):
             assert yaws_rad.flags.c_contiguous
         trial.step()
+
+
+def test_yaws_lie_side_by_side_where_robots_learn():
+    env = SwarmVectorEnv(robots=3, worlds=2)
+    env.reset(seed=1)
+    for _ in range(2):
+        assert env._poses[..., 2].flags.c_contiguous
+        env.step(np.zeros((6, 2)))
