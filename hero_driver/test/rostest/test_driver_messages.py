@@ -69,7 +69,7 @@ class TestDriverMessages(DriverCase):
         for payload in (odd, b"\x01\x02", good):
             robot.send("laser", payload)
         proximity.wait_count(1)
-        self.assertIn(odd, [message._buff for message in scans.messages])
+        self.assertIn(odd, [message._buff for message in scans.wait_count(2)])
         self.assertEqual(len(proximity.messages), 1)
         self.fleet.wait("/hero_3", Robot.READY, "counted", lambda e: e.dropped_messages >= 1)
 
