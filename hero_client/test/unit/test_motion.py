@@ -195,6 +195,15 @@ def test_another_goal_on_the_way_has_its_own_time_and_place():
     assert controller.state is State.FAILED
 
 
+def test_another_goal_on_the_way_may_be_farther_than_the_first_one_was():
+    controller = GoToGoalController(Goal(0.1, 0.0), 0.0, avoid=True)
+    for index in range(int(1.5 * PROGRESS_S / STEP_S)):
+        controller.step(Pose(0.011 * index, 0.0, 0.0), FREE, STEP_S * index)
+        if index == 5:
+            controller.change_goal(Goal(9.0, 0.0), 0.01, 100.0, STEP_S * index)
+    assert controller.state is State.ACTIVE, controller.reason
+
+
 def test_the_side_of_a_detour_is_kept_for_a_while():
     for free_s, is_kept in ((1.3, True), (1.7, False)):
         controller = GoToGoalController(Goal(1.0, 0.0), 0.0, avoid=True)

@@ -301,14 +301,21 @@ def test_a_zero_is_missed_unless_two_readings_after_it_show_rest():
         assert not commanders.is_zero_missed(after_s + 1.0) or after_s < 0.5, "said once"
 
 
-def test_a_zero_is_not_missed_without_readings_motion_or_if_motion_follows():
-    for commands, has_readings in (((True, False), False), ((False,), True), ((True, False, True), True)):
+def test_a_zero_is_not_missed_without_motion_or_before_motion_or_a_stop():
+    for commands, has_readings, is_stopped in (
+        ((True, False), False, False),
+        ((False,), True, False),
+        ((True, False, True), True, False),
+        ((True, False), True, True),
+    ):
         wheels = WheelMotion()
         if has_readings:
             wheels.read_ticks(0.0, 0.0)
         commanders = CommandSources(wheels)
         for moves in commands:
             commanders.note_command(VELOCITY, VELOCITY, "sender", "/program", moves, 0.0)
+        if is_stopped:
+            commanders.stop()
         assert not commanders.is_zero_missed(9.0)
 
 

@@ -246,6 +246,20 @@ def test_reports_come_each_period_and_once_for_a_burst_of_changes(monkeypatch):
     assert spin.told == []
 
 
+def test_a_change_during_a_report_is_reported_next(monkeypatch):
+    spin = Spin(monkeypatch, ends_s=1.0)
+    report = spin.node._report
+
+    def report_meanwhile(*arguments):
+        report(*arguments)
+        if len(spin.reports) == 1:
+            spin.node._changed.set()
+
+    spin.node._report = report_meanwhile
+    spin.node.spin()
+    assert spin.reports == [(0.125, True), (0.25, False)]
+
+
 def test_a_loop_that_breaks_ends_the_node_with_an_error(monkeypatch):
     spin = Spin(monkeypatch)
     node = spin.node

@@ -206,9 +206,12 @@ def test_the_last_files_are_kept_for_others_than_robots(still_loop, file_limit, 
     ]
     ((delay_s, resume),) = later
     assert delay_s == 0.5 and listener.fileno() not in loop._serves
+    loop._listener = None  # the loop has ended meanwhile
+    resume()
+    assert listener.fileno() not in loop._serves
+    loop._listener = listener
     resume()
     assert listener.fileno() in loop._serves
-    loop._listener = listener
 
 
 @pytest.mark.parametrize(
