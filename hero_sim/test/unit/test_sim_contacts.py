@@ -1,5 +1,6 @@
 """Bodies that meet: what must hold in every step, whatever they do."""
 
+import collections
 import math
 
 import numpy as np
@@ -175,13 +176,61 @@ def test_worlds_give_the_same_bytes_compiled_and_not(monkeypatch, arena):
 
 
 @pytest.mark.slow
-def test_loops_over_worlds_give_the_same_bytes_also_without_numba(monkeypatch):
+@pytest.mark.parametrize("is_compiled", [False, True])
+def test_loops_over_worlds_give_the_same_bytes_also_without_numba(monkeypatch, is_compiled):
     """With robots that touch each other, walls and a post all the time."""
     arena = build_rectangle(0.3, 0.24, 0)._replace(circles_m=np.array([(0.0, 0.0, 0.02)]))
     places = [(x_m, y_m, 3.0 * x_m) for x_m in (-0.1, 0.0, 0.1) for y_m in (-0.07, 0.07)]
     monkeypatch.setattr(compiled, "_compile_loops", lambda module: module)
+    monkeypatch.setattr(body_loops, "IS_COMPILED", is_compiled)
     with np.errstate(over="ignore"):  # of random bits, which wrap
         compare_loops(monkeypatch, arena, np.array(places * 2), 2, 2)
+
+
+def count_looks(monkeypatch, arena, looped):
+    """Return how many contacts were active, and how often they were looked at, left, listed and solved."""
+    looks = collections.Counter()
+    for name in ("list_near", "find_contacts", "solve_contacts", "leave_walls"):
+        call = getattr(body_loops, name)
+
+        def count(*given, name=name, call=call):
+            result = call(*given)
+            looks[name] += 1
+            looks["active"] += result[2] if name == "find_contacts" else 0
+            return result
+
+        monkeypatch.setattr(body_loops, name, count)
+    listing = contacts.Contacts._list_near
+    monkeypatch.setattr(
+        contacts.Contacts, "_list_near", lambda own, near: (looks.update(["list_near"]), listing(own, near))[1]
+    )
+    monkeypatch.setattr(compiled, "_compile_loops", lambda module: module)
+    monkeypatch.setattr(compiled, "COMPILED_ROWS", 0 if looped else 10**9)
+    arena, rng = load_arena(arena), np.random.RandomState(2)
+    poses = np.vstack([place_robots(arena, 4, np.random.RandomState(seed)) for seed in range(2)])
+    errors = draw_errors([np.random.RandomState(row) for row in range(8)])
+    world = World(arena, poses, [np.random.RandomState(seed) for seed in range(2)], errors)
+    looks.clear()
+    with np.errstate(over="ignore"):  # of random bits, which wrap
+        for _ in range(25):
+            world.commands_m_s[:] = rng.uniform(-0.05, 0.25, (8, 2))
+            world.step(20)
+            world.poses.sum()
+    return [looks[name] for name in sorted(looks)]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arena", "looped", "kept"),
+    [
+        ("maze", False, [346, 144, 132, 39, 215]),
+        ("maze", True, [344, 244, 215, 63, 215]),
+        ("discs", False, [140, 261, 220, 36, 220]),
+    ],
+)
+def test_bodies_are_looked_at_as_seldom_as_they_were(monkeypatch, arena, looped, kept):
+    """That what happens does not depend on it, other tests show; looking more often takes more time."""
+    assert count_looks(monkeypatch, arena, looped) == kept
 
 
 @pytest.mark.option("numba")

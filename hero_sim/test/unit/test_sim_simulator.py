@@ -1,16 +1,22 @@
 """Robots in real time: the pace of the clock, pauses of the machine, and what is told of connections."""
 
+import collections
+import hashlib
 import inspect
 import signal
+import struct
 from unittest.mock import create_autospec
 
+import numpy as np
 import pytest
-from driver_side import parse_options
+from driver_side import VELOCITY, parse_options
 
+from hero_driver.rosserial import packets
 from hero_sim import main
 from hero_sim import simulator as simulators
 from hero_sim.build import build_simulator
 from hero_sim.errors import OptionError
+from hero_sim.faults import KINDS
 from hero_sim.link.tcp_link import TcpLink
 from hero_sim.robot_constants import RECEIVE_WINDOW_LENGTH
 from hero_sim.simulator import _FLAPPING_MS, _LATE_S, _MAX_WAIT_S, _MIN_WAIT_S
@@ -282,3 +288,74 @@ def test_no_end_of_a_run_leaves_a_connection_open(monkeypatch):
     with pytest.raises(ZeroDivisionError), main.simulate(parse_options("--port", "9"), print):
         raise ZeroDivisionError
     assert close_all.call_count == 2
+
+
+class Peer(Link):
+    """A driver that accepts and closes connections, commands, and does not always read: at random, but the same."""
+
+    def __init__(self, simulator):
+        super().__init__()
+        self.simulator, self.rng, self.open_rows, self.log = simulator, np.random.RandomState(3), set(), []
+
+    def act(self):
+        simulator, chance, now_ms = self.simulator, self.rng.randint(100), self.simulator.swarm.now_ms
+        for name, index, *more in self.calls:
+            if name == "connect":
+                self.connecting.add(index)
+            elif name in ("close", "abandon"):
+                self.open_rows.discard(index)
+                self.connecting.discard(index)
+            self.log.append((now_ms, name, index, *more))
+        self.calls.clear()
+        for index in sorted(self.connecting):
+            if chance < 60:
+                self.connecting.discard(index)
+                if chance < 20:
+                    simulator.connection_failed(index, "refused")
+                else:
+                    self.open_rows.add(index)
+                    simulator.connection_made(index)
+                    simulator.receive_bytes(index, packets.encode_packet(packets.ID_PUBLISHER, b""))
+        for index in sorted(self.open_rows):
+            what = self.rng.randint(400)
+            if what < 2:
+                self.open_rows.discard(index)
+                simulator.connection_lost(index, "closed")
+            elif what < 4:
+                simulator.writing_blocked(index)
+            elif what < 16:
+                simulator.writing_resumed(index)
+            elif what < 60:
+                simulator.receive_bytes(index, packets.encode_packet(packets.ID_TIME, bytes(8)))
+                simulator.receive_bytes(
+                    index, packets.encode_packet(VELOCITY, struct.pack("<6d", 0.1, 0, 0, 0, 0, 1.0))
+                )
+            elif what < 62:
+                simulator.receive_bytes(index, bytes(2500))
+
+    def has_unsent(self, index):
+        return self.rng.randint(3) == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("wifi", "kept"),
+    [
+        ("ideal", "abandon 4 close 1 connect 25 drop_unsent 1021 pause 740 send 1075: 34 lines, 32f8433beb442b43"),
+        ("bad,channels=2", "abandon 4 close 1 connect 19 pause 910 send 154: 32 lines, 598c65631a2af29c"),
+    ],
+    ids=["ideal", "bad"],
+)
+def test_what_robots_in_real_time_do_at_their_links_is_what_they_did(bench, wifi, kept):
+    """Results must not change without a word in the CHANGELOG: to renew these, see test_sim_kept_results.py."""
+    faults = [f"--fault={kind}@{3 + number}:robot={number % 4}" for number, kind in enumerate(sorted(KINDS))]
+    simulator, lines, _, clock = bench("--count", "4", "--wifi", wifi, "--arena", "obstacles", *faults)
+    simulator.link = peer = Peer(simulator)
+    while simulator.swarm.now_ms < 16000:
+        clock.now_s += peer.rng.randint(30) / 1000.0
+        simulator._step(None)
+        peer.act()
+    counts = collections.Counter(name for _, name, *_ in peer.log)
+    log = repr((peer.log, lines, np.round(peer.waits_s, 6).tolist())).encode()
+    calls = " ".join(f"{name} {counts[name]}" for name in sorted(counts))
+    assert f"{calls}: {len(lines)} lines, {hashlib.sha256(log).hexdigest()[:16]}" == kept
