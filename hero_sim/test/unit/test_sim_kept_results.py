@@ -1,16 +1,12 @@
-"""Results that are kept: robots of every model, driven at random, do what they did when the numbers below were noted.
+"""Results that are kept: robots of every model, driven at random, do what they did (see kept_log.py)."""
 
-Results of experiments must not change without a word in the CHANGELOG. After a change that is meant, take the numbers
-of the failure; if others than expected changed, look for the reason first. All are the same on every machine.
-"""
-
-import hashlib
 import itertools
 import struct
 
 import numpy as np
 import pytest
 from driver_side import DriverSide
+from kept_log import Log
 
 from hero_driver.rosserial import packets
 from hero_node import Pose
@@ -19,25 +15,6 @@ from hero_sim.world.arena import Arena, build_rectangle, outline
 from hero_sim.world.pushing.shapes import Disc, Polygon, PushedBody
 from hero_sim.world.robot_errors import RobotErrors, draw_errors
 from hero_sim.world.world import World
-
-
-class Log:
-    """Sums up arrays and texts."""
-
-    def __init__(self):
-        self._sum = hashlib.sha256()
-
-    def add(self, *values):
-        for value in values:
-            if isinstance(value, np.ndarray):
-                # Adding zero takes the sign from zeros.
-                value = np.nan_to_num(np.asarray(value, dtype=float) + 0.0).tobytes()
-            self._sum.update(value if isinstance(value, bytes) else repr(value).encode())
-
-    @property
-    def digest(self):
-        return self._sum.hexdigest()[:16]
-
 
 # -- robots in process ---------------------------------------------------------------------------------------
 
