@@ -51,7 +51,7 @@ def fixture_ros(monkeypatch):
         return ros.published
 
     def subscribe(topic, kind, receive, argument, queue_size, tcp_nodelay):
-        assert kind is module.rospy.AnyMsg and topic not in ros.callbacks and queue_size > 1 and tcp_nodelay
+        assert kind is module.rospy.AnyMsg and topic not in ros.callbacks and queue_size == 100 and tcp_nodelay
         ros.callbacks[topic] = lambda message: receive(message, argument)
 
         def unregister():
@@ -63,7 +63,7 @@ def fixture_ros(monkeypatch):
 
     monkeypatch.setattr(module, "ask_master", ask)
     monkeypatch.setattr(module.rospy, "Subscriber", subscribe)
-    monkeypatch.setattr(module.rospy, "logwarn_throttle_identical", lambda period_s, text: ros.warnings.append(text))
+    monkeypatch.setattr(module.rospy, "logwarn_throttle_identical", lambda *said: ros.warnings.append(said))
     return ros
 
 
@@ -121,7 +121,7 @@ def test_a_message_of_another_definition_is_named_and_not_shown(ros):
     ros.callbacks["/a"](make_message(b"other", ColorRGBA))
     ros.callbacks["/a"](make_message(b"text"))
     assert sdk.logged == [("/a", b"text")]
-    assert ros.warnings == ["/a has another std_msgs/String than this machine: it is not shown"]
+    assert ros.warnings == [(10.0, "/a has another std_msgs/String than this machine: it is not shown")]
 
 
 def test_a_client_that_comes_later_gets_what_is_latched(ros):
@@ -193,6 +193,7 @@ def test_the_server_ends_with_the_program_whatever_ends_that(monkeypatch, error)
     with pytest.raises(KeyboardInterrupt) if error else nullcontext():
         module.main()
     assert steps == ["looked"] * (1 if error else 3) + ["stopped"] and programs[0].is_over
+    assert set(programs[0].pauses_s) == {0.5}
     module.import_optional.assert_called_once_with("foxglove", "foxglove-sdk")
 
     def refuse(**options):
@@ -202,6 +203,14 @@ def test_the_server_ends_with_the_program_whatever_ends_that(monkeypatch, error)
     with pytest.raises(ProgramError, match="ws://127.0.0.1:8765 cannot be served: Address already in use"):
         module.main()
     assert steps[-1] == "stopped" and len(steps) < 5 and programs[1].is_over
+
+
+def test_its_port_is_any_that_tcp_has():
+    for port in (1, 65535):
+        assert check_parameters(module.PARAMETERS, {"port": port})["port"] == port
+    for port in (0, 65536):
+        with pytest.raises(ProgramError, match="port"):
+            check_parameters(module.PARAMETERS, {"port": port})
 
 
 @pytest.mark.option("foxglove")

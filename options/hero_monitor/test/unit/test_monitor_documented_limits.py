@@ -16,10 +16,12 @@ from hero_monitor.control.drive_requests import DriveRequests
 from hero_monitor.control.programs import Programs
 from hero_monitor.fleet_feed.feed import FleetFeed
 from hero_monitor.page_requests import INERT_S
-from hero_monitor.program import END_CHECK_PERIOD_S, Monitor
+from hero_monitor.program import Monitor
 from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.server import COOKIE, PAGES_MAX, BaseHandler, MonotonicLoop, Server
+
+END_CHECK_PERIOD_S = 0.2
 
 DOCS = Path(__file__).resolve().parents[4] / "docs"
 README = Path(__file__).resolve().parents[2] / "README.md"

@@ -10,8 +10,10 @@ import tornado.ioloop
 from tornado.iostream import StreamClosedError
 
 from hero_monitor.serving import fair_stream as module
-from hero_monitor.serving.fair_stream import REST_FACTOR, REST_MAX_S, TURN_S, UNREAD_WRITES_MAX, FairStream
+from hero_monitor.serving.fair_stream import FairStream
 from hero_monitor.serving.server import MonotonicLoop
+
+REST_FACTOR, REST_MAX_S, TURN_S, UNREAD_WRITES_MAX = 3.0, 0.05, 0.001, 1000
 
 
 class EndlessStream(FairStream):

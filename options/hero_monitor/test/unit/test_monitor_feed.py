@@ -21,25 +21,22 @@ from hero_client.ros import RobotListener, RobotTrack, StopStatus, find_lost_com
 from hero_monitor.fleet_feed import feed as feed_module
 from hero_monitor.fleet_feed import robot_feed as robot_feed_module
 from hero_monitor.fleet_feed.feed import (
-    LOG_LINES_PER_READ,
-    LOOK_PERIOD_S,
-    MARKERS_MAX,
-    ROBOTS_MAX,
-    ROW_PERIOD_S,
     FleetFeed,
     describe_arena,
     describe_stop_of_others,
     find_true_poses,
     measure_extent,
 )
-from hero_monitor.fleet_feed.losses import FORGOTTEN_S, SILENT_S
-from hero_monitor.fleet_feed.page_state import LOG_LINES_KEPT, MAX_LINE_LENGTH
 from hero_monitor.fleet_feed.placement import Placement
-from hero_monitor.fleet_feed.robot_feed import LIGHT_S, REACHED_M, RobotFeed
+from hero_monitor.fleet_feed.robot_feed import RobotFeed
 from hero_msgs.msg import Robot, RobotArray, RobotPose, RobotPoses
 from hero_node import NodeError, Pose, Velocity
 from hero_node.ros import MasterWatch
 from hero_test.nonempty import nonempty
+
+FORGOTTEN_S, LIGHT_S, LOG_LINES_KEPT, LOG_LINES_PER_READ = 10.0, 15.0, 500, 40
+LOOK_PERIOD_S, MARKERS_MAX, MAX_LINE_LENGTH, REACHED_M = 3.0, 2000, 400, 0.02
+ROBOTS_MAX, ROW_PERIOD_S, SILENT_S = 1000, 0.5, 1.8
 
 NOW_S = 100.0
 
@@ -417,7 +414,10 @@ def test_commands_that_no_robot_hears_and_goals_outside_the_walls_are_told(fleet
         feed.find_goal = lambda placement, goal=goal: goal
         told = [loss["remedy"] for loss in fleet.read()["losses"]]
         assert ("the goal of hero_0 lies outside the walls" in told) == is_told
-    fleet.now_s += 2.0 * LOOK_PERIOD_S
+    fleet.now_s += LOOK_PERIOD_S - 0.125
+    fleet.read()
+    assert find.call_count == 1
+    fleet.now_s += 0.125
     assert fleet.read()["losses"][0]["remedy"] == lost, "a master that is gone tells nothing new"
     assert find.call_count == 2, "once in LOOK_PERIOD_S"
 

@@ -1,24 +1,34 @@
 """The guard of a program in virtual time, and limits of what pages and programs may take."""
 
+import os
 import re
+import runpy
+import select
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 
+import hero_node
 import sources
+from hero_client.controllers import AvoidanceLaw
 from hero_client.values import MAX_ANGULAR_RAD_S, MAX_LINEAR_M_S
 from hero_monitor.control import guard as module
 from hero_monitor.control import programs as programs_module
-from hero_monitor.control.offers import OFFERS
+from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.control.programs import ChildProcess, Programs
-from hero_monitor.control.requests import MAX_GOAL_M, MAX_TEXT_LENGTH, RequestError, read_request
-from hero_monitor.fleet_feed.camera_picture import MAX_DISTANCE_M, CameraPicture
+from hero_monitor.control.requests import RequestError, read_request
+from hero_monitor.fleet_feed.camera_picture import CameraPicture
 from hero_monitor.fleet_feed.page_state import LogRing, PageState
 from hero_monitor.fleet_feed.placement import Placement
 from hero_node import Pose
 from hero_test.nonempty import nonempty
+
+MAX_DISTANCE_M, MAX_GOAL_M, MAX_TEXT_LENGTH = 10000.0, 1000.0, 16000
 
 
 def run_guard(monkeypatch, signs, ends_after=10**6, code=0):
@@ -60,6 +70,49 @@ def test_a_program_ends_with_the_monitor_after_five_seconds_of_silence(monkeypat
     assert run_guard(monkeypatch, [b"."] * 200 + [b""]) == (ended, 201, 3.0)
     for code, told in ((0, 0), (1, 1), (-9, 137)):
         assert run_guard(monkeypatch, [b"."] * 100, ends_after=7, code=code) == (told, 7, None)
+
+
+def test_a_guard_is_told_its_patience_and_the_command(monkeypatch):
+    process = create_autospec(subprocess.Popen, instance=True)
+    process.poll.return_value = None
+    started = create_autospec(subprocess.Popen, return_value=process)
+    ended = create_autospec(hero_node.end_process, return_value=-signal.SIGKILL)
+    monkeypatch.setattr(subprocess, "Popen", started)
+    monkeypatch.setattr(hero_node, "end_process", ended)
+    monkeypatch.setattr(signal, "signal", create_autospec(signal.signal))
+    monkeypatch.setattr(select, "select", lambda *_: ([0], [], []))
+    monkeypatch.setattr(os, "read", lambda *_: b"")
+    monkeypatch.setattr(sys, "argv", ["guard.py", "3.5", "walk", "--fast"])
+    monkeypatch.delitem(sys.modules, module.__name__)
+    with pytest.raises(SystemExit) as caught:
+        runpy.run_module(module.__name__, run_name="__main__")
+    assert caught.value.code == 137
+    started.assert_called_once_with(["walk", "--fast"], stdin=subprocess.DEVNULL)
+    ended.assert_called_once_with(process, 3.5)
+
+
+OFFERED = {
+    "swarm_go_to": {
+        "shape": ("circle", (), ""), "spacing_m": (0.3, (AvoidanceLaw().min_spacing_m, 2.0), "m"), "turn_deg": (0.0, (-360.0, 360.0), "deg"),
+        "x_m": (0.0, (-1000.0, 1000.0), "m"), "y_m": (0.0, (-1000.0, 1000.0), "m"),
+        "linear_m_s": (0.08, (0.01, 0.2), "m/s"),
+    },
+    "go_to_goal": {"avoid": (False, (), "")},
+    "random_walk": {"linear_m_s": (0.1, (0.01, 0.2), "m/s"), "angular_rad_s": (1.5, (0.1, 4.0), "rad/s")},
+    "follow": {"gap_m": (0.15, (0.1, 2.0), "m"), "linear_m_s": (0.15, (0.01, 0.2), "m/s")},
+    "led_show": {
+        "pattern": ("rainbow", (), ""), "period_s": (4.0, (0.5, 60.0), "s"), "brightness": (1.0, (0.0, 1.0), ""),
+    },
+}  # fmt: skip
+
+
+def test_programs_of_pages_begin_with_known_values_within_known_limits():
+    offered = {offer["program"]: offer["fields"] for offer in describe_offers(list(OFFERED))}
+    found = {
+        program: {field["name"]: (field["default"], tuple(field["limits"] or ()), field["unit"]) for field in fields}
+        for program, fields in offered.items()
+    }
+    assert found == OFFERED and list(found) == list(OFFERED)
 
 
 def test_what_pages_offer_is_what_launch_files_say():

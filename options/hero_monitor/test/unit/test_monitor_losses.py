@@ -3,7 +3,9 @@
 import pytest
 
 from hero_monitor.control.requests import AGE_MAX_S, is_fresh
-from hero_monitor.fleet_feed.losses import FORGOTTEN_S, NO_DRIVER, SILENT_S, LocalizationWatch, list_losses
+from hero_monitor.fleet_feed.losses import NO_DRIVER, LocalizationWatch, list_losses
+
+FORGOTTEN_S, SILENT_S = 10.0, 1.8
 
 
 def list_sources(drivers, localization=None, now_s=0.0):

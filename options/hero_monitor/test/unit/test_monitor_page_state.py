@@ -12,20 +12,14 @@ from visualization_msgs.msg import Marker, MarkerArray
 from hero_client.ros import RobotTrack
 from hero_monitor.control.requests import RequestError, read_request
 from hero_monitor.fleet_feed import drawings
-from hero_monitor.fleet_feed.camera_picture import BYTES_MAX, SILENT_S, CameraPicture
+from hero_monitor.fleet_feed.camera_picture import CameraPicture
 from hero_monitor.fleet_feed.feed import encode_nearest
-from hero_monitor.fleet_feed.page_state import (
-    LOG_LINES_AT_ONCE,
-    LOG_LINES_KEPT,
-    MAX_LINE_LENGTH,
-    PageState,
-    encode_color,
-    encode_pose,
-    encode_range,
-    shorten,
-)
-from hero_monitor.fleet_feed.placement import APART_M, Placement
+from hero_monitor.fleet_feed.page_state import PageState, encode_color, encode_pose, encode_range, shorten
+from hero_monitor.fleet_feed.placement import Placement
 from hero_node import Pose
+
+APART_M, BYTES_MAX, LOG_LINES_AT_ONCE, LOG_LINES_KEPT = 1.0, 2000000, 100, 500
+MAX_LINE_LENGTH, SILENT_S = 400, 3.0
 
 
 def test_a_page_gets_each_part_of_the_state_once_until_it_changes():
@@ -188,9 +182,10 @@ def test_a_picture_that_is_old_or_none_is_not_shown():
     picture = CameraPicture()
     picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
     picture.receive(CompressedImage(data=b"\x89PNG"), 10.0)
-    picture.receive(CompressedImage(data=JPEG + bytes(BYTES_MAX)), 10.0)
+    picture.receive(CompressedImage(data=JPEG.ljust(BYTES_MAX + 1)), 10.0)
     assert picture.describe("map", 10.0) is None
-    picture.receive(CompressedImage(data=JPEG), 10.0)
+    picture.receive(CompressedImage(data=JPEG.ljust(BYTES_MAX)), 10.0)
+    assert picture.describe("map", 10.0 + SILENT_S) is not None
     assert picture.describe("map", 10.0 + SILENT_S + 0.1) is None
     assert picture.jpeg == b""
 

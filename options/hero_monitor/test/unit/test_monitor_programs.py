@@ -1,6 +1,7 @@
 """Which programs pages may start, with what, and how they end: with the monitor, by a stop, or by themselves."""
 
 import contextlib
+import errno
 import io
 import os
 import queue
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
-from unittest.mock import create_autospec
+from unittest.mock import Mock, create_autospec
 
 import pytest
 import yaml
@@ -325,9 +326,24 @@ def test_the_length_of_a_recording_ends_when_it_is_told_to(started, tmp_path):
 
 @pytest.mark.parametrize(("program", "driven"), [("follow", ["hero_1"]), ("led_show", [])])
 def test_robots_that_a_program_does_not_drive_are_left_alone(program, driven):
-    child = ChildProcess(program, ["hero_0", "hero_1"])
-    child.end()
-    assert child.driven == driven
+    programs = Programs("/hero_monitor", None, None)
+    child = programs._running[1] = ChildProcess(program, ["hero_0", "hero_1"])
+    assert child.driven == driven and programs.find_driver(["hero_0"]) == ""
+    programs.end_those_of(["hero_2"])
+    assert not child.is_ending
+    programs.end_those_of(["hero_2", "hero_0"])
+    assert child.is_ending, "a stop of one that it does not drive ends it, too"
+
+
+def test_a_program_that_cannot_be_started_is_listed_with_the_reason(started, monkeypatch):
+    full = OSError(errno.ENOSPC, "No space left on device")
+    monkeypatch.setattr(programs_module.tempfile, "TemporaryFile", Mock(side_effect=full))
+    child = started.start("print()")
+    child.thread.join(DEADLINE_S)
+    forget, number = started._calls.get_nowait()
+    forget(number)
+    assert (started.programs.count, started.ended, child.is_ending) == (0, [child], True)
+    assert [row["failure"] for row in started.programs.describe()] == [str(full)]
 
 
 def test_every_running_program_is_told_that_the_monitor_runs():

@@ -11,15 +11,16 @@ from hero_client.ros import StopStatus
 from hero_monitor import page_requests
 from hero_monitor.control import drive_requests as commander_module
 from hero_monitor.control import requests
-from hero_monitor.control.dead_man import HOLD_TIMEOUT_S
-from hero_monitor.control.drive_requests import LISTENER_TIMEOUT_S, DriveRequests
-from hero_monitor.control.programs import PROGRAMS_MAX
-from hero_monitor.control.requests import AGE_MAX_S
+from hero_monitor.control.drive_requests import DriveRequests
 from hero_monitor.fleet_feed.placement import Placement
-from hero_monitor.page_requests import GOALS_AT_ONCE, INERT_S, PageRequests
+from hero_monitor.page_requests import PageRequests
 from hero_monitor.serving.lesson import TEACHER, User
 from hero_node import NodeError, Pose
 from hero_node.files import EntryError
+
+GOALS_AT_ONCE, HOLD_TIMEOUT_S, INERT_S, LISTENER_TIMEOUT_S = 100, 0.4, 2.0, 2.0
+PROGRAMS_MAX = 20
+AGE_MAX_S = {"drive": 0.4, "goal": 1.0, "start": 1.0, "record": 1.0, "release": 1.0}
 
 NOW_MS = 5000000
 

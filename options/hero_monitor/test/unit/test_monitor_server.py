@@ -17,14 +17,9 @@ from hero_monitor.serving import server as server_module
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.lesson import Lesson
-from hero_monitor.serving.server import (
-    PAGES_MAX,
-    FileHandler,
-    LoginHandler,
-    PageSocket,
-    PictureHandler,
-    Server,
-)
+from hero_monitor.serving.server import FileHandler, LoginHandler, PageSocket, PictureHandler, Server
+
+PAGES_MAX = 200
 
 TOKEN = "a secret of more than sixteen letters"
 OURS = {"Origin": "http://localhost"}

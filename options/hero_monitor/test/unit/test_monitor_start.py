@@ -1,5 +1,6 @@
 """The monitor's parameters, sockets and background: tokens, limits, and pages that take nothing."""
 
+import dataclasses
 import json
 from types import SimpleNamespace
 
@@ -11,11 +12,13 @@ from hero_monitor.background import Background
 from hero_monitor.control.offers import OFFERS, describe_offers
 from hero_monitor.parameters import list_host_names, load_parameters, read_token
 from hero_monitor.serving import server as server_module
-from hero_monitor.serving.access import TOKEN_LENGTH_MIN, Access
-from hero_monitor.serving.server import WAITING_MAX, PageSocket
+from hero_monitor.serving.access import Access
+from hero_monitor.serving.server import PageSocket
 from hero_node import ProgramError
 from hero_node.parameters import check_parameters
 from hero_test.nonempty import nonempty
+
+TOKEN_LENGTH_MIN, WAITING_MAX = 16, 5
 
 TOKEN = "x" * TOKEN_LENGTH_MIN
 
@@ -48,14 +51,17 @@ def test_parameters_are_checked_and_name_this_pc(monkeypatch):
     monkeypatch.setattr(parameters_module, "read_parameters", lambda declared: check_parameters(declared, given))
     monkeypatch.setattr(parameters_module.platform, "node", lambda: "pc.lab")
     defaults = load_parameters()
-    assert (defaults.host, defaults.port, defaults.token_file, defaults.control) == ("127.0.0.1", 8088, "", False)
+    safe = "127.0.0.1", 8088, "", [], False, 10.0, "world", "~/hero_recordings", "~/hero_behaviors", False
+    assert dataclasses.astuple(defaults) == safe
     assert list_host_names(defaults) == ["pc.lab", "pc.local", "127.0.0.1"]
-    assert defaults.map_frame == "world"
     given.update(host_names=" a, b c", map_frame="/map", control=True)
     loaded = load_parameters()
     assert list_host_names(loaded)[:4] == ["a", "b", "c", "pc.lab"]
     assert loaded.map_frame == "/map" and loaded.control and loaded.record_folder == "~/hero_recordings"
-    for wrong in ({"port": 65536}, {"rate_hz": 0.5}, {"rate_hz": 31.0}, {"host": ""}):
+    for right in ({"port": 0, "rate_hz": 1.0}, {"port": 65535, "rate_hz": 30.0}):
+        given.update(right)
+        assert (load_parameters().port, load_parameters().rate_hz) == tuple(right.values())
+    for wrong in ({"port": 65536}, {"port": -1}, {"rate_hz": 0.9}, {"rate_hz": 30.1}, {"host": ""}):
         given.clear()
         given.update(wrong)
         with pytest.raises(ProgramError, match=next(iter(wrong))):
