@@ -9,7 +9,8 @@ from hero_node.robot_constants import BODY_RADIUS_M
 from hero_sim import scene
 from hero_sim.errors import OptionError
 from hero_sim.world import arena as arenas
-from hero_sim.world.arena_file import SHIPPED, load_arena
+from hero_sim.world import arena_file
+from hero_sim.world.arena_file import SHIPPED, load_arena, locate_arena
 from hero_sim.world.robot_errors import draw_errors
 from hero_sim.world.world import World
 
@@ -58,6 +59,53 @@ def test_a_file_is_read_with_all_its_parts(tmp_path):
     assert arena.bounds_m.tolist() == [0.0, 0.0, 1.0, 1.0]
 
 
+AREA = "bounds_m: [0, 0, 1, 1]\nareas: [{name: nest, %s}]\n"
+OBJECT = "bounds_m: [0, 0, 1, 1]\nobjects: [{mass_kg: 0.2, friction: 0.3, %s}]\n"
+
+
+def test_areas_lamps_and_objects_of_a_file_are_where_it_says(tmp_path):
+    arena = load_arena(
+        write(
+            tmp_path,
+            "bounds_m: [-2, -2, 2, 2]\nlamps_m: [[0.1, 0.2], [3, 4]]\nareas:\n"
+            "  - {name: nest, rectangle_m: [-1, -0.5, 1, 0.5], color: 0.25}\n"
+            "  - {name: food, circle_m: [1, 0, 0.2], color: [0, 0.5, 1]}\nobjects:\n"
+            "  - {circle_m: [0.5, 0.6, 0.05], mass_kg: 0.03, friction: 0.4}\n"
+            "  - {polygon_m: [[1, 1], [1.2, 1], [1.2, 1.1], [1, 1.1]], mass_kg: 0.1, friction: 0.3}\n",
+        )
+    )
+    assert arena.lamps_m.tolist() == [[0.1, 0.2], [3.0, 4.0]] and arena.name == "arena.yaml"
+    assert arena.areas == (
+        arenas.Area("nest", (-1.0, -0.5, 1.0, 0.5), (0.25,) * 3),
+        arenas.Area("food", (1.0, 0.0, 0.2), (0.0, 0.5, 1.0)),
+    )
+    disc, box = arena.objects
+    assert disc.pose == (0.5, 0.6, 0.0) and disc.shape.radius_m == 0.05
+    assert disc.friction_n == pytest.approx(0.03 * 0.4 * 9.81)
+    assert box.pose == pytest.approx((1.1, 1.05, 0.0)) and box.friction_n == pytest.approx(0.1 * 0.3 * 9.81)
+    assert np.ravel(box.corners_m) == pytest.approx([1.0, 1.0, 1.2, 1.0, 1.2, 1.1, 1.0, 1.1])
+    assert locate_arena("/a/b.yaml", "maze") == "maze" and locate_arena("/a/b.yaml", "") == ""
+    assert locate_arena("/a/b.yaml", "c.yaml") == "/a/c.yaml"
+
+
+def test_a_closed_wall_is_the_rim_only_if_it_reaches_as_far_as_all_others(tmp_path):
+    ring = "[[-1, -1], [1, -1], [1, 1], [-1, 1], %s]"
+    for walls, rims in (
+        (ring % "[-1, -1]", 1),
+        (ring % "[-1, 0.9]", 0),
+        ("%s, [[0, 0], [0.5, 0], [0, 0.5], [0, 0]]" % ring % "[-1, -1]", 1),
+        ("%s, [[0, 0], [1.1, 0]]" % ring % "[-1, -1]", 0),
+        ("[[-1, -1], [1, 1], [-1, -1]]", 0),
+    ):
+        arena = load_arena(write(tmp_path, "walls_m: [%s]\n" % walls))
+        assert len(arena.rims_m) == rims, walls
+        assert arena.bounds_m.tolist() == [-1.0, -1.0, 1.1 if "1.1" in walls else 1.0, 1.0]
+    arena = load_arena(
+        write(tmp_path, "walls_m: [%s]\npolygons_m: [[[0, 0], [0, -1.5], [1, 0]]]\n" % ring % "[-1, -1]")
+    )
+    assert arena.rims_m == () and arena.bounds_m.tolist() == [-1.0, -1.5, 1.0, 1.0]
+
+
 @pytest.mark.parametrize(
     "text, words",
     [
@@ -75,6 +123,51 @@ def test_a_file_is_read_with_all_its_parts(tmp_path):
         ("- 1\n", "must hold names and values"),
         ("", "must hold names and values"),
         ("a: [1\nb: 2\n", "line 2"),
+        ('name: "a\\eb"\nbounds_m: [0, 0, 1, 1]\n', "line 1: name is 'a\\x1bb', but must be one line of text"),
+        ("bounds_m: [0, 1, 1, 1]\n", "bounds_m is a list, but must be [x min, y min, x max, y max], each minimum less"),
+        (
+            AREA % "circle_m: [0, 0, 0], color: 1",
+            "circle_m is a list, but must be a circle whose radius is more than 0",
+        ),
+        (
+            AREA % "circle_m: [0, 0, 1], rectangle_m: [0, 0, 1, 1], color: 1",
+            "a mapping with circle_m or rectangle_m, name",
+        ),
+        (AREA % "color: 1", "a mapping with circle_m or rectangle_m, name, and color or picture"),
+        (AREA % "circle_m: [0, 0, 1]", "a mapping with circle_m or rectangle_m, name, and color or picture"),
+        (AREA % "circle_m: [0, 0, 1], color: 1, picture: a.png", "name, and color or picture"),
+        (
+            AREA % "circle_m: [0, 0, 1], picture: a.png",
+            "picture is 'a.png', but must be left out, or have a rectangle_m",
+        ),
+        (
+            AREA % "circle_m: [0, 0, 1], color: 1.01",
+            "is '1.01', but must be a number from 0 to 1 (gray), or [red, green,",
+        ),
+        (AREA % "circle_m: [0, 0, 1], color: [0, 0, -0.1]", "color is '-0.1', but must be a number from 0 to 1"),
+        (
+            AREA % "rectangle_m: [0, 0, 0, 1], color: 1",
+            "rectangle_m is a list, but must be [x min, y min, x max, y max]",
+        ),
+        (AREA % "rectangle_m: [0, 1, 1, 1], color: 1", "each minimum less than its maximum"),
+        (OBJECT % "circle_m: [0, 0, 1], polygon_m: [[0, 0], [1, 0], [0, 1]]", "a mapping with circle_m or polygon_m"),
+        (OBJECT % "", "circle_m or polygon_m, mass_kg and friction"),
+        (OBJECT % "circle_m: [0, 0, 0]", "a radius must be more than 0, not 0"),
+        (OBJECT % "polygon_m: [[0, 0], [1, 0]]", "polygon_m is a list, but must be a list of at least 3 points [x, y]"),
+        (
+            OBJECT % "polygon_m: [[0, 0], [0, 1], [1, 0]]",
+            "corners must be those of a convex polygon, counter-clockwise",
+        ),
+        (OBJECT.replace("0.2", "0") % "circle_m: [0, 0, 1]", "mass_kg must be more than 0, not 0"),
+        (
+            OBJECT.replace("0.3", "1001") % "circle_m: [0, 0, 1]",
+            "friction is '1001', but must be a number from -1000 to",
+        ),
+        ("bounds_m: [0, 0, 1, 1]\npolygons_m: [[[0, 0], [1, 1]]]\n", "a list of at least 3 points [x, y]"),
+        (
+            "bounds_m: [0, 0, 1, 1]\nlamps_m: [[0, 0, 1]]\n",
+            "lamps_m is a list, but must be a list of 2 numbers: x and y",
+        ),
     ],
 )
 def test_a_wrong_file_is_refused_with_file_and_reason(tmp_path, text, words):
@@ -247,6 +340,30 @@ def test_a_picture_on_the_floor_has_its_upper_row_first():
     x_m, y_m = np.array([(0.5, 0.5), (1.5, 0.5), (2.9, 0.1), (0.5, -0.1), (3.0, -1.0), (0.0, 1.0)]).T
     colors = picture.find_colors(x_m, y_m)
     assert colors.tolist() == [[value] * 3 for value in (0.0, 0.25, 0.5, 0.75, 0.125, 0.0)]
+
+
+def test_a_picture_is_read_in_gray_up_to_its_largest_size(tmp_path, monkeypatch):
+    image = pytest.importorskip("PIL.Image", reason="pictures need python3-pil")
+    text = AREA % "rectangle_m: [0, 0, 1, 1], picture: floor.png"
+    for levels, expected in (
+        (np.array([[0, 51], [255, 102]], dtype=np.uint8), [[0.0, 0.2], [1.0, 0.4]]),
+        (np.array([[0, 13107], [65535, 26214]], dtype=np.uint16), [[0.0, 0.2], [1.0, 0.4]]),
+    ):
+        image.fromarray(levels).save(str(tmp_path / "floor.png"))
+        (area,) = load_arena(write(tmp_path, text)).areas
+        assert area.gray == pytest.approx(np.array(expected)) and area.color == pytest.approx((0.4,) * 3)
+    monkeypatch.setattr(arena_file, "_MAX_PIXELS", 4)
+    load_arena(write(tmp_path, text))
+    monkeypatch.setattr(arena_file, "_MAX_PIXELS", 3)
+    with pytest.raises(
+        OptionError, match=r"line 2: picture .*/floor\.png cannot be read: it has 2 x 2 pixels, more than 3"
+    ):
+        load_arena(write(tmp_path, text))
+    for file, reason in (("gone.png", "No such file or directory"), ("arena.yaml", "cannot identify image file")):
+        with pytest.raises(
+            OptionError, match=f"{file} cannot be read: {reason}.*; give a PNG or PGM, its path relative"
+        ):
+            load_arena(write(tmp_path, text.replace("floor.png", file)))
 
 
 def test_viewers_draw_areas_as_plates_and_pictures_in_strips_of_one_gray():
