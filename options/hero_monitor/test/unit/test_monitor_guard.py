@@ -93,7 +93,8 @@ def test_a_guard_is_told_its_patience_and_the_command(monkeypatch):
 
 OFFERED = {
     "swarm_go_to": {
-        "shape": ("circle", (), ""), "spacing_m": (0.3, (AvoidanceLaw().min_spacing_m, 2.0), "m"), "turn_deg": (0.0, (-360.0, 360.0), "deg"),
+        "shape": ("circle", (), ""), "spacing_m": (0.3, (AvoidanceLaw().min_spacing_m, 2.0), "m"),
+        "turn_deg": (0.0, (-360.0, 360.0), "deg"),
         "x_m": (0.0, (-1000.0, 1000.0), "m"), "y_m": (0.0, (-1000.0, 1000.0), "m"),
         "linear_m_s": (0.08, (0.01, 0.2), "m/s"),
     },
