@@ -57,6 +57,14 @@ def test_one_late_step_slows_for_a_while_and_the_loop_recovers():
     assert run(lateness, 0.1, int(HOLD_S / 0.1), end_s)[0] == 1.0
 
 
+def test_a_late_step_counts_for_two_seconds_and_no_longer():
+    for later_steps, share in ((int(HOLD_S / 0.125), 0.45), (int(HOLD_S / 0.125) + 1, 1.0)):
+        lateness = Lateness(0.125)
+        lateness.step(0.0)
+        run(lateness, 0.125, later_steps + 1, start_s=0.5)
+        assert lateness.find_share(0.0) == pytest.approx(share)
+
+
 def test_lateness_that_lasts_is_told_now_and_then():
     _, warnings, end_s = run(Lateness(), 0.5, 41)
     assert len(warnings) == end_s // REPORT_PERIOD_S

@@ -61,6 +61,10 @@ def test_a_goal_is_reached_half_a_second_after_the_stop():
     controller = GoToGoalController(Goal(0.0, 0.0), 0.0)
     assert step_until_end(controller, lambda now_s: HERE, 2.0) == pytest.approx(SETTLE_S, abs=0.11)
     assert controller.state is State.REACHED
+    exact = GoToGoalController(Goal(0.0, 0.0), 0.0)
+    for index in range(5):
+        exact.step(HERE, None, 0.125 * index)
+        assert (exact.state is State.REACHED) == (0.125 * index >= SETTLE_S)
     pushed = GoToGoalController(Goal(0.0, 0.0), 0.0)
     # Inside 0.7 of the tolerance it stops, outside all of it it starts anew, and the half second with it.
     for index, (x_m, is_stopped) in enumerate(

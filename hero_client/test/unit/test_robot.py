@@ -134,8 +134,9 @@ def test_topics_that_few_read_are_subscribed_to_and_waited_for():
     link.silent_s["laser"] = 1.1
     with pytest.raises(StaleDataError, match="the last message on /hero_3/laser came 1.1 s ago"):
         assert robot.infrared_counts
+    link.wait_for_next = lambda topic, timeout_s: link.waited.append((topic, timeout_s, link.subscribed[-1]))
     assert robot.wait_for_scan(0.7) == link.ranges
-    assert link.waited[-1] == ("proximity", 0.7, 1) and link.subscribed[-1] == "proximity"
+    assert link.waited[-1] == ("proximity", 0.7, "proximity")
 
 
 def test_a_new_pose_counts_when_two_messages_came():
@@ -278,6 +279,18 @@ def test_a_goal_that_is_not_reached_is_named_as_it_was_given():
         link.advance = lambda step_s: None
         with pytest.raises(GoalError, match="hero_3 did not %s: " % says):
             move(0.5)
+
+
+def test_a_measured_pose_that_stays_the_same_ends_a_motion():
+    for frame, ended_s in (("map", 3.0), ("odom", 0.0)):
+        robot, link = make_robot()
+        link.localized = Pose(1.0, 1.0, 0.0)
+        if frame == "odom":
+            robot.go_to(0.3, 0.0)
+            continue
+        with pytest.raises(GoalError, match="its wheels turn, but its pose stays the same"):
+            robot.go_to(2.0, 1.0, frame=frame)
+        assert robot.now_s - 100.0 == pytest.approx(ended_s, abs=0.3)
 
 
 def test_a_robot_that_falls_silent_on_its_way_fails_with_the_cause():

@@ -76,6 +76,16 @@ def test_a_cone_ends_at_its_range_too():
         assert sense_binary(pair(far_m + off_m, 0.0), cone)[0] == is_seen
 
 
+def test_what_is_as_far_as_the_range_is_sensed():
+    poses = np.array([[(0.0, 0.0, 0.0), (0.75, 0.0, 0.0)]])
+    gap_m = 0.75 - BODY_RADIUS_M - BODY_RADIUS_M
+    for range_m, is_seen in ((gap_m, True), (np.nextafter(gap_m, 0.0), False)):
+        assert sense_binary(poses, Binary(range_m=range_m))[0] == is_seen
+        assert sense_binary(poses, Binary(half_angle_rad=0.3, range_m=range_m))[0] == is_seen
+    for range_m, is_seen in ((0.75, True), (np.nextafter(0.75, 0.0), False)):
+        assert sense_neighbors(poses, Neighbors(range_m=range_m)).seen[0, 1] == is_seen
+
+
 def test_a_beam_ends_on_the_round_surface_of_a_body_beside_its_axis():
     left_m = 0.8 * BODY_RADIUS_M
     poses = np.array([[(0.0, 0.0, 0.0), (1.0, left_m, 0.0)]])

@@ -1,5 +1,7 @@
 """fleet.yaml: notes on robots and topics to show, with file, line and remedy for each mistake."""
 
+import math
+
 import pytest
 
 from hero_node.files import (
@@ -94,6 +96,20 @@ def test_numbers_may_be_written_with_an_exponent_as_yaml_takes_for_text():
             EntryError, match=f"a.yaml, line 1: {name} is {shown}, but must be a number from 0 to 1000 m"
         ):
             entries[name].number(0.0, 1000.0, "m")
+    unknown = read_entries("far: .nan", "a.yaml", "").value["far"]
+    assert math.isnan(unknown.number(0.0, 1.0, "m", may_be_nan=True))
+    with pytest.raises(EntryError, match="far is nan, but must be a number from 0 to 1 m"):
+        unknown.number(0.0, 1.0, "m")
+
+
+def test_a_text_may_be_as_long_and_as_deep_as_can_be_read_and_no_more():
+    for text, longer, words in (
+        ("a: " + "[" * 19 + "]" * 19, "a: " + "[" * 20 + "]" * 20, "a.yaml, line 1: more than 20 levels"),
+        ("a: 1 #".ljust(500_000, "x"), "a: 1 #".ljust(500_001, "x"), "a.yaml: longer than 500000 characters"),
+    ):
+        assert list(read_entries(text, "a.yaml", "").value) == ["a"]
+        with pytest.raises(EntryError, match=words):
+            read_entries(longer, "a.yaml", "")
 
 
 @pytest.mark.parametrize(("value", "shown"), [("5", "5"), ("''", "''"), ("[a]", "a list")])

@@ -59,12 +59,16 @@ def test_a_symbolic_link_stays_and_its_target_is_replaced(tmp_path):
     assert link.is_symlink() and target.read_bytes() == b"new"
 
 
-def test_a_replaced_file_keeps_its_mode(tmp_path):
+def test_a_replaced_file_keeps_its_mode_and_owner(tmp_path, monkeypatch):
     path = tmp_path / "a.yaml"
     path.write_bytes(b"old")
     path.chmod(0o640)
+    owners = []
+    monkeypatch.setattr(os, "chown", lambda fd, *owner: owners.append((os.readlink(f"/proc/self/fd/{fd}"), *owner)))
     write_file(str(path), b"new")
     assert path.stat().st_mode & 0o777 == 0o640
+    ((new, *owner),) = owners
+    assert new.startswith(str(path) + ".") and owner == [path.stat().st_uid, path.stat().st_gid]
 
 
 def test_a_file_of_another_user_keeps_its_mode_though_not_its_owner(tmp_path, monkeypatch):
