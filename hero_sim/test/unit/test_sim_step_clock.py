@@ -61,6 +61,15 @@ def test_a_motion_that_is_cancelled_takes_its_next_step_at_once(clock):
     assert notes == [1000, "stop", 1080], "the step that was due before is not taken"
 
 
+def test_a_step_that_was_due_just_when_a_stop_ends_is_not_taken(clock):
+    notes = []
+    motion = StepMotion(clock, take_steps(clock, notes, (0.1, 5.0)))
+    clock.sleep(0.04)
+    motion.cancel()  # it stops until 1100 ms
+    clock.sleep(1.0)
+    assert notes == [1000, "stop", 1100] and isinstance(motion.exception(), GoalError)
+
+
 def test_the_wait_for_a_stop_to_be_sent_is_not_cut_short(clock):
     notes = []
     motion = StepMotion(clock, take_steps(clock, notes, (5.0,)))

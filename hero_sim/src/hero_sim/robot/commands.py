@@ -25,7 +25,6 @@ STOP_US = 1000
 LIGHT_US = 1000
 """The same for switching the motors off, and for setting the light."""
 
-
 _TWIST = "<d32xd"  # linear.x (m/s) and angular.z (rad/s); the firmware uses no other
 
 Answer = Tuple[bool, str]

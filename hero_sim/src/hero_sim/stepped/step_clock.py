@@ -45,15 +45,16 @@ class StepClock(Clock):
         """Move robots and motions on to until_ms."""
         queue = self._queue
         while queue and queue[0][0] <= until_ms:
-            due_ms, _, motion = heapq.heappop(queue)
-            if motion.due_ms == due_ms:  # else it was cancelled since
+            due_ms, number, motion = heapq.heappop(queue)
+            if motion.number == number:  # else it was cancelled since
                 self.rows.advance(max(due_ms, self.rows.now_ms))
                 motion.take_step()
         self.rows.advance(max(until_ms, self.rows.now_ms))
 
     def schedule(self, motion: "StepMotion") -> None:
         """Schedule a motion's next step at its due_ms."""
-        heapq.heappush(self._queue, (motion.due_ms, next(self._order), motion))
+        motion.number = next(self._order)
+        heapq.heappush(self._queue, (motion.due_ms, motion.number, motion))
 
 
 class StepMotion(BackgroundMotion):
@@ -61,7 +62,10 @@ class StepMotion(BackgroundMotion):
 
     Attributes:
         due_ms: when it takes its next step.
+        number: of that step in the clock's queue; an earlier one is not taken.
     """
+
+    number: int
 
     def __init__(self, clock: StepClock, steps: Steps) -> None:
         """Take the first step as soon as the program waits."""

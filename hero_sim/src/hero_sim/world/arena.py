@@ -19,7 +19,6 @@ START_GAP_M = 0.05
 
 _MAX_TRIES = 2000
 
-
 BARE_GRAY = 0.5
 """Gray level of the floor without an area, from 0, black, to 1, white."""
 

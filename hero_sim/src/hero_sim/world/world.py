@@ -45,7 +45,6 @@ _REST_M_S = 1e-6
 
 Rows = Union[int, slice, np.ndarray]  # the number of one row, or several of them
 
-
 Obstacles = Tuple[Segments, np.ndarray]
 """Walls, and circles (C, 3), x y radius, of one world."""
 

@@ -29,7 +29,6 @@ LIGHT_Z_M = 0.002
 LIT_DIAMETER_M = 0.019
 """Covers the model's dark light in hat_link (urdf/hero.urdf)."""
 
-
 NAME_Z_M = 0.11
 NAME_SIZE_M = 0.045
 RING_GAP_M = 0.008
