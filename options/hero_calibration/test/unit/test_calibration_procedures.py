@@ -11,7 +11,7 @@ from hero_calibration import store
 from hero_calibration.calibration import calibrate_parts
 from hero_calibration.errors import CalibrationError, EndedError
 from hero_calibration.models import infrared_model
-from hero_calibration.models.step_response import ANGULAR_RAD_S, STEP_M_S
+from hero_calibration.models.step_response import ANGULAR_RAD_S
 from hero_calibration.procedures.infrared import calibrate_infrared
 from hero_calibration.procedures.motors import MotorResult, calibrate_motors
 from hero_calibration.procedures.placement import place_robots
@@ -25,6 +25,8 @@ from hero_sim.stepped import RobotRows
 from hero_sim.world import Arena, World, draw_errors
 from hero_sim.world.robot_errors import SERVO_CENTER_US, set_known
 from hero_test.nonempty import nonempty
+
+STEP_M_S = 0.08
 
 SEEDS = (0,)
 APART_M = 0.6

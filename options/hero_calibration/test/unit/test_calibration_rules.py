@@ -13,19 +13,21 @@ from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models import infrared_model as model
 from hero_calibration.models.encoder_readings import make_readings
 from hero_calibration.models.infrared_model import Facing
-from hero_calibration.models.step_response import DEFAULT_GAINS, NOMINAL_GAIN_M_S_US, Response, choose_gains, find_best
+from hero_calibration.models.step_response import DEFAULT_GAINS, Response, choose_gains, find_best
 from hero_calibration.procedures import wheels
 from hero_calibration.procedures.infrared import InfraredResult
 from hero_calibration.procedures.motors import MotorResult
 from hero_calibration.procedures.placement import place_robots
 from hero_calibration.procedures.velocity import VelocityResult, evaluate_test
-from hero_calibration.procedures.wheels import CAMERA_SD, NOMINAL_M, Leg, fit_wheels, follow_ticks
-from hero_calibration.robots.probe import STALE_S, Probe
-from hero_calibration.robots.session import SETTLE_S, Session
+from hero_calibration.procedures.wheels import NOMINAL_M, Leg, fit_wheels, follow_ticks
+from hero_calibration.robots.probe import Probe
+from hero_calibration.robots.session import Session
 from hero_client.values import BODY_RADIUS_M
 from hero_node import Pose
 from hero_node.files import KeptCalibration
 from hero_node.robot_constants import TICK_M
+
+CAMERA_SD, NOMINAL_GAIN_M_S_US, SETTLE_S, STALE_S = (0.001, 0.001, 0.005), 0.25 / 220.0, 0.6, 3.0
 
 
 class FakeProbe(Probe):

@@ -12,10 +12,11 @@ from hero_calibration.models import dead_zone, step_response
 from hero_calibration.models.encoder_readings import Readings
 from hero_calibration.models.infrared_model import Facing
 from hero_calibration.procedures import infrared, motors, velocity, wheels
-from hero_calibration.robots.session import SETTLE_S
 from hero_node import Pose, transform_pose
 from hero_node.robot_constants import TICK_M
 from hero_test.nonempty import nonempty
+
+SETTLE_S = 0.6
 
 STEP_S = 0.034
 STARTS_S = [2.0, 2.45, 2.9, 3.35]

@@ -23,8 +23,10 @@ from hero_recording.bags.bag_set import BagSet
 from hero_recording.bags.topics import Message, find_robot_topic, is_fleet_topic, make_patterns
 from hero_recording.errors import RecordingError
 from hero_recording.plots import analysis
-from hero_recording.plots.figures import MAX_NAMED, Figures, choose_colors
+from hero_recording.plots.figures import Figures, choose_colors
 from hero_recording.plots.observations import Observations, Origin, RobotObservations
+
+MAX_NAMED = 7
 
 
 def observe(path, robot_ids=None):

@@ -21,11 +21,13 @@ from hero_recording.bags.tables import TABLES, read_rows, to_seconds
 from hero_recording.bags.topics import Message
 from hero_recording.errors import RecordingError
 from hero_recording.plots import analysis
-from hero_recording.plots.analysis import COMMAND_TIMEOUT_S, ODOMETRY_GAP_S, SAME_TIME_S
-from hero_recording.plots.observations import MAX_VALUE, Observations, Origin, RobotObservations
-from hero_recording.record import CHECK_PERIOD_S, CLOSING_S, EMPTY_BAG_BYTES, SILENCE_S, Recording
+from hero_recording.plots.observations import Observations, Origin, RobotObservations
+from hero_recording.record import Recording
 from hero_recording.step_recorder import StepRecorder
 from hero_sim.stepped import LATCHED, StepSwarm
+
+CHECK_PERIOD_S, CLOSING_S, COMMAND_TIMEOUT_S, EMPTY_BAG_BYTES = 0.5, 10.0, 2.0, 10000
+MAX_VALUE, ODOMETRY_GAP_S, SAME_TIME_S, SILENCE_S = 1000000.0, 0.5, 0.2, 15.0
 
 PERIOD_S = 0.034
 
