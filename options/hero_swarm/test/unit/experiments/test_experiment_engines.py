@@ -106,6 +106,32 @@ def test_what_is_done_beside_an_error_is_kept():
     assert sorted(kept) == [1, 4, 9, 16, 25, 36, 49]
 
 
+class Slow(Executor):
+    """Is done with number 0 alone, by an error or not; holds what waits."""
+
+    def __init__(self, error):
+        self.error, self.waiting = error, []
+
+    def submit(self, function, *arguments):
+        future = Future()
+        self.waiting.append(future)
+        if arguments == (0,) and self.error:
+            future.set_exception(self.error)
+        elif arguments == (0,):
+            future.set_result(0)
+        return future
+
+
+@pytest.mark.parametrize("error", [ValueError("of number 0"), None])
+def test_batches_that_wait_are_cancelled_by_an_error_and_by_ctrl_c(error):
+    slow = Slow(error)
+    with engines.Engine(lambda: slow, 2) as engine, pytest.raises((ValueError, KeyboardInterrupt)):
+        for task, result in engine.compute(square, [(number,) for number in range(9)]):
+            assert (task, result) == ((0,), 0) and len(slow.waiting) == 4, "two for each worker"
+            raise KeyboardInterrupt
+    assert [future.cancelled() for future in slow.waiting] == [False, True, True, True]
+
+
 def test_without_dask_the_error_names_its_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(ProgramError, match="python3-distributed"):

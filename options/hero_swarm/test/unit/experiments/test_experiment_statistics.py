@@ -8,9 +8,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 
 from hero_swarm.experiments.errors import ExperimentError
+from hero_swarm.experiments.experiment_file import NO_START, Cell
 from hero_swarm.experiments.reporting import statistics
-from hero_swarm.experiments.reporting.figures import draw_over_time, draw_runs
+from hero_swarm.experiments.reporting.figures import _spans_a_map, draw_map, draw_over_time, draw_runs
 from hero_swarm.experiments.reporting.statistics import Interval
+from hero_swarm.experiments.reporting.summary import Summary
 from hero_test.nonempty import nonempty
 
 
@@ -128,6 +130,43 @@ def test_medians_over_time_lie_in_the_middle_half_up_to_the_last_run():
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["a", "b"]
     (below,) = draw_over_time("order", ["a"], times_s, [first - 5.0]).axes
     assert below.get_ylabel() == "order" and below.get_ylim()[0] < -4.0
+
+
+def summarize(medians):
+    """Return summaries of cells by the numbers that vary: {(robots, gain): median}."""
+    return [
+        Summary(Cell({"robots": robots, "gain": gain}, {}, {}, "a", NO_START), (), Interval(median, 0.0, 9.0))
+        for (robots, gain), median in medians.items()
+    ]
+
+
+def test_medians_of_two_numbers_are_a_map_that_can_be_read():
+    medians = {(20, 1.5): 4.0, (5, 0.25): 1.0, (5, 1.5): 2.0, (20, 0.25): math.inf, (5, 1.0): 2.5, (20, 1.0): 2.4375}
+    axes, bar = draw_map("time (s)", summarize(medians)).axes
+    assert _spans_a_map(summarize(medians))
+    (image,) = axes.images
+    shown = np.ma.filled(image.get_array(), math.inf).tolist()
+    assert shown == [[1.0, 2.5, 2.0], [math.inf, 2.4375, 4.0]], "rows upwards, what was not reached is bare"
+    assert image.origin == "lower" and image.cmap.name == "cividis"
+    texts = {(text.get_text(), text.get_position(), text.get_color()) for text in axes.texts}
+    assert texts == {
+        ("1", (0, 0), "white"), ("2.5", (1, 0), "black"), ("2", (2, 0), "white"),
+        ("inf", (0, 1), "black"), ("2.44", (1, 1), "white"), ("4", (2, 1), "black"),
+    }, "light on dark"  # fmt: skip
+    ticks = [[label.get_text() for label in axis.get_ticklabels()] for axis in (axes.xaxis, axes.yaxis)]
+    assert ticks == [["0.25", "1", "1.5"], ["5", "20"]]
+    assert (axes.get_xlabel(), axes.get_ylabel(), bar.get_ylabel()) == ("gain", "robots", "median time (s)")
+    never = draw_map("s", summarize({(5, 1): math.inf, (5, 2): math.inf, (9, 1): math.inf, (9, 2): math.inf}))
+    assert {text.get_color() for text in never.axes[0].texts} == {"black"}
+
+
+def test_a_map_needs_two_numbers_and_runs_of_all_their_combinations():
+    whole = {(robots, gain): 1.0 for robots in (5, 20) for gain in (1.0, 2.0)}
+    assert _spans_a_map(summarize(whole)) and not _spans_a_map(summarize(whole)[1:])
+    assert not _spans_a_map(summarize({(5, 1.0): 1.0, (5, 2.0): 1.0}))
+    assert not _spans_a_map(summarize({(5, "a"): 1.0, (9, "a"): 1.0, (5, "b"): 1.0, (9, "b"): 1.0}))
+    one = [summary._replace(cell=summary.cell._replace(varied={"gain": 1.0})) for summary in summarize(whole)]
+    assert not _spans_a_map(one)
 
 
 def test_no_label_of_a_figure_is_cut_off():

@@ -12,7 +12,7 @@ from PIL import Image
 from hero_client.values import BODY_RADIUS_M
 from hero_node import Pose
 from hero_recording import step_recorder
-from hero_sim.scene import CYLINDER, Shape
+from hero_sim.scene import ARROW, CUBE, CYLINDER, TEXT, Shape
 from hero_sim.world import Area, list_outlines, load_arena
 from hero_sim.world.arena import build_rectangle
 from hero_swarm import show, video
@@ -123,6 +123,26 @@ def test_a_frame_shows_areas_robots_with_noses_and_lights_and_the_time():
             reach_m = share * BODY_RADIUS_M
             assert look(x_m + reach_m * np.cos(yaw_rad), y_m + reach_m * np.sin(yaw_rad)) == seen, share
     assert (frame[10:30, 10:60] == 0).any(), "the time"
+
+
+def test_shapes_have_their_places_and_sizes_to_a_pixel():
+    limits_m = np.array([(1.0, -2.0), (4.0, 0.0)])  # 200 pixels for each m, around (2.5, -1)
+    for kind, pose, size_m, box in (
+        (CYLINDER, Pose(2.0, -0.5, 0.3), (0.4, 0.4, 1.0), (160, 160, 240, 240)),
+        (CUBE, Pose(3.0, -1.5, 0.0), (0.6, 0.1, 1.0), (340, 390, 460, 410)),
+        (CUBE, Pose(3.0, -1.5, np.pi / 2.0), (0.6, 0.1, 1.0), (390, 340, 410, 460)),
+        (CUBE, Pose(2.5, -1.0, np.pi / 4.0), (1.0, 0.001, 1.0), (229, 229, 371, 371)),
+        (ARROW, Pose(3.0, -1.5, 0.0), (0.6, 0.1, 1.0), (400, 390, 520, 410)),
+        (ARROW, Pose(3.0, -1.5, -np.pi / 2.0), (0.6, 0.1, 1.0), (390, 400, 410, 520)),
+    ):
+        shape = Shape("any", 0, kind, (1.0, 0.0, 0.5, 1.0), pose, 0.0, size_m)
+        frame = np.asarray(
+            video.draw_frame(limits_m, 0.0, [shape, shape._replace(kind=TEXT, pose=Pose(1.2, -1.0, 0.0))])
+        )
+        rows, columns = (np.abs(frame.astype(int) - (255, 0, 128)).max(axis=2) < 60).nonzero()
+        found = columns.min(), rows.min(), columns.max() + 1, rows.max() + 1
+        assert np.abs(np.subtract(found, box)).max() <= 2, (kind, pose, found)
+    assert frame.shape == (600, 600, 3) and frame[599, 599].tolist() == FLOOR
 
 
 def test_a_run_is_replayed_at_its_speed_as_the_simulator_shows_its_world(monkeypatch):

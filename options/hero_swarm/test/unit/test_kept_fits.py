@@ -1,0 +1,105 @@
+"""Fits of robots on short recordings: what they find must not change without a word in CHANGELOG.rst.
+
+Fingerprints of what came out when they were written; a failure shows the new one.
+"""
+
+import numpy as np
+import pytest
+
+from hero_swarm.fitting import motor_fit
+from hero_swarm.fitting.body_fit import _list_stretches, fit_body
+from hero_swarm.fitting.motor_fit import Motors, fit_motors, predict_ends, replay_commands
+from hero_swarm.fitting.recording import (
+    PULSES,
+    VELOCITY,
+    Recording,
+    find_slips,
+    interpolate_poses,
+    measure_wheels,
+    sample_times,
+)
+from hero_swarm.fitting.robot_fit import Fit, describe_fit
+from hero_test.fingerprint import assert_kept
+
+PERIOD_S = 0.05
+
+
+def make_recording(time_s, kind=PULSES, seed=1, rest_s=(0.0, 0.0)):
+    """Return a recording of odometry in curves, of poses elsewhere that are turned, and that rest for a while."""
+    random = np.random.RandomState(seed)
+    times_s = np.arange(0.0, time_s, PERIOD_S)
+    linear_m_s, angular_rad_s = 0.06 + 0.05 * np.sin(times_s / 2.0), 1.5 * np.cos(times_s / 3.0 + seed)
+    yaw_rad = np.cumsum(angular_rad_s) * PERIOD_S
+    x_m, y_m = (np.cumsum(linear_m_s * turned(yaw_rad)) * PERIOD_S for turned in (np.cos, np.sin))
+    wrapped_rad = np.remainder(yaw_rad + np.pi, 2.0 * np.pi) - np.pi
+    odometry = np.column_stack((times_s, x_m, y_m, wrapped_rad))
+    moves = ~((times_s >= rest_s[0]) & (times_s < rest_s[1]))
+    turned_rad = 0.7 + 1.03 * np.cumsum(angular_rad_s * moves) * PERIOD_S
+    places_m = [np.cumsum(0.97 * linear_m_s * moves * turned(turned_rad)) * PERIOD_S for turned in (np.cos, np.sin)]
+    poses = np.column_stack((times_s + 0.01, *places_m, np.remainder(turned_rad + np.pi, 2.0 * np.pi) - np.pi))
+    poses[:, 1:] += random.normal(0.0, 0.001, (len(poses), 3))
+    told_s = np.arange(0.0, time_s, 0.3)
+    pulses = np.rint(1500.0 + random.uniform(-70.0, 70.0, (len(told_s), 2)))
+    speeds = random.uniform((-0.05, -2.0), (0.15, 2.0), (len(told_s), 2))
+    commands = np.column_stack((told_s, np.full(len(told_s), kind), pulses if kind == PULSES else speeds))
+    return Recording(commands, odometry, poses[:: 1 + seed % 2])
+
+
+MOTORS = [
+    Motors({}),
+    Motors({"left_gain": 1.2, "lag_s": 0.15, "left_center_us": 1507.0}, 0.06, 0.016),
+    Motors({"right_gain": 0.8, "dead_zone_us": 45.0, "right_center_us": 1290.0}, 0.0, 0.04),
+]
+
+
+@pytest.mark.parametrize(
+    ("kind", "kept"), [(PULSES, [-1.8514286, 0.2674275, 468]), (VELOCITY, [0.0071181, -0.2380986, 468])]
+)
+def test_commands_are_replayed_as_they_were(kind, kept):
+    recording = make_recording(4.0, kind)
+    assert_kept(kept, replay_commands(recording, MOTORS))
+
+
+def test_motors_are_fitted_in_the_steps_that_they_were(monkeypatch):
+    monkeypatch.setattr(motor_fit, "_ITERATIONS", 2)
+    found = []
+    for motors in fit_motors([make_recording(3.0), make_recording(2.5, seed=2)]):
+        found += [*motors.values.values(), motors.delay_s, motors.phase_s]
+    assert_kept([1942.815382, 380.8751977, 16], *found)
+
+
+def test_a_body_is_fitted_to_curves_as_it_was():
+    recordings = [make_recording(30.0), make_recording(40.0, seed=2, rest_s=(9.0, 12.0))]
+    lengths = [[len(poses) for _, poses in _list_stretches(recording)] for recording in recordings]
+    assert_kept([17.7852784, -168.3426207, 9], fit_body(recordings), *lengths)
+
+
+@pytest.mark.parametrize(
+    ("kind", "kept"), [(PULSES, [0.4133172, 0.1659305, 27]), (VELOCITY, [0.0201796, 0.0362999, 27])]
+)
+def test_ends_of_paths_are_predicted_as_they_were(kind, kept):
+    recording = make_recording(15.0, kind, rest_s=(9.0, 10.5))
+    robots = [(motors, np.array(body)) for motors, body in zip(MOTORS, ((1, 1, 1), (1.02, 0.99, 1.03), (1, 1.05, 1)))]
+    assert_kept(kept, *(predict_ends(recording, robots, share, 2.0) for share in (0.0, 0.3, 0.8)))
+
+
+def test_recordings_are_read_at_times_as_they_were():
+    recording = make_recording(12.0, seed=2, rest_s=(4.0, 6.5))
+    times_s, cut = sample_times(recording), recording.cut(0.61)
+    found = times_s, measure_wheels(recording, times_s), find_slips(recording), interpolate_poses(cut.poses, times_s)
+    assert_kept([-1083.626786, 1537.4239643, 2803], *found, *cut, find_slips(make_recording(0.9)))
+
+
+def test_a_fit_is_told_with_its_errors_and_its_delay():
+    values = {"left_wheel": 1.0123456, "slip": 0.02}
+    assert describe_fit(Fit(values, 0.0, 0.0123, 0.0045), 3) == [
+        "# hero_3: held-out paths of 5 s end 4.5 mm off, before the fit 12.3 mm",
+        "# hero_3: no servo pulses were recorded, so motors are nominal",
+        "robot=3,left_wheel=1.0123,slip=0.02",
+    ]
+    assert describe_fit(Fit({"lag_s": 0.1}, 0.0316, 0.004, 0.004), 12) == [
+        "# hero_12: nothing to correct: it drives as a nominal robot",
+        "# hero_12: held-out paths of 5 s end 4.0 mm off, before the fit 4.0 mm",
+        "# hero_12: commands work 32 ms later than in the simulator",
+        "robot=12,lag_s=0.1",
+    ]
