@@ -484,3 +484,11 @@ def test_a_beam_that_sees_has_another_color(monkeypatch):
     beams = BehaviorMarkers(Seeing(), "map", "/node")._draw_sensor("beam", poses[0], sensed)
     sees, free = beams.colors[0], beams.colors[2]
     assert beams.colors == [sees, sees, free, free] and sees.r > 0.9 > free.r
+
+
+def test_numbers_of_the_program_are_taken_up_to_their_limits():
+    limited = {name: one for name, one in PARAMETERS.items() if getattr(one, "limits", None)}
+    assert {name: (one.default, *one.limits) for name, one in limited.items()} == {
+        "object_radius_m": (0.05, 0.001, 5.0), "simulated": (0, 0, 1000), "seed": (0, 0, 2**31 - 1),
+        "time_s": (0.0, 0.0, 1e6),
+    }  # fmt: skip

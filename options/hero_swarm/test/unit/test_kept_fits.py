@@ -3,10 +3,12 @@
 Fingerprints of what came out when they were written; a failure shows the new one.
 """
 
+from unittest.mock import create_autospec
+
 import numpy as np
 import pytest
 
-from hero_swarm.fitting import motor_fit
+from hero_swarm.fitting import motor_fit, robot_fit
 from hero_swarm.fitting.body_fit import _list_stretches, fit_body
 from hero_swarm.fitting.motor_fit import Motors, fit_motors, predict_ends, replay_commands
 from hero_swarm.fitting.recording import (
@@ -18,8 +20,9 @@ from hero_swarm.fitting.recording import (
     measure_wheels,
     sample_times,
 )
-from hero_swarm.fitting.robot_fit import Fit, describe_fit
+from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
 from hero_test.fingerprint import assert_kept
+from hero_test.nonempty import nonempty
 
 PERIOD_S = 0.05
 
@@ -75,12 +78,14 @@ def test_a_body_is_fitted_to_curves_as_it_was():
 
 
 @pytest.mark.parametrize(
-    ("kind", "kept"), [(PULSES, [0.4133172, 0.1659305, 27]), (VELOCITY, [0.0201796, 0.0362999, 27])]
+    ("kind", "kept"), [(PULSES, [0.3452531, 0.4229561, 39]), (VELOCITY, [-0.0014432, 0.0492524, 39])]
 )
 def test_ends_of_paths_are_predicted_as_they_were(kind, kept):
     recording = make_recording(15.0, kind, rest_s=(9.0, 10.5))
     robots = [(motors, np.array(body)) for motors, body in zip(MOTORS, ((1, 1, 1), (1.02, 0.99, 1.03), (1, 1.05, 1)))]
-    assert_kept(kept, *(predict_ends(recording, robots, share, 2.0) for share in (0.0, 0.3, 0.8)))
+    late = recording._replace(poses=recording.poses[recording.poses[:, 0] > 1.7])
+    given = [(recording, share) for share in (0.0, 0.3, 0.8)] + [(late, 0.0)]
+    assert_kept(kept, *(predict_ends(one, robots, share, 2.0) for one, share in given))
 
 
 def test_recordings_are_read_at_times_as_they_were():
@@ -103,3 +108,23 @@ def test_a_fit_is_told_with_its_errors_and_its_delay():
         "# hero_12: commands work 32 ms later than in the simulator",
         "robot=12,lag_s=0.1",
     ]
+
+
+def test_a_fit_is_judged_by_the_third_that_it_has_not_seen(monkeypatch):
+    recordings, body = [make_recording(30.0), make_recording(15.0, seed=2)], np.array((1.01, 0.99, 1.02))
+    motors = [Motors({"lag_s": 0.1}, 0.02), Motors({"lag_s": 0.1}, 0.02, 0.01)]
+    results = {"fit_body": {"return_value": body}, "fit_motors": {"return_value": motors}}
+    ends_m = [np.array([[0.02, 0.06], [0.01, 0.03]]), np.array([[0.03], [0.02]])]
+    for name, result in {**results, "predict_ends": {"side_effect": ends_m}}.items():
+        monkeypatch.setattr(robot_fit, name, create_autospec(getattr(robot_fit, name), **result))
+    fit = fit_robot(recordings)
+    for fitted in nonempty((robot_fit.fit_body, robot_fit.fit_motors)):
+        assert [seen.time_s for seen in fitted.call_args.args[0]] == pytest.approx([20.0, 10.0], abs=0.06)
+    judged = robot_fit.predict_ends.call_args_list
+    assert [id(call.args[0]) for call in judged] == list(map(id, recordings))
+    assert [[motors for motors, _ in call.args[1]] for call in judged] == [[Motors({}), own] for own in motors]
+    assert [call.args[2:] for call in judged] == [(pytest.approx(2.0 / 3.0), 5.0)] * 2
+    assert (fit.before_m, fit.after_m, fit.delay_s) == (0.03, 0.02, 0.02)
+    lost = 1.0 - 0.02 * np.sqrt(2.0 / np.pi)
+    expected = {"lag_s": 0.1, "left_wheel": 1.01 / lost, "right_wheel": 0.99 / lost, "slip": 0.02}
+    assert fit.values == pytest.approx({**expected, "wheel_separation_m": 1.02 * 0.063})

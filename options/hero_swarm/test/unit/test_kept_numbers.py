@@ -5,6 +5,7 @@ the change is wanted, and told in CHANGELOG.rst.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -187,3 +188,18 @@ def test_learners_observe_and_are_rewarded_as_they_were():
         found += [*env.step(random.uniform(-1.2, 1.2, (8, 2))), env.time_s]
     found.append(env.reset())
     assert_kept([1.28233, -32.9964615, 1332], *found)
+
+
+class Calls(NamedTuple):
+    """A sensor that counts how often it was read since the worlds began."""
+
+    def read(self, around):
+        around.kept["calls"] = around.kept.get("calls", 0) + 1
+        return np.full(around.poses.shape[0] * around.poses.shape[1], 0.1 * around.kept["calls"])
+
+
+def test_what_sensors_keep_ends_with_its_episode():
+    env = SwarmVectorEnv(2, 3, errors=0.0, metric=None, sensors={"calls": Calls()})
+    for _ in range(2):
+        observed = [env.reset(), *(env.step(np.zeros((6, 2)))[0] for _ in range(2))]
+        assert np.array(observed)[..., -1] == pytest.approx(np.repeat([[0.1], [0.2], [0.3]], 6, axis=1))

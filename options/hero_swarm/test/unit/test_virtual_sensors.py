@@ -54,8 +54,8 @@ def test_light_comes_from_lamps_and_halves_at_its_reach(arena):
     assert light.intensity[:3] == pytest.approx([1.0, 0.5, 0.5]) and np.isnan(light.intensity[3])
     assert light.bearing_rad[1:3] == pytest.approx([math.pi / 2.0, math.pi])
     assert read(Light(), [[(0.0, 0.0, 0.0)]], arena).intensity[0] > 1.0, "two lamps are brighter than one"
-    dark = read(Light(), [[(0.0, 0.0, 0.0)]], arena._replace(lamps_m=np.empty((0, 2))))
-    assert dark.intensity.tolist() == [0.0]
+    dark = read(Light(), [[(0.0, 0.0, 0.0), (math.nan,) * 3]], arena._replace(lamps_m=np.empty((0, 2))))
+    assert dark.intensity[0] == 0.0 and np.isnan([dark.intensity[1], dark.bearing_rad[1]]).all()
 
 
 def test_messages_reach_neighbors_in_range_of_the_same_world():
@@ -210,6 +210,20 @@ def test_the_program_publishes_what_each_robot_senses(tmp_path, monkeypatch):
         receivers["/hero_7/deposit"](Float32(amount))
         node.step()
     assert 0.0 < sent["/hero_7/pheromone"][-1].x < 1.0, "its program has fallen silent, or tells no number"
+
+
+def test_numbers_of_the_program_are_taken_up_to_their_limits():
+    pytest.importorskip("rospy", reason="the program needs ROS")
+    from hero_swarm.ros.virtual_sensors_node import PARAMETERS
+
+    numbers = {name: (one.default, *one.limits) for name, one in PARAMETERS.items() if one.limits}
+    assert numbers == {
+        "seed": (0, 0, 2**31 - 1), "rate_hz": (10.0, 1.0, 50.0), "range_m": (1000.0, 0.0, 1000.0),
+        "field_rad": (math.tau, 0.0, math.tau), "range_noise_m": (0.0, 0.0, 1.0), "bearing_noise_rad": (0.0, 0.0, 1.0),
+        "dropout": (0.0, 0.0, 1.0), "message_range_m": (0.5, 0.0, 1000.0), "message_loss": (0.0, 0.0, 1.0),
+        "light_reach_m": (1.0, 0.01, 1000.0), "half_life_s": (30.0, 0.1, 1e6),
+    }  # fmt: skip
+    assert PARAMETERS["occlusion"].default is False and PARAMETERS["arena"].default == "empty"
 
 
 def test_robots_that_join_a_driver_later_are_added_once(monkeypatch):

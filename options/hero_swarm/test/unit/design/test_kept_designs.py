@@ -6,11 +6,13 @@ Fingerprints of what came out when they were written; a failure shows the new on
 import io
 import sys
 import types
+from unittest.mock import create_autospec
 
 import numpy as np
 import pytest
 import yaml
 
+from hero_swarm.design import program
 from hero_swarm.design.kinds import Machines, Networks, Numbers
 from hero_swarm.design.mission import read_mission
 from hero_swarm.design.search import CHOICE, REAL, WHOLE, Genes, adapt, evolve, find_worse, race
@@ -140,3 +142,27 @@ def test_numbers_of_candidates_become_the_behaviors_that_they_did(mission):
     kind = Numbers(read_mission(mission))
     found = [number_all(yaml.safe_load(kind.dump(genome, "a.yaml", ""))) for genome in draw(kind.genes, 3)]
     assert_kept([1671.1063619, -1388.894448, 78], *kind.genes, *found)
+
+
+@pytest.mark.parametrize("score", ["order", "dispersion"])
+def test_finalists_are_ranked_by_what_is_better_in_pseudo_reality(score, mission, tmp_path, monkeypatch):
+    path = tmp_path / mission
+    path.write_text(MISSION.replace("score: order", f"score: {score}") + "baseline: dispersion\ndelay_s: 0.1\n")
+    results = [np.array([[4.0], [0.0], [-2.0]]), np.array([[4.0, 3.0], [0.5, 0.5], [-2.0, 1.0]])]
+    monkeypatch.setattr(program, "_run", create_autospec(program._run, side_effect=results))
+    options = program.parse_options([mission, "--tests", "7"])
+    title, *rows, best = program.compare(options, read_mission(mission), "m", ["1.npz", "2.npz"]).splitlines()
+    told = {"1.npz": ["4", "3.5"], "2.npz": ["0", "0.5"], "dispersion": ["-2", "-0.5"]}
+    if score == "order":
+        order, first, losses = ["1.npz", "2.npz", "dispersion"], "1.npz", {"1.npz": "12", "dispersion": "-75"}
+    else:
+        order, first, losses = ["dispersion", "2.npz", "1.npz"], "2.npz", {"1.npz": "-12", "dispersion": "75"}
+    assert title.split() == [score, "simulated", "pseudo-reality", "loss", "%"]
+    assert [row.split() for row in rows] == [[name, *told[name], losses.get(name, "nan")] for name in order]
+    assert best == f"best in pseudo-reality: {first}"
+    (stem, content), (other_stem, other) = (call.args[1:] for call in program._run.call_args_list)
+    assert (stem, other_stem) == ("m_simulated", "m_pseudo_reality")
+    shared = {"robots": 2, "time_s": 1, "seeds": {"count": 7}, "metrics": [score], "arena": "arena.yaml"}
+    names = ["1.npz", "2.npz", "dispersion"]
+    assert content == {**shared, "delay_s": 0.1, "vary": {"behavior": names}}
+    assert other == {**shared, "vary": {"behavior": names, "world": ["usual", "worst"]}}
