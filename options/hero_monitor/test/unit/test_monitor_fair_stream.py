@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import time
+from contextlib import suppress
 from types import SimpleNamespace
 
 import pytest
@@ -78,6 +79,8 @@ def test_a_client_that_sends_without_a_pause_leaves_others_their_turns(pair, clo
 def test_the_rest_after_a_long_request_is_bounded(pair, clock):
     async def run():
         stream = EndlessStream(pair[0])
+        await stream.read_bytes(1)
+        assert clock.rests_s == [], "no client rests before it has worked"
         clock.step_s = 10.0
         await stream.read_bytes(1)
         stream.close()
@@ -88,17 +91,27 @@ def test_the_rest_after_a_long_request_is_bounded(pair, clock):
 
 def test_a_client_that_reads_nothing_is_closed(pair):
     async def run():
-        stream = FairStream(pair[0])
-        chunk = bytes(5000)
-        writes = [stream.write(chunk)]
-        while writes[-1].done():  # into the buffers of the kernel
+        stream, writes = FairStream(pair[0]), []
+
+        async def leave_unread():
+            writes.append(stream.write(bytes(5000)))
+            while writes[-1].done():  # into the buffers of the kernel
+                await asyncio.sleep(0)
+                writes.append(stream.write(bytes(5000)))
+            for _ in range(UNREAD_WRITES_MAX - 1):
+                writes.append(stream.write(bytes(5000)))
+
+        await leave_unread()
+        pair[1].setblocking(False)
+        while not writes[-1].done():
+            with suppress(BlockingIOError):
+                pair[1].recv(10**6)
             await asyncio.sleep(0)
-            writes.append(stream.write(chunk))
-        for _ in range(UNREAD_WRITES_MAX - 1):
-            writes.append(stream.write(chunk))
+        await asyncio.sleep(0)
+        await leave_unread()
         assert not stream.closed()
         with pytest.raises(StreamClosedError):
-            stream.write(chunk)
+            stream.write(b"x")
         assert stream.closed()
         with pytest.raises(StreamClosedError):
             await writes[-1]

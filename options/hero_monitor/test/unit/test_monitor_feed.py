@@ -153,7 +153,7 @@ def test_a_row_says_what_the_driver_and_the_odometry_say(fleet):
     expected = {
         "name": "hero_3", "id": 3, "state": "READY", "known": True, "stop": "at rest", "since": 60, "uptime": 61,
         "reconnects": 2, "speed": 0.123, "turn": 1.235, "bytes": 4001, "distance": 0.5, "dropped": 5, "bad": 6,
-        "clock": -0.0123, "source": "", "health": [0, ""], "nearest": 0.25,
+        "clock": -0.0123, "source": "", "health": [0, ""], "nearest": 0.25, "values": {"battery": 3.7041},
     }  # fmt: skip
     assert {name: shown[name] for name in expected} == expected and len(shown["error"]) == MAX_LINE_LENGTH
 
@@ -410,7 +410,11 @@ def test_commands_that_no_robot_hears_and_goals_outside_the_walls_are_told(fleet
     fleet.put("/hero_sim/arena", MarkerArray(walls))
     feed = fleet.feed._feeds["/hero_0"]
     feed.listener.track.receive_pose(Pose(0.5, 0.5, 0.0))
-    for goal, is_told in ((Pose(0.9, 0.9, 0.0), False), (Pose(0.9, 1.1, 0.0), True), (Pose(-1.1, 0.9, 0.0), True)):
+    for x_m, y_m, is_told in (
+        (1.0, 1.0, False), (-1.0, -1.0, False), (0.9, 1.001, True), (0.9, -1.001, True), (1.001, 0.9, True),
+        (-1.001, 0.9, True),
+    ):  # fmt: skip
+        goal = Pose(x_m, y_m, 0.0)
         feed.find_goal = lambda placement, goal=goal: goal
         told = [loss["remedy"] for loss in fleet.read()["losses"]]
         assert ("the goal of hero_0 lies outside the walls" in told) == is_told
@@ -443,7 +447,7 @@ def test_arena_and_ground_truth_are_drawn_in_millimeters():
     gone.action = Marker.DELETE
     odd = make_marker(Marker.CUBE, math.nan, 1.0, 1.0)
     disc.pose.position.y = 2.0
-    shown = describe_arena(MarkerArray([box, disc, gone, other, odd]))
+    shown = describe_arena(MarkerArray([odd, gone, other, box, disc]))
     assert shown == {"boxes": [[1000, 0, 0, 500, 20, None]], "circles": [[1000, 2000, 50, None]]}
     painted = [make_marker(kind, 0.5, 0.2, 0.1, ns="areas") for kind in (Marker.CUBE, Marker.CYLINDER)]
     for marker in painted:
@@ -451,6 +455,7 @@ def test_arena_and_ground_truth_are_drawn_in_millimeters():
     areas = describe_arena(MarkerArray(painted))
     assert areas == {"boxes": [[1000, 0, 0, 500, 200, "#ff8000"]], "circles": [[1000, 0, 250, "#ff8000"]]}
     walls = [[0, -900, 0, 1800, 20, None], [900, 0, 1571, 1800, 20, None]]
+    assert measure_extent([[100, 200, 524, 1000, 20, None]], []) == [-333, -50, 533, 450], "turned by 30 degrees"
     assert measure_extent(walls, [[-500, 950, 100, None], [0, -950, 70, None]]) == [-900, -1020, 900, 1050]
     assert len(describe_arena(MarkerArray([box] * (MARKERS_MAX + 1)))["boxes"]) == MARKERS_MAX
     heading, name = (

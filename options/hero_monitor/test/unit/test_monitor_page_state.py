@@ -81,6 +81,8 @@ def test_numbers_are_integers_and_those_not_finite_have_a_code():
     assert encode_color(1.0, 0.5, 7.0) == "#ff80ff"
     assert encode_color(0.0, 0.0, 0.0) is None
     assert encode_color(math.nan, 1.0, 0.0) is None
+    with pytest.raises(ValueError, match="JSON"):
+        PageState().put("poses", math.nan)
 
 
 @pytest.mark.parametrize("pose", [(1e306, 0.0, 0.0), (0.0, -2e4, 0.0), (math.inf, 0.0, 0.0), (0.0, 0.0, math.nan)])

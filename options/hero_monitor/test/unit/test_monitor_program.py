@@ -13,10 +13,12 @@ from hero_monitor import program as module
 from hero_monitor.background import Background
 from hero_monitor.control.drive_requests import DriveRequests
 from hero_monitor.control.programs import Programs
+from hero_monitor.fleet_feed.camera_picture import CameraPicture
 from hero_monitor.fleet_feed.feed import FleetFeed
 from hero_monitor.fleet_feed.page_state import PageState
 from hero_monitor.page_requests import PageRequests
 from hero_monitor.program import LESSON, Monitor
+from hero_monitor.serving import server as server_module
 from hero_monitor.serving.lesson import TEACHER, VIEWER, Lesson, Role, User
 from hero_monitor.serving.server import MonotonicLoop, PageSocket, Server
 from hero_node import ProgramError
@@ -67,6 +69,43 @@ def make_monitor(monkeypatch):
     monkeypatch.setattr(module.rospy, "loginfo", lambda *_: None)
     monkeypatch.setattr(module, "read_clock_ms", lambda: 5000)
     return monitor
+
+
+@pytest.mark.parametrize("classroom", [False, True])
+def test_a_monitor_is_wired_as_its_parameters_say(monkeypatch, classroom):
+    kinds = FleetFeed, DriveRequests, PageRequests, Background
+    feed, commander, requests, background = made = [create_autospec(kind, instance=True) for kind in kinds]
+    feed.page_state, feed.drivers, feed.picture = PageState(), create_autospec(Drivers, instance=True), CameraPicture()
+    feed.lab_file = SimpleNamespace(topics=[SimpleNamespace(name="battery", unit="V")])
+    requests.programs = create_autospec(Programs, instance=True)
+    for kind, instance in zip(kinds, made):
+        monkeypatch.setattr(module, kind.__name__, create_autospec(kind, return_value=instance))
+    for name in ("Server", "MonotonicLoop"):
+        monkeypatch.setattr(server_module, name, create_autospec(getattr(server_module, name)))
+    periodic = create_autospec(tornado.ioloop.PeriodicCallback)
+    monkeypatch.setattr(tornado.ioloop, "PeriodicCallback", periodic)
+    monkeypatch.setattr(module.rospy, "get_name", lambda: "/lab/hero_monitor")
+    monkeypatch.setattr(module, "raise_file_limit", lambda: 601)
+    monkeypatch.setattr(module, "read_token", create_autospec(module.read_token, return_value="x" * 16))
+    parameters = SimpleNamespace(host="10.42.0.1", token_file="key", host_names=["lab"], control=True, rate_hz=5.0)
+    parameters.map_frame, parameters.classroom = "world", classroom
+    monitor = Monitor(parameters, None)
+    module.FleetFeed.assert_called_once_with("world", background)
+    module.DriveRequests.assert_called_once_with(feed.drivers, background)
+    module.read_token.assert_called_once_with("10.42.0.1", "key")
+    *given, lesson = module.PageRequests.call_args[0]
+    later, broadcast = server_module.MonotonicLoop.return_value.add_callback, monitor._broadcast_updates
+    assert given == [parameters, feed, commander, background, later, broadcast] and (lesson is not None) == classroom
+    hello = {"control": True, "topics": [["battery", "V"]], "node": "lab/hero_monitor"}
+    assert json.loads(feed.page_state.take_updates({}))["hello"] == hello
+    ((access, limits, actions), _) = server_module.Server.call_args
+    assert access.lesson is lesson and access.admits_host("lab") and access.admits_host("10.42.0.1")
+    assert access.find_key("x" * 16) and not access.admits_host("other") and limits._connections_max == 300
+    feed.picture.jpeg = b"newest"
+    assert actions[:3] == (monitor._enter, requests.receive, monitor._leave) and actions.find_picture() == b"newest"
+    calls = (monitor._update_pages, 200.0), (monitor._step, 60.0), (monitor._send_clock, 120.0)
+    assert [one.args for one in periodic.call_args_list] == [*calls, (monitor._check_end, 200.0)]
+    assert monitor._repeated == [periodic.return_value] * 3 and not periodic.return_value.start.called
 
 
 ENDS = ["programs.close", "commander.close", "server.close", "background.shutdown"]

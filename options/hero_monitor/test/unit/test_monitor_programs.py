@@ -47,6 +47,13 @@ def test_the_last_line_of_a_program_tells_why_it_failed(printed, line):
     assert programs_module.read_last_line(io.BytesIO(b"y" * 9000 + b"\n" + printed)) in (line, "y" * 1999)
 
 
+def test_a_folder_that_is_not_there_yet_holds_nothing(tmp_path):
+    assert programs_module.measure(tmp_path / "none") == 0
+    for name in ("hero_0.bag", "hero_1.bag.active"):
+        (tmp_path / name).write_bytes(b"x" * 7)
+    assert programs_module.measure(tmp_path) == 14
+
+
 def read_launch_arguments(package, program):
     text = (sources.PACKAGES[package] / "launch" / (program + ".launch")).read_text(encoding="utf-8")
     return [line.split('name="')[1].split('"')[0] for line in text.splitlines() if "<arg " in line]
@@ -60,7 +67,8 @@ def test_all_that_pages_may_set_are_parameters_of_the_program(program):
     arguments = dict(text[1:].split(":=", 1) for text in make_arguments(program, [0, 12], "map", defaults))
     assert set(arguments) <= set(read_launch_arguments(offer.package, offer.program))
     assert yaml.safe_load(arguments["robots"]) == "0 12"
-    assert ("frame" in arguments) == offer.has_frame
+    needs_frame = program in ("swarm_go_to", "follow") or program.startswith("behavior_")
+    assert ("frame" in arguments) == offer.has_frame == needs_frame
 
 
 def test_all_built_in_behaviors_are_offered():

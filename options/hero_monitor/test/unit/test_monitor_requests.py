@@ -320,16 +320,14 @@ class Ros:
         self.now_s += duration_s
 
     def open(self, topic, kind, queue_size, tcp_nodelay):
-        assert tcp_nodelay and kind.__name__ == ("PoseStamped" if topic.endswith("goal") else "Twist")
-        opened_s = self.now_s
-        return SimpleNamespace(
-            publish=lambda message: self.sent.append((topic, message)),
-            get_num_connections=lambda: 2
-            if self.now_s - opened_s >= self.connect_s - 1e-9
-            else 1
-            if topic.endswith("goal")
-            else 0,
-        )
+        opened_s, own = self.now_s, int(topic.endswith("goal"))  # this node subscribes to goals, too
+        assert (kind.__name__, queue_size, tcp_nodelay) == (("PoseStamped", 2) if own else ("Twist", 1)) + (True,)
+
+        def count():
+            self.commander.step()  # the pages' thread goes on
+            return own + int(self.now_s - opened_s >= self.connect_s - 1e-9)
+
+        return SimpleNamespace(publish=lambda message: self.sent.append((topic, message)), get_num_connections=count)
 
     def ask_master(self, call):
         if self.master_fails:
@@ -358,8 +356,8 @@ def test_a_topic_is_opened_once_and_a_stop_waits_for_it(monkeypatch):
     ros.commander.dead_man.release(1, "hero_0")
     for _ in range(3):
         ros.commander.step()
-    assert ros.take() == [], "not lost: the topic is yet to be opened"
     ros.work()
+    assert ros.take() == [], "not lost: the topic was yet to be connected"
     assert ros.now_s == pytest.approx(100.3, abs=0.03)
     ros.commander.step()
     assert ros.take() == [(TOPIC, 0.0, 0.0)]

@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import runpy
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -72,6 +74,14 @@ def test_a_token_of_any_characters_is_compared_and_names_without_case():
     access = Access("geheim-äöü-1234567", ["PC.lab."])
     assert access.find_key("geheim-äöü-1234567") and not access.find_key("geheim-äöü-1234568")
     assert not access.find_key("\ud800") and access.admits_host("pc.LAB") and not access.admits_host("pc")
+
+
+@pytest.mark.parametrize("name", ["hero_monitor.program", "hero_monitor.page_requests"])
+def test_a_pc_without_tornado_loads_what_says_so(monkeypatch, name):
+    monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setitem(sys.modules, "tornado", None)
+    monkeypatch.setitem(sys.modules, "hero_monitor.serving.server", None)
+    assert runpy.run_module(name)
 
 
 class Socket(PageSocket):
