@@ -324,6 +324,24 @@ def test_the_length_of_a_recording_counts_from_its_file_on(started, monkeypatch,
     assert starts_s[0] < starts_s[1] < starts_s[2] == starts_s[3]
 
 
+@pytest.mark.parametrize(("folder", "patience_s"), [(None, "3.0"), (Path("/x"), "20.0")])
+def test_a_recorder_has_time_to_close_its_files_and_robots_stop_at_once(monkeypatch, folder, patience_s):
+    start = create_autospec(subprocess.Popen)
+    monkeypatch.setattr(programs_module.subprocess, "Popen", start)
+    child, output = ChildProcess("record", folder=folder), io.BytesIO()
+    assert child._spawn(["/record", "-a"], output) is start.return_value
+    ((command,), options) = start.call_args
+    assert command == [sys.executable, "-m", "hero_monitor.control.guard", patience_s, "/record", "-a"]
+    held = {"stdin": child._guard_end, "stdout": output, "stderr": subprocess.STDOUT, "start_new_session": True}
+    assert options == held and not os.get_blocking(child._monitor_end)
+    with pytest.raises(OSError, match="Bad file"):
+        os.fstat(child._guard_end)
+    start.return_value.wait.return_value = 3
+    assert child._wait_for(start.return_value) == 3
+    start.return_value.wait.assert_called_once_with(1.0)
+    child.end()
+
+
 def test_the_length_of_a_recording_ends_when_it_is_told_to(started, tmp_path):
     recording = started.programs._running[1] = ChildProcess("record", folder=tmp_path)
     recording.end()
