@@ -14,9 +14,12 @@ from hero_client.controllers.avoidance import (
 from hero_client.controllers.go_to_goal import BLIND_S, FREE_S, PROGRESS_M, PROGRESS_S, Goal, GoToGoalController
 from hero_client.controllers.heading_check import MAX_TURN_RAD, MIN_DRIVE_M, MIN_SHARE, HeadingCheck, is_upside_down
 from hero_client.controllers.lateness import COVERED_S, REPORT_PERIOD_S, STOP_S, Lateness
-from hero_client.controllers.motion import BLOCKED_S, STALL_S, State
-from hero_client.controllers.orca import AvoidanceLaw, avoid_others, avoid_sensed
+from hero_client.controllers.motion import AIM_SHARE, BLOCKED_S, SILENCE_S, STALL_S, State
+from hero_client.controllers.orca import AvoidanceLaw, avoid_others, avoid_sensed, keep_apart
 from hero_client.controllers.pose_check import FROZEN_S, JUMP_M, JUMP_WINDOW_S, FrozenCheck, PoseCheck, is_apart
+from hero_client.controllers.swarm_go_to import DOCKING_M as SWARM_DOCKING_M
+from hero_client.controllers.swarm_go_to import NUDGE_RAD, PATIENCE_S, SwarmGoToController
+from hero_client.controllers.swarm_go_to import PROGRESS_M as SWARM_PROGRESS_M
 from hero_client.controllers.unicycle import DOCKING_M, TOLERANCE_RAD, GoToLaw, go_to_point, go_to_pose
 from hero_client.values.object_sensing import (
     NOTHING,
@@ -29,6 +32,7 @@ from hero_client.values.object_sensing import (
     sense_sight,
 )
 from hero_client.values.readings import MAX_POSITION_M, find_nearest, front_first, is_plausible
+from hero_client.values.sensing import Binary, Neighbors, sense_binary, sense_neighbors
 from hero_client.values.stamped_history import StampedHistory, interpolate_pose
 from hero_node import STOP, Pose, Velocity
 from hero_node.robot_constants import BODY_RADIUS_M
@@ -86,6 +90,30 @@ def test_a_blocked_way_and_wheels_that_stand_end_a_motion_in_time():
             assert controller.state is State.ACTIVE
             controller.step(HERE, ranges, STEP_S * index)
         assert controller.state is State.FAILED
+
+
+def test_a_pause_that_no_driver_minds_is_no_new_beginning_of_a_stall():
+    for pause_s, begins_anew in ((SILENCE_S, False), (SILENCE_S + 0.001, True)):
+        controller, index = GoToGoalController(Goal(1.0, 0.0), 0.0), 0
+        controller.step(HERE, FREE, 0.0)
+        while controller.state is State.ACTIVE:
+            controller.step(HERE, FREE, pause_s + STEP_S * index)
+            index += 1
+        # Of a pause 0.2 s count.
+        assert (index - 1 > int((STALL_S - 0.2) / STEP_S) + 1) == begins_anew and "do not turn" in controller.reason
+
+
+def test_a_goal_begins_to_count_within_its_share_and_an_obstacle_before_it():
+    aside = GoToGoalController(Goal(AIM_SHARE * 0.125, 0.0), 0.0, tolerance_m=0.125)
+    assert aside.step(HERE, FREE, 0.0).linear_m_s > 0.0
+    beyond, ranges = GoToGoalController(Goal(0.0625, 0.0), 0.0), see(BODY_RADIUS_M + 0.0625)
+    free_m = find_in_path(ranges)[0]
+    beyond.distance_m = free_m
+    assert beyond._slow_for_obstacle(Velocity(0.125, 0.0), ranges, 0.0) == (0.125, 0.0), "it stands behind the goal"
+    beyond.distance_m = free_m + 1e-9
+    assert beyond._slow_for_obstacle(Velocity(0.125, 0.0), ranges, 0.0).linear_m_s < 0.04
+    beyond._obstacle = find_nearest(see(0.0))
+    assert "too close to measure" in beyond._describe_obstacle()
 
 
 def test_a_place_is_reached_below_its_tolerance_and_a_goal_beside_is_ahead():
@@ -176,6 +204,76 @@ def test_robots_and_walls_count_within_reach_alone():
         assert np.isfinite(bounds).any() == is_near
 
 
+def test_discs_that_touch_come_apart_in_a_step_and_meeting_ones_pass_on_the_right():
+    touching, _ = keep_apart(np.array([(0.125, 0.0)]), np.array([(0.5, 0.25)]), 0.125, 3.0, 0.1)
+    assert touching[0] == pytest.approx((-0.75 / math.hypot(0.75, 0.25), 0.25 / math.hypot(0.75, 0.25)))
+    for sign in (1.0, -1.0):
+        head_on, _ = keep_apart(np.array([(sign, 0.0)]), np.array([(sign * 0.5, 0.0)]), 0.125, 3.0, 0.1)
+        assert sign * head_on[0, 1] < 0.0
+
+
+class Swarm:
+    """A controller of robots that all go to one place, each alone in its world."""
+
+    def __init__(self, robots, tolerance_m=0.01):
+        self.law = AvoidanceLaw()
+        self.controller = SwarmGoToController([(0.0, 0.0)] * robots, self.law, STEP_S, tolerance_m)
+        self.robots = robots
+
+    def wait(self, elapsed_s, distance_m=1.0):
+        return self.controller._find_turns(np.full(self.robots, distance_m), elapsed_s)
+
+
+def test_robots_of_a_jam_go_aside_after_their_patience_to_either_side():
+    swarm = Swarm(400)
+    swarm.wait(STEP_S)
+    assert np.abs(swarm.wait(PATIENCE_S)).max() <= NUDGE_RAD, "not more than their patience"
+    aside_rad = swarm.wait(0.5)
+    sizes_rad = np.abs(aside_rad)
+    assert 0.5 <= sizes_rad.min() < 0.53 and 2.47 < sizes_rad.max() <= 2.5 and abs((aside_rad > 0.0).mean() - 0.5) < 0.1
+    assert (swarm.wait(1.5) == aside_rad).all(), "2 s aside, in one direction"
+    assert np.abs(swarm.wait(STEP_S)).max() <= NUDGE_RAD
+    for nearer_m, is_aside in ((SWARM_PROGRESS_M, True), (1.01 * SWARM_PROGRESS_M, False)):
+        swarm = Swarm(1)
+        swarm.wait(STEP_S)
+        swarm.wait(PATIENCE_S, 1.0 - nearer_m)
+        assert (abs(swarm.wait(STEP_S, 1.0 - nearer_m)[0]) > NUDGE_RAD) == is_aside
+
+
+def test_a_robot_of_a_swarm_docks_and_has_arrived_below_its_distances():
+    for x_m, is_docking in ((SWARM_DOCKING_M, False), (below(SWARM_DOCKING_M), True)):
+        (command,) = Swarm(1).controller.step([Pose(-x_m, 0.0, 0.0)])
+        assert (command.angular_rad_s == 0.0) == is_docking and command.linear_m_s > 0.0
+    swarm = Swarm(1, tolerance_m=0.125)
+    for x_m, has_arrived in ((AIM_SHARE * 0.125, False), (0.0625, True), (below(0.125), True), (0.125, False)):
+        swarm.controller.step([Pose(-x_m, 0.0, 0.0)])
+        assert swarm.controller.arrived == [has_arrived], x_m
+
+
+class Never:
+    """Random numbers that are not to be drawn: they would change those that follow."""
+
+    def __getattr__(self, name):
+        raise AssertionError(name)
+
+
+class Always:
+    """Random numbers that are all a quarter."""
+
+    def random(self, *shape):
+        return np.full(shape, 0.25)
+
+
+def test_sensors_draw_numbers_for_their_own_errors_alone():
+    poses = np.array([[(0.0, 0.0, 0.0), (0.0, 0.5, 0.0), (0.5, 0.0, 0.0), (0.25, BODY_RADIUS_M, 0.0)]])
+    near = sense_neighbors(poses, Neighbors(field_rad=math.pi), Never())
+    assert near.seen[0].tolist() == [False, True, True, True] and not near.seen[2].any()
+    assert sense_binary(poses[:, [0, 3]], Binary(), Never()).tolist() == [False, False], "a beam that touches the rim"
+    assert sense_binary(poses, Binary(error=0.25), Always()).tolist() == sense_binary(poses, Binary()).tolist()
+    assert sense_neighbors(poses, Neighbors(dropout=0.25), Always()).seen[0].tolist() == [False, True, True, True]
+    assert sense_neighbors(poses, Neighbors(occlusion=True), Never()).seen[0, 2], "what touches the line hides nothing"
+
+
 def test_objects_are_sensed_up_to_the_range_and_not_behind_robots():
     radii_m = np.array([BODY_RADIUS_M])
     poses = np.array([[(0.0, 0.0, 0.0), (0.75, 0.0, 0.0)]])
@@ -186,6 +284,7 @@ def test_objects_are_sensed_up_to_the_range_and_not_behind_robots():
         (far, below(gap_m), NOTHING),
         (same, gap_m, OBJECT),
         (PlacedObjects(np.array([[(BODY_RADIUS_M, BODY_RADIUS_M, 0.0)]]), radii_m), gap_m, ROBOT),
+        (PlacedObjects(np.array([[(0.0, 0.0, 0.0)]]), radii_m), gap_m, ROBOT),
     ):
         assert sense_sight(poses, things, Sight(range_m))[0] == expected
     for range_m, is_seen in ((0.75, True), (below(0.75), False)):

@@ -119,7 +119,7 @@ def avoid_sensed(
     for beam in range(gaps_m.shape[1]):
         direction, limit_m_s = towards[:, beam], limits_m_s[:, beam]
         excess_m_s = np.where(near[:, beam], np.maximum((wanted * direction).sum(axis=1) - limit_m_s, 0.0), 0.0)
-        forward_m_s = np.maximum(np.minimum(excess_m_s, excess_m_s + limit_m_s), 0.0) * (excess_m_s > 0.0)
+        forward_m_s = np.maximum(np.minimum(excess_m_s, excess_m_s + limit_m_s), 0.0)
         right = np.stack((direction[:, 1], -direction[:, 0]), axis=1)
         wanted = wanted - excess_m_s[:, None] * direction + forward_m_s[:, None] * right
     return wanted, -towards, np.where(near, -limits_m_s, -np.inf)
