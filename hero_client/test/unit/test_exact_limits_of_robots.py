@@ -14,7 +14,7 @@ from hero_client.robots.group import READY_TIMEOUT_S
 from hero_client.robots.light import MIN_BLINK_PERIOD_S
 from hero_client.robots.robot_base import WARNING_PERIOD_S
 from hero_client.robots.swarm_base import FIRST_REPORT_S, REPORT_PERIOD_S
-from hero_client.values.errors import GoalError, RobotNotReadyError, StaleDataError
+from hero_client.values.errors import GoalError, RobotNotReadyError, StaleDataError, StoppedError
 from hero_client.values.readings import FRESH_S
 from hero_node import Pose
 from hero_node.files import EntryError
@@ -32,6 +32,11 @@ def test_data_are_fresh_up_to_a_second():
         assert (robot.fresh_pose() is not None) == (robot.fresh_velocity() is not None) == is_fresh
         assert math.isnan(robot.fresh_proximity()[0]) != is_fresh
         assert (robot.missing_ranges() is None) == is_fresh
+        robot, link = make_robot()
+        link.silent_s["proximity"], link.ranges[:] = age_s, [math.nan] * 8
+        robot.forward(0.01)
+        assert any("does not see what is in its way" in text for text in link.warned) == is_fresh
+        link.silent_s["odom"] = age_s
         for name in ("pose", "velocity", "proximity"):
             if is_fresh:
                 assert getattr(robot, name) is not None
@@ -78,7 +83,7 @@ def test_warnings_and_reports_come_again_once_their_period_has_passed():
 
 
 def test_a_robot_that_is_ready_at_the_last_moment_is_ready():
-    for ready_s, is_in_time in ((1.0, True), (1.03, False)):
+    for ready_s, is_in_time in ((1.0, True), (1.01, False)):
         robot, link = make_robot()
         link.ready_s = 100.0 + ready_s
         if is_in_time:
@@ -112,6 +117,16 @@ def test_goals_of_a_swarm_end_after_their_time_and_after_twenty_steps_without_a_
     with pytest.raises(GoalError, match="no pose for 2 s"):
         swarm.go_to_each({0: (9.0, 0.0)}, frame="world")
     assert len(steps) == SILENT_STEPS + 1, "the first one had a pose"
+
+
+def test_the_error_of_one_robot_is_told_as_it_is_and_of_two_in_one():
+    swarm = FakeSwarm(0, 1, 2)
+    swarm.links[1].is_stopped = True
+    with pytest.raises(StoppedError, match="hero_1 does not move"):
+        swarm.forward(0.1)
+    swarm.links[2].is_stopped = True
+    with pytest.raises(GoalError, match="hero_1 does not move.*; hero_2 does not move"):
+        swarm.forward(0.1)
 
 
 def test_places_of_a_formation_may_be_as_near_as_robots_need():
