@@ -81,16 +81,10 @@ class Recording:
                 say(f"{path} was cut off, or is being recorded; to repair it: record --repair {path}")
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._receive_signal)
-        seconds = self._options.seconds
-        say(
-            "recording to %s %s; %s are free, stops by itself below %s"
-            % (
-                os.path.join(self._options.folder, self._options.name + "_*.bag"),
-                "until Ctrl-C" if seconds is None else "for %g s, or until Ctrl-C" % seconds,
-                format_size(self._free_mb * MB),
-                format_size(self._options.min_free_mb * MB),
-            )
-        )
+        seconds, files = self._options.seconds, os.path.join(self._options.folder, self._options.name + "_*.bag")
+        until = "until Ctrl-C" if seconds is None else "for %g s, or until Ctrl-C" % seconds
+        free, limit = format_size(self._free_mb * MB), format_size(self._options.min_free_mb * MB)
+        say(f"recording to {files} {until}; {free} are free, stops by itself below {limit}")
         start_s = time.monotonic()
         # It names every topic that it subscribes to, on stdout and on /rosout; warnings and errors remain.
         with tempfile.NamedTemporaryFile(suffix=".config") as logging:
@@ -107,11 +101,12 @@ class Recording:
             reason = self._watch(recorder, start_s)
         finally:
             code = end_process(recorder, CLOSING_S)
-            repaired = self._repair_leftovers()
+            leftovers = [path for path in self._find_files() if path.endswith(ACTIVE_SUFFIX)]
+            repair_all(leftovers)
         self._summarize(time.monotonic() - start_s)
         if reason is not None:
             raise RecordingError("stopped: " + reason)
-        if repaired or code not in (0, -signal.SIGINT, -signal.SIGTERM):
+        if leftovers or code not in (0, -signal.SIGINT, -signal.SIGTERM):
             raise RecordingError(f"rosbag's recorder failed (exit code {code}); its last lines tell why")
 
     def _watch(self, recorder: "subprocess.Popen[bytes]", start_s: float) -> Optional[str]:
@@ -133,16 +128,6 @@ class Recording:
                     say(f"nothing received in {SILENCE_S:.0f} s: is the driver running, has a robot joined?")
         return None
 
-    def _repair_leftovers(self) -> bool:
-        """Repair what the recorder could not close; return whether there was anything."""
-        leftovers = [path for path in self._find_files() if path.endswith(ACTIVE_SUFFIX)]
-        for path in leftovers:
-            try:
-                say(repair_bag(path))
-            except RecordingError as error:
-                command_line.print_error(str(error))
-        return bool(leftovers)
-
     def _summarize(self, elapsed_s: float) -> None:
         files = self._find_files()
         if sum(files.values()) <= EMPTY_BAG_BYTES:
@@ -150,6 +135,18 @@ class Recording:
         for path, size in files.items():
             say(f"{path}  {format_size(size)}")
         say(f"{format_size(sum(files.values()))} in {elapsed_s:.0f} s")
+
+
+def repair_all(paths: Sequence[str]) -> bool:
+    """Repair recordings; return whether all could be: one that cannot be keeps no other from it."""
+    failed = []
+    for path in paths:
+        try:
+            say(repair_bag(path))
+        except RecordingError as error:
+            command_line.print_error(str(error))
+            failed.append(path)
+    return not failed
 
 
 def format_size(size: float) -> str:
@@ -211,13 +208,13 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     return options
 
 
-def main() -> None:
-    """Record, or repair recordings. Raises: RecordingError, NodeError."""
+def main() -> int:
+    """Record, or repair recordings; return the exit status. Raises: RecordingError, NodeError."""
     ros_arguments = [word for word in sys.argv[1:] if REMAPPING.match(word)]
     options = parse_options([word for word in sys.argv[1:] if not REMAPPING.match(word)])
     declare_topics(read_fleet_file().topics)
-    for path in options.repair or ():
-        say(repair_bag(path))
-    if not options.repair:
-        check_master()
-        Recording(options, ros_arguments).run()
+    if options.repair:
+        return 0 if repair_all(options.repair) else 1
+    check_master()
+    Recording(options, ros_arguments).run()
+    return 0

@@ -3,10 +3,12 @@
 import os
 import re
 import sys
+from unittest.mock import create_autospec
 
 import pytest
 
 from hero_recording import record
+from hero_recording.errors import RecordingError
 
 
 @pytest.mark.parametrize(
@@ -41,9 +43,25 @@ def test_remappings_are_the_recorders(monkeypatch, tmp_path):
     ran = []
     monkeypatch.setattr(record.Recording, "run", lambda recording: ran.append(recording))
     monkeypatch.setattr(record.roslib.packages, "find_node", lambda package, name: ["/opt/record"])
-    record.main()
+    assert record.main() == 0
     assert ran[0]._options.seconds == 3.0 and ran[0]._options.name == "a"
     assert ran[0]._command[-2:] == ["__name:=my_record", "/tf:=/other"]
+
+
+@pytest.mark.parametrize(("files", "status"), [(["a.bag", "b.bag"], 0), (["a.bag", "text.bag", "b.bag"], 1)])
+def test_a_file_that_cannot_be_repaired_is_named_and_others_are(files, status, monkeypatch, capsys):
+    def repair(path):
+        if path == "text.bag":
+            raise RecordingError("text.bag cannot be repaired")
+        return "repaired " + path
+
+    monkeypatch.setattr(record, "repair_bag", create_autospec(record.repair_bag, side_effect=repair))
+    monkeypatch.setattr(record, "check_master", None)  # no ROS master is needed
+    monkeypatch.setattr(sys, "argv", ["record", "--repair", *files])
+    assert record.command_line.call(record.main) == status
+    shown = capsys.readouterr()
+    assert shown.out.splitlines() == ["record: repaired a.bag", "record: repaired b.bag"]
+    assert ("text.bag cannot be repaired" in shown.err) == bool(status)
 
 
 def test_the_ends_of_what_options_may_be_are_allowed():

@@ -29,17 +29,9 @@ def list_files(monkeypatch, folder):
     Recording._find_files(SimpleNamespace(_pattern=str(folder / "*.bag"), _old_files=set()))
 
 
-def repair_leftovers(monkeypatch, _folder):
+def repair_all(monkeypatch, _folder):
     monkeypatch.setattr(record, "repair_bag", fail)
-    Recording._repair_leftovers(SimpleNamespace(_find_files=lambda: {"hero_0.bag.active": 1}))
-
-
-def read_patterns(monkeypatch, _folder):
-    expressions = record.re
-    monkeypatch.setattr(
-        record, "re", SimpleNamespace(compile=fail, fullmatch=expressions.fullmatch, error=expressions.error)
-    )
-    record.parse_options(["--topics", "/a"])
+    record.repair_all(["hero_0.bag.active"])
 
 
 def record_steps(monkeypatch, _folder):
@@ -50,7 +42,7 @@ def record_steps(monkeypatch, _folder):
     step_recorder.StepRecorder(None, [0], "run.bag")
 
 
-@pytest.mark.parametrize("act", [watch_disk, list_files, repair_leftovers, read_patterns, record_steps])
+@pytest.mark.parametrize("act", [watch_disk, list_files, repair_all, record_steps])
 def test_an_error_that_was_not_foreseen_is_not_taken_for_another(act, monkeypatch, tmp_path):
     with pytest.raises(UnforeseenError):
         act(monkeypatch, tmp_path)
