@@ -233,6 +233,27 @@ def test_bodies_are_looked_at_as_seldom_as_they_were(monkeypatch, arena, looped,
     assert count_looks(monkeypatch, arena, looped) == kept
 
 
+@pytest.mark.slow
+def test_loops_over_worlds_miss_no_robot_that_comes_from_afar(monkeypatch):
+    """Robots are listed anew when they could touch what is not in their lists."""
+    monkeypatch.setattr(compiled, "_compile_loops", lambda module: module)
+    # Lanes in which two robots, or one and a post, come from distances that differ by less than they go meanwhile.
+    lanes, results = [(index, 0.1 * index - 0.55) for index in range(12)], []
+    posts_m = [(0.01 * index, y_m, 0.04) for index, y_m in lanes[8:]]
+    arena = build_rectangle(2.0, 1.4, 0)._replace(circles_m=np.array(posts_m))
+    poses = [(-0.2, y_m, 0.0) for _, y_m in lanes] + [(0.25 + 0.01 * k, y_m, math.pi) for k, y_m in lanes[:8]]
+    for rows in (10**9, 0):
+        monkeypatch.setattr(compiled, "COMPILED_ROWS", rows)
+        world = build_world(poses, arena)
+        set_speeds(world, np.full(20, 0.28))
+        with np.errstate(over="ignore"):  # of random bits, which wrap
+            for _ in range(10):
+                world.step(10)
+                results.append(world.poses.tobytes())
+        assert max(map(np.max, world.measure_overlaps())) < MAX_OVERLAP_M
+    assert results[:10] == results[10:]
+
+
 @pytest.mark.option("numba")
 def test_nothing_is_compiled_at_the_first_contact(monkeypatch):
     """Robots in real time would pause meanwhile."""

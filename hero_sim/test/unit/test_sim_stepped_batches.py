@@ -99,10 +99,11 @@ def test_a_row_that_no_robot_has_and_time_that_has_passed_are_refused():
 
 def test_a_light_goes_out_15_s_after_its_last_command():
     robots = RobotRows(build_world(2, 0))
+    robots.advance(300)
     robots.send_light(1, (1.0, 0.5, 0.0, 1.0))
-    robots.advance(15000)
+    robots.advance(15300)
     assert robots.lights.tolist() == [[0.0] * 4, [1.0, 0.5, 0.0, 1.0]]
-    robots.advance(15001)
+    robots.advance(15301)
     assert not robots.lights.any()
 
 
