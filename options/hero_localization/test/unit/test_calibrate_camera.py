@@ -1,25 +1,35 @@
 """calibrate_camera: views of the board until the lens is known; what was found of each robot's tag is written."""
 
+import itertools
 import math
 import sys
+from contextlib import nullcontext
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
 
-from hero_client import ProgramError
+from hero_client import ProgramError, Robot
+from hero_localization.calibration.arena_calibration import ArenaCalibration
 from hero_localization.calibration.lens_calibration import BoardView, LensCalibration
 from hero_localization.calibration.print_fit import estimate_height, find_height_error, find_print_scale
 from hero_localization.calibration.robot_calibration import RobotCalibration
 from hero_localization.camera.camera_model import Intrinsics
 from hero_localization.camera.frame_source import Frame
 from hero_localization.errors import CalibrationError, DetectorError
-from hero_localization.nodes import calibrate_camera, calibrate_lens, calibrate_robots, calibration_images
+from hero_localization.nodes import (
+    calibrate_arena,
+    calibrate_camera,
+    calibrate_lens,
+    calibrate_robots,
+    calibration_images,
+)
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 from hero_localization.tracking import settings
 from hero_localization.tracking.detectors import create_detector
-from hero_localization.tracking.tag_pose import TagLayout
+from hero_localization.tracking.tag_pose import TagCorners, TagLayout
 from hero_node import Pose
 from hero_sim.world.arena import build_rectangle
 
@@ -223,6 +233,98 @@ def test_without_a_board_for_ten_seconds_a_hint_is_given(tmp_path, monkeypatch, 
     with pytest.raises(StopIteration):
         calibrate_lens.calibrate_lens_by_board(parsed, board, program)
     assert capsys.readouterr().out.count("no board in the images (mean shade 77 of 255)") == 2, "after 10 s each"
+
+
+@pytest.fixture
+def watch(monkeypatch):
+    """Return a function that watches hero_4 in images with so many tags 9 each; its robot and subscriber are mocks."""
+    times_s = itertools.count(0.0, 0.5)
+    robot, subscriber = mock.create_autospec(Robot, instance=True), mock.Mock(spec=["unregister"])
+    monkeypatch.setattr(calibrate_robots, "Robot", lambda robot_id: {4: nullcontext(robot)}[robot_id])
+    monkeypatch.setattr(calibrate_robots, "read_duration_clock_s", lambda: next(times_s))
+    monkeypatch.setattr(calibrate_robots.rospy, "Subscriber", mock.Mock(return_value=subscriber))
+    camera, tag = CameraOptions().geometry, TagCorners(9, np.array(((0, 0), (25, 0), (25, 25), (0, 25))) + 900.0)
+
+    def run(counts):
+        found = iter(counts)
+        frame = Frame(1.0, np.zeros((8, 8), np.uint8), 0)
+        images = SimpleNamespace(settings=settings.Settings(camera=camera), take=lambda: frame, poll=lambda: frame)
+        images.find_tags = lambda frame: [tag] * next(found)
+        return calibrate_robots._watch_robot(images, SimpleNamespace(sleep=None), 4, 9)
+
+    return SimpleNamespace(run=run, robot=robot, subscriber=subscriber, subscribed=calibrate_robots.rospy.Subscriber)
+
+
+@pytest.mark.parametrize(
+    ("count", "reason"), [(0, "is not in the image, or too dark; the robot was not"), (2, "appears more than once")]
+)
+def test_a_robot_whose_tag_is_not_seen_alone_for_three_seconds_stands(watch, count, reason):
+    with pytest.raises(CalibrationError, match=f"tag 9 {reason}"):
+        watch.run([count] * 20)
+    assert watch.robot.wait_until_ready.called and watch.robot.check_not_stopped.called
+    assert not watch.robot.drive.called and not watch.subscribed.called
+
+
+def test_odometry_of_a_robot_is_not_heard_any_more_when_its_drive_fails(watch):
+    with pytest.raises(StopIteration):  # no more images
+        watch.run([1] * 5)
+    assert watch.subscribed.call_args.args[0] == "/hero_4/odom"
+    assert watch.robot.drive.call_args_list[-1].args == (0.0, 2.5) and watch.subscriber.unregister.call_count == 1
+
+
+LENSES = {
+    name: Intrinsics(8, 8, np.diag((focal_px, focal_px, 1.0)), np.zeros(5))
+    for name, focal_px in (("file", 5.0), ("info", 6.0))
+}
+
+
+@pytest.mark.parametrize(("known", "taken"), [("file info", "file"), ("info", "info"), ("", None)])
+def test_the_arena_is_calibrated_with_the_lens_of_the_file_if_it_has_one(known, taken, tmp_path, monkeypatch, capsys):
+    lenses = {name: lens if name in known else None for name, lens in LENSES.items()}
+    images = mock.create_autospec(calibration_images.Images, instance=True)
+    images.settings, images.source = (
+        settings.Settings(lens=lenses["file"]),
+        mock.Mock(lens=lenses["info"], lens_problem="K"),
+    )
+    images.take.return_value, images.find_tags.return_value = Frame(0.0, np.zeros((8, 8), np.uint8), 0), []
+    camera = CameraOptions().geometry._replace(lens=LENSES[taken or "file"])
+    found = ArenaCalibration(
+        camera, {100: 0.001, 101: 0.002, 102: 0.012, 103: 0.001, 104: 0.0}, [102], ["measure again"]
+    )
+    calibrate = mock.create_autospec(calibrate_arena.calibrate_arena, return_value=found)
+    monkeypatch.setattr(calibrate_arena, "calibrate_arena", calibrate)
+    monkeypatch.setattr(calibrate_arena, "find_print_mistake", lambda gray, family: "mirrored")
+    options = calibrate_camera.parse_options(["arena", "--file", str(tmp_path / "camera.yaml")])
+    if taken is None:
+        with pytest.raises(CalibrationError, match=r"holds no lens \(K\): calibrate_camera lens comes"):
+            calibrate_arena.calibrate_extrinsics(options, images)
+        return
+    assert calibrate_arena.calibrate_extrinsics(options, images) == 1
+    assert calibrate.call_args.args[0] is lenses[taken] and images.take.call_count == 30
+    written = settings.load(options.file)
+    assert written.lens.matrix[0, 0] == LENSES[taken].matrix[0, 0] and written.arena_sd_m == pytest.approx(
+        found.sd_m, abs=1e-5
+    )
+    out = capsys.readouterr().out
+    assert "tag 101: 2.0 mm\n" in out and "tag 102: 12.0 mm (left out)\n" in out
+    assert "residual 1.2 mm rms; the camera is 2.20 m above the floor" in out
+    calibrate.side_effect = CalibrationError("no camera sees this")
+    with pytest.raises(CalibrationError, match="^no camera sees this; mirrored$"):
+        calibrate_arena.calibrate_extrinsics(options, images)
+
+
+@pytest.mark.parametrize("part", ["lens", "arena", "robots"])
+def test_a_calibration_that_fails_leaves_the_camera(part, monkeypatch):
+    images = mock.create_autospec(calibration_images.Images, instance=True)
+    monkeypatch.setattr(calibrate_camera, "Images", lambda *_: images)
+    monkeypatch.setattr(calibrate_camera, "_check_file", lambda options: settings.Settings())
+    monkeypatch.setattr(calibrate_camera, "Program", lambda *_, **__: nullcontext())
+    for name in ("calibrate_lens_by_board", "calibrate_extrinsics", "calibrate_robot_tags"):
+        monkeypatch.setattr(calibrate_camera, name, mock.Mock(side_effect=CalibrationError(name)))
+    monkeypatch.setattr(sys, "argv", ["calibrate_camera", part, "--robots", "1"])
+    with pytest.raises(CalibrationError, match={"lens": "board", "arena": "extrinsics", "robots": "tags"}[part]):
+        calibrate_camera.main()
+    images.close.assert_called_once_with()
 
 
 @pytest.fixture

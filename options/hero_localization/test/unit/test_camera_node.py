@@ -119,6 +119,15 @@ def test_true_robots_are_moved_on_from_their_newest_messages(monkeypatch):
         assert poses[0] == pytest.approx(expected), stamp_s
 
 
+def test_a_hand_is_where_it_is_told_until_either_number_is_none():
+    node = camera_node.CameraNode.__new__(camera_node.CameraNode)
+    seen = []
+    for place_m in ((0.1, -0.2), (0.3, math.nan), (0.1, 0.2), (math.nan, 0.0), (0.0, math.inf)):
+        node._receive_hand(camera_node.Point(*place_m, 0.5))
+        seen.append(node._hand_m)
+    assert seen == [(0.1, -0.2), None, (0.1, 0.2), None, None]
+
+
 @pytest.mark.parametrize("stamps_arrival", [False, True])
 def test_images_go_on_when_the_clock_is_set(monkeypatch, stamps_arrival):
     now_s, ahead_s, published = [50.0], [1000.0], []

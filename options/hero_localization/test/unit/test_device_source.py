@@ -193,6 +193,18 @@ def test_a_device_that_is_no_camera_has_no_controls():
         assert device_controls.call_control(DEVICE, request, device_controls.GAIN, 3) is None
 
 
+def test_a_control_that_a_camera_lacks_leaves_no_file_open(monkeypatch):
+    files = SimpleNamespace(open=lambda path, flags: 77, close=lambda file: closed.append(file), O_RDWR=2, O_NONBLOCK=0)
+    closed = []
+    monkeypatch.setattr(device_controls, "os", files)
+    monkeypatch.setattr(device_controls.fcntl, "ioctl", Camera(GAIN=7).ioctl)
+    found = [
+        device_controls.call_control(DEVICE, device_controls.GET_CONTROL, control)
+        for control in (device_controls.GAIN, device_controls.FOCUS)
+    ]
+    assert (found, closed) == ([7, None], [77, 77])
+
+
 def test_a_camera_is_asked_for_small_images_of_one_size_and_rate(play, monkeypatch):
     asked, backends = {}, []
     monkeypatch.setattr(Recording, "set", lambda self, name, value: asked.update({name: value}))

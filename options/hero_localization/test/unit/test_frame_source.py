@@ -125,7 +125,11 @@ def test_camera_info_beside_the_pictures_tells_the_lens(receivers):
         receive(CameraInfo(width=640, height=480, K=matrix, distortion_model="plumb_bob", D=[0.1] * 5))
         assert (source.lens.width_px, source.lens.height_px, source.lens.matrix[1, 1]) == (640, 480, 901.0)
         receive(CameraInfo())
-        assert source.lens is None, "one that is not calibrated"
+        assert source.lens is None and source.lens_problem == "", "one that is not calibrated"
+        receive(CameraInfo(width=640, height=480, K=matrix, distortion_model="plumb_bob", D=[0.1] * 3))
+        assert source.lens is None and source.lens_problem.startswith("camera_info: a lens of the model 'plumb_bob'")
+        receive(CameraInfo(width=640, height=480, K=matrix, distortion_model="plumb_bob", D=[0.1] * 5))
+        assert source.lens is not None and source.lens_problem == ""
 
 
 def test_pictures_without_a_stamp_are_as_new_as_now(source, monkeypatch):

@@ -1,5 +1,6 @@
 """The program localize: which robots it listens to, and what it takes of a report of all robots."""
 
+import math
 from unittest import mock
 
 import pytest
@@ -50,6 +51,19 @@ def test_an_unknown_robot_in_a_report_does_not_keep_the_next_from_its_pose(node)
     assert (robot_id, now_s) == (9, 50.0) and measured.pose.x_m == pytest.approx(0.9)
     assert node._localizer.distrust.call_args.args[1] == [4]
     assert set(node._unknown_s) == {7}
+
+
+def test_poses_that_no_robot_can_have_or_without_an_error_keep_no_other_away(node):
+    node._localizer.add_measurement.return_value = []
+    report = make_report("", (4, RobotPose.TRACKED), (9, RobotPose.TRACKED), (4, RobotPose.TRACKED))
+    report.robots[0].x, report.robots[2].position_sd, report.robots[2].yaw_sd = math.nan, 0.003, 0.02
+    assert not node._image_used.is_set()
+    node._receive_swarm(report)
+    assert node._image_used.is_set(), "the poses of an image are published at once"
+    (first, one, _), (second, other, _) = [call.args for call in node._localizer.add_measurement.call_args_list]
+    assert (first, one.is_systematic, second, other.is_systematic) == (9, False, 4, True)
+    assert one.covariance.diagonal() == pytest.approx([0.002**2, 0.002**2, 0.01**2]), "that of the parameters"
+    assert other.covariance.diagonal() == pytest.approx([0.003**2, 0.003**2, 0.02**2])
 
 
 def test_a_report_in_another_frame_is_left_alone_and_told(node):

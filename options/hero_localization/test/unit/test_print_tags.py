@@ -124,6 +124,14 @@ def test_wrong_options_are_named(arguments, words):
         print_tags.main(arguments)
 
 
+def test_a_page_that_cannot_be_drawn_leaves_the_file_as_it_was(tmp_path):
+    path = tmp_path / "tags.pdf"
+    path.write_bytes(b"an earlier one")
+    with pytest.raises(LocalizationError, match="tag 600: family"):
+        print_tags.main(["--robots", "1 600", "--out", str(path)])
+    assert path.read_bytes() == b"an earlier one" and list(tmp_path.iterdir()) == [path]
+
+
 def test_a_path_that_cannot_be_written_is_named():
     with pytest.raises(FileNotFoundError, match="'/nowhere/tags.pdf'$"):
         print_tags.main(["--robots", "3", "--out", "/nowhere/tags.pdf"])

@@ -62,6 +62,15 @@ def test_robots_do_not_map_each_other():
     assert not swarm_map.grid.occupied.any()
 
 
+def test_an_obstacle_that_a_robot_nearly_touches_is_not_the_robot_itself():
+    swarm_map = make_map()
+    for step in range(10):
+        swarm_map.add_pose(0, 0.2 * step, Pose(0.0, 0.0, 0.0))
+        swarm_map.add_ranges(0, 0.2 * step, [0.05, *[math.inf] * 7])
+    swarm_map.update()
+    np.testing.assert_allclose(occupied_center(swarm_map), (0.05, 0.0), atol=0.01)
+
+
 def test_a_map_that_cannot_be_written_is_an_error(tmp_path):
     with pytest.raises(OSError):
         save_map(str(tmp_path / "none" / "arena.yaml"), OccupancyGrid((0.0, 0.0, 1.0, 1.0)))

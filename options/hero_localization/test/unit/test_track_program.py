@@ -105,6 +105,7 @@ def test_each_kind_of_problem_is_logged_every_thirty_seconds(node):
         (100.0, "camera", "no image for 3 s", True),
         (101.0, "camera", "no image for 4.5 s", True),
         (102.0, "hero_3", "its tag is misshapen", False),
+        (102.0, "hero_4", "its tag is misshapen", False),
         (129.9, "camera", "no image for 33 s", True),
         (130.0, "camera", "no image for 33 s", True),
         (99.0, "camera", "no image for 2 s", True),
@@ -113,6 +114,7 @@ def test_each_kind_of_problem_is_logged_every_thirty_seconds(node):
     assert node.lines == [
         ("err", "camera: no image for 3 s"),
         ("warn", "hero_3: its tag is misshapen"),
+        ("warn", "hero_4: its tag is misshapen"),
         ("err", "camera: no image for 33 s"),
         ("err", "camera: no image for 2 s"),
     ], "also after ROS time went back"
