@@ -91,6 +91,12 @@ def test_an_invalid_goal_is_rejected_with_the_reason(wrong, words):
         read_goal(make_message(**wrong), use_heading=True)
 
 
+def test_a_goal_at_the_very_limits_is_taken():
+    goal, frame = read_goal(make_message((1e6, -1e6, 0.0), (0.0, 0.0, 0.0, 1e3), "f" * 200), True)
+    assert goal[:2] == (1e6, -1e6) and frame == "f" * 200
+    assert read_goal(make_message(turn=(0.0, 0.0, 0.0, 1e-6)), True)[0].yaw_rad is None
+
+
 def test_a_quaternion_of_zeros_means_no_heading():
     assert read_goal(make_message(turn=(0.0, 0.0, 0.0, 0.0), frame=""), True) == (Goal(0.1, 0.2, None), "")
     assert read_goal(make_message(turn=(0.0, 0.0, 1.0, 0.0)), True)[0].yaw_rad == pytest.approx(math.pi)

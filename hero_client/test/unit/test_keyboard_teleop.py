@@ -41,6 +41,14 @@ def test_a_held_key_drives_without_a_break_and_stops_soon_after():
     assert drive.command(presses_s[-1] + 0.31) == STOP
 
 
+def test_a_key_is_held_below_the_time_of_a_repetition_and_drives_below_its_own():
+    for again_s, ends_s in ((0.3, 0.3 + 0.75), (0.25, 0.25 + 0.3)):
+        drive = KeyDrive(0.1, 1.0)
+        drive.press("w", 0.0)
+        drive.press("w", again_s)
+        assert drive.command(ends_s - 0.001).linear_m_s == 0.1 and drive.command(ends_s) == STOP
+
+
 def test_every_stop_key_stops_at_once():
     for key in STOP_KEYS:
         drive = KeyDrive(0.1, 1.0)

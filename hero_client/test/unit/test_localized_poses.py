@@ -62,6 +62,15 @@ def test_an_old_or_uncertain_pose_is_an_error_with_its_cause(robot, now_s, text)
         receive(robot).find(3, now_s)
 
 
+@pytest.mark.parametrize(
+    ("robot", "now_s"),
+    [(make_pose(3, age_s=0.0), 8.0), (make_pose(3, age_s=-1.0), 7.0), (make_pose(3, position_sd=0.05), 7.0)],
+    ids=["a second old", "a second ahead", "5 cm"],
+)
+def test_a_pose_counts_up_to_its_limits(robot, now_s):
+    assert receive(robot).find(3, now_s) == (1.0, 2.0, 0.5)
+
+
 @pytest.mark.parametrize("ahead_s", [1.2, 3600.0])
 def test_a_pose_that_is_stamped_ahead_is_no_pose(ahead_s):
     poses = receive(make_pose(0, age_s=-0.05), make_pose(3, age_s=-ahead_s))

@@ -236,6 +236,13 @@ def push(teleop, *pressed, stick=1.0):
     teleop.receive(Joy(axes=[0.0, stick], buttons=[int(index in pressed) for index in range(6)]))
 
 
+def test_a_joystick_needs_the_axes_and_buttons_that_are_read_and_no_more():
+    assert MAPPING.read(Joy(axes=[0.5, 1.0], buttons=[0, 0, 0, 0, 1])) == (0.1, 1.0)
+    for axes, buttons in (([0.5], [0] * 5), ([0.5, 1.0], [0] * 4)):
+        with pytest.raises(ProgramError, match="the joystick has %d axes and %d buttons" % (len(axes), len(buttons))):
+            MAPPING.read(Joy(axes=axes, buttons=buttons))
+
+
 def test_a_joystick_that_falls_silent_stops_the_robots(shown):
     swarm = make_swarm(0, 1)
     teleop = JoystickTeleop(swarm, MAPPING)
