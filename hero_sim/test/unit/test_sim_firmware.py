@@ -6,6 +6,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hero_driver.rosserial import packets, payloads
+from hero_sim.robot.clock import NEVER_MS
 from hero_test.nonempty import nonempty
 
 
@@ -240,6 +241,25 @@ def test_the_rest_of_a_packet_does_not_outlive_its_connection():
     firmware.connection_lost()
     firmware.connection_made(now_ms)
     assert firmware.received_length == 0
+
+
+def test_a_reboot_in_the_middle_of_a_spin_is_as_any_other():
+    fresh, driver = DriverSide(connect=False), DriverSide()
+    fresh.run(6000)
+    driver.start_streaming()
+    (robot,) = driver.swarm.robots
+    driver.send_bytes(0, packets.encode_packet(RECEIVED["led"], bytes(16)) * 80)
+    driver.run(60)  # each takes 1 ms of the spin
+    robot.connection_lost()
+    robot.switch_off()
+    assert robot.due_ms == NEVER_MS and not robot.is_on
+    driver.connect, booted_ms = False, driver.swarm.now_ms + 10
+    robot.switch_on(booted_ms)
+    driver.swarm.reschedule(0)
+    driver.run(5500)
+    after_ms = [at_ms - booted_ms for at_ms in driver.connects[0] if at_ms > booted_ms]
+    first_ms = fresh.swarm.robots[0].body.booted_ms
+    assert len(after_ms) > 30 and after_ms == [at_ms - first_ms for at_ms in fresh.connects[0]][: len(after_ms)]
 
 
 def test_a_robot_that_cannot_write_blocks_for_5_s_unless_it_can_again():
