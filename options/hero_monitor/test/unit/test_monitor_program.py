@@ -18,6 +18,7 @@ from hero_monitor.fleet_feed.feed import FleetFeed
 from hero_monitor.fleet_feed.page_state import PageState
 from hero_monitor.page_requests import PageRequests
 from hero_monitor.program import LESSON, Monitor
+from hero_monitor.serving import invitation
 from hero_monitor.serving import server as server_module
 from hero_monitor.serving.lesson import TEACHER, VIEWER, Lesson, Role, User
 from hero_monitor.serving.server import MonotonicLoop, PageSocket, Server
@@ -121,6 +122,45 @@ def test_programs_and_robots_are_stopped_before_pages_whatever_ends_it(monitor, 
         monitor.run()
     assert monitor.calls == ["server.listen", "end_check.start", *([] if error else ["served"]), *ENDS]
     assert not monitor._background.submit.called, "it only shows"
+    monitor._background.shutdown.assert_called_once_with(wait=False)
+
+
+def test_phones_are_led_to_the_port_that_was_opened(monitor, monkeypatch):
+    monitor._server.listen.side_effect, monitor._server.listen.return_value = None, 40123
+    monitor._lesson, said = Lesson(), []
+    monkeypatch.setattr(module.rospy, "loginfo", lambda *words: said.append(words))
+    monkeypatch.setattr(invitation, "find_source_address", lambda _: "10.42.0.1")
+    monitor.run()
+    monitor._server.listen.assert_called_once_with("0.0.0.0", 8080)
+    link, code = "http://10.42.0.1:40123/", monitor._lesson.class_code
+    assert (monitor._invitation["code"], monitor._invitation["link"]) == (code, link)
+    assert said[0][1:] == (code, f"{link}#{code}")
+    assert said[1][1:] == (link, " (view only; control:=true allows driving)")
+
+
+def test_behaviors_are_offered_before_programs_are_looked_for(monitor, monkeypatch):
+    offers = {"follow": "built in"}
+    monitor._parameters.behavior_folder = "/own"
+    monkeypatch.setattr(module, "OFFERS", offers)
+    monkeypatch.setattr(module, "find_behaviors", create_autospec(module.find_behaviors, return_value={"own": "new"}))
+    monkeypatch.setattr(module, "find_programs", create_autospec(module.find_programs, side_effect=lambda: [*offers]))
+    assert monitor._find_programs() == ["follow", "own"] and offers["own"] == "new"
+    module.find_behaviors.assert_called_once_with("/own")
+
+
+def test_wrong_parameters_are_told_before_a_library_is_missed(monkeypatch):
+    calls = []
+    program = create_autospec(Program, instance=True)
+    program.__enter__.return_value = program
+    monkeypatch.setattr(module, "Program", create_autospec(Program, return_value=program))
+    monkeypatch.setattr(module, "load_parameters", lambda: calls.append("parameters") or "loaded")
+    monkeypatch.setattr(module, "import_optional", lambda *names: calls.append(names))
+    monkeypatch.setattr(module, "Monitor", create_autospec(Monitor))
+    module.Monitor.side_effect = lambda *given: calls.append(given) or module.Monitor.return_value
+    module.main()
+    assert calls == ["parameters", ("tornado", "python3-tornado"), ("loaded", program)]
+    module.Monitor.return_value.run.assert_called_once_with()
+    module.Program.assert_called_once_with("hero_monitor")
 
 
 def test_a_port_that_is_taken_is_an_error_with_what_to_do(monitor):
@@ -152,12 +192,14 @@ def test_guards_are_told_that_it_runs_until_the_program_ends(monitor):
 
 
 def test_between_updates_robots_are_stopped_and_a_new_stop_is_shown(monitor):
-    monitor._feed.read_stop.side_effect = [False, True]
+    monitor._feed.read_stop.side_effect, steps = [False, True], []
+    monitor._commander.step.side_effect = lambda: steps.append("due stops")
+    monitor._requests.end_motions_of_stopped_robots.side_effect = lambda: steps.append("ends")
     page = Page()
     monitor._server.pages.append(page.socket)
     monitor._feed.page_state.put("stop", {"text": "stopping"})
     monitor._step()
-    assert monitor._commander.step.called and monitor._requests.end_motions_of_stopped_robots.called
+    assert steps == ["due stops", "ends"], "what is due waits for nothing"
     assert page.sent == []
     monitor._step()
     assert page.sent == [{"stop": {"text": "stopping"}}]

@@ -3,12 +3,13 @@
 import json
 import math
 from types import SimpleNamespace
-from unittest.mock import Mock
+from unittest.mock import Mock, create_autospec
 
 import pytest
 
-from hero_client.ros import StopStatus
+from hero_client.ros import Drivers, StopStatus
 from hero_monitor import page_requests
+from hero_monitor.background import Background
 from hero_monitor.control import drive_requests as commander_module
 from hero_monitor.control import requests
 from hero_monitor.control.drive_requests import DriveRequests
@@ -223,6 +224,8 @@ def test_a_stop_of_one_robot_ends_its_hold_and_both_pages_are_told(desk):
     desk.ended_ms = {"hero_0": NOW_MS}
     assert desk.ask("drive", **DRIVE) == ["hero_0 was stopped: let go, and press again to drive"]
     assert desk.take() == [] and desk.pages[0].ended == [DRIVE["pressed_ms"]], "its other robots are not driven either"
+    desk.ended_ms["hero_1"] = NOW_MS
+    assert desk.ask("drive", **DRIVE) == ["hero_0, hero_1 were stopped: let go, and press again to drive"]
     assert desk.ask("drive", **{**DRIVE, "pressed_ms": NOW_MS + 1}) == []
     assert [words[0] for words in desk.take()] == ["drive", "drive"]
 
@@ -231,7 +234,7 @@ def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
     assert desk.ask("goal", yaw=1.5, **GOAL) == [] == desk.ask("goal", **GOAL)
     (robot, frame, goal, with_heading), future = desk.submitted[0]
     assert (robot, frame, goal, with_heading) == ("hero_0", "hero_0/odom", pytest.approx((1.0, 0.5, 1.5)), True)
-    assert desk.submitted[1][0][3] is False
+    assert desk.submitted[1][0][2:] == (pytest.approx((1.0, 0.5, 0.0)), False)
     for _ in range(GOALS_AT_ONCE - 2):
         assert desk.ask("goal", **GOAL) == []
     assert desk.ask("goal", **GOAL) == ["too many goals at once"]
@@ -240,6 +243,10 @@ def test_a_goal_is_sent_in_the_background_and_its_outcome_told(desk):
     assert desk.pages[0].told == [("info", "hero_0 has a new goal")]
     desk.pages[0].take()
     assert desk.ask("goal", **GOAL) == [] and len(desk.submitted) == GOALS_AT_ONCE + 1
+    assert desk.ask("goal", **GOAL) == ["too many goals at once"], "one place for each that was answered"
+    with pytest.raises(ArithmeticError):
+        tell(SimpleNamespace(result=lambda: 1 / 0))
+    assert desk.ask("goal", **GOAL) == [], "or failed"
 
 
 def test_a_program_is_started_with_its_robots_and_their_topics_open(desk, monkeypatch):
@@ -292,6 +299,13 @@ def test_a_recording_begins_once_and_ends_on_request(desk, monkeypatch):
     desk.recording = None
     del desk.programs.paths["record"]
     assert desk.ask("record", on=True) == ["hero_recording is not installed"]
+
+
+def test_robots_that_are_gone_are_dismissed_in_the_background(desk):
+    desk.feed.drivers = create_autospec(Drivers, instance=True)
+    desk.requests._background = create_autospec(Background, instance=True)
+    assert desk.ask("dismiss") == []
+    desk.requests._background.submit.assert_called_once_with(desk.feed.drivers.dismiss_gone)
 
 
 def test_a_page_says_what_it_shows(desk):

@@ -126,6 +126,8 @@ def test_warnings_wait_for_no_terminal(monkeypatch):
     said.append("printed")
     background.warn("third")
     assert jobs[1:] == [(0.0, "third")]
+    background.inform("fourth")
+    assert jobs[2:] == [("fourth",)]
     background.shutdown()
 
 
