@@ -74,8 +74,9 @@ def make_message(data, kind=String, **header):
 def test_topics_are_subscribed_to_while_a_client_wants_them(ros):
     sdk = FakeSdk()
     topics = module.TopicServer(sdk)
-    ros.published = [["/a", "std_msgs/String"], ["/b", "std_msgs/String"], ["/c", "no_package/Thing"]]
+    ros.published = [["/b", "std_msgs/String"], ["/a", "std_msgs/String"], ["/c", "no_package/Thing"]]
     topics.look()
+    assert list(sdk.open) == ["/a", "/b"]
     assert sdk.open == {topic: ("std_msgs/String", String._full_text.encode()) for topic in ("/a", "/b")}
     assert ros.callbacks == {}
     sdk.wanted = {"/a"}

@@ -157,9 +157,9 @@ def test_requests_end_at_the_limits_of_robots_and_texts():
 
 
 def test_all_programs_are_waited_for_together_at_the_end(monkeypatch):
-    clock, ended, joined = SimpleNamespace(now_s=100.0), [], []
+    clock, ended, joined, told = SimpleNamespace(now_s=100.0), [], [], []
     monkeypatch.setattr(programs_module, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
-    programs = Programs("/hero_monitor", None, ended.append)
+    programs = Programs("/hero_monitor", None, lambda child: ended.append(child) or told.append(len(joined)))
 
     def join(timeout_s):
         joined.append(timeout_s)
@@ -180,6 +180,7 @@ def test_all_programs_are_waited_for_together_at_the_end(monkeypatch):
     assert rows[0]["bytes"] == 0 and rows[2]["folder"] == "/x" and not rows[0]["ending"]
     programs.close()
     assert joined == [3.0, 0.0] and ended == children[:2] and all(child.is_ending for child in children)
+    assert told == [1, 2], "its robots are stopped after it has ended"
     programs._forget(1)
     assert 1 not in programs._running and ended[-1] is children[0]
 

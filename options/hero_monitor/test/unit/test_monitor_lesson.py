@@ -14,7 +14,7 @@ from hero_monitor.control.activity import Activity
 from hero_monitor.control.requests import REQUESTS
 from hero_monitor.serving import invitation as invitation_module
 from hero_monitor.serving.access import TOKEN_KEY, Access
-from hero_monitor.serving.invitation import describe_invitation, make_login_link, make_qr_rows
+from hero_monitor.serving.invitation import describe_invitation, make_link, make_login_link, make_qr_rows
 from hero_monitor.serving.lesson import TEACHER, VIEWER, Lesson, Role, User
 from hero_node import find_source_address
 
@@ -106,7 +106,7 @@ def test_who_drove_and_who_stopped_is_in_the_log_and_a_file(monkeypatch, tmp_pat
     monkeypatch.setattr(rospkg, "get_ros_home", lambda: str(home))
     background = Background()
     activity = Activity(background)
-    for elapsed_s in (0.0, 0.1, 10.0, 10.125):  # the last one: a new drive
+    for elapsed_s in (0.0, 0.125, 10.0, 10.125):  # the last one: a new drive
         clock.now_s += elapsed_s
         activity.note_drive("Ada", ["hero_3"])
     activity.note_drive("Bob", ["hero_3"])
@@ -139,10 +139,13 @@ def test_phones_find_the_page_by_its_address_and_the_code(monkeypatch):
         assert (shown["code"], shown["link"]) == ("123456", f"http://{name}:8088/")
         find.assert_called_with("10.42.0.1")
     assert make_login_link("10.0.0.9", 80, "123456") == "http://10.0.0.9:80/#123456"
+    assert (make_link("::", 80), make_link("::1", 80)) == ("http://lab-pc:80/", "http://[::1]:80/")
 
 
 def test_without_the_library_there_is_no_qr_code_and_with_it_a_square(monkeypatch):
-    made = SimpleNamespace(add_data=lambda text: None, make=lambda: None, get_matrix=lambda: [[True, False]] * 2)
+    added, rows = [], []
+    made = SimpleNamespace(add_data=added.append, make=lambda: rows.append([True, False, *added]))
+    made.get_matrix = lambda: [row[:2] for row in rows if row[2:]] * 2
     monkeypatch.setitem(__import__("sys").modules, "qrcode", SimpleNamespace(QRCode=lambda border: made))
     assert make_qr_rows("http://10.42.0.1:8088/#123456") == ["10", "10"]
     monkeypatch.setitem(__import__("sys").modules, "qrcode", None)

@@ -3,14 +3,16 @@
 import asyncio
 import socket
 from types import SimpleNamespace
-from unittest.mock import Mock, create_autospec
+from unittest.mock import Mock, call, create_autospec
 
+import pytest
+import tornado.web
 import tornado.websocket
 
 from hero_monitor.serving.access import Access
 from hero_monitor.serving.client_limits import ClientLimits
 from hero_monitor.serving.lesson import TEACHER, VIEWER, User
-from hero_monitor.serving.server import PageSocket, Server
+from hero_monitor.serving.server import FileHandler, PageSocket, Server
 
 
 def make_page(pages, stream=None, **actions):
@@ -69,6 +71,26 @@ def test_whose_code_was_withdrawn_watches_on():
     assert page.user == User("Ada", TEACHER) and page.who == "Ada (teacher), 10.42.0.7"
     page.find_user = lambda: None
     assert page.user == User("", VIEWER) and page.who == "a viewer, 10.42.0.7"
+
+
+@pytest.mark.parametrize(
+    ("host", "user"), [("pc", User("", VIEWER)), ("pc", None), ("evil.example", User("", TEACHER))]
+)
+def test_only_connections_of_those_who_are_logged_in_last(host, user):
+    page = FileHandler.__new__(FileHandler)
+    page.access, page.limits = Access(None, ["pc"]), create_autospec(ClientLimits, instance=True)
+    page.request = SimpleNamespace(host_name=host, connection=SimpleNamespace(stream="a stream"))
+    page.find_user = lambda: user
+    if host == "pc":
+        page.prepare()
+        assert page.limits.trust.call_args_list == [call("a stream")] * bool(user)
+    else:
+        with pytest.raises(tornado.web.HTTPError, match="421"):
+            page.prepare()
+        assert not page.limits.trust.called
+    page.request.connection = None  # of a connection that is closed already
+    if host == "pc":
+        page.prepare()
 
 
 def test_a_browser_is_asked_for_life_and_signs_of_one_server_hold_on_no_other():

@@ -285,6 +285,7 @@ def test_beams_and_metric_of_each_behavior_are_drawn_while_it_runs():
     found.receive(make_drawing("two", end_m=2.0), 11.0)
     assert len(found.describe("map", 11.0)) == 8
     assert found.describe("odom", 11.0) == []
+    assert len(found.describe("map", 12.0)) == 8
     assert len(found.describe("map", 12.5)) == 4, "the first one has ended"
     assert found.describe("map", 20.0) == []
     plain = make_drawing("one")
@@ -306,6 +307,12 @@ def test_drawings_that_no_page_can_show_are_left_out():
     found.receive(wrong, 0.0)
     assert [drawn["color"] for drawn in found.describe("map", 0.0)] == ["#0000ff", "#00ff00"]
     found.receive(MarkerArray(), 0.0)
+    wrong.markers[0].points[2].x = math.nan
+    wrong.markers[1].action, wrong.markers[2].scale.z = Marker.DELETE, 0.05
+    found.receive(wrong, 0.0)
+    assert [drawn.get("text") for drawn in found.describe("map", 0.0)] == ["order 0.91"]
+    found.receive(MarkerArray(wrong.markers[2:] * 21), 0.0)
+    assert len(found.describe("map", 0.0)) == 20
 
 
 def test_codes_for_drivers_reach_teachers_only():

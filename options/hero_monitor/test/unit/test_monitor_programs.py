@@ -2,7 +2,9 @@
 
 import contextlib
 import errno
+import importlib.util
 import io
+import json
 import os
 import queue
 import select
@@ -14,6 +16,8 @@ from pathlib import Path
 from unittest.mock import Mock, create_autospec
 
 import pytest
+import roslib.packages
+import rospkg
 import yaml
 
 import sources
@@ -85,6 +89,40 @@ class Dance(Behavior):
     swing_m = 0.3
     settings = {"swing_m": number(0.3, 0.1, 1.0, "m")}
 """
+
+
+def test_behaviors_are_described_by_a_process_that_may_fail(monkeypatch, capfd):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "hero_swarm" else "found")
+    run = create_autospec(subprocess.run)
+    monkeypatch.setattr(programs_module.subprocess, "run", run)
+    assert programs_module.find_behaviors("~/own") == {} and not run.called
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: "found")
+    described = {"behavior": "own.py:Dance", "title": "Dance", "sentence": "It dances.", "fields": []}
+    run.return_value = subprocess.CompletedProcess([], 0, json.dumps([described]).encode())
+    (offer,) = programs_module.find_behaviors("~/own").items()
+    assert offer[0] == "behavior_own.py:Dance" and offer[1][:3] == ("hero_swarm", "behavior", "Dance")
+    assert (offer[1].behavior, offer[1].sentence, offer[1].has_frame) == ("own.py:Dance", "It dances.", True)
+    command = [sys.executable, "-m", "hero_swarm", "describe", os.path.expanduser("~/own")]
+    run.assert_called_once_with(command, stdout=subprocess.PIPE, timeout=60.0, check=True)
+    for error in (subprocess.TimeoutExpired("python3", 60.0), OSError(12, "Cannot allocate memory"), ValueError("x")):
+        run.side_effect = error
+        assert programs_module.find_behaviors("~") == {}
+        assert f"no behaviors are offered: {error}" in capfd.readouterr().err
+
+
+def test_only_programs_of_installed_packages_are_offered(monkeypatch):
+    def find(package, program):
+        if package == "hero_swarm":
+            raise rospkg.ResourceNotFound(package)
+        return {"record": ["/opt/record"], "follow": ["/opt/follow", "/old/follow"], "led_show": None}.get(program, [])
+
+    monkeypatch.setattr(roslib.packages, "find_node", find)
+    monkeypatch.setattr(roslib.packages, "ROSPkgException", rospkg.ResourceNotFound)
+    assert programs_module.find_programs() == {"record": "/opt/record", "follow": "/opt/follow"}
+    monkeypatch.setattr(roslib.packages, "find_node", lambda package, program: [f"/{package}/{program}"])
+    found = programs_module.find_programs()
+    assert found["behavior_milling"] == found["behavior_rendezvous"] == "/hero_swarm/behavior"
+    assert set(found) == {*OFFERS, "record"}
 
 
 @pytest.mark.slow
@@ -348,6 +386,8 @@ def test_the_length_of_a_recording_ends_when_it_is_told_to(started, tmp_path):
     recording.start_s -= 100.0
     recording.end_s = recording.start_s + 7.5
     assert started.programs.describe()[0]["seconds"] == 7
+    recording.start_s += 100.0
+    assert started.programs.describe()[0]["seconds"] == 0, "its first file came too late"
 
 
 @pytest.mark.parametrize(("program", "driven"), [("follow", ["hero_1"]), ("led_show", [])])
