@@ -45,6 +45,20 @@ def test_what_is_printed_can_be_set_again():
     assert all(np.allclose(left, right, rtol=1e-5) for left, right in nonempty(zip(errors, again)))
 
 
+def test_of_a_file_the_lines_of_all_robots_and_of_these_are_taken(tmp_path):
+    file = tmp_path / "errors.txt"
+    file.write_text("# fitted\n\nslip=0.01\n  robot=6,slip=0.03  \nrobot=9,slip=0.04\nslip=0.05,robot=7\n")
+    errors = build("--count", "3", "--first-id", "5", "--errors", str(file), "--error", "robot=7,lag_s=0.1")
+    assert errors.slip.ravel().tolist() == [0.01, 0.03, 0.05] and errors.servo_lag_s.ravel().tolist() == [
+        0.08,
+        0.08,
+        0.1,
+    ]
+    file.write_bytes(b"\xff")
+    with pytest.raises(OptionError, match="errors .* cannot be read: 'utf-8' codec can't decode"):
+        build("--errors", str(file))
+
+
 @pytest.mark.parametrize(
     "text, named",
     [
