@@ -197,6 +197,48 @@ def test_of_too_many_abandoned_connections_the_first_ends(driver, monkeypatch):
             later.recv(1)
 
 
+class Probe:
+    """A socket that finds out addresses, on a PC without some of them."""
+
+    lacks = ()
+
+    def __init__(self, family, kind):
+        assert (family, kind) == (socket.AF_INET, socket.SOCK_DGRAM)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        pass
+
+    def bind(self, address):
+        self.connect(address)
+
+    def connect(self, address):
+        if address[0] in self.lacks:
+            raise OSError("no such address")
+
+    def getsockname(self):
+        return "10.42.0.7", 40000
+
+
+def test_a_robot_names_the_address_that_leads_to_its_driver(monkeypatch):
+    monkeypatch.setattr(tcp_link.socket, "socket", Probe)
+    found = [(family, 1, 6, "", address) for family, address in ((socket.AF_INET6, ("::1", 11411, 0, 0)),) * 2]
+    for host, lacks, own in (
+        ("10.42.0.1", (), ["10.42.0.7"] * 2),
+        ("10.42.0.1", ("10.42.0.1",), ["0.0.0.0"] * 2),
+        ("127.0.0.1", (), ["127.0.1.1", "127.0.1.2"]),
+        ("127.0.0.1", ("127.0.1.1",), ["127.0.0.1", "127.0.1.2"]),
+    ):
+        entries = [*found, (socket.AF_INET, 1, 6, "", (host, 11411))]
+        monkeypatch.setattr(tcp_link.socket, "getaddrinfo", lambda *given, entries=entries, **named: list(entries))
+        monkeypatch.setattr(Probe, "lacks", lacks)
+        link = TcpLink(2, "lab", 11411)
+        assert link.own_addresses == own and link._address == (host, 11411), "robots use IPv4"
+        link.close_all()
+
+
 def test_robots_connect_from_addresses_of_their_own(monkeypatch):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

@@ -221,9 +221,9 @@ def test_the_interpreter_and_the_one_on_the_path_are_checked(monkeypatch):
         get_manifest=lambda name: SimpleNamespace(version=name.rpartition("_")[2], author=computer.AUTHOR),
     )
     monkeypatch.setattr(computer.rospkg, "RosPack", lambda: finder)
-    monkeypatch.setattr(computer, "CORE", ("a_1",))
-    monkeypatch.setattr(computer, "OPTIONS", ("b_2",))
-    assert "several versions are mixed: 1, 2" in computer.check_packages().text
+    monkeypatch.setattr(computer, "CORE", ("a_3", "b_1"))
+    monkeypatch.setattr(computer, "OPTIONS", ("c_5", "d_2", "e_4", "f_1"))
+    assert "several versions are mixed: 1, 2, 3, 4, 5" in computer.check_packages().text
 
 
 def test_addresses_are_read_from_ip(monkeypatch):

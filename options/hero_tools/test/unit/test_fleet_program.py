@@ -6,6 +6,7 @@ import io
 import json
 import math
 from types import SimpleNamespace
+from unittest.mock import create_autospec
 
 import pytest
 from test_fleet_rows import make_row
@@ -193,6 +194,41 @@ def test_a_program_that_leaves_robots_driving_ends_with_an_error(world, monkeypa
         program.run_screen(Keyboard(world))
 
 
+@pytest.mark.parametrize(
+    ("arguments", "is_terminal", "has_keys", "expected"),
+    [
+        (["--once"], True, True, "once"),
+        (["--inventory"], True, True, "once"),
+        (["--json"], True, True, "lines"),
+        ([], False, True, "lines"),
+        ([], True, False, "lines"),
+        ([], True, True, "screen"),
+    ],
+)
+def test_what_is_shown_fits_the_output_and_a_signal_is_the_status(
+    world, monkeypatch, arguments, is_terminal, has_keys, expected
+):
+    shown, keyboard = [], Keyboard(world)
+
+    def open_keyboard():
+        if not has_keys:
+            raise module.NoTerminalError("no terminal")
+        return keyboard
+
+    for name in ("once", "lines", "screen"):
+        show = create_autospec(getattr(FleetProgram, "run_" + name))
+        show.side_effect = lambda own, *given, name=name: shown.append((name, *given)) or 1
+        monkeypatch.setattr(FleetProgram, "run_" + name, show)
+    monkeypatch.setattr(module, "Program", lambda name, anonymous: contextlib.nullcontext(world))
+    monkeypatch.setattr(module, "Keyboard", open_keyboard)
+    monkeypatch.setattr(module.rospy, "myargv", lambda: ["fleet", *arguments])
+    monkeypatch.setattr(module.sys.stdout, "isatty", lambda: is_terminal, raising=False)
+    assert module.main() == 1
+    world.end_signal = 15
+    assert module.main() == 143, "whatever is missing"
+    assert shown == [(expected, keyboard) if expected == "screen" else (expected,)] * 2
+
+
 def test_a_robot_has_moved_from_half_its_body_or_a_radian_on():
     for distance_m, turned_rad, has_moved in ((MOVED_M, 0.0, True), (0.049, 0.99, False), (0.0, MOVED_RAD, True)):
         row = make_row(0, distance_m=distance_m, turned_rad=turned_rad)
@@ -233,6 +269,15 @@ def test_the_table_is_as_high_as_the_terminal_and_leaves_robots_out(world):
     for height in (8, 20):
         assert len(program._make_lines(100, height)) == height
     assert len(program._make_lines(100, 10000)) > 30
+    assert len(program._make_screen(None)) == 8, "with the state of a stop and the keys"
+
+
+def test_all_lines_are_drawn_over_the_earlier_ones_in_one_piece(monkeypatch):
+    calls = []
+    stdout = SimpleNamespace(write=calls.append, flush=lambda: calls.append("flush"))
+    monkeypatch.setattr(module.sys, "stdout", stdout)
+    module.draw(["first", "last"])
+    assert calls == ["\x1b[Hfirst\x1b[K\r\nlast\x1b[K\x1b[J", "flush"]
 
 
 class Terminal(io.StringIO):
