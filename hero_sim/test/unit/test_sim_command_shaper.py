@@ -101,3 +101,15 @@ def test_motion_that_grew_old_behind_a_stop_is_not_sent_as_its_repeat():
     shaper.offer(0, 0, 0.2, 0.0)
     sent = [shaper.take(MAX_AGE_MS + 1 + index * INTERVAL_MS).values.tolist() for index in range(STOP_REPEATS + 2)]
     assert sent == [[[0.0], [0.0]]] * (STOP_REPEATS + 1) + [[[], []]]
+
+
+@pytest.mark.parametrize("rows", [(0, 0), (0, np.array([0])), (np.array([0]), 0), ([0], [0])])
+def test_of_two_commands_at_one_time_the_later_one_is_sent_last(rows):
+    shaper, sent = CommandShaper(2, 0.0), []
+    for number, row in enumerate(rows, 1):
+        shaper.offer(0, row, 0.5 * number, 0.25)
+    shaper.offer(0, 1, 0.75, -0.5)
+    for now_ms in (0, INTERVAL_MS - 1, INTERVAL_MS):
+        taken = shaper.take(now_ms)
+        sent += zip(taken.rows.tolist(), taken.at_ms.tolist(), *taken.values.tolist())
+    assert sent == [(0, 0, 0.5, 0.25), (1, 0, 0.75, -0.5), (0, INTERVAL_MS, 1.0, 0.25)]
