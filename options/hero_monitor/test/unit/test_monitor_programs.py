@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import Mock, create_autospec
 
 import pytest
@@ -417,6 +418,13 @@ def test_every_running_program_is_told_that_the_monitor_runs():
     programs._running = {number: create_autospec(ChildProcess, instance=True) for number in (4, 7)}
     programs.beat()
     assert [child.beat.call_count for child in programs._running.values()] == [1, 1]
+
+
+def test_a_program_is_known_to_end_before_its_guard_can_end_it(monkeypatch):
+    child, known = ChildProcess("record"), []
+    monkeypatch.setattr(programs_module, "os", SimpleNamespace(close=lambda _: known.append(child.is_ending)))
+    child.end()
+    assert known == [True], "else its end would be taken for a failure"
 
 
 @pytest.mark.parametrize("is_gone", [True, False])
