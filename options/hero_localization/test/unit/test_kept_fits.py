@@ -71,6 +71,50 @@ def test_fits_of_prints_in_shadows_are_as_they_were():
     check_figures(rows, TEMPLATES, 2)
 
 
+SOUGHT = """
+1.00 7.00 29.67 26.16 29.67 29.20 28.24 26.83 3.12 0.42 -0.48 2.95 9.73 9.73 4.97
+1.00 7.00 27.79 27.95 33.85 27.95 28.27 26.95 3.12 0.45 -0.50 2.95 9.70 9.79 4.95
+1.00 7.00 25.66 24.63 31.72 27.67 25.36 24.94 3.93 0.62 -0.58 3.70 0.12 -1.19 -1.39
+1.00 7.00 28.27 28.81 28.27 26.37 28.00 28.49 -2.21 1.11 -1.20 -2.11 9.95 9.96 5.53
+1.00 7.00 26.58 29.05 26.58 31.49 28.09 28.45 -2.17 1.05 -1.19 -2.11 9.90 9.86 5.68
+1.00 7.00 29.71 31.04 27.28 31.04 29.55 30.50 -2.58 1.26 -1.99 -2.23 0.25 4.13 -1.87
+1.00 7.00 34.42 33.35 34.42 29.34 33.42 32.87 0.28 -4.14 3.91 0.18 9.37 9.69 6.50
+1.00 7.00 35.22 30.66 31.21 22.65 35.58 32.11 0.16 -4.84 4.07 0.39 5.29 5.50 -0.18
+1.00 7.00 37.75 35.65 33.74 35.65 37.09 34.90 0.18 -5.23 4.60 0.01 -1.30 0.88 -0.96
+"""
+
+
+def test_prints_are_sought_farther_away_as_they_were():
+    """From places and sizes that are far off: whether they are found, and what the first rounds make of them."""
+    rows = []
+    for index, (tag_id, to_image) in enumerate(PRINTS):
+        image, template = (
+            photograph(tag_id, to_image, (0.35, 1.0, 0.5)[index]),
+            tag_template.TagTemplate("36h11", tag_id, 0.35),
+        )
+        shape, center = to_image[:, :2], to_image @ (4.0, 4.0, 1.0)
+        shades, cell_px = np.log(image.astype(np.float32) + tag_template.DARK), math.sqrt(np.linalg.det(shape))
+        for cells, factor in ((0.9, 1.0), (1.6, 1.08), (0.3, 1.3)):
+            off_px = cells * cell_px * np.array((math.cos(2.0 * index + 1.0), math.sin(2.0 * index + 1.0)))
+            shapes = factor * np.array((shape, shape @ cv2.Rodrigues(np.array((0.0, 0.0, 0.15)))[0][:2, :2]))
+            found = template.find(image, center + off_px, shapes)
+            starts = list(template._list_starts(shades, center + off_px, shapes, cell_px))
+            fit = template._refine(shades, *starts[1], 2)
+            numbers = 10.0 * np.array((fit.code, fit.border, fit.contrast))
+            rows.append(
+                (
+                    found is not None,
+                    len(starts),
+                    *starts[1][1],
+                    *starts[3][1],
+                    *fit.center,
+                    *fit.shape.ravel(),
+                    *numbers,
+                )
+            )
+    check_figures(rows, SOUGHT, 2)
+
+
 PRINT_FITS = """
 101.0 0.61 26 217 1.00 14.20 17.30 39.00 13.30 42.20 36.50 17.40 40.50
 101.0 0.61 71 233 1.80 32.40 41.70 14.80 32.10 23.60 15.30 41.20 24.90

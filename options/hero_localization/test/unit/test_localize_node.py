@@ -10,6 +10,7 @@ from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from hero_client import ProgramError
 from hero_localization.nodes import localize
 from hero_msgs.msg import RobotPose, RobotPoses
 
@@ -84,3 +85,43 @@ def test_cameras_are_where_their_programs_publish_them_in_the_common_frame(node)
     assert {name: place_m.tolist() for name, place_m in node._localizer.heights.cameras_m.items()} == {
         "/track_2": [0.1, -0.2, pytest.approx(2.124)]
     }
+
+
+def test_diagnostics_name_tags_of_unknown_robots_each_second_for_three(node, monkeypatch):
+    drivers = mock.Mock()
+    drivers.read.side_effect = [None, *[mock.Mock(robots=[mock.Mock(id=5), mock.Mock(id=-1)])] * 9]
+    monkeypatch.setattr(localize, "share_drivers", lambda: drivers)
+    monkeypatch.setattr(localize.rospy, "loginfo", mock.Mock())
+    node._chosen, node._localizer.find_lost.return_value = None, ["hero_4 lost"]
+    node._localizer.add_measurement.return_value = []
+    node._localizer.list_source_problems.return_value = {"clock of /track": "late"}
+    node._receive_swarm(make_report("map", (7, RobotPose.TRACKED), (5, RobotPose.TRACKED)))
+    told = []
+    for now_s in (50.0, 50.5, 51.0, 52.9, 53.9, 49.0):
+        monkeypatch.setattr(localize.rospy, "get_time", lambda now_s=now_s: now_s)
+        node._outputs.publish_diagnostics.reset_mock()
+        node._image_used.set()
+        node.step(9.0)
+        is_due = node._outputs.publish_diagnostics.called
+        assert node._localizer.list_robots.call_args.args == (now_s, False, is_due)
+        assert not node._image_used.is_set(), "it waits for the next image"
+        if is_due:
+            robots, unknown, problems = node._outputs.publish_diagnostics.call_args.args
+            assert robots is node._localizer.list_robots.return_value and problems == {"clock of /track": "late"}
+            told.append((now_s, unknown))
+    assert told == [(50.0, [5, 7]), (51.0, [7]), (52.9, [7]), (53.9, []), (49.0, [7])], "also after time went back"
+    assert list_subscribed() == ["/hero_4", "/hero_9", "/hero_5"]
+    assert node._outputs.publish.call_count == 6
+    localize.rospy.loginfo.assert_called_with("hero_4 lost")
+
+
+@pytest.mark.parametrize(("given", "used"), [("/world/hero_{id}/pose", "/world/hero_4/pose"), ("/hero_0/pose", None)])
+def test_a_topic_of_measured_poses_holds_the_id(node, given, used):
+    parameters = {name: declared.default for name, declared in localize.PARAMETERS.items()}
+    parameters = {**parameters, "robots": [4], "pose_topic": given, "frame": "/map", "pose_frame": "/world"}
+    if used is None:
+        with pytest.raises(ProgramError, match=r"~pose_topic is '/hero_0/pose', but must hold \{id\}"):
+            localize.LocalizationNode(parameters)
+    else:
+        localize.LocalizationNode(parameters)
+        assert localize.PoseInput.call_args.args[:2] == (used, "world") and localize.Outputs.call_args.args == ("map",)

@@ -79,6 +79,7 @@ def test_each_reading_of_odometry_places_its_frame_once(bench):
     assert (transform.header.frame_id, transform.header.stamp) == ("map", rospy.Time(40))
     place = transform.transform
     assert (place.translation.x, place.translation.y, yaw_of(place.rotation)) == pytest.approx(ORIGIN)
+    assert (place.translation.z, place.rotation.x, place.rotation.y) == (0.0, 0.0, 0.0)
     assert bench.publish(make_robot(2), make_robot(5, 40.1)) == ["hero_5/odom"]
     assert len(bench.sent["~poses"]) == 1 and bench.sent["/hero_2/pose"] == []
     assert bench.publish(make_robot(2), make_robot(5, 40.1)) == [] and bench.sent["/tf"] == []
@@ -98,6 +99,7 @@ def test_poses_with_their_covariance_go_to_those_who_listen(bench):
     assert bench.sent["/hero_2/pose"] == []
     (message,) = bench.sent["/hero_5/pose"]
     assert (message.pose.pose.position.x, yaw_of(message.pose.pose.orientation)) == pytest.approx((5.0, 0.5))
+    assert message.pose.pose.position.z == message.pose.pose.orientation.x == message.pose.pose.orientation.y == 0.0
     covariance = np.array(message.pose.covariance).reshape(6, 6)
     assert np.diag(covariance) == pytest.approx([4e-6, 4e-6, 0.0, 0.0, 0.0, 9e-6])
     assert np.count_nonzero(covariance) == 3 and message.header.frame_id == "map"

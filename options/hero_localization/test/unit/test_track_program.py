@@ -8,11 +8,18 @@ from unittest import mock
 import cv2
 import numpy as np
 import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_localization.camera.camera_model import Camera, Intrinsics
+from hero_localization.camera.frame_source import Frame
 from hero_localization.errors import DetectorError, LocalizationError
 from hero_localization.nodes import track
+from hero_localization.tracking import settings as camera_file
 from hero_localization.tracking.settings import Settings
+from hero_localization.tracking.tag_pose import TagCorners, list_corners
+from hero_msgs.msg import RobotPose, RobotPoses
+from hero_node import Pose
+from hero_node.parameters import check_parameters
 
 
 @pytest.fixture
@@ -147,3 +154,140 @@ def test_the_place_of_the_camera_is_published(monkeypatch, turn_rad):
     axis = (2.0 * (x * z + y * w), 2.0 * (y * z - x * w), 1.0 - 2.0 * (x * x + y * y))
     assert axis == pytest.approx(camera.rotation[2], abs=1e-9)
     assert node._tracker.camera is camera
+
+
+class Bench:
+    """A whole node without ROS and without a detector, below a camera that looks straight down.
+
+    sent: messages by topic. heard: topics with a subscriber.
+    """
+
+    def __init__(self, monkeypatch, tmp_path):
+        self.sent, self.heard, self.now_s = {}, set(), 50.0
+        monkeypatch.setattr(track.rospy, "Publisher", self.advertise)
+        monkeypatch.setattr(track.rospy, "Subscriber", mock.Mock())
+        monkeypatch.setattr(track.rospy, "get_time", lambda: self.now_s)
+        monkeypatch.setattr(track.rospy, "get_rostime", lambda: track.rospy.Time(7))
+        monkeypatch.setattr(track.rospy, "get_name", lambda: "/track")
+        monkeypatch.setattr(track.rospy, "logwarn", lambda line: None)
+        self.source = mock.Mock(problem="", warning="", arrived_s=50.0)
+        monkeypatch.setattr(track, "open_source", mock.create_autospec(track.open_source, return_value=self.source))
+        self.detector = mock.create_autospec(track.DetectorProcess, instance=True)
+        self.start = mock.create_autospec(track.DetectorProcess, return_value=self.detector)
+        monkeypatch.setattr(track, "DetectorProcess", self.start)
+        lens = Intrinsics(640, 480, np.array(((500.0, 0, 320.0), (0, 500.0, 240.0), (0, 0, 1.0))), np.zeros(5))
+        self.camera = Camera(lens, np.diag((1.0, -1.0, -1.0)), np.array((0.1, 0.0, 1.076)))
+        path = str(tmp_path / "camera.yaml")
+        seen = {100: Pose(0.3, 0.2, 0.0), 101: Pose(-0.2, 0.2, 0.0)}
+        places = {tag_id: [*pose[:2], 0] for tag_id, pose in seen.items()}
+        camera_file.update(path, {"references": places, "objects": {50: "box"}, "delay_s": 0.06, "decimate": 1.5})
+        camera_file.update(path, camera_file.describe_camera(self.camera, seen))
+        self.node = track.TrackNode(check_parameters(track.PARAMETERS, {"file": path, "frame": "/map"}))
+
+    def advertise(self, topic, kind, queue_size, latch=False):
+        messages = self.sent[topic] = []
+        return mock.Mock(publish=messages.append, get_num_connections=lambda: int(topic in self.heard))
+
+    def see(self, *tags, shift_m=0.0):
+        """Take an image of the reference tags, of which all seem shifted, and of tags: (id, x, y, size)."""
+        shown = [(100, 0.3 + shift_m, 0.2, 0.1, 0.0), (101, -0.2 + shift_m, 0.2, 0.1, 0.0)]
+        shown += [(*tag, 0.076) for tag in tags]
+        self.detector.search.return_value = [
+            TagCorners(tag_id, self.camera.project(list_corners(Pose(x_m, y_m, 0.0), size_m, height_m)))
+            for tag_id, x_m, y_m, size_m, height_m in shown
+        ]
+        self.source.poll.return_value = Frame(self.now_s, np.full((480, 640), 100, np.uint8), 3)
+        for messages in self.sent.values():
+            messages.clear()
+        self.node.step()
+        return self.sent
+
+
+@pytest.fixture(name="bench")
+def make_bench(monkeypatch, tmp_path):
+    bench = Bench(monkeypatch, tmp_path)
+    assert bench.see()["~measured_poses"] == [], "the first image is a second old when its detector has started"
+    assert bench.start.call_args.args == (
+        track.camera_file.DEFAULT_BACKEND,
+        "36h11",
+        1.5,
+        640,
+        480,
+        pytest.approx(20.0),
+    )
+    return bench
+
+
+def test_an_image_tells_where_robots_and_objects_were_when_it_was_taken(bench):
+    bench.heard = {"~objects"}
+    sent = bench.see((3, 0.2, -0.1, 0.04), (50, 0.0, 0.1, 0.04), (2, 0.0, -0.1, 0.04))
+    ((report,), (objects,)) = sent["~measured_poses"], sent["~objects"]
+    assert report.header.frame_id == "map" and report.header.stamp.to_sec() == pytest.approx(49.94)
+    assert [(robot.id, robot.state) for robot in report.robots] == [(2, RobotPose.TRACKED), (3, RobotPose.TRACKED)]
+    robot = report.robots[1]
+    assert (robot.x, robot.y, robot.yaw) == pytest.approx((0.2, -0.1, 0.0), abs=1e-6)
+    assert robot.stamp == report.header.stamp and 5e-4 < robot.position_sd < 1e-3 and 0.003 < robot.yaw_sd < 0.01
+    assert [(found.name, found.x, found.y) for found in objects.objects] == [
+        ("box", pytest.approx(0.0, abs=1e-6), pytest.approx(0.1))
+    ]
+    assert bench.see((2, 0.0, -0.1, 0.04), shift_m=0.02)["~measured_poses"][0].robots[0].state == RobotPose.LOST
+    bench.heard = set()
+    assert bench.see((50, 0.0, 0.1, 0.04))["~objects"] == []
+
+
+def test_robots_are_expected_where_localize_says_unless_it_does_not_know(bench):
+    states = RobotPose.TRACKED, RobotPose.LOST, RobotPose.UNKNOWN
+    bench.node._expect(
+        RobotPoses(robots=[RobotPose(id=number, state=state, x=0.1) for number, state in enumerate(states)])
+    )
+    bench.see()
+    gray, stamp_s, expected = bench.detector.search.call_args.args
+    assert gray.shape == (480, 640) and stamp_s == 50.0 and sorted(expected) == [0, 1]
+    assert expected[0] == pytest.approx((320.0, 240.0, 20.0))
+
+
+def test_the_picture_is_shown_five_times_a_second_to_those_who_look(bench):
+    assert bench.see()["~picture"] == bench.sent["~picture/outline"] == []
+    bench.heard = {"~picture/compressed"}
+    sent = bench.see()
+    (outline,), (jpeg,) = sent["~picture/outline"], sent["~picture/compressed"]
+    assert sent["~picture"] == [] and jpeg.header.stamp.to_sec() == pytest.approx(49.94)
+    assert (outline.header.frame_id, jpeg.header.frame_id) == ("map", "map")
+    corners = [(point.x, point.y) for point in outline.polygon.points]
+    box_m = 0.1 - 0.64, -0.478, 0.1 + 0.638, 0.48
+    assert corners == [pytest.approx((box_m[x], box_m[y]), abs=1e-3) for x, y in ((0, 1), (2, 1), (2, 3), (0, 3))]
+    bench.heard, shown = {"~picture"}, []
+    for bench.now_s in (50.1, 50.19, 50.21, 50.3, 49.0):
+        sent = bench.see((2, 0.0, -0.1, 0.04))
+        shown.append(len(sent["~picture"]))
+        assert sent["~picture/outline"] == [], "once for a camera"
+    assert shown == [0, 0, 1, 0, 1], "also after time went back"
+    (image,) = sent["~picture"]
+    assert (image.encoding, image.step, len(image.data)) == ("bgr8", 3 * image.width, 3 * image.width * image.height)
+    assert (image.width, image.height) == (1280, pytest.approx(960, abs=2))
+
+
+def test_diagnostics_come_each_second_with_the_rate_or_with_problems(bench):
+    bench.see()
+    assert bench.sent["/diagnostics"] == []
+    bench.now_s = 51.0
+    (message,) = bench.see()["/diagnostics"]
+    (status,) = message.status
+    assert (status.level, status.message) == (DiagnosticStatus.OK, "1.0 images per second, 2 tags")
+    assert bench.see()["/diagnostics"] == []
+    bench.now_s, bench.source.warning = 52.5, "exposure"
+    (message,) = bench.see((7, 0.0, 0.0, 0.06))["/diagnostics"]
+    told = {status.name: (status.level, status.message[:12]) for status in message.status}
+    assert told.pop("track: camera")[0] == DiagnosticStatus.OK
+    assert told == {
+        "track: camera controls": (DiagnosticStatus.WARN, "exposure"),
+        "track: tag 7": (DiagnosticStatus.WARN, "measures 150"),
+    }
+    bench.now_s, bench.source.problem = 53.5, "unplugged"
+    (message,) = bench.see()["/diagnostics"]
+    assert [(status.level, status.message) for status in message.status] == [(DiagnosticStatus.ERROR, "unplugged")]
+
+
+def test_the_end_leaves_the_camera_and_ends_the_detector(bench):
+    bench.node.close()
+    assert bench.source.close.called and bench.detector.close.called
