@@ -19,6 +19,12 @@ def test_nothing_is_stopped_while_a_button_is_held(held):
         assert held.take_stops(now_s) == []
 
 
+def test_a_report_counts_until_its_time_is_over():
+    dead_man = DeadMan()
+    assert dead_man.hold(1, "hero_0", now_s=0.0)
+    assert dead_man.take_stops(0.4) == [] and dead_man.take_stops(0.4001) == ["hero_0"]
+
+
 def test_a_released_button_stops_the_robot_and_then_leaves_it_alone(held):
     held.release(1, "hero_0")
     assert held.take_stops(10.05) == ["hero_0"]

@@ -78,6 +78,12 @@ def test_a_client_that_sends_without_a_pause_leaves_others_their_turns(pair, clo
 
 def test_the_rest_after_a_long_request_is_bounded(pair, clock):
     async def run():
+        clock.step_s = TURN_S
+        stream = EndlessStream(pair[0])
+        await stream.read_bytes(1)
+        assert clock.rests_s == [REST_FACTOR * TURN_S], "a turn that is used up is over"
+        clock.rests_s.clear()
+        clock.step_s = 0.0
         stream = EndlessStream(pair[0])
         await stream.read_bytes(1)
         assert clock.rests_s == [], "no client rests before it has worked"

@@ -444,6 +444,7 @@ def test_arena_and_ground_truth_are_drawn_in_millimeters():
     assert areas == {"boxes": [[1000, 0, 0, 500, 200, "#ff8000"]], "circles": [[1000, 0, 250, "#ff8000"]]}
     walls = [[0, -900, 0, 1800, 20, None], [900, 0, 1571, 1800, 20, None]]
     assert measure_extent([[100, 200, 524, 1000, 20, None]], []) == [-333, -50, 533, 450], "turned by 30 degrees"
+    assert measure_extent([], [[100, 200, 30, None]]) == [70, 170, 130, 230] and measure_extent([], []) is None
     assert measure_extent(walls, [[-500, 950, 100, None], [0, -950, 70, None]]) == [-900, -1020, 900, 1050]
     assert len(describe_arena(MarkerArray([box] * (MARKERS_MAX + 1)))["boxes"]) == MARKERS_MAX
     heading, name = (

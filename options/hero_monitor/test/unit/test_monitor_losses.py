@@ -83,6 +83,10 @@ def test_losses_begin_and_end_at_their_times():
         (FORGOTTEN_S + 0.01, []),
     ):
         assert list_sources(100.0 + silent_s) == lost
+    watch.receive(1, 0.0)
+    assert not watch.is_lost(SILENT_S) and watch.is_expected(FORGOTTEN_S) and not watch.has_lost_camera(SILENT_S)
+    watch.receive(0, 0.0)
+    assert watch.has_lost_camera(SILENT_S)
     several = list_losses({"/a": False, "/lab/b": False}, True, LocalizationWatch(), 0.0)
     assert several[0].cause == "No answer from a, lab/b: their robots are unknown"
     assert "No ROS master" in several[1].cause and len(several) == 2

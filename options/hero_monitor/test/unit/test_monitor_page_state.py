@@ -89,6 +89,7 @@ def test_numbers_are_integers_and_those_not_finite_have_a_code():
 def test_a_pose_that_cannot_be_drawn_is_none(pose):
     assert encode_pose(Pose(*pose)) is None
     assert encode_pose(None) is None
+    assert encode_pose(Pose(1e4, -1e4, 0.0)) == [10000000, -10000000, 0]
 
 
 def test_an_impossible_range_is_an_invalid_reading():
@@ -183,6 +184,9 @@ def test_a_picture_lies_on_the_map_of_its_frame_and_on_no_other():
 def test_a_picture_that_is_old_or_none_is_not_shown():
     picture = CameraPicture()
     picture.receive_outline(make_outline((-1.0, -0.5), (1.0, -0.5), (1.0, 0.5), (-1.0, 0.5)))
+    for now_s in (0.0, 0.2):
+        picture.receive(CompressedImage(data=JPEG), now_s)
+    assert picture.describe("map", 0.2)["number"] == 2 and picture.describe("map", 10.0) is None
     picture.receive(CompressedImage(data=b"\x89PNG"), 10.0)
     picture.receive(CompressedImage(data=JPEG.ljust(BYTES_MAX + 1)), 10.0)
     assert picture.describe("map", 10.0) is None

@@ -103,6 +103,8 @@ def test_a_slow_page_keeps_its_newest_notices():
     assert page.written == [{"notice": {"level": "info", "text": "hello"}}] and page.ready
     page.acknowledge("stop")
     assert page.written.pop() == {"received": "stop"}
+    page.end_hold(5000.5)
+    assert page.written.pop() == {"hold_over": 5000.5}
     page.is_done = False
     page.acknowledge("stop")
     for number in range(WAITING_MAX + 2):
