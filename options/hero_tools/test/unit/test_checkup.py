@@ -4,12 +4,13 @@ import socket
 import subprocess
 import threading
 import xml.etree.ElementTree as ElementTree
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import create_autospec
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from hero_test.nonempty import nonempty
 from hero_tools import check
@@ -274,6 +275,41 @@ def test_what_nodes_report_is_counted_and_problems_are_named():
         "track: 0 of 1 without a problem; localization: 1 of 2 without a problem",
     )
     assert finding.remedy == ("track: camera: images are too dark", "localization: hero_1: not measured for 3 s")
+
+
+class DiagnosticsSubscriber:
+    """Hears nodes, each of which sends some of its statuses at a time."""
+
+    sent = (
+        ("/track", "camera", 0),
+        ("/localization", "hero_0", 0),
+        ("/track", "tags", 1),
+        ("/localization", "hero_0", 2),
+    )
+
+    def __init__(self, steps, topic, kind, keep):
+        assert (topic, kind) == ("/diagnostics", DiagnosticArray)
+        steps.append("listen")
+        self.unregister = lambda: steps.append("end")
+        for node, name, level in self.sent:
+            report = DiagnosticArray(status=[DiagnosticStatus(name=name, level=level, message="message")])
+            report._connection_header = {"callerid": node}
+            keep(report)
+
+
+def test_of_each_node_all_statuses_are_told_with_the_newest_of_a_name(monkeypatch):
+    steps = []
+    publishers = [["/rosout", ["/track"]], ["/diagnostics", ["/track", "/localization", "/silent"]]]
+    monkeypatch.setattr(localization, "ask_master", lambda question: [publishers, [], []])
+    monkeypatch.setattr(localization.rospy, "Subscriber", partial(DiagnosticsSubscriber, steps))
+    monkeypatch.setattr(localization, "wait_until", lambda is_done, limit_s: steps.append((is_done(), limit_s)))
+    finding = localization.check_nodes()
+    told = "localization: 0 of 1 without a problem; silent: 0 of 0 without a problem; track: 1 of 2 without a problem"
+    assert (finding.state, finding.text) == (WARN, told)
+    assert [line.partition(":")[0] for line in finding.remedy] == ["hero_0", "silent sends no diagnostics", "tags"]
+    assert steps == ["listen", (False, points.REPORT_TIMEOUT_S), "end"]
+    publishers.pop()
+    assert localization.check_nodes() == (OK, "no node reports diagnostics", ())
 
 
 def test_a_tracker_that_reports_nothing_is_named():
