@@ -173,12 +173,21 @@ def test_modules_of_all_declared_packages_are_found_by_their_names():
     assert "catkin_pkg" in modules and all(map(str.isidentifier, nonempty(modules)))
 
 
-@pytest.mark.parametrize("free_gb, state", [(0.1, FAIL), (1.0, WARN), (50.0, OK)])
-def test_a_disk_that_fills_is_told(monkeypatch, tmp_path, free_gb, state):
+@pytest.mark.parametrize("free_gb, state", [(0.19, FAIL), (0.2, WARN), (1.99, WARN), (2.0, OK)])
+def test_a_disk_that_fills_is_told_also_before_a_folder_is_there(monkeypatch, tmp_path, free_gb, state):
+    looked = []
+
+    def measure(folder):
+        looked.append(folder)
+        return SimpleNamespace(free=free_gb * 1e9)
+
+    monkeypatch.setattr(computer.shutil, "disk_usage", measure)
     monkeypatch.setenv("ROS_HOME", str(tmp_path / "not" / "there"))
-    monkeypatch.setattr(computer.shutil, "disk_usage", lambda path: SimpleNamespace(free=free_gb * 1e9, path=path))
     finding = computer.check_disk()
-    assert finding.state == state and f"{free_gb:.1f} GB free" in finding.text
+    assert finding.state == state and finding.text == f"{free_gb:.1f} GB free for {tmp_path}/not/there"
+    monkeypatch.delenv("ROS_HOME")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert computer.check_disk().text.endswith(f" for {tmp_path}/.ros") and looked == [str(tmp_path)] * 2
 
 
 @pytest.mark.parametrize("answer, state", [("yes\n", OK), ("no\n", WARN), (None, OK)])
