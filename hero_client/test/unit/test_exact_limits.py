@@ -204,7 +204,7 @@ def test_robots_and_walls_count_within_reach_alone():
         assert np.isfinite(bounds).any() == is_near
 
 
-def test_discs_that_touch_come_apart_in_a_step_and_meeting_ones_pass_on_the_right():
+def test_discs_that_touch_come_apart_and_meeting_ones_pass_on_the_right():
     touching, _ = keep_apart(np.array([(0.125, 0.0)]), np.array([(0.5, 0.25)]), 0.125, 3.0, 0.1)
     assert touching[0] == pytest.approx((-0.75 / math.hypot(0.75, 0.25), 0.25 / math.hypot(0.75, 0.25)))
     for sign in (1.0, -1.0):
@@ -269,6 +269,8 @@ def test_sensors_draw_numbers_for_their_own_errors_alone():
     near = sense_neighbors(poses, Neighbors(field_rad=math.pi), Never())
     assert near.seen[0].tolist() == [False, True, True, True] and not near.seen[2].any()
     assert sense_binary(poses[:, [0, 3]], Binary(), Never()).tolist() == [False, False], "a beam that touches the rim"
+    beside = np.array([[(0.0, 0.0, 0.0), (BODY_RADIUS_M, 1.05 * BODY_RADIUS_M, 0.0)]])
+    assert sense_binary(beside, Binary()).tolist() == [False, False], "it just does not touch the sensor"
     assert sense_binary(poses, Binary(error=0.25), Always()).tolist() == sense_binary(poses, Binary()).tolist()
     assert sense_neighbors(poses, Neighbors(dropout=0.25), Always()).seen[0].tolist() == [False, True, True, True]
     assert sense_neighbors(poses, Neighbors(occlusion=True), Never()).seen[0, 2], "what touches the line hides nothing"

@@ -45,7 +45,7 @@ def test_data_are_fresh_up_to_a_second():
                     getattr(robot, name)
 
 
-def test_a_robot_is_connecting_and_its_first_data_waited_for_in_the_first_two_seconds():
+def test_a_robot_is_connecting_in_its_first_two_seconds():
     for after_s, is_first in ((0.5, True), (READY_TIMEOUT_S, False)):
         robot, link = make_robot()
         link.ready_s, link.silent_s["odom"] = math.inf, math.inf
@@ -55,7 +55,7 @@ def test_a_robot_is_connecting_and_its_first_data_waited_for_in_the_first_two_se
         assert bool(link.waited) == is_first
 
 
-def test_the_fastest_speeds_are_driven_and_the_shortest_times_taken_without_a_word():
+def test_the_fastest_speeds_and_the_shortest_times_are_taken():
     robot, link = make_robot()
     robot.drive(MAX_LINEAR_M_S, -MAX_ANGULAR_RAD_S)
     assert link.warned == [] and link.sent[-1][1:] == (MAX_LINEAR_M_S, -MAX_ANGULAR_RAD_S)
@@ -105,7 +105,7 @@ def test_robots_without_a_goal_may_be_as_near_as_their_spacing():
             swarm.go_to_each({0: (0.0, 0.0)}, frame="world")
 
 
-def test_goals_of_a_swarm_end_after_their_time_and_after_twenty_steps_without_a_pose():
+def test_goals_of_a_swarm_end_in_time_and_after_20_steps_without_a_pose():
     swarm = FakeSwarm(0)
     with pytest.raises(GoalError, match="not there after 1 s"):
         swarm.go_to_each({0: (9.0, 0.0)}, frame="world", timeout_s=1.0)

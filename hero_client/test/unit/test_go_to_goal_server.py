@@ -97,6 +97,8 @@ def drive(server, link, later=()):
 def test_a_goal_is_driven_to_and_reported_twice_a_second():
     server, link = make_server()
     assert server._thread.daemon, "a goal that never ends keeps no program alive"
+    assert go_to_goal_server.actionlib.ActionServer.call_args[1] == {"auto_start": False}, "its thread may then begin"
+    server._server.start.assert_called_once_with()
     assert not server.busy and not drive(server, link)
     server.put(ask(0.2))
     assert server.busy and drive(server, link) and not server.busy and server.reached

@@ -41,7 +41,7 @@ def test_a_held_key_drives_without_a_break_and_stops_soon_after():
     assert drive.command(presses_s[-1] + 0.31) == STOP
 
 
-def test_a_key_is_held_below_the_time_of_a_repetition_and_drives_below_its_own():
+def test_a_key_is_held_and_drives_below_its_times():
     for again_s, ends_s in ((0.3, 0.3 + 0.75), (0.25, 0.25 + 0.3)):
         drive = KeyDrive(0.1, 1.0)
         drive.press("w", 0.0)

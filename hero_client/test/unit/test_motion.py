@@ -123,7 +123,12 @@ def test_a_blocked_motion_fails_after_two_seconds_without_a_break():
 
 
 def test_wheels_that_stand_still_are_told_from_slow_commands_and_noise():
-    for wanted, is_stalled in (((0.02, 0.0), True), ((-0.019, 0.19), False), ((0.0, -0.2), True)):
+    for wanted, is_stalled in (
+        ((0.02, 0.0), True),
+        ((-0.02, 0.0), True),
+        ((-0.019, 0.19), False),
+        ((0.0, -0.2), True),
+    ):
         ended_s = step_until_end(Steady(*wanted), lambda now_s: HERE, 9.0)
         assert ended_s == (pytest.approx(STALL_S, abs=0.11) if is_stalled else 9.0)
     for far, turn, is_stalled in ((0.004, 0.0, True), (0.006, 0.0, False), (0.0, 0.04, True), (0.0, 0.06, False)):

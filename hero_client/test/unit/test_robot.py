@@ -141,9 +141,11 @@ def test_topics_that_few_read_are_subscribed_to_and_waited_for():
 
 def test_a_new_pose_counts_when_two_messages_came():
     robot, link = make_robot()
+    link.wait_for_next = lambda topic, timeout_s, count: link.waited.append(
+        (topic, timeout_s, count, link.subscribed[-1])
+    )
     robot.set_pose(1.0, 2.0, 3.0)
-    assert link.odometries == [(1.0, 2.0, 3.0)] and link.subscribed == ["odom"]
-    assert link.waited == [("odom", 5.0, 2)]
+    assert link.odometries == [(1.0, 2.0, 3.0)] and link.waited == [("odom", 5.0, 2, "odom")]
 
 
 def test_speeds_are_limited_and_that_is_said_once():
