@@ -92,7 +92,9 @@ def test_recordings_are_read_at_times_as_they_were():
     recording = make_recording(12.0, seed=2, rest_s=(4.0, 6.5))
     times_s, cut = sample_times(recording), recording.cut(0.61)
     found = times_s, measure_wheels(recording, times_s), find_slips(recording), interpolate_poses(cut.poses, times_s)
-    assert_kept([-1083.626786, 1537.4239643, 2803], *found, *cut, find_slips(make_recording(0.9)))
+    assert_kept([-1083.626786, 1537.4239643, 2803], *found, *cut)
+    none = find_slips(make_recording(0.9))
+    assert none.shape == (0,)
 
 
 def test_a_fit_is_told_with_its_errors_and_its_delay():

@@ -171,3 +171,9 @@ def test_compiled_neighbors_are_those_that_others_see(monkeypatch, range_m):
         near = read_sensor("near", Neighbors(range_m=range_m), Surroundings(0.0, poses, Random(range(20), 15)))
         found.append([values.tolist() for values in near])
     assert found[0] == found[1] and 0 < near.counts[:15].sum() <= 14 * 13 and not near.seen[3].any()
+
+
+def test_a_reading_of_a_sensor_that_is_not_there_is_named():
+    _, sensed = watch(1)
+    with pytest.raises(AttributeError, match="^the behavior has no sensor 'eye'$"):
+        sensed.eye  # noqa: B018

@@ -1,11 +1,14 @@
 """Files of users are read once, and what was read is what runs, here and in other processes."""
 
+import errno
 import os
 import pickle
 import sys
+from unittest.mock import create_autospec
 
 import pytest
 
+from hero_node.files import read_file
 from hero_swarm.behaviors import find_behavior
 from hero_swarm.sources import Sources
 
@@ -108,3 +111,10 @@ def test_a_pipe_as_behavior_is_refused_at_once(tmp_path):
     os.mkfifo(str(tmp_path / "own.py"))
     with pytest.raises(ValueError, match="no such file"):
         find_behavior(str(tmp_path / "own.py"))
+
+
+def test_a_file_that_the_disk_does_not_give_is_named_with_the_reason(own, monkeypatch):
+    error = PermissionError(errno.EACCES, "Permission denied")
+    monkeypatch.setattr("hero_swarm.sources.read_file", create_autospec(read_file, side_effect=error))
+    with pytest.raises(ValueError, match=f"behavior {own} cannot be read: Permission denied$"):
+        find_behavior(str(own), Sources())

@@ -106,6 +106,28 @@ def test_what_is_done_beside_an_error_is_kept():
     assert sorted(kept) == [1, 4, 9, 16, 25, 36, 49]
 
 
+def test_a_worker_leaves_ctrl_c_to_the_program_and_ends_with_it(monkeypatch):
+    began = []
+
+    class Thread:
+        def __init__(self, target, name, daemon):
+            self.start = lambda: began.append((target, name, daemon, signal.getsignal(signal.SIGINT)))
+
+    parent = types.SimpleNamespace(join=lambda: began.append("joined"))
+    monkeypatch.setattr(engines.threading, "Thread", Thread)
+    monkeypatch.setattr(engines.multiprocessing, "parent_process", lambda: parent)
+    monkeypatch.setattr(engines.os, "_exit", began.append)
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        engines._prepare_worker()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    ((follow, name, daemon, ctrl_c),) = began
+    assert (name, daemon, ctrl_c) == ("end with the program", True, signal.SIG_IGN)
+    follow()
+    assert began[1:] == ["joined", 1]
+
+
 class Slow(Executor):
     """Is done with number 0 alone, by an error or not; holds what waits."""
 

@@ -4,7 +4,7 @@ import pytest
 
 from hero_node.files.yaml_text import MAX_CHARACTERS
 from hero_swarm.experiments.errors import ExperimentError
-from hero_swarm.experiments.experiment_file import Bound, Start, parse_experiment
+from hero_swarm.experiments.experiment_file import Bound, Start, parse_experiment, read_experiment
 
 FILE = """\
 behavior: aggregation
@@ -222,6 +222,13 @@ def test_too_many_cells_are_refused_before_any_is_made(monkeypatch):
     vary = ", ".join("p%d: [%s]" % (number, values) for number in range(8))
     with pytest.raises(ExperimentError, match="at most 1000000 runs, not 300000000000000000"):
         parse(FILE.replace("robots: [10, 25], errors: [perfect, default]", "robots: [10], " + vary))
+
+
+def test_an_experiment_that_cannot_be_read_is_one_line(tmp_path):
+    (tmp_path / "e.yaml").mkdir()
+    for name, words in (("e.yaml", "Is a directory"), ("none.yaml", "No such file or directory")):
+        with pytest.raises(ExperimentError, match=f"{name} cannot be read: {words}$"):
+            read_experiment(str(tmp_path / name))
 
 
 VARYING = """\
