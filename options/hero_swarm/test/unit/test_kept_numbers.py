@@ -54,6 +54,10 @@ def test_the_filter_gives_the_commands_that_it_gave(mode, fence_m, neighbors, ke
     assert_kept(kept, *found, safe.calls, safe.limited_calls)
 
 
+def test_a_filter_is_called_at_20_hz_or_more_often_unless_it_is_off():
+    assert [SafetyFilter(mode, FENCE_M).rate_hz for mode in (OFF, FENCE, ROBOTS)] == [0.0, 20.0, 20.0]
+
+
 def test_a_robot_whose_yaw_is_no_number_is_stopped_as_one_without_a_pose():
     poses = np.array([[(0.0, 0.0, 0.0), (0.1, 0.0, math.nan)]])
     linear_m_s, angular_rad_s = SafetyFilter(ROBOTS)(poses, np.full(2, 0.1), np.full(2, 0.5))
@@ -130,15 +134,15 @@ class Wander(Behavior):
 @pytest.mark.parametrize(
     ("options", "kept"),
     [
-        ({}, [0.5936499, -5.5421421, 228]),
-        ({"errors": 0.0, "delay_s": 0.2}, [3.2390858, -4.7337563, 228]),
+        ({}, [-1.7791966, 0.8992851, 231]),
+        ({"errors": 0.0, "delay_s": 0.2}, [-3.3030875, 1.7374554, 231]),
         (
             {"drive": PULSES, "wifi": "bad", "known_errors": ["friction=0.2", "robot=1,lag_s=0.2"]},
-            [1.2403341, -6.4344972, 228],
+            [-2.3565602, 1.2102032, 231],
         ),
-        ({"safety": ROBOTS, "delay_s": 0.15, "errors": 2.0}, [2.0504626, -8.1243238, 228]),
-        ({"arena": "box", "known_errors": ["wheel_friction=0.4"]}, [-0.4197151, 2.5121394, 249]),
-        ({"is_point": True}, [1.2044838, -4.2455492, 228]),
+        ({"safety": ROBOTS, "delay_s": 0.15, "errors": 2.0}, [-1.9179, -2.1199834, 231]),
+        ({"arena": "box", "known_errors": ["wheel_friction=0.4"]}, [-6.6301459, -18.1835955, 252]),
+        ({"is_point": True}, [1.246201, -1.3999715, 231]),
     ],
     ids=str,
 )
@@ -152,15 +156,15 @@ def test_a_trial_drives_robots_to_where_it_did(options, kept):
     found = [trial.poses]
     for time_s, poses in trial.run(1.5, every_s=0.5):
         state = trial.state
-        found += [time_s, poses, trial.velocities, state.objects, state.radii_m, trial.things.radii_m]
+        found += [time_s, state.time_s, poses, trial.velocities, state.objects, state.radii_m, trial.things.radii_m]
     assert_kept(kept, *found)
 
 
 def test_objects_are_scattered_where_they_were():
-    arena, robots = load_arena("box"), draw_poses(1, 4, reach_m=0.5)[0]
-    arena = arena._replace(objects=arena.objects * 3)
-    found = [thing.pose for seed in (1, 2) for thing in scatter_objects(arena, robots, seed)]
-    assert_kept([-1.1181957, 1.2561986, 18], *found)
+    arena, robots = load_arena("box"), draw_poses(1, 12, reach_m=0.5)[0]
+    arena = arena._replace(objects=arena.objects * 4)
+    found = [thing.pose for seed in range(8) for thing in scatter_objects(arena, robots, seed)]
+    assert_kept([2.9737138, 7.845585, 96], *found)
 
 
 @pytest.mark.parametrize(

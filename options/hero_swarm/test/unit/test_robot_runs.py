@@ -176,3 +176,30 @@ def test_no_trial_starts_before_all_robots_are_ready(stage, capsys):
     assert capsys.readouterr().err.splitlines() == [
         f"seed 1: cannot start: {reason}" for reason in ("stopped", "hero_3: has gone", "no pose")
     ]
+
+
+def test_the_operator_is_told_who_is_farthest_off_and_who_is_turned_most():
+    swarm = SimpleNamespace(robots=[SimpleNamespace(name="hero_3"), SimpleNamespace(name="hero_7")])
+    starts = np.array([(0.0, 0.0, 3.0), (1.0, 1.0, 0.25)])
+    for turn_rad, degrees in (
+        (0.5, "29 degrees (hero_7)"),
+        (-0.5, "29 degrees (hero_7)"),
+        (0.125, "16 degrees (hero_3)"),
+    ):
+        poses = starts + [(0.03, -0.04, -6.0), (0.0, 0.02, turn_rad)]
+        source = SimpleNamespace(read=lambda poses=poses: (poses, np.zeros(2)))
+        offsets = robot_runs._describe_offsets(swarm, starts, source)
+        assert offsets == f"robots are up to 50 mm (hero_3) and {degrees} from their places"
+
+
+def test_the_drive_to_the_starts_ends_after_two_minutes(stage, monkeypatch):
+    drive = mock.create_autospec(robot_runs.StartDrive, instance=True)
+    drive.done, drive.lateness = False, SimpleNamespace(take_warning=lambda: "late")
+    drive.step.return_value = np.zeros((2, 1))
+    monkeypatch.setattr(robot_runs, "StartDrive", lambda starts, radius_m: drive)
+    stage.max_body_radius_m, warned = 0.06, []
+    stage.report_missing, stage.fresh_proximity, stage.warn = mock.Mock(), lambda: None, warned.append
+    stage.drive, stage.warn_if_blind = lambda *speed: None, lambda: None
+    robot_runs._drive_to_starts(stage, stage, np.zeros((1, 3)), stage, "seed 1")
+    assert stage.now_s - 50.0 == pytest.approx(120.0, abs=0.06) and stage.stops == 1
+    assert len(drive.step.call_args_list) == pytest.approx(20.0 * 120.0, abs=2) and set(warned) == {"late"}
