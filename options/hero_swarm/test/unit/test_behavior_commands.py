@@ -210,8 +210,9 @@ def test_groups_gather_and_keep_away_from_others():
         "segregation", (0, 0, 0), (9, 0, 0), (0.25, 0, 0), (9, 9, 0), (0.25, 0, 0), near=Neighbors(range_m=2.0)
     )
     assert crowd[0][0] == pytest.approx(4.0 / math.sqrt(2.0) * 0.02), "less from each of many"
-    colors = find_behavior("segregation")().colors(np.array([0, 1, 2, 5]))
-    assert colors.tolist() == [[1, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 1]]
+    colors = find_behavior("segregation")().colors(np.arange(7))
+    palette = [[1, 0, 0], [0, 0, 1], [0, 1, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]
+    assert colors.tolist() == [*palette, palette[0]]
 
 
 def test_robots_drive_to_the_middles_of_their_cells():
@@ -361,6 +362,10 @@ def test_a_box_is_pushed_when_all_are_in_place_and_until_one_is_far_off():
         assert pushes.tolist() == [pushes_on] * 2, (back_m, aside_m, was_pushing)
     commands, _ = act("box_pushing", right, move(left, 0.04, 0.0), things=things)
     assert commands == close_to(STILL, (1.5 * 0.04, 0.0)), "the others wait"
+    near, _ = act("box_pushing", (-1.0 - 0.3 * row_m, 0.0, 0.0), things=things, memory=np.array([True]))
+    assert near == close_to((0.08, 0.0)), "whoever pushes does not go around"
+    for name in ("box_pushing", "cooperative_transport"):
+        assert act(name, right, things=make_things(0.0, 0.0))[0] == close_to(STILL), "it is where it shall be"
     around, _ = act("box_pushing", (-1.0 + row_m, 0.0, math.pi / 2.0), things=things)
     assert around == close_to((0.08, 0.0))
 

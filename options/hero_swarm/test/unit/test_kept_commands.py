@@ -115,7 +115,8 @@ def test_machines_and_trees_command_what_they_did_on_floors_and_by_lamps():
         ([make_tree()], True),
     ):
         found += run(make_machine(machines, is_tree)(), FLOOR, 0.4)
-    assert_kept([6.9250454, 7.3162162, 1440], *found)
+    found += run(make_machine([make_states(1)], False, turn_rad_s=1.25, rate_hz=5.0)(), FLOOR, 0.3)
+    assert_kept([19.488865, 3.7802159, 1920], *found)
 
 
 def test_machines_become_the_tables_and_the_graph_that_they_did():
@@ -126,3 +127,23 @@ def test_machines_become_the_tables_and_the_graph_that_they_did():
 
 def test_accelerated_points_move_as_they_did():
     assert_kept([12.3374894, -51.3249267, 600], *run(find_behavior(str(ACCELERATED))(noise=0.2), None, 2.0))
+
+
+def test_pages_may_set_numbers_up_to_the_limits_that_they_had():
+    kinds = [find_behavior(name) for name in list_names()]
+    settings = [(getattr(kind, name), *one.limits) for kind in kinds for name, one in sorted(kind.settings.items())]
+    assert_kept([98.1656097, -1007.9284495, 183], *settings)
+
+
+def test_a_machine_takes_floors_at_the_bounds_for_gray_and_shows_its_state():
+    when = [{"to": str(number), "when": f"{name} floor", "probability": 1.0}
+            for number, name in enumerate(("black", "gray", "white"))]  # fmt: skip
+    states = [{"name": str(number), "do": "stop", "next": when} for number in range(3)]
+    machine = make_machine([states], False)()
+    gray = np.array([0.0, 0.2499, 0.25, 0.5, 0.75, 0.7501, 1.0])
+    sensed = SimpleNamespace(floor=SimpleNamespace(gray=gray), near=SimpleNamespace(counts=np.zeros(7, dtype=int)))
+    found = machine._move(sensed, 0, np.zeros(7, dtype=int), np.zeros((7, 5)))
+    assert found.tolist() == [0, 0, 1, 1, 1, 2, 2] and machine.rate_hz == 10.0
+    shown = machine.colors((np.arange(8),)).tolist()
+    assert shown[0] == shown[7] == [0, 0, 1] and len({tuple(color) for color in shown}) == 7
+    assert {part for color in shown for part in color} == {0.0, 1.0}
