@@ -1,6 +1,9 @@
 """Options of the simulator: what they are unless they are given, and the numbers that they take."""
 
 import re
+import runpy
+import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -112,3 +115,20 @@ def test_the_infrared_and_the_servos_of_a_flash_are_as_asked(tmp_path):
     (tmp_path / "hero_8.json").write_text("{}")
     with pytest.raises(OptionError, match=r"flash file .*hero_8\.json"):
         build("--count=2", "--first-id=7", f"--flash-dir={tmp_path}")
+
+
+@pytest.mark.filterwarnings("ignore:.*found in sys.modules")
+@pytest.mark.parametrize("module", ["hero_sim", "hero_sim.in_process"])
+def test_modules_run_as_programs_end_with_their_status(monkeypatch, capsys, module):
+    monkeypatch.setattr(sys, "argv", [module, "--no-such-option"])
+    handler = signal.getsignal(signal.SIGINT)
+    try:
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_module(module, run_name="__main__")
+        assert ended.value.code == 2 and "usage: " in capsys.readouterr().err
+        assert (signal.getsignal(signal.SIGINT) == signal.SIG_DFL) == (module == "hero_sim"), "Ctrl-C while it loads"
+        monkeypatch.setitem(sys.modules, "hero_sim.main", None)
+        with pytest.raises(SystemExit, match="^hero_sim: hero_sim.main is missing; install python3-numpy"):
+            runpy.run_module("hero_sim", run_name="__main__")
+    finally:
+        signal.signal(signal.SIGINT, handler)
