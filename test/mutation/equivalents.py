@@ -8,7 +8,7 @@ import ast
 import re
 from collections import Counter
 from pathlib import Path
-from typing import Iterator, List, NamedTuple, Pattern, Tuple
+from typing import Iterator, List, NamedTuple, Optional, Pattern, Tuple
 
 from mutation.mutations import Mutation, list_mutations
 
@@ -20,12 +20,12 @@ class Equivalent(NamedTuple):
     """One line."""
 
     count: int
-    pattern: Pattern[str]
+    pattern: Optional[Pattern[str]]  # None: the change is the text
     text: str
 
     def hides(self, key: str) -> bool:
         """Return whether this change is one of those of the line."""
-        return bool(self.pattern.fullmatch(key))
+        return bool(self.pattern.fullmatch(key)) if self.pattern else key == self.text
 
 
 def read_lines() -> List[Equivalent]:
@@ -34,8 +34,8 @@ def read_lines() -> List[Equivalent]:
     for line in FILE.read_text(encoding="utf-8").splitlines():
         if line and not line.startswith("#"):
             count, key, _reason = re.fullmatch(r"(\d+) ([^\t]+)\t(.+)", line).groups()
-            pattern = key[1:] if key.startswith("/") else re.escape(key)
-            found.append(Equivalent(int(count), re.compile(pattern), key))
+            pattern = re.compile(key[1:]) if key.startswith("/") else None
+            found.append(Equivalent(int(count), pattern, key))
     return found
 
 
