@@ -96,13 +96,13 @@ export class StopPanel {
   show() {
     const [level, text] = this.describe() || ["", ""];
     const banner = element("stopping");
-    banner.hidden = text === "";
+    banner.toggleAttribute("hidden", text === ""); // what is so already is not painted anew
     if (banner.dataset.level !== level) banner.dataset.level = level;
     setText(banner, text);
     const atRest = this.stopped && this.connection.isFresh && level !== "error" && level !== "warn";
     element("stop").classList.toggle("done", atRest);
     setText(element("stop"), atRest ? "STOPPED" : "STOP ALL");
-    element("release_bar").hidden = !this.stopped;
+    element("release_bar").toggleAttribute("hidden", !this.stopped);
     element("release").hidden = !this.mayRelease;
     setText(element("release_note"), this.mayRelease ? "Robots may move then." : "The teacher releases the robots.");
     const { classList } = element("release");
