@@ -12,6 +12,7 @@ from sensor_msgs.msg import Joy
 from hero_client.apps import joystick_teleop, keyboard_teleop
 from hero_client.apps.joystick_teleop import (
     DRAIN_S,
+    FIRST_WARNING_S,
     SILENCE_S,
     JoystickMapping,
     JoystickTeleop,
@@ -260,6 +261,26 @@ def test_a_joystick_that_falls_silent_stops_the_robots(shown):
         teleop.step(swarm.now_s)
     assert "hero_1: waiting: nothing subscribes" in swarm.logged[0]
     assert not velocities(swarm.links[0]) and [level for level, _ in shown] == ["logwarn"] * 3, "every 5 s from 2 s on"
+
+
+def test_a_joystick_is_silent_told_and_heard_again_from_its_times_on(shown):
+    assert not joystick_teleop.is_held([1] * 5, 5) and joystick_teleop.is_held([0, 1], 1), "one that it lacks"
+    swarm = make_swarm(0)
+    start_s, clock = swarm.now_s, swarm._clock
+    teleop = JoystickTeleop(swarm, MAPPING)
+    for after_s, warnings in ((FIRST_WARNING_S - 0.125, 0), (FIRST_WARNING_S, 1)):
+        teleop._pauses.step(start_s + after_s)
+        teleop.step(start_s + after_s)
+        assert len(shown) == warnings
+    push(teleop, 4)
+    arrived_s = teleop._arrival_s
+    for after_s, command in ((SILENCE_S - 0.125, (0.1, 0.0)), (SILENCE_S, (0.0, 0.0))):
+        teleop.step(arrived_s + after_s)
+        assert velocities(swarm.links[0])[-1] == command
+    teleop._fresh_s = clock.now_s = arrived_s + 0.25
+    teleop._pauses.step(clock.now_s)
+    push(teleop, 4)
+    assert teleop._arrival_s == clock.now_s
 
 
 def test_what_waited_during_a_pause_drives_no_robot(shown):

@@ -333,6 +333,14 @@ def test_a_rival_keeps_its_robot_for_half_a_second_of_silence():
         assert commanders.needs_another_stop(stopper, now_s) == has_more, (silence_s, node)
 
 
+def test_as_many_commands_as_the_limit_in_a_second_are_no_fault():
+    for commands, is_fault in ((int(RATE_MAX_HZ), False), (int(RATE_MAX_HZ) + 1, True)):
+        sources = CommandSources(WheelMotion())
+        for _ in range(commands):
+            sources.note_command(VELOCITY, VELOCITY, None, "/mine", True, 10.0)
+        assert bool(sources.find_fault(10.0)) == is_fault
+
+
 def test_wheels_that_do_not_turn_for_five_seconds_of_commands_are_told():
     wheels = WheelMotion()
     sources = CommandSources(wheels)
