@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import os
 from types import SimpleNamespace
 from unittest import mock
 
@@ -69,7 +70,12 @@ def make_node(monkeypatch):
     """A node without ROS, whose camera file and log a test holds."""
     node = track.TrackNode.__new__(track.TrackNode)
     node._path, node._file_s, node._settings, node._tracker = "camera.yaml", 1.0, "old settings", "old tracker"
-    node._logged_s, node.file, node.lines = {}, SimpleNamespace(changed_s=1.0, loads=0, content=None), []
+    node._process, node._logged_s, node.file, node.lines = (
+        None,
+        {},
+        SimpleNamespace(changed_s=1.0, loads=0, content=None),
+        [],
+    )
 
     def load(path):
         assert path == "camera.yaml"
@@ -286,6 +292,17 @@ def test_diagnostics_come_each_second_with_the_rate_or_with_problems(bench):
     bench.now_s, bench.source.problem = 53.5, "unplugged"
     (message,) = bench.see()["/diagnostics"]
     assert [(status.level, status.message) for status in message.status] == [(DiagnosticStatus.ERROR, "unplugged")]
+
+
+def test_another_family_in_the_camera_file_is_sought_by_another_detector(bench):
+    for parts, count in (({"delay_s": 0.05}, 1), ({"family": "16h5"}, 2), ({"decimate": 2.5}, 3)):
+        camera_file.update(bench.node._path, parts)
+        os.utime(bench.node._path, (count, count))
+        bench.now_s += 1.5
+        for _ in range(3):
+            bench.see()
+        assert (bench.start.call_count, bench.detector.close.call_count) == (count, count - 1), parts
+    assert bench.start.call_args.args[1:3] == ("16h5", 2.5) and len(bench.sent["~measured_poses"]) == 1
 
 
 def test_the_end_leaves_the_camera_and_ends_the_detector(bench):

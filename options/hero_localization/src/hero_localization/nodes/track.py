@@ -157,6 +157,9 @@ class TrackNode:
             rospy.logerr(f"{error}; the calibration before it counts")
             return
         if settings.camera is not None:
+            if self._process is not None and settings[:3] != self._settings[:3]:  # of another detector
+                self._process.close()
+                self._process = None
             self._settings = settings
             self._start_tracker(settings.camera)
             rospy.loginfo(f"{self._path} has changed, and counts from now on")
