@@ -212,6 +212,16 @@ def test_the_end_of_a_wall_presses_the_edge_that_it_pokes():
         assert contact.depth_m == pytest.approx(0.01) and contact.normal_x == pytest.approx(-1.0)
 
 
+def test_a_corner_right_at_the_end_of_a_wall_is_pressed():
+    body = put(BOX, 0.0, 0.101)
+    (left_m, y_m), (right_m, _) = sorted(body.corners_m, key=lambda corner_m: (corner_m[1] > 0.1, corner_m[0]))[:2]
+    for ends in ((left_m, 0.0, right_m, 0.0), (right_m, 0.0, left_m, 0.0)):
+        contacts = touch_walls(body, [ends], 0.004)
+        found = sorted((contact.x_m, contact.y_m) for contact in contacts)
+        assert found == [(left_m, 0.0), (left_m, y_m), (right_m, 0.0), (right_m, y_m)]
+        assert {(contact.normal_x, contact.normal_y) for contact in contacts} == {(0.0, 1.0)}
+
+
 def test_outlines_are_the_edges_and_discs_where_they_are():
     disc, box = place(Disc(0.05), 0.4, 0.1), place(BOX, 0.0, 0.0, math.pi / 2.0)
     edges_m, discs_m = list_outlines([disc, box])

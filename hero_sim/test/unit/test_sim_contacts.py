@@ -188,7 +188,7 @@ def test_loops_over_worlds_give_the_same_bytes_also_without_numba(monkeypatch, i
 
 
 def count_looks(monkeypatch, arena, looped):
-    """Return how many contacts were active, and how often they were looked at, left, listed and solved."""
+    """Return how many contacts were active, and listed; how often they were looked at, left, listed and solved."""
     looks = collections.Counter()
     for name in ("list_near", "find_contacts", "solve_contacts", "leave_walls"):
         call = getattr(body_loops, name)
@@ -197,23 +197,31 @@ def count_looks(monkeypatch, arena, looped):
             result = call(*given)
             looks[name] += 1
             looks["active"] += result[2] if name == "find_contacts" else 0
+            looks["contacts"] += given[3][1] if name == "list_near" and result else 0
             return result
 
         monkeypatch.setattr(body_loops, name, count)
-    listing = contacts.Contacts._list_near
-    monkeypatch.setattr(
-        contacts.Contacts, "_list_near", lambda own, near: (looks.update(["list_near"]), listing(own, near))[1]
-    )
+    list_near = contacts.Contacts._list_near
+
+    def list_and_count(own, before):
+        near = list_near(own, before)
+        looks.update(list_near=1, contacts=len(near.keys))
+        return near
+
+    monkeypatch.setattr(contacts.Contacts, "_list_near", list_and_count)
     monkeypatch.setattr(compiled, "_compile_loops", lambda module: module)
     monkeypatch.setattr(compiled, "COMPILED_ROWS", 0 if looped else 10**9)
-    arena, rng = load_arena(arena), np.random.RandomState(2)
-    poses = np.vstack([place_robots(arena, 4, np.random.RandomState(seed)) for seed in range(2)])
-    errors = draw_errors([np.random.RandomState(row) for row in range(8)])
+    rng = np.random.RandomState(2)
+    arena = (
+        load_arena(arena) if arena else build_rectangle(0.9, 0.7, 0)._replace(circles_m=np.array([(0.1, 0.1, 0.05)]))
+    )
+    poses = np.vstack([place_robots(arena, 6, np.random.RandomState(seed)) for seed in range(2)])
+    errors = draw_errors([np.random.RandomState(row) for row in range(12)])
     world = World(arena, poses, [np.random.RandomState(seed) for seed in range(2)], errors)
     looks.clear()
     with np.errstate(over="ignore"):  # of random bits, which wrap
         for _ in range(25):
-            world.commands_m_s[:] = rng.uniform(-0.05, 0.25, (8, 2))
+            world.commands_m_s[:] = rng.uniform(-0.05, 0.25, (12, 2))
             world.step(20)
             world.poses.sum()
     return [looks[name] for name in sorted(looks)]
@@ -223,9 +231,9 @@ def count_looks(monkeypatch, arena, looped):
 @pytest.mark.parametrize(
     ("arena", "looped", "kept"),
     [
-        ("maze", False, [346, 144, 132, 39, 215]),
-        ("maze", True, [344, 244, 215, 63, 215]),
-        ("discs", False, [140, 261, 220, 36, 220]),
+        ("", False, [1564, 520, 216, 205, 52, 404]),
+        ("", True, [1562, 486, 422, 404, 94, 404]),
+        ("discs", False, [696, 110, 415, 407, 48, 508]),
     ],
 )
 def test_bodies_are_looked_at_as_seldom_as_they_were(monkeypatch, arena, looped, kept):

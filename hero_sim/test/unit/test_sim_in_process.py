@@ -135,7 +135,7 @@ def test_an_option_that_cannot_be_used_is_one_line(run):
     assert "--model hero_minus: must be one of" in ended.stderr and "Traceback" not in ended.stderr
 
 
-def test_robots_are_four_unless_they_are_counted_and_named_where_they_ended(run, tmp_path):
+def test_robots_are_four_unless_counted_and_named_where_they_ended(run, tmp_path):
     text = "from hero_client import Swarm\nwith Swarm.discover() as swarm:\n    print(len(swarm))\n"
     drive = text + "    swarm[1].forward(0.05)\n    swarm[1].drive(0.0, 0.5, duration_s=1.0)\n    1 / 0\n"
     ended = run(text, arguments=())

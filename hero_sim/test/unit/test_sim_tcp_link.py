@@ -146,6 +146,14 @@ def test_the_end_of_a_connection_is_told_once_and_nothing_is_sent_after_it(drive
     assert driver.events.seen == ["made", "lost"] and driver.link.count_open() == 0
 
 
+def test_a_closed_connection_is_over_for_the_driver_at_once(driver):
+    connection = driver.link._connections[0]  # what nothing refers to would be closed anyway
+    driver.link.close(0)
+    driver.socket.settimeout(60.0)
+    assert driver.socket.recv(1) == b"" and connection.socket.fileno() == -1
+    assert driver.events.seen == ["made"], "which the robot knows"
+
+
 def reset(driver):
     driver.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     driver.socket.close()
