@@ -281,6 +281,15 @@ def start_confirmed_filter():
     return pose_filter
 
 
+def test_an_outlier_elsewhere_takes_one_from_those_that_agree():
+    pose_filter, outcomes = start_confirmed_filter(), []
+    for index, x_m in enumerate((0.3, 0.3, 0.3, 0.9, 0.3, 0.3)):
+        stamp_s = 1.05 + 0.05 * index
+        pose_filter.add_odometry(stamp_s, ZERO)
+        outcomes.append(pose_filter.add_measurement(StampedPose(stamp_s, Pose(x_m, 0.0, 0.0), COVARIANCE)))
+    assert outcomes == [Outcome.OUTLIER] * 5 + [Outcome.MOVED]
+
+
 @pytest.mark.parametrize(("off", "outcome"), [(4.03, Outcome.USED), (4.05, Outcome.OUTLIER)])
 def test_one_true_pose_of_a_thousand_is_an_outlier(off, outcome):
     for axis in range(3):
