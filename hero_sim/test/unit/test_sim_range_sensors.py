@@ -166,6 +166,16 @@ def test_robots_that_stream_expect_all_of_their_readings():
     assert len(looks) < 0.8 * sent
 
 
+def test_distances_are_whole_millimeters_up_to_the_reach():
+    errors = draw_errors([np.random.RandomState(row) for row in range(40)], 0.0)
+    poses = np.column_stack((np.zeros(40), np.arange(40.0), np.zeros(40)))
+    for wall_m in (3.0, 9.0):
+        arena = build_default(1)._replace(segments_m=np.array([(wall_m, -9.0, wall_m, 99.0)]))
+        read_m = World(arena, poses, [np.random.RandomState(0)], errors).read_distances(np.arange(40))
+        assert np.round(read_m, 3).tolist() == read_m.tolist() and len(np.unique(read_m)) > 6
+        assert read_m.mean() == pytest.approx(min(wall_m, 4.0), abs=0.004) and read_m.max() <= 4.0
+
+
 NOTHING = (1e6, 0.0)
 
 
@@ -257,12 +267,14 @@ def test_compiled_sensors_see_the_same_bytes(monkeypatch):
 
 def test_loops_over_rays_see_the_same_bytes_as_arrays(monkeypatch):
     arena = build_rectangle(0.6, 0.5, 0)._replace(circles_m=np.array([[0.1, 0.15, 0.04]]))
-    poses = np.array([(-0.2, -0.1, 0.4), (-0.1, -0.1, 2.5), (0.0, 0.1, -1.0), (0.2, -0.15, 5.0)])
+    touching_m = 0.3 - BODY_RADIUS_M - 5e-4
+    poses = np.array([(-0.2, -0.1, 0.4), (-0.1, -0.1, 2.5), (0.0, 0.1, -1.0), (touching_m, -0.15, 5.0)])
     errors = draw_errors([np.random.RandomState(row) for row in range(4)])
     world = World(arena, poses, [np.random.RandomState(0)], errors)
     ((_, sight),) = world._look(np.arange(4), world.observe())
     seen = []
     for loops in (None, ray_loops):
         monkeypatch.setattr(range_sensors, "compile_loops", lambda module, rows, loops=loops: loops)
-        seen.append(range_sensors.measure_signals(sight, ALPHA, BETA))
+        seen.append(range_sensors._measure_brightness(sight))
     assert seen[0].tobytes() == seen[1].tobytes() and len(np.unique(seen[0])) > 20
+    assert seen[0].max() > 1.0 / 0.002**2, "nearer than that, a sensor gets no more light than from 1 mm"

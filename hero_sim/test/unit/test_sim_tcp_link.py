@@ -126,6 +126,13 @@ def test_what_waits_is_limited_and_can_be_dropped(driver, monkeypatch):
     assert sent.startswith(received[:-3]) and len(received) < len(sent) + 3, "whole until there, nothing twice"
 
 
+def test_what_a_full_system_takes_nothing_of_is_sent_whole(driver):
+    driver.fill()
+    driver.link.drop_unsent(0)
+    driver.link.send(0, b"all of it, to the end")
+    assert driver.read_to(b"end").endswith(b"all of it, to the end")
+
+
 def test_a_paused_robot_leaves_what_comes_to_the_system(driver):
     driver.link.pause(0, True)
     driver.socket.sendall(b"later")
