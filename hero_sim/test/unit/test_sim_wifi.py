@@ -134,6 +134,16 @@ def test_outages_last_as_long_and_come_as_often_as_the_profile_says():
     assert [late.find_arrival(199990.0 + step) - 199990.0 - step for step in range(10)] == list(delays_ms[-10:])
 
 
+def test_what_was_on_its_way_when_a_stall_began_arrives_when_it_ends():
+    radio = Radio(make_profile(base_ms=50.0), np.random.RandomState(0))
+    for direction in (radio.up, radio.down):
+        direction.put(0, b"before")
+    radio.stall(10, 200)
+    for direction in (radio.up, radio.down):
+        direction.put(20, b", meanwhile")
+        assert [direction.take(now_ms) for now_ms in (50, 209, 210, 260)] == [b"", b"", b"before", b", meanwhile"]
+
+
 def test_what_waits_for_a_stall_to_end_passes_at_the_networks_pace():
     radio = Radio(make_profile(bytes_per_s=1000.0), np.random.RandomState(0))
     radio.stall(0, 500)
