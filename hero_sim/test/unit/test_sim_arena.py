@@ -88,6 +88,18 @@ def test_areas_lamps_and_objects_of_a_file_are_where_it_says(tmp_path):
     assert locate_arena("/a/b.yaml", "c.yaml") == "/a/c.yaml"
 
 
+def test_files_of_an_arena_are_read_as_asked():
+    read = []
+
+    def give(path):
+        read.append(path)
+        return b"name: yes\nbounds_m: [0, 0, 1, 1]\n"
+
+    assert load_arena("/packed/mine.yaml", give).name == "yes" and read == ["/packed/mine.yaml"]
+    load_arena("maze", give)
+    assert read[1].endswith("/world/arenas/maze.yaml")
+
+
 def test_a_closed_wall_is_the_rim_only_if_it_reaches_as_far_as_all_others(tmp_path):
     ring = "[[-1, -1], [1, -1], [1, 1], [-1, 1], %s]"
     for walls, rims in (

@@ -8,6 +8,7 @@ from driver_side import RECEIVED, DriverSide
 
 from hero_sim.errors import OptionError
 from hero_sim.robot.flash import Flash
+from hero_sim.robot.motor_pid import POSITION_GAINS, VELOCITY_GAINS
 
 CENTERS = struct.pack("<2h", 1490, 1512)
 
@@ -44,6 +45,14 @@ def test_a_reboot_of_a_robot_keeps_what_was_set_without_any_folder():
     robot = driver.swarm.robots[0]
     robot.switch_on(driver.swarm.now_ms)
     assert robot.motors.motors.centers_us == [1490, 1512]
+
+
+def test_gains_of_a_wheel_without_a_proportional_one_are_the_programs():
+    robot = set_centers().swarm.robots[0]
+    robot.flash.velocity_pid, robot.flash.position_pid = [1.0, 0.0, 0.0, 0.0, 2.0, 3.0], [0.0, 4.0, 5.0, 6.0, 0.0, 0.0]
+    robot.switch_on(0)
+    assert [pid.gains for pid in robot.motors.velocity.pids] == [(1.0, 0.0, 0.0), VELOCITY_GAINS]
+    assert [pid.gains for pid in robot.motors.position.pids] == [POSITION_GAINS, (6.0, 0.0, 0.0)]
 
 
 def test_a_folder_that_goes_away_costs_no_robot_but_is_reported(tmp_path):
