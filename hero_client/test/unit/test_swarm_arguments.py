@@ -56,7 +56,7 @@ def test_robots_are_waited_for_until_all_drivers_are_known(monkeypatch):
         clock.now_s += duration_s
         return True
 
-    rows = [Robot(id=number, state=Robot.READY) for number in (5, 2, -1)] + [Robot(id=3)]
+    rows = [Robot(id=number, state=Robot.READY) for number in (5, 0, -1)] + [Robot(id=3)]
     monkeypatch.setattr(drivers_module, "time", SimpleNamespace(monotonic=lambda: clock.now_s))
     drivers = Drivers.__new__(Drivers)
     drivers.read_each = lambda: {} if drivers.report is None else {"/hero_driver": drivers.report}
@@ -71,12 +71,12 @@ def test_robots_are_waited_for_until_all_drivers_are_known(monkeypatch):
             drivers.wait_for_robots(3.0, sleep)
         assert clock.now_s == pytest.approx(103.0, abs=0.03)
     drivers.report, clock.now_s = RobotArray(robots=rows), 100.0
-    assert drivers.wait_for_robots(3.0, sleep, [5]) == [2, 5] and clock.now_s == pytest.approx(100.02)
-    assert drivers.wait_for_robots(3.0, sleep, [5, 3]) == [2, 5] and clock.now_s == pytest.approx(103.02, abs=0.03)
+    assert drivers.wait_for_robots(3.0, sleep, [5]) == [0, 5] and clock.now_s == pytest.approx(100.02)
+    assert drivers.wait_for_robots(3.0, sleep, [5, 3]) == [0, 5] and clock.now_s == pytest.approx(103.02, abs=0.03)
     with pytest.raises(RobotNotReadyError):
         drivers.wait_for_robots(3.0, sleep)
     monkeypatch.setattr(Drivers, "is_settled", True)
-    assert drivers.wait_for_robots(3.0, sleep) == [2, 5]
+    assert drivers.wait_for_robots(3.0, sleep) == [0, 5]
 
 
 @pytest.mark.parametrize("wrong", [3, "012", True, None])

@@ -44,6 +44,8 @@ def test_a_log_line_holds_no_names_of_topics_and_is_published_once(rosout_publis
     [line] = rosout_publisher.lines
     assert (line.msg, line.level, line.topics) == ("a line about hero_3", line.ERROR, [])
     assert line.header.stamp.secs == 7
+    asks = rosout.rospy  # by the one or the other, as its version has it
+    assert not asks.get_param_cached("/rosout_disable_topics_generation") and not asks.has_param("/use_sim_time")
     logging.getLogger("rosout").error("another line")
     assert [line.msg for line in rosout_publisher.lines] == ["a line about hero_3", "another line"]
 
