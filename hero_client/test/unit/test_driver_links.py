@@ -116,7 +116,10 @@ def test_drivers_are_found_and_forgotten_when_they_have_gone(ros):
     ros.look()
     assert ros.drivers.names() == [A, B]
     ros.report(B, (1, Robot.READY))
-    ros.known = []
+    reporting, ros.reporting, ros.is_master_there = ros.reporting, set(), False
+    ros.look()
+    assert B in ros.drivers.names(), "of a master that is away is known what it said"
+    ros.known, ros.reporting, ros.is_master_there = [], reporting, True
     ros.look()
     assert ros.drivers.names() == [B], "no longer listed, but connected"
     ros.reporting = set()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from linkless_robot import FakeSwarm
 
+from hero_client.controllers.pose_check import FROZEN
 from hero_client.robots.common_frame import CommonFrame
 from hero_client.robots.group import wait_for_all
 from hero_client.robots.swarm_base import FIRST_REPORT_S, POLL_HZ, REPORT_PERIOD_S
@@ -241,12 +242,22 @@ def test_poses_in_one_frame_are_waited_for_and_their_absence_told():
         swarm.links[1].localized = error
         assert frame.pose_of(swarm[1]) is None and frame.missing["hero_1"] == str(error)
 
+    swarm.links[0].localized = Pose(1.0, 1.0, 0.0)
+    swarm.links[0].velocity = Velocity(0.125, 0.0)
+    for _ in range(32):
+        pose = frame.pose_of(swarm[0])
+        assert (pose is None) == (frame.missing["hero_0"] == FROZEN), "what is not where the robot is is no pose"
+        swarm.sleep(0.125)
+    assert pose is None
+    swarm.links[0].localized, swarm.links[0].velocity = None, Velocity(0.0, 0.0)
+    swarm.links[0].pose = Pose(0.0, 0.0, 0.0)
+
     def measure_later(step_s):
-        swarm.links[1].localized = None if swarm.now_s > 104.0 else swarm.links[1].localized
+        swarm.links[1].localized = None if swarm.now_s > 108.0 else swarm.links[1].localized
 
     swarm._clock.joined.append(SimpleNamespace(advance=measure_later))
     assert swarm.wait_for_poses(frame) == [(0.0, 0.0, 0.0), (0.0, 0.5, 0.0)]
-    assert swarm.now_s == pytest.approx(104.0, abs=1.01 / POLL_HZ)
+    assert swarm.now_s == pytest.approx(108.0, abs=1.01 / POLL_HZ)
     assert [text for _, _, text in swarm.logged] == ["hero_1: waiting: was never measured"]
     swarm._clock.is_to_continue = False
     with pytest.raises(ProgramError, match="ended before all robots were there"):

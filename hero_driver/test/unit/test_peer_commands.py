@@ -151,9 +151,11 @@ def test_a_command_for_what_the_robot_has_not_declared_costs_no_other():
 def test_a_command_too_long_for_the_robot_is_reported_and_costs_no_other():
     with Clock().is_the_drivers() as clock:
         robot = CommandedRobot(clock)
-        for payload in (bytes(65536), LIGHT_PAYLOAD):
+        for topic in robot.peer.session.topics.values():
+            topic.info = topic.info._replace(buffer_length=64)
+        for payload in (bytes(65), LIGHT_PAYLOAD):  # few enough to be sent in one go
             robot.bridge.commands.queue.offer(LIGHT, payload)
         robot.peer.send_commands()
         clock.run(0.1)
-    assert len(robot.warnings) == 1 and "65536 bytes does not fit the robot's buffer" in robot.warnings[0]
+    assert len(robot.warnings) == 1 and "65 bytes does not fit the robot's buffer of 64 bytes" in robot.warnings[0]
     assert [payload for _, name, payload in robot.taken if name == LIGHT] == [LIGHT_PAYLOAD]
