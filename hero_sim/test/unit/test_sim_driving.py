@@ -243,6 +243,15 @@ def test_imu_readings_are_up_to_a_quarter_of_a_second_old():
     assert min(ages_s) == pytest.approx(0.0, abs=0.035)
 
 
+def test_the_queue_of_the_imu_gives_a_reading_every_ten_milliseconds():
+    hat = ImuHat(0.5)
+    first, second, third = (hat.read(now_ms, 0.5 + now_ms / 100.0, now_ms / 10.0) for now_ms in (20, 40, 60))
+    assert first == second == pytest.approx((0.2, round(2.0 * 16.4 * 180.0 / math.pi)))
+    assert third == pytest.approx((0.4, round(4.0 * 16.4 * 180.0 / math.pi))), "the first one not before 30 ms"
+    hat = ImuHat(0.5)
+    assert [round(hat.read(now_ms, 0.5 + now_ms / 100.0, 0.0)[0], 9) for now_ms in (19, 39)] == [0.19, 0.39]
+
+
 def test_the_odom_frame_survives_a_restart_and_follows_set_odom():
     driver = DriverSide("--perfect")
     driver.start_streaming()

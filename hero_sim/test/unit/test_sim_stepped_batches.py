@@ -1,5 +1,7 @@
 """RobotRows as programs use it: many robots and worlds at once, commands that cannot be used, figures, Wi-Fi."""
 
+from unittest.mock import create_autospec
+
 import numpy as np
 import pytest
 from stepped_worlds import build_world
@@ -7,7 +9,9 @@ from stepped_worlds import build_world
 from hero_sim.link.wifi import PROFILES, Radio
 from hero_sim.robot.models import MODELS
 from hero_sim.stepped.robot_rows import RobotRows
+from hero_sim.stepped.rules.servo_pulses import ServoPulses
 from hero_sim.world import compiled
+from hero_sim.world.world import World
 from hero_test.nonempty import nonempty
 
 
@@ -242,3 +246,17 @@ def test_the_velocity_is_reset_when_odometry_is_set():
     assert not robots.velocities.any() and not robots.ticks.any()
     robots.advance(2150)
     assert robots.velocities[0, 0] == pytest.approx(speed_m_s, rel=0.05)
+
+
+def test_pulses_that_go_out_already_are_not_written_again():
+    world, pulses_us = create_autospec(World, instance=True), np.array([[1400.0] * 3, [1600.0] * 3])
+    servos, first = ServoPulses(world, np.full((2, 3), 1500.0)), np.array([True, False, False])
+    counts = []
+    for which in (first, first, True, True):
+        servos.write(0, pulses_us, which)
+        counts.append(world.write_pulses.call_count)
+    servos.stop(np.array([1]))
+    for which in (first, True):
+        servos.write(5, pulses_us, which)
+        counts.append(world.write_pulses.call_count)
+    assert counts == [1, 1, 2, 2, 2, 3]
