@@ -222,6 +222,14 @@ def test_default_detector_is_installed():
     assert [tag.tag_id for tag in create_detector().detect(picture(5))] == [5]
 
 
+def test_a_library_that_is_broken_is_not_called_missing(tmp_path, monkeypatch):
+    (tmp_path / "apriltag.py").write_text("raise OSError('libapriltag.so.3 is no library')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "apriltag", raising=False)
+    with pytest.raises(OSError, match="libapriltag"):
+        create_detector("apriltag")
+
+
 def test_missing_library_is_named_with_its_package(monkeypatch):
     monkeypatch.setitem(sys.modules, "apriltag", None)
     with pytest.raises(DetectorError, match="apt install python3-apriltag"):
