@@ -45,6 +45,8 @@ def test_rotation_is_one_for_a_ring_and_none_for_robots_at_rest_or_opposed():
     assert metrics.rotation(places_m, 0.0 * circling) == pytest.approx([0.0])
     opposed = circling * np.where(np.arange(10) % 2, 1.0, -1.0)[:, None]
     assert metrics.rotation(places_m, opposed) == pytest.approx([0.0])
+    centered_m, moving = np.array([[(1.0, 0.0), (-1.0, 0.0), (0.0, 0.0)]]), np.array([[(0, 1.0), (0, -1.0), (0, 1.0)]])
+    assert metrics.rotation(centered_m, moving) == pytest.approx([2.0 / 3.0]), "who is at the center circles nothing"
 
 
 def test_walls_are_followed_by_those_that_move_along_them():

@@ -55,7 +55,7 @@ def test_light_comes_from_lamps_and_halves_at_its_reach(arena):
     assert light.bearing_rad[1:3] == pytest.approx([math.pi / 2.0, math.pi])
     assert read(Light(), [[(0.0, 0.0, 0.0)]], arena).intensity[0] > 1.0, "two lamps are brighter than one"
     dark = read(Light(), [[(0.0, 0.0, 0.0), (math.nan,) * 3]], arena._replace(lamps_m=np.empty((0, 2))))
-    assert dark.intensity[0] == 0.0 and np.isnan([dark.intensity[1], dark.bearing_rad[1]]).all()
+    assert dark.intensity[0] == dark.bearing_rad[0] == 0.0 and np.isnan([dark.intensity[1], dark.bearing_rad[1]]).all()
 
 
 def test_messages_reach_neighbors_in_range_of_the_same_world():
@@ -98,6 +98,19 @@ def test_pheromone_stays_evaporates_and_keeps_worlds_apart(arena):
         assert {part: values[0] for part, values in trail.items() if values[0]} == {name: pytest.approx(1.0)}
     outside = read(sensor, [[(9.0, 0.0, 0.0)], [(math.nan, 0.0, 0.0)]], time_s=2.5, deposits=np.ones(2), **around)
     assert outside.here[0] == 0.0 and np.isnan(outside.here[1])
+
+
+def test_pheromone_beside_the_arena_is_not_that_of_its_other_side(arena):
+    kept, sensor = {}, Pheromone(cell_m=0.5)
+    places = [[(0.9, 0.1, 0.0), (-1.1, 0.1, 0.0), (0.1, 0.9, 0.0), (0.1, -1.1, 0.0), (0.0, 0.6, 0.0)]]
+    read(sensor, places, arena, kept=kept)
+    here = read(sensor, places, arena, kept=kept, time_s=1.0, deposits=np.array([1.0, 2.0, 4.0, 8.0, 0.0])).here
+    assert here.tolist() == [1.0, 0.0, 4.0, 0.0, 4.0]
+
+
+def test_virtual_sensors_have_the_defaults_of_their_document():
+    assert Floor() == (0.0,) and Light() == (1.0,) and RangeAndBearing() == (0.5, 0.0, math.inf)
+    assert Pheromone() == (30.0, 0.04, 0.06, 0.6)
 
 
 class Marking(Behavior):

@@ -16,6 +16,7 @@ from hero_swarm.design import program
 from hero_swarm.design.kinds import Machines, Networks, Numbers
 from hero_swarm.design.mission import read_mission
 from hero_swarm.design.search import CHOICE, REAL, WHOLE, Genes, adapt, evolve, find_worse, race
+from hero_swarm.machines.modules import LIMITS
 from hero_test.fingerprint import assert_kept
 
 GENES = Genes.of([(-2.0, 2.0, REAL), (0, 4, CHOICE), (0.5, 1.0, REAL), (1, 10, WHOLE), (0, 3, CHOICE)])
@@ -142,6 +143,12 @@ def test_numbers_of_candidates_become_the_behaviors_that_they_did(mission):
     kind = Numbers(read_mission(mission))
     found = [number_all(yaml.safe_load(kind.dump(genome, "a.yaml", ""))) for genome in draw(kind.genes, 3)]
     assert_kept([1671.1063619, -1388.894448, 78], *kind.genes, *found)
+
+
+def test_numbers_of_modules_are_those_of_chocolate():
+    probability, steepness, gain = (0.0, 1.0), (0.0, 20.0), (1.0, 5.0)
+    whole = {"turn_steps": (1, 100), "neighbors": (0, 10)}
+    assert {"probability": probability, "steepness": steepness, "gain": gain, **whole} == LIMITS
 
 
 @pytest.mark.parametrize("score", ["order", "dispersion"])
