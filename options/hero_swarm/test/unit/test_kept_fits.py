@@ -27,16 +27,16 @@ from hero_test.nonempty import nonempty
 PERIOD_S = 0.05
 
 
-def make_recording(time_s, kind=PULSES, seed=1, rest_s=(0.0, 0.0)):
-    """Return a recording of odometry in curves, of poses elsewhere that are turned, and that rest for a while."""
+def make_recording(time_s, kind=PULSES, seed=1, rest_s=(0.0, 0.0), share=0.0, sign=1.0):
+    """Return a recording of odometry in curves, of poses elsewhere that are turned, and lag behind for a while."""
     random = np.random.RandomState(seed)
     times_s = np.arange(0.0, time_s, PERIOD_S)
-    linear_m_s, angular_rad_s = 0.06 + 0.05 * np.sin(times_s / 2.0), 1.5 * np.cos(times_s / 3.0 + seed)
+    linear_m_s, angular_rad_s = sign * (0.06 + 0.05 * np.sin(times_s / 2.0)), 1.5 * np.cos(times_s / 3.0 + seed)
     yaw_rad = np.cumsum(angular_rad_s) * PERIOD_S
     x_m, y_m = (np.cumsum(linear_m_s * turned(yaw_rad)) * PERIOD_S for turned in (np.cos, np.sin))
     wrapped_rad = np.remainder(yaw_rad + np.pi, 2.0 * np.pi) - np.pi
     odometry = np.column_stack((times_s, x_m, y_m, wrapped_rad))
-    moves = ~((times_s >= rest_s[0]) & (times_s < rest_s[1]))
+    moves = np.where((times_s >= rest_s[0]) & (times_s < rest_s[1]), share, 1.0)
     turned_rad = 0.7 + 1.03 * np.cumsum(angular_rad_s * moves) * PERIOD_S
     places_m = [np.cumsum(0.97 * linear_m_s * moves * turned(turned_rad)) * PERIOD_S for turned in (np.cos, np.sin)]
     poses = np.column_stack((times_s + 0.01, *places_m, np.remainder(turned_rad + np.pi, 2.0 * np.pi) - np.pi))
@@ -95,6 +95,16 @@ def test_recordings_are_read_at_times_as_they_were():
     assert_kept([-1083.626786, 1537.4239643, 2803], *found, *cut)
     none = find_slips(make_recording(0.9))
     assert none.shape == (0,)
+
+
+def test_samples_at_which_poses_lag_behind_wheels_are_those_that_were():
+    found = []
+    for seed, sign in ((1, 1.0), (2, -1.0), (3, 1.0)):
+        recording = make_recording(24.0, seed=seed, rest_s=(3.0, 22.0), share=0.52, sign=sign)
+        slips_s = find_slips(recording)
+        assert 5 < len(slips_s) < 350, "only some"
+        found += [slips_s, len(slips_s)]
+    assert_kept([-97.3419688, -29.9278207, 231], *found)
 
 
 def test_a_fit_is_told_with_its_errors_and_its_delay():

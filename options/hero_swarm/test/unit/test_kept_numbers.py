@@ -17,6 +17,7 @@ from hero_swarm import metrics
 from hero_swarm.behavior import PULSES, Behavior, Floor, Light, Pheromone, Random, RangeAndBearing, sense
 from hero_swarm.experiments.computing.starts import place_all
 from hero_swarm.experiments.experiment_file import Start
+from hero_swarm.learning.observation import Observation
 from hero_swarm.learning.vector_env import SwarmVectorEnv
 from hero_swarm.metrics.own import State, measure_metric
 from hero_swarm.safety import FENCE, OFF, ROBOTS, SafetyFilter
@@ -186,12 +187,17 @@ def test_robots_are_placed_where_they_were(start, kept):
 
 def test_learners_observe_and_are_rewarded_as_they_were():
     sensors = {"trail": Pheromone(), "floor": Floor(), "lamp": Light()}
-    env = SwarmVectorEnv(2, 4, FLOOR, 0.5, metric="order", rate_hz=8.0, neighbors=2, range_m=0.6, sensors=sensors)
+    arena = FLOOR._replace(bounds_m=np.array([-0.7, -0.6, 0.9, 0.7]))
+    env = SwarmVectorEnv(2, 4, arena, 0.5, metric="order", rate_hz=8.0, neighbors=2, range_m=0.6, sensors=sensors)
     found, random = [env.reset(5)], np.random.RandomState(1)
     while not env.ended:
         found += [*env.step(random.uniform(-1.2, 1.2, (8, 2))), env.time_s]
     found.append(env.reset())
-    assert_kept([1.28233, -32.9964615, 1332], *found)
+    assert_kept([4.0173147, -46.6899321, 1332], *found)
+
+
+def test_observations_have_the_defaults_of_their_document():
+    assert Observation((0.0, 0.0, 1.0, 1.0)) == ((0.0, 0.0, 1.0, 1.0), 5, 1.0, {})
 
 
 class Calls(NamedTuple):
