@@ -158,7 +158,7 @@ class SafetyFilter:
             away_m = points_m[:, :, None] - np.concatenate((points_m, standing_m), axis=1)[:, None]
             square_m2 = (away_m * away_m).sum(axis=-1)
             square_m2[:, np.arange(robots), np.arange(robots)] = np.inf
-            nearest = np.argpartition(square_m2, count - 1, axis=2)[..., :count]
+            nearest = np.sort(np.argpartition(square_m2, count - 1, axis=2)[..., :count])  # in one order everywhere
             away_m = np.take_along_axis(away_m, nearest[..., None], axis=2)
             distance_m = np.sqrt(np.maximum(np.take_along_axis(square_m2, nearest, axis=2), 1e-12))
             normals.append(away_m / distance_m[..., None])

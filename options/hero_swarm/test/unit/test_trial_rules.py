@@ -243,6 +243,9 @@ def test_a_place_is_clear_up_to_an_overlap_that_is_allowed():
     places_m = np.array([(0.5 - BODY_RADIUS_M + into_m, 0.0) for into_m in (-0.001, 0.001, 0.003)])
     assert is_clear(places_m, arena).tolist() == [True, False, False]
     assert is_clear(places_m, arena, 0.002).tolist() == [True, True, False]
+    rim_m = 50.0 + 5e-10 * np.array([(0, 0), (1, 1), (-1, -1)])  # of a plane without walls, rounded
+    assert is_clear(rim_m, OPEN).all() and is_clear(-rim_m, OPEN).all()
+    assert not is_clear(np.array([(50.001, 0), (-50.001, 0), (0, 50.001), (0, -50.001)]), OPEN).any()
 
 
 @pytest.mark.parametrize("is_point", [False, True])
