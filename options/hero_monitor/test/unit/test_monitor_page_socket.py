@@ -93,7 +93,7 @@ def test_only_connections_of_those_who_are_logged_in_last(host, user):
         page.prepare()
 
 
-def test_a_browser_is_asked_for_life_and_signs_of_one_server_hold_on_no_other():
+def test_a_login_of_one_server_is_none_of_another_and_browsers_are_pinged():
     one, other = (Server(Access(None, []), ClientLimits(9), Mock())._http.request_callback.settings for _ in range(2))
     limits = {"websocket_ping_interval": 3.0, "websocket_ping_timeout": 9.0, "websocket_max_message_size": 16384}
     assert {name: one[name] for name in limits} == limits
