@@ -10,6 +10,8 @@ from test_calibration_rules import FakeSession
 
 from hero_calibration import calibrate, calibration
 from hero_calibration.errors import CalibrationError, EndedError
+from hero_calibration.procedures.velocity import calibrate_velocity
+from hero_calibration.procedures.wheels import calibrate_wheels
 from hero_calibration.robots import ros_probe
 from hero_client import RobotNotReadyError
 from hero_client.ros import Drivers
@@ -138,3 +140,20 @@ def test_a_file_that_cannot_be_written_fails_a_robot_that_had_not_failed(monkeyp
     assert calibration._save(late, "/c", {}) == calibration._save(good, "/c", {}) == ""
     assert late.failure == "velocity: turned late"
     assert good.failure == "/c/hero_1.yaml cannot be written: No space left on device"
+
+
+@pytest.mark.parametrize(
+    ("calibrate_part", "told"),
+    [
+        (lambda session: calibrate_velocity(session, {}, {}), "velocity: gains are tried, about a minute\n"),
+        (
+            lambda session: calibrate_wheels(session, None, {}),
+            "wheels: squares to the left and to the right, about 1 min\n",
+        ),
+    ],
+)
+def test_users_are_told_how_long_a_part_takes(calibrate_part, told, capsys):
+    session = FakeSession(0)
+    start_s = session.now_s
+    calibrate_part(session)
+    assert capsys.readouterr().out.startswith(told) and session.now_s - start_s == pytest.approx(60.0, abs=20.0)
