@@ -134,6 +134,9 @@ def test_every_end_has_its_status_and_at_most_one_line(monkeypatch, capsys, main
     with open("/dev/full", "w", encoding="utf-8") as output:
         monkeypatch.setattr(sys, "stdout", output)
         assert command_line.call(main, ValueError) == status
+        is_lost = status == 141 or errors.startswith("the output cannot be written")
+        # What waits in the buffer would fail again at the end.
+        assert (os.readlink(f"/proc/self/fd/{output.fileno()}") == os.devnull) == is_lost
     told = capsys.readouterr().err
     assert told.startswith("program: " + errors) if errors else not told
     assert told.count("\n") == bool(errors)

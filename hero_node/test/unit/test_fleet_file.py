@@ -112,6 +112,13 @@ def test_a_text_may_be_as_long_and_as_deep_as_can_be_read_and_no_more():
             read_entries(longer, "a.yaml", "")
 
 
+def test_what_is_no_mapping_is_refused_with_an_example():
+    entries = read_entries("{plain: 3, list: [1]}", "a.yaml", "").value
+    for name, shown in (("plain", "3"), ("list", "a list")):
+        with pytest.raises(EntryError, match=f"{name} is {shown}, but must be a mapping such as {{x: ...}}"):
+            entries[name].mapping(("x", "y"))
+
+
 @pytest.mark.parametrize(("value", "shown"), [("5", "5"), ("''", "''"), ("[a]", "a list")])
 def test_what_is_no_text_is_refused(value, shown):
     with pytest.raises(EntryError, match=f"a.yaml, line 1: name is {shown}, but must be a text"):

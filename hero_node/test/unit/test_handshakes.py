@@ -4,6 +4,7 @@ import queue
 import socket
 import struct
 import threading
+from unittest import mock
 
 import pytest
 
@@ -154,6 +155,16 @@ def test_one_too_many_closes_the_oldest_of_the_address_with_the_most(server):
         client.sendall(HEADER)
     addresses = {server.take()[1] for _ in range(4)}
     assert addresses == {client.getsockname() for client in (other, many[1], many[2], newest)}
+
+
+def test_a_connection_that_ends_without_a_header_is_closed_and_forgotten():
+    sock = mock.create_autospec(socket.socket, instance=True)
+    sock.recv.return_value = b""
+    reader = HandshakeReader(mock.Mock(side_effect=AssertionError("served")))
+    reader._pending.add(sock, ("10.0.0.1", 5))
+    reader._run(sock, ("10.0.0.1", 5))
+    sock.close.assert_called_once_with()
+    assert not reader._pending.remove(sock)
 
 
 def test_one_that_is_closed_already_makes_room_for_the_next():

@@ -3,6 +3,7 @@
 import errno
 import os
 import threading
+from unittest import mock
 
 import pytest
 
@@ -178,6 +179,15 @@ def test_where_a_file_system_has_no_locks_programs_are_told(tmp_path, monkeypatc
     monkeypatch.setattr(safe_file.fcntl, "flock", fail)
     with hold_file(str(tmp_path / "lock")) as is_held:
         assert not is_held
+
+
+def test_no_program_waits_for_a_lock_in_the_kernel(tmp_path, monkeypatch):
+    flock = mock.create_autospec(safe_file.fcntl.flock)
+    monkeypatch.setattr(safe_file.fcntl, "flock", flock)
+    with lock_file(str(tmp_path / "a")), hold_file(str(tmp_path / "b"), is_shared=True), hold_file(str(tmp_path / "c")):
+        kinds = [call[0][1] for call in flock.call_args_list]
+    exclusive, shared = safe_file.fcntl.LOCK_EX | safe_file.fcntl.LOCK_NB, safe_file.fcntl.LOCK_SH
+    assert kinds == [exclusive, shared | safe_file.fcntl.LOCK_NB, exclusive]
 
 
 def test_a_file_is_held_by_one_program_or_by_those_that_share_it(tmp_path):
