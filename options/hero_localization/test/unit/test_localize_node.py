@@ -54,7 +54,7 @@ def test_an_unknown_robot_in_a_report_does_not_keep_the_next_from_its_pose(node)
     assert set(node._unknown_s) == {7}
 
 
-def test_poses_that_no_robot_can_have_or_without_an_error_keep_no_other_away(node):
+def test_a_pose_that_no_robot_can_have_keeps_no_other_of_its_image_away(node):
     node._localizer.add_measurement.return_value = []
     report = make_report("", (4, RobotPose.TRACKED), (9, RobotPose.TRACKED), (4, RobotPose.TRACKED))
     report.robots[0].x, report.robots[2].position_sd, report.robots[2].yaw_sd = math.nan, 0.003, 0.02

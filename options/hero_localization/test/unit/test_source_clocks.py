@@ -233,3 +233,15 @@ def test_a_clock_that_is_not_known_yet_is_not_taken_for_a_hand():
     drive = Drive([0.1], motion=lambda now_s: (0.2 * (now_s % 1.0 < 0.5), 2.5 if now_s % 1.4 < 0.7 else -2.5))
     drive.run(4.0)
     assert len(drive.lines) == 1 and "found at" in drive.lines[0], drive.lines
+
+
+@pytest.mark.parametrize("delay_s", [0.1, -0.1])
+def test_a_delay_above_three_deviations_is_corrected_by_5_percent_of_the_time(delay_s):
+    clocks, odometry = SourceClocks(True), OdometryHistory()
+    measured = StampedPose(5.0, Pose(0.0, 0.0, 0.0), COVARIANCE, TRACK)
+    assert clocks.correct(4, measured, odometry, 50.0).stamp_s == 5.0
+    clocks._delays_s[0] = delay_s
+    for sd_s, now_s, corrected_s in ((0.034, 50.1, 0.0), (0.033, 50.2, 0.005), (0.01, 51.2, 0.055), (0.01, 60.0, 0.1)):
+        clocks._covariance[0, 0] = sd_s**2
+        found = clocks.correct(4, measured, odometry, now_s)
+        assert 5.0 - found.stamp_s == pytest.approx(math.copysign(corrected_s, delay_s)), now_s
