@@ -236,7 +236,7 @@ def test_a_clock_that_is_not_known_yet_is_not_taken_for_a_hand():
 
 
 @pytest.mark.parametrize("delay_s", [0.1, -0.1])
-def test_a_delay_above_three_deviations_is_corrected_by_5_percent_of_the_time(delay_s):
+def test_a_delay_above_three_deviations_is_corrected_by_5_percent_of_time(delay_s):
     clocks, odometry = SourceClocks(True), OdometryHistory()
     measured = StampedPose(5.0, Pose(0.0, 0.0, 0.0), COVARIANCE, TRACK)
     assert clocks.correct(4, measured, odometry, 50.0).stamp_s == 5.0
