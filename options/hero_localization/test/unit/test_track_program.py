@@ -140,6 +140,8 @@ def test_time_without_images_is_no_longer_than_the_node_runs(monkeypatch):
     for opened_s, text in ((1.0, None), (3.0, "no image for 3 s: is the camera's driver running?")):
         monkeypatch.setattr(track, "time", SimpleNamespace(monotonic=lambda opened_s=opened_s: 5.0 + opened_s))
         assert node._list_problems(1.8e9) == ([] if text is None else [("camera", text, True)])
+    node._source.arrived_s = 1.8e9 - 1.9
+    assert node._list_problems(1.8e9) == [], "nor longer than since the last one"
 
 
 @pytest.mark.parametrize("turn_rad", [(math.pi, 0.0, 0.0), (3.0, 0.2, -0.4), (0.0, 0.0, 0.0)])
