@@ -17,13 +17,14 @@ class Events(LinkHandler):
     """Notes what happens to the connections."""
 
     def __init__(self):
-        self.seen, self.received = [], b""
+        self.seen, self.received, self.reasons = [], b"", []
 
     def connection_made(self, index):
         self.seen.append("made")
 
     def connection_failed(self, index, reason):
         self.seen.append("failed")
+        self.reasons.append(reason)
 
     def connection_lost(self, index, reason):
         self.seen.append("lost")
@@ -263,11 +264,12 @@ def test_robots_connect_from_addresses_of_their_own(monkeypatch):
         link.connect(0)
         while not events.seen:
             link.poll(1.0)
-        assert events.seen == ["failed"], "no server listens"
+        assert (events.seen, events.reasons) == (["failed"], ["Connection refused"]), "no server listens"
         link._address = ("255.255.255.255", 1)  # not for TCP, so that the system refuses at once
         made, make = [], socket.socket
         monkeypatch.setattr(tcp_link.socket, "socket", lambda *given: made.append(make(*given)) or made[-1])
         link.connect(1)
         assert [sock.fileno() for sock in made] == [-1], "closed"
+        assert events.reasons[1] and "Errno" not in events.reasons[1]
         assert events.seen == ["failed"] * 2 and not link.is_connecting(1)
         link.close_all()
