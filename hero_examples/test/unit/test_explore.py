@@ -133,6 +133,7 @@ def test_a_goal_is_kept_until_the_map_goes_on_or_the_robot_is_near():
     explorer.choose(HERE, [(1.0, 0.0), (0.0, 0.9)], [], 0.0)
     assert explorer.goal == (0.0, 0.9), "the nearest"
     kept = explorer.controller
+    assert kept._avoid, "the map has unknown places"
     for pose, frontiers in ((HERE, [(0.14, 0.9), (0.5, 0.0)]), (Pose(0.0, 0.9 - 1.01 * NEAR_M, 0.0), [(0.0, 0.9)])):
         explorer.choose(pose, frontiers, [], 1.0)
         assert explorer.controller is kept

@@ -91,7 +91,7 @@ def test_a_walker_that_lost_its_ranges_forgets_where_it_turned():
 
 def test_the_program_walks_as_its_parameters_say(monkeypatch):
     commands = []
-    for seed in (5, 5, 6):
+    for seed in (0, 0, 6):
         with StepSwarm(2, arena="empty", seed=1) as swarm:
             log = swarm.log()
             Run(monkeypatch, random_walk, swarm, 0.6, linear_m_s=0.04, seed=seed)()
