@@ -78,6 +78,17 @@ def test_an_exploration_ends_some_time_after_the_last_frontier(monkeypatch, swar
     assert {robot.light for robot in swarm} == {DARK} and true_paths.stop_within(swarm)
 
 
+@pytest.mark.parametrize(("seed", "seeds"), [(0, [0, 1, 2]), (-1, [None] * 3)])
+def test_each_explorer_has_a_seed_of_its_own_or_draws_one(monkeypatch, swarm, seed, seeds):
+    given, make = [], explore.Explorer
+    monkeypatch.setattr(explore.rospy, "Subscriber", lambda *arguments, **options: None)
+    monkeypatch.setattr(
+        explore, "Explorer", lambda robot, common, seed: given.append(seed) or make(robot, common, seed)
+    )
+    Run(monkeypatch, explore, swarm, 0.2, seed=seed)()
+    assert given == seeds
+
+
 def test_a_leader_is_never_driven_by_its_followers_program(monkeypatch, swarm):
     run, driven = Run(monkeypatch, follow, swarm, 1.0, robots="2 0 1"), []
     chain = StepWorld([swarm[number] for number in (2, 0, 1)], swarm._clock)
