@@ -139,6 +139,8 @@ class StopRequestTest(unittest.TestCase):
     def test_fleet_ends_while_the_master_hangs_and_names_who_is_not_stopped(self):
         table = self.open_table()
         with suspended(self.hung_pid, self.master_pid):
+            # A report that was on its way would be taken for an answer.
+            table.wait_for_next(b"driver hero_driver_b does not answer")
             table.press(b"sq")
             self.assertEqual(table.wait_for_end(), 1)
             table.wait_for(b"fleet: NOT STOPPED: driver hero_driver_b does not answer")

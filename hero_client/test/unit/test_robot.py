@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 from linkless_robot import FakeSwarm, make_robot
 
+from hero_client.controllers.go_to_goal import Goal
 from hero_client.robots.group import READY_TIMEOUT_S
 from hero_client.robots.robot_base import WARNING_PERIOD_S
 from hero_client.values.errors import GoalError, NotCalibratedError, RobotNotReadyError, StaleDataError, StoppedError
@@ -276,6 +277,8 @@ def test_a_goal_that_is_not_reached_is_named_as_it_was_given():
         with pytest.raises(GoalError, match=says):
             robot.go_to(5.0, 0.5, frame=frame, timeout_s=1.0)
         assert link.velocity == (0.0, 0.0)
+    with pytest.raises(GoalError, match=r"hero_3 did not reach \(-6, 1\): not there after 2 s"):
+        robot.go_to(5.0, 0.5, on_step=lambda controller: controller.change_goal(Goal(-6.0, 1.0), 0.1, 2.0, 100.0))
     for move, says in ((robot.forward, "drive 0.5 m"), (robot.turn, "turn 0.5 rad")):
         link.ranges[:] = [0.05] * 8
         link.advance = lambda step_s: None

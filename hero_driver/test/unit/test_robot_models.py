@@ -37,6 +37,18 @@ def test_an_id_whose_model_changes_is_told_of_and_goes_on_from_where_it_is():
     assert robot.corrections.note_encoder(PLUS_ENCODER_MD5) == ""
 
 
+@pytest.mark.parametrize(
+    "md5sum, rim_m, separation_m",
+    [(STOCK_ENCODER_MD5, math.pi * 0.0492 / 288, 0.063), (PLUS_ENCODER_MD5, math.pi * 0.050 / 96, 0.065)],
+)
+def test_a_robot_turns_by_the_wheels_of_its_model(md5sum, rim_m, separation_m):
+    robot = CorrectedRobot()
+    robot.corrections.note_encoder(md5sum)
+    robot.receive_burst(NOW_NS, (0.0, 0.0))
+    robot.receive_burst(NOW_NS + 34 * MS, (-20.0, 20.0))
+    assert robot.corrections.odometry.ticks.yaw_rad == pytest.approx(40 * rim_m / separation_m)
+
+
 @pytest.mark.parametrize("model, diameter_m", [("hero", 0.050), ("hero_plus", 0.048), ("", 0.048)])
 def test_calibrated_wheels_of_another_model_are_told_of_and_not_used(model, diameter_m):
     robot = CorrectedRobot(

@@ -135,6 +135,12 @@ def test_an_option_that_cannot_be_used_is_one_line(run):
     assert "--model hero_minus: must be one of" in ended.stderr and "Traceback" not in ended.stderr
 
 
+def test_only_perfect_robots_drive_straight(run):
+    text = "from hero_client import Robot\nwith Robot(0) as robot:\n    robot.drive(0.1, 0.0, duration_s=2.0)\n"
+    for options, is_straight in (((), False), (("--perfect",), True)):
+        assert (run(text + "    print(robot.pose.yaw_rad)", *options).stdout == "0.0\n") == is_straight
+
+
 def test_robots_are_four_unless_counted_and_named_where_they_ended(run, tmp_path):
     text = "from hero_client import Swarm\nwith Swarm.discover() as swarm:\n    print(len(swarm))\n"
     drive = text + "    swarm[1].forward(0.05)\n    swarm[1].drive(0.0, 0.5, duration_s=1.0)\n    1 / 0\n"

@@ -1,11 +1,10 @@
-"""Results that are kept of the parts of simulated robots, drawn or computed from many inputs (see kept_log.py)."""
+"""Results that are kept of the parts of simulated robots, drawn or computed from many inputs (see kept_results)."""
 
 import math
 
 import numpy as np
 import pytest
 from driver_side import parse_options
-from kept_log import Log
 
 from hero_node import Pose
 from hero_sim import scene
@@ -20,35 +19,36 @@ from hero_sim.world.pushing.shapes import Disc, Polygon, PushedBody
 from hero_sim.world.robot_errors import describe_errors, draw_errors
 from hero_sim.world.wheel_loops import draw_normal_at, find_place
 from hero_sim.world.world import World
+from hero_test.kept_results import Digest
 
 
 def test_headings_and_random_numbers_are_those_that_they_were():
-    log = Log()
-    log.add(*find_heading(np.linspace(-40.0, 40.0, 4001)), *find_heading(np.arange(-9, 10) * (math.pi / 4.0)))
+    digest = Digest()
+    digest.add(*find_heading(np.linspace(-40.0, 40.0, 4001)), *find_heading(np.arange(-9, 10) * (math.pi / 4.0)))
     places = find_place(np.arange(50)[:, None, None], np.arange(4)[:, None], np.arange(9))
     numbers = draw_normal_at(np.uint64(12345), places)
-    log.add(numbers)
+    digest.add(numbers)
     assert (numbers.mean(), numbers.std()) == pytest.approx((0.0, 1.0), abs=0.05)
-    assert log.digest == "f51aae4e966c8a5c"
+    assert str(digest) == "f51aae4e966c8a5c"
 
 
 def test_robots_drawn_for_a_seed_are_those_that_they_were():
-    log = Log()
+    digest = Digest()
     for seed in range(3):
         models = ["--model", "hero_plus,robot=%d" % (seed + 6)]
         options = parse_options("--count", "5", "--first-id", "5", "--seed", str(seed), "--wifi", "router", *models)
-        log.add({name: np.ravel(drawn).tolist() for name, drawn in draw_seeds(options).items()})
+        digest.add({name: np.ravel(drawn).tolist() for name, drawn in draw_seeds(options).items()})
         errors, options.servo_timing = build_errors(options), "drawn"
-        log.add(*errors, describe_errors(errors, 5), [draw_servo_timing(options, number) for number in range(40)])
+        digest.add(*errors, describe_errors(errors, 5), [draw_servo_timing(options, number) for number in range(40)])
         world = build_world(options, 2)
-        log.add(world.poses, *world.errors)
-        log.add([round(radio.find_arrival(0.0), 6) for radio in build_radios(options, 2)])
+        digest.add(world.poses, *world.errors)
+        digest.add([round(radio.find_arrival(0.0), 6) for radio in build_radios(options, 2)])
     poses = np.arange(18.0).reshape(2, 3, 3)
     world = place_worlds(arenas.build_rectangle(40.0, 40.0, 0), poses, (7, 9), 0.5, known=["robot=1,slip=0.1"])
-    log.add(world.poses, *world.errors)
+    digest.add(world.poses, *world.errors)
     (line,) = describe_errors(draw_errors([np.random.RandomState(3)]), 3)
     assert line.startswith("robot=3,left_center_us=1511,right_center_us=1503,dead_zone_us=30,left_gain=1.00289,")
-    assert log.digest == "dbdd2bbb6aa883ba"
+    assert str(digest) == "dbdd2bbb6aa883ba"
 
 
 def build_all():
@@ -73,21 +73,21 @@ def build_all():
 
 
 def test_places_in_arenas_are_those_that_they_were():
-    log, free = Log(), []
+    digest, free = Digest(), []
     points_m = np.stack(np.meshgrid(*2 * [np.linspace(-1.05, 1.05, 43)]), axis=-1).reshape(-1, 2)
     for arena in [build_all(), *map(load_arena, SHIPPED)]:
-        log.add(arenas.measure_clearance(points_m, arena), arenas.place_robots(arena, 6, np.random.RandomState(4)))
+        digest.add(arenas.measure_clearance(points_m, arena), arenas.place_robots(arena, 6, np.random.RandomState(4)))
         free.append(sum(arenas.is_free(Pose(*point_m, 0.0), arena.starts, arena, 0.06) for point_m in points_m[::7]))
     for count in range(1, 30):
-        log.add(np.round(arenas.build_default(count).starts, 6), arenas.build_default(count).segments_m)
-        log.add(np.round(arenas.build_rectangle(3.0, 1.0, count).starts, 6))
+        digest.add(np.round(arenas.build_default(count).starts, 6), arenas.build_default(count).segments_m)
+        digest.add(np.round(arenas.build_rectangle(3.0, 1.0, count).starts, 6))
     for area in build_all().areas:
-        log.add(area.covers(*points_m.T), area.find_colors(*np.clip(points_m, (-0.2, 0.1), (0.7, 0.6)).T))
-    assert f"{free} {log.digest}" == "[109, 187, 158, 133, 259, 225] 7e20c9c7bc922784"
+        digest.add(area.covers(*points_m.T), area.find_colors(*np.clip(points_m, (-0.2, 0.1), (0.7, 0.6)).T))
+    assert f"{free} {digest}" == "[109, 187, 158, 133, 259, 225] 7e20c9c7bc922784"
 
 
 def test_sensors_see_what_they_saw():
-    arena, log, rng = build_all(), Log(), np.random.RandomState(6)
+    arena, digest, rng = build_all(), Digest(), np.random.RandomState(6)
     poses = np.column_stack((rng.uniform(-0.7, 0.7, (60, 2)), rng.uniform(-4.0, 4.0, 60)))
     errors = draw_errors([np.random.RandomState(row) for row in range(60)])
     for objects in (None, [[]] * 3):
@@ -95,31 +95,33 @@ def test_sensors_see_what_they_saw():
         rows, view = np.arange(60), world.observe()
         for each, sight in world._look(rows, view):
             alpha_counts_m2, beta_counts = errors.alpha_counts_m2[each], errors.beta_counts[each]
-            log.add(range_sensors.measure_signals(sight, alpha_counts_m2, beta_counts))
-            log.add(range_sensors.measure_distances(sight))
-        log.add(world.read_infrared(rows[1::2]), world.read_distances(rows[::3], view), world.read_infrared(rows, view))
-    assert log.digest == "e24f6ab2723569ec"
+            digest.add(range_sensors.measure_signals(sight, alpha_counts_m2, beta_counts))
+            digest.add(range_sensors.measure_distances(sight))
+        digest.add(
+            world.read_infrared(rows[1::2]), world.read_distances(rows[::3], view), world.read_infrared(rows, view)
+        )
+    assert str(digest) == "e24f6ab2723569ec"
 
 
 def test_networks_delay_bytes_as_they_did():
-    log = Log()
+    digest = Digest()
     for name, profile in sorted(PROFILES.items()):
         radio, taken = Radio(profile, np.random.RandomState(2)), 0
         for now_ms in range(0, 30000, 35):
-            log.add(round(radio.up.send(now_ms, 1400), 3), radio.is_transparent(now_ms), radio.is_carrying)
+            digest.add(round(radio.up.send(now_ms, 1400), 3), radio.is_transparent(now_ms), radio.is_carrying)
             radio.down.put(now_ms, bytes(56))
             taken += len(radio.down.take(now_ms))
             if now_ms % 7000 == 0:
                 radio.stall(now_ms, 400)
-        log.add(name, taken)
+        digest.add(name, taken)
     network = build_network(*parse_wifi("hotspot,channels=2"), range(30))
     for now_ms in range(0, 1000, 35):
         for radio in network:
-            log.add(round(radio.up.send(now_ms, 1400), 3), radio.is_congested(now_ms))
+            digest.add(round(radio.up.send(now_ms, 1400), 3), radio.is_congested(now_ms))
     channel = Channel(np.random.RandomState(1))
     for number in range(400):
-        log.add([round(ms, 3) for ms in channel.carry(number * 0.7, number % 23, 100 + 100 * (number % 17))])
-    assert log.digest == "bbe8822f3e0cf783"
+        digest.add([round(ms, 3) for ms in channel.carry(number * 0.7, number % 23, 100 + 100 * (number % 17))])
+    assert str(digest) == "bbe8822f3e0cf783"
 
 
 def test_viewers_are_shown_what_they_were():
@@ -138,7 +140,7 @@ def test_viewers_are_shown_what_they_were():
         )
         for shape in shapes
     ]  # fmt: skip
-    log = Log()
+    digest = Digest()
     flat = [shape._replace(pose=Pose(*shape.pose[:2], 0.0)) for shape in rounded]
-    log.add(rounded, scene.encode_markers(1234567890123, flat))
-    assert f"{len(shapes)} {log.digest}" == "405 5c3ec657271c619a"
+    digest.add(rounded, scene.encode_markers(1234567890123, flat))
+    assert f"{len(shapes)} {digest}" == "405 5c3ec657271c619a"

@@ -1,4 +1,4 @@
-"""Results that are kept: robots of every model, driven at random, do what they did (see kept_log.py)."""
+"""Results that are kept: robots of every model, driven at random, do what they did (see kept_results)."""
 
 import itertools
 import struct
@@ -6,7 +6,6 @@ import struct
 import numpy as np
 import pytest
 from driver_side import DriverSide
-from kept_log import Log
 
 from hero_driver.rosserial import packets
 from hero_node import Pose
@@ -15,6 +14,7 @@ from hero_sim.world.arena import Arena, build_rectangle, outline
 from hero_sim.world.pushing.shapes import Disc, Polygon, PushedBody
 from hero_sim.world.robot_errors import RobotErrors, draw_errors
 from hero_sim.world.world import World
+from hero_test.kept_results import Digest
 
 # -- robots in process ---------------------------------------------------------------------------------------
 
@@ -51,16 +51,16 @@ def wander_in_process(arena, wifi, seconds):
     """Return where the first robots are at the end by their odometry, and the sum of all readings."""
     models = ["hero_plus,robot=1", "v3.0,robot=2"]
     swarm = StepSwarm(4, seed=4, arena=arena, wifi=wifi, worlds=2, model=models, error="robot=3,slip=0.1")
-    rows, rng, log = swarm.rows, np.random.RandomState(5), Log()
+    rows, rng, digest = swarm.rows, np.random.RandomState(5), Digest()
     for name, hooks in (("cycle", rows.on_cycle), ("scan", rows.on_scan), ("distance", rows.on_distance)):
-        hooks.append(lambda which, name=name: log.add(name, rows.now_ms, which))
+        hooks.append(lambda which, name=name: digest.add(name, rows.now_ms, which))
     while rows.now_ms < 1000 * seconds:
         act(rng, rows)
         rows.advance(rows.now_ms + int(rng.randint(1, 250)))
-        log.add(rows.odometry, rows.velocities, rows.ticks, rows.lights, rows.commands, rows.odometry_ms)
-        log.add(rows.proximity_m, rows.ranges_m, rows.counts, rows.distance_m, rows.scan_ms, rows.distance_ms)
-        log.add(rows.world.poses, rows.world.object_poses, rows.world.travels_m, rows.world.measure_body_speeds())
-    return f"{np.round(rows.odometry[:2], 3).tolist()} {log.digest}"
+        digest.add(rows.odometry, rows.velocities, rows.ticks, rows.lights, rows.commands, rows.odometry_ms)
+        digest.add(rows.proximity_m, rows.ranges_m, rows.counts, rows.distance_m, rows.scan_ms, rows.distance_ms)
+        digest.add(rows.world.poses, rows.world.object_poses, rows.world.travels_m, rows.world.measure_body_speeds())
+    return f"{np.round(rows.odometry[:2], 3).tolist()} {digest}"
 
 
 @pytest.mark.slow
@@ -100,7 +100,7 @@ def list_payloads(rng, model):
 
 def converse(seed, seconds, *arguments):
     """Return how many packets each robot has sent, and the sum of their times and contents."""
-    driver, rng, log = DriverSide("--seed", str(seed), *arguments), np.random.RandomState(seed), Log()
+    driver, rng, digest = DriverSide("--seed", str(seed), *arguments), np.random.RandomState(seed), Digest()
     driver.run(2300)
     for index in range(len(driver.swarm.robots)):
         driver.send(index, packets.ID_PUBLISHER)
@@ -129,12 +129,12 @@ def converse(seed, seconds, *arguments):
         driver.connect = rng.randint(4) > 0
         driver.swarm.reschedule(index)
         driver.run(int(rng.randint(1, 200)))
-        log.add(driver.swarm.world.commands_m_s, np.array([robot.due_ms for robot in driver.swarm.robots]))
-        log.add([robot.sensing.show_light(robot.to_millis(driver.swarm.now_ms)) for robot in driver.swarm.robots])
+        digest.add(driver.swarm.world.commands_m_s, np.array([robot.due_ms for robot in driver.swarm.robots]))
+        digest.add([robot.sensing.show_light(robot.to_millis(driver.swarm.now_ms)) for robot in driver.swarm.robots])
     for arrivals in driver.arrivals:
-        log.add(*itertools.chain.from_iterable(arrivals))
-    log.add(*driver.reports)
-    return f"{[len(arrivals) for arrivals in driver.arrivals]} {log.digest}"
+        digest.add(*itertools.chain.from_iterable(arrivals))
+    digest.add(*driver.reports)
+    return f"{[len(arrivals) for arrivals in driver.arrivals]} {digest}"
 
 
 @pytest.mark.slow
@@ -178,15 +178,15 @@ def build_crowd():
 
 @pytest.mark.slow
 def test_things_are_pushed_to_where_they_were():
-    world, rng, log = build_crowd(), np.random.RandomState(7), Log()
+    world, rng, digest = build_crowd(), np.random.RandomState(7), Digest()
     for step in range(60):
         if step % 10 == 0:
             # Most of them forward.
             world.write_pulses(True, np.array((rng.randint(1200, 1520, 10), rng.randint(1480, 1800, 10))))
         world.step(1 + 2 * (step % 2))
         objects = world.object_poses  # first: whatever is read moves the bodies
-        log.add(world.poses, objects)
+        digest.add(world.poses, objects)
         if step % 20 == 0:
-            log.add(world.read_infrared(np.arange(10)), world.read_distances(np.arange(10)))
+            digest.add(world.read_infrared(np.arange(10)), world.read_distances(np.arange(10)))
     kept = "[[0.028, 0.021], [-0.099, -0.026], [-0.086, 0.055], [0.0, 0.115]] 3d876c3ee3ce0130"
-    assert f"{np.round(world.object_poses[0, :, :2], 3).tolist()} {log.digest}" == kept
+    assert f"{np.round(world.object_poses[0, :, :2], 3).tolist()} {digest}" == kept

@@ -68,7 +68,7 @@ def test_ids_of_many_robots_end_with_the_last_one():
 
 
 def test_errors_of_robots_are_taken_up_to_their_ends():
-    """Beyond, what is simulated would mean nothing; to renew the list, see kept_log.py."""
+    """Beyond, what is simulated would mean nothing; to renew the list, see kept_results."""
     limits = {key: (kind.least, kind.most) for key, kind in KINDS.items() if not key.startswith("alpha")}
     assert limits == {
         "left_center_us": (1000, 2000), "right_center_us": (1000, 2000), "dead_zone_us": (0, 200),

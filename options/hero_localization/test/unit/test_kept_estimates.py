@@ -1,13 +1,13 @@
-"""What the filters make of one varied drive, in figures: see kept_figures."""
+"""What the filters make of one varied drive, in figures: see kept_results."""
 
 import math
 
 import numpy as np
-from kept_figures import check_figures
 
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_node import Pose, transform_pose, wrap_angle
+from hero_test.kept_results import check_figures
 
 STEP_S = 0.002
 TURNED = Pose(0.3, -0.2, 2.5)

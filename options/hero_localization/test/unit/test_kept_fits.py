@@ -1,4 +1,4 @@
-"""What fits of prints to images, of cameras and of robots' tags find, in figures: see kept_figures."""
+"""What fits of prints to images, of cameras and of robots' tags find, in figures: see kept_results."""
 
 import math
 
@@ -8,7 +8,6 @@ import pytest
 pytest.importorskip("cv2")
 
 import cv2
-from kept_figures import check_figures
 
 from hero_localization.calibration import print_fit, robot_calibration
 from hero_localization.calibration.arena_calibration import calibrate_arena
@@ -19,6 +18,7 @@ from hero_localization.tracking import tag_template
 from hero_localization.tracking.camera_shift import CameraShift
 from hero_localization.tracking.tag_pose import TagCorners, fit_squares, list_corners
 from hero_node import Pose, transform_pose
+from hero_test.kept_results import check_figures
 
 CAMERA = CameraOptions().geometry
 

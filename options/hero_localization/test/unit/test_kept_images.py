@@ -1,15 +1,14 @@
-"""What the simulated camera shows of a small varied arena, in means of blocks of pixels: see kept_figures."""
+"""What the simulated camera shows of a small varied arena, in means of blocks of pixels: see kept_results."""
 
 import numpy as np
 import pytest
 
 pytest.importorskip("cv2")
 
-from kept_figures import check_figures
-
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 from hero_sim.world.arena import build_rectangle
+from hero_test.kept_results import check_figures
 
 OPTIONS = CameraOptions(
     width_px=320,

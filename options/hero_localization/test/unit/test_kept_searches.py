@@ -1,10 +1,11 @@
-"""Where tags are searched, what is mapped, and what images and robots' tags measure, in figures: see kept_figures."""
+"""Where tags are searched, what is mapped, and what images and tags measure, in figures: see kept_results."""
 
 import math
 
 import numpy as np
 import pytest
-from kept_figures import check_figures
+
+from hero_test.kept_results import check_figures
 
 pytest.importorskip("cv2")
 

@@ -1,7 +1,6 @@
 """Commands of each behavior in a varied state: results of experiments must not change without a word in CHANGELOG.rst.
 
-Fingerprints of what was commanded when they were written. A failure shows the new one, which takes the old one's place
-once the change is wanted, and told.
+See hero_test.kept_results.
 """
 
 import zlib
@@ -17,7 +16,7 @@ from hero_swarm.behavior import Random, act, decide, sense
 from hero_swarm.behaviors import find_behavior, list_names
 from hero_swarm.behaviors.machine import make_machine
 from hero_swarm.machines.modules import draw_dot, follow, stack
-from hero_test.fingerprint import assert_kept
+from hero_test.kept_results import check_sums
 
 WORLDS, ROBOTS, STEPS = 2, 6, 5
 
@@ -76,7 +75,7 @@ def run(behavior, arena=None, reach_m=0.25):
 def test_each_behavior_commands_what_it_did_in_a_crowd_and_a_swarm(name):
     numbers = {"left0": 0.8, "right0": 1.0, "left1": 0.5, "right1": -0.6} if name == "wheel_genome" else {}
     behavior = find_behavior(name)(**numbers)
-    assert_kept(KEPT[name], *run(behavior, reach_m=0.15), *run(behavior, reach_m=0.6))
+    check_sums(KEPT[name], *run(behavior, reach_m=0.15), *run(behavior, reach_m=0.6))
 
 
 def make_states(shift):
@@ -116,23 +115,23 @@ def test_machines_and_trees_command_what_they_did_on_floors_and_by_lamps():
     ):
         found += run(make_machine(machines, is_tree)(), FLOOR, 0.4)
     found += run(make_machine([make_states(1)], False, turn_rad_s=1.25, rate_hz=5.0)(), FLOOR, 0.3)
-    assert_kept([19.488865, 3.7802159, 1920], *found)
+    check_sums([19.488865, 3.7802159, 1920], *found)
 
 
 def test_machines_become_the_tables_and_the_graph_that_they_did():
-    assert_kept([-5.6211954, -21.4311523, 7687], *stack([make_states(1), make_tree(), make_states(2)]))
+    check_sums([-5.6211954, -21.4311523, 7687], *stack([make_states(1), make_tree(), make_states(2)]))
     graph = draw_dot(make_states(1))
     assert zlib.crc32(graph.encode()) == 1392506245, graph
 
 
 def test_accelerated_points_move_as_they_did():
-    assert_kept([12.3374894, -51.3249267, 600], *run(find_behavior(str(ACCELERATED))(noise=0.2), None, 2.0))
+    check_sums([12.3374894, -51.3249267, 600], *run(find_behavior(str(ACCELERATED))(noise=0.2), None, 2.0))
 
 
 def test_pages_may_set_numbers_up_to_the_limits_that_they_had():
     kinds = [find_behavior(name) for name in list_names()]
     settings = [(getattr(kind, name), *one.limits) for kind in kinds for name, one in sorted(kind.settings.items())]
-    assert_kept([98.1656097, -1007.9284495, 183], *settings)
+    check_sums([98.1656097, -1007.9284495, 183], *settings)
 
 
 def test_a_machine_takes_floors_at_the_bounds_for_gray_and_shows_its_state():

@@ -1,7 +1,6 @@
 """Safety filter, trials, sensors, metrics and learners on varied cases: their results must not change without a word.
 
-Fingerprints of what came out when they were written. A failure shows the new one, which takes the old one's place once
-the change is wanted, and told in CHANGELOG.rst.
+See hero_test.kept_results.
 """
 
 import math
@@ -22,7 +21,7 @@ from hero_swarm.learning.vector_env import SwarmVectorEnv
 from hero_swarm.metrics.own import State, measure_metric
 from hero_swarm.safety import FENCE, OFF, ROBOTS, SafetyFilter
 from hero_swarm.trial import Trial, scatter_objects
-from hero_test.fingerprint import assert_kept
+from hero_test.kept_results import check_sums
 
 FENCE_M = np.array((-0.5, -0.4, 0.45, 0.35))
 
@@ -52,7 +51,7 @@ def test_the_filter_gives_the_commands_that_it_gave(mode, fence_m, neighbors, ke
         angular_rad_s[4] = math.inf if step == 1 else 0.0
         safe.others_m = random.uniform((-0.5, -0.5, 0.03), (0.5, 0.5, 0.07), (step, 3))
         found += [*safe(poses, linear_m_s, angular_rad_s, ages_s if step else None), safe.is_limited]
-    assert_kept(kept, *found, safe.calls, safe.limited_calls)
+    check_sums(kept, *found, safe.calls, safe.limited_calls)
 
 
 def test_a_filter_is_called_at_20_hz_or_more_often_unless_it_is_off():
@@ -86,7 +85,7 @@ def test_virtual_sensors_give_what_they_gave():
             found += sensor
         around["messages"] = np.arange(20.0).reshape(10, 2) + step
         around["deposits"] = np.arange(10.0) / 5.0
-    assert_kept([-31.4924609, -69.5476864, 2050], *found)
+    check_sums([-31.4924609, -69.5476864, 2050], *found)
 
 
 @pytest.mark.parametrize("name", sorted(metrics.METRICS))
@@ -99,7 +98,7 @@ def test_each_metric_measures_what_it_did(name):
     found = [measure_metric(name, state)]
     if name in metrics.CHANCE:
         found.append(metrics.score(name, np.linspace(0.0, 1.0, 21)))
-    assert_kept(METRICS[name], *found)
+    check_sums(METRICS[name], *found)
 
 
 METRICS = {
@@ -158,14 +157,14 @@ def test_a_trial_drives_robots_to_where_it_did(options, kept):
     for time_s, poses in trial.run(1.5, every_s=0.5):
         state = trial.state
         found += [time_s, state.time_s, poses, trial.velocities, state.objects, state.radii_m, trial.things.radii_m]
-    assert_kept(kept, *found)
+    check_sums(kept, *found)
 
 
 def test_objects_are_scattered_where_they_were():
     arena, robots = load_arena("box"), draw_poses(1, 12, reach_m=0.5)[0]
     arena = arena._replace(objects=arena.objects * 4)
     found = [thing.pose for seed in range(8) for thing in scatter_objects(arena, robots, seed)]
-    assert_kept([2.9737138, 7.845585, 96], *found)
+    check_sums([2.9737138, 7.845585, 96], *found)
 
 
 @pytest.mark.parametrize(
@@ -182,7 +181,7 @@ def test_objects_are_scattered_where_they_were():
 def test_robots_are_placed_where_they_were(start, kept):
     rows = b"# x, y, yaw\n" + b"\n".join(b"%f, %f, %f" % tuple(pose) for pose in 5.0 * draw_poses(1, 8)[0])
     arena = load_arena("empty") if start.kind != "file" else build_rectangle(9.0, 9.0, 1)
-    assert_kept(kept, place_all(start, arena, 7, [3, 5, 3], lambda path: rows))
+    check_sums(kept, place_all(start, arena, 7, [3, 5, 3], lambda path: rows))
 
 
 def test_learners_observe_and_are_rewarded_as_they_were():
@@ -193,7 +192,7 @@ def test_learners_observe_and_are_rewarded_as_they_were():
     while not env.ended:
         found += [*env.step(random.uniform(-1.2, 1.2, (8, 2))), env.time_s]
     found.append(env.reset())
-    assert_kept([4.0173147, -46.6899321, 1332], *found)
+    check_sums([4.0173147, -46.6899321, 1332], *found)
 
 
 def test_observations_have_the_defaults_of_their_document():

@@ -1,6 +1,6 @@
 """Methods of design and their candidates: what they find must not change without a word in CHANGELOG.rst.
 
-Fingerprints of what came out when they were written; a failure shows the new one.
+See hero_test.kept_results.
 """
 
 import io
@@ -17,7 +17,7 @@ from hero_swarm.design.kinds import Machines, Networks, Numbers
 from hero_swarm.design.mission import read_mission
 from hero_swarm.design.search import CHOICE, REAL, WHOLE, Genes, adapt, evolve, find_worse, race
 from hero_swarm.machines.modules import LIMITS
-from hero_test.fingerprint import assert_kept
+from hero_test.kept_results import check_sums
 
 GENES = Genes.of([(-2.0, 2.0, REAL), (0, 4, CHOICE), (0.5, 1.0, REAL), (1, 10, WHOLE), (0, 3, CHOICE)])
 
@@ -66,7 +66,7 @@ def test_a_method_asks_for_the_candidates_that_it_asked_for(method, budget, kept
     monkeypatch.setitem(sys.modules, "cmaes", types.SimpleNamespace(CMA=StubCma))
     judge = Judge(0.05)
     found = method(judge, GENES, budget, np.random.RandomState(4))
-    assert_kept(kept, found, *judge.asked)
+    check_sums(kept, found, *judge.asked)
 
 
 def test_candidates_that_are_worse_are_those_that_were():
@@ -76,7 +76,7 @@ def test_candidates_that_are_worse_are_those_that_were():
         level = np.linspace(0.0, 1.5, count)[:, None]
         for _ in range(8):
             found.append(find_worse(np.round(level + random.standard_normal((count, seeds)), 1)))
-    assert_kept([-2.1574742, 0.051301, 240], *found)
+    check_sums([-2.1574742, 0.051301, 240], *found)
 
 
 MISSION = """\
@@ -126,7 +126,7 @@ def test_numbers_of_candidates_become_the_machines_that_they_did(is_tree, is_bar
         (tmp_path / "arena.yaml").write_text(ARENA.partition("\n")[0])
     kind = Machines(read_mission(mission), is_tree)
     files = [yaml.safe_load(kind.dump(genome, "a.yaml", "# mine\n")) for genome in draw(kind.genes, 1)]
-    assert_kept(kept, *kind.genes, number_all(files))
+    check_sums(kept, *kind.genes, number_all(files))
 
 
 def test_numbers_of_candidates_become_the_networks_that_they_did(mission):
@@ -136,13 +136,13 @@ def test_numbers_of_candidates_become_the_networks_that_they_did(mission):
         with np.load(io.BytesIO(kind.dump(genome, "a.yaml", ""))) as file:
             found += [file["w_0"], file["b_0"], number_all(yaml.safe_load(str(file["about"])))]
     (layer,) = kind.make(genomes, None)._file[2]
-    assert_kept([1140.6507171, -640.08956, 544], *found, *layer)
+    check_sums([1140.6507171, -640.08956, 544], *found, *layer)
 
 
 def test_numbers_of_candidates_become_the_behaviors_that_they_did(mission):
     kind = Numbers(read_mission(mission))
     found = [number_all(yaml.safe_load(kind.dump(genome, "a.yaml", ""))) for genome in draw(kind.genes, 3)]
-    assert_kept([1671.1063619, -1388.894448, 78], *kind.genes, *found)
+    check_sums([1671.1063619, -1388.894448, 78], *kind.genes, *found)
 
 
 def test_numbers_of_modules_are_those_of_chocolate():

@@ -1,6 +1,6 @@
 """Fits of robots on short recordings: what they find must not change without a word in CHANGELOG.rst.
 
-Fingerprints of what came out when they were written; a failure shows the new one.
+See hero_test.kept_results.
 """
 
 from unittest.mock import create_autospec
@@ -21,7 +21,7 @@ from hero_swarm.fitting.recording import (
     sample_times,
 )
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
-from hero_test.fingerprint import assert_kept
+from hero_test.kept_results import check_sums
 from hero_test.nonempty import nonempty
 
 PERIOD_S = 0.05
@@ -60,7 +60,7 @@ MOTORS = [
 )
 def test_commands_are_replayed_as_they_were(kind, kept):
     recording = make_recording(4.0, kind)
-    assert_kept(kept, replay_commands(recording, MOTORS))
+    check_sums(kept, replay_commands(recording, MOTORS))
 
 
 def test_motors_are_fitted_in_the_steps_that_they_were(monkeypatch):
@@ -68,13 +68,13 @@ def test_motors_are_fitted_in_the_steps_that_they_were(monkeypatch):
     found = []
     for motors in fit_motors([make_recording(3.0), make_recording(2.5, seed=2)]):
         found += [*motors.values.values(), motors.delay_s, motors.phase_s]
-    assert_kept([1942.815382, 380.8751977, 16], *found)
+    check_sums([1942.815382, 380.8751977, 16], *found)
 
 
 def test_a_body_is_fitted_to_curves_as_it_was():
     recordings = [make_recording(30.0), make_recording(40.0, seed=2, rest_s=(9.0, 12.0))]
     lengths = [[len(poses) for _, poses in _list_stretches(recording)] for recording in recordings]
-    assert_kept([17.7852784, -168.3426207, 9], fit_body(recordings), *lengths)
+    check_sums([17.7852784, -168.3426207, 9], fit_body(recordings), *lengths)
 
 
 @pytest.mark.parametrize(
@@ -85,14 +85,14 @@ def test_ends_of_paths_are_predicted_as_they_were(kind, kept):
     robots = [(motors, np.array(body)) for motors, body in zip(MOTORS, ((1, 1, 1), (1.02, 0.99, 1.03), (1, 1.05, 1)))]
     late = recording._replace(poses=recording.poses[recording.poses[:, 0] > 1.7])
     given = [(recording, share) for share in (0.0, 0.3, 0.8)] + [(late, 0.0)]
-    assert_kept(kept, *(predict_ends(one, robots, share, 2.0) for one, share in given))
+    check_sums(kept, *(predict_ends(one, robots, share, 2.0) for one, share in given))
 
 
 def test_recordings_are_read_at_times_as_they_were():
     recording = make_recording(12.0, seed=2, rest_s=(4.0, 6.5))
     times_s, cut = sample_times(recording), recording.cut(0.61)
     found = times_s, measure_wheels(recording, times_s), find_slips(recording), interpolate_poses(cut.poses, times_s)
-    assert_kept([-1083.626786, 1537.4239643, 2803], *found, *cut)
+    check_sums([-1083.626786, 1537.4239643, 2803], *found, *cut)
     none = find_slips(make_recording(0.9))
     assert none.shape == (0,)
 
@@ -104,7 +104,7 @@ def test_samples_at_which_poses_lag_behind_wheels_are_those_that_were():
         slips_s = find_slips(recording)
         assert 5 < len(slips_s) < 350, "only some"
         found += [slips_s, len(slips_s)]
-    assert_kept([-97.3419688, -29.9278207, 231], *found)
+    check_sums([-97.3419688, -29.9278207, 231], *found)
 
 
 def test_a_fit_is_told_with_its_errors_and_its_delay():
