@@ -31,7 +31,6 @@ PRESSES_MAX = 100
 FIRST_WARNING_S = 2.0
 """joy_node may start later."""
 
-
 CHOSEN_COLOR = "white"
 
 

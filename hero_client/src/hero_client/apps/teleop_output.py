@@ -12,7 +12,6 @@ from ..robots.robot_base import BaseRobot
 PAUSE_S = 0.5
 """A teleoperation takes a step every 0.05 to 0.1 s; after more than this it, or its PC, was suspended or too busy."""
 
-
 HOLD_ENDED = "robots were stopped or released, which ends what you hold: let go, then press again"
 
 

@@ -66,7 +66,6 @@ class WanderLaw(NamedTuple):
 
 WANDER = WanderLaw()
 
-
 STOP_STEPS = 2
 """At 10 Hz: the robot takes about 0.5 s to slow down to a lower speed, but 0.15 s to stop."""
 

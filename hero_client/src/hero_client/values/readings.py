@@ -16,7 +16,6 @@ recording of real robots the longest one lasted 0.15 to 1.3 s."""
 MAX_POSITION_M = 1000.0
 """No robot drives this far; a position or range beyond is invalid."""
 
-
 NOT_CALIBRATED = "its infrared sensors are not calibrated: `rosrun hero_calibration calibrate`"
 """Why ranges are nan, for users: a stock robot sends them for sensors without constants (RangeSensor.ino)."""
 

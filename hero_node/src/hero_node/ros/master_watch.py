@@ -16,7 +16,6 @@ from .master import LimitedTransport, MasterRefusalError, ask_master
 SENTINEL = "~get_loggers"
 """A service that rospy registers when a node starts, and not again: what the node registers later does not tell."""
 
-
 WATCH_PERIOD_S = 2.0
 """Time between two looks at the master."""
 

@@ -65,7 +65,6 @@ starts; what was found in this step."""
 IS_COMPILED = False
 """True in loops that numba compiles: a branch that is hard to predict costs a processor more than what it skips."""
 
-
 START_X, START_Y, ALONG_X, ALONG_Y, LENGTH2, THICKNESS = range(6)
 """Rows of obstacles: segments (see Segments) with a radius."""
 

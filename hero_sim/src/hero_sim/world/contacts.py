@@ -59,7 +59,6 @@ _MARGIN_M = 0.03
 _MANY = 12
 """Contacts of a robot for which there is room at the start."""
 
-
 _OF_PLACE = np.dtype([("first", np.uintp), ("second", np.uintp), ("starts", int), ("seen", int)])
 _OF_BODY = np.dtype([("stamp", int), *((name, float) for name in ("x", "y", "turn", "a", "u_x", "u_y", "h"))])
 _ENDS = [f"{how}_{part}_{end}" for end in (1, 2) for how in ("pressed", "dragged") for part in ("x", "y", "turn")]

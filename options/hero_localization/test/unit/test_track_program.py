@@ -12,12 +12,13 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from hero_localization.camera.camera_model import Camera, Intrinsics
+from hero_localization.camera.device_controls import DeviceControls
 from hero_localization.camera.frame_source import Frame
 from hero_localization.errors import DetectorError, LocalizationError
 from hero_localization.nodes import track
 from hero_localization.tracking import settings as camera_file
 from hero_localization.tracking.settings import Settings
-from hero_localization.tracking.tag_pose import TagCorners, list_corners
+from hero_localization.tracking.tag_pose import TagCorners, TagLayout, list_corners
 from hero_msgs.msg import RobotPose, RobotPoses
 from hero_node import Pose
 from hero_node.parameters import check_parameters
@@ -69,13 +70,9 @@ def test_a_camera_is_not_called_uncalibrated_before_its_file_may_be_there(monkey
 def make_node(monkeypatch):
     """A node without ROS, whose camera file and log a test holds."""
     node = track.TrackNode.__new__(track.TrackNode)
-    node._path, node._file_s, node._settings, node._tracker = "camera.yaml", 1.0, "old settings", "old tracker"
-    node._process, node._logged_s, node.file, node.lines = (
-        None,
-        {},
-        SimpleNamespace(changed_s=1.0, loads=0, content=None),
-        [],
-    )
+    node._path, node._file_s, node._settings, node._tracker = "camera.yaml", 1.0, Settings(), "old tracker"
+    node.file = SimpleNamespace(changed_s=1.0, loads=0, content=None)
+    node._process, node._logged_s, node.lines = None, {}, []
 
     def load(path):
         assert path == "camera.yaml"
@@ -94,7 +91,7 @@ def make_node(monkeypatch):
 
 def test_a_calibration_that_is_written_meanwhile_counts_at_once(node):
     for changed_s, camera in ((2.0, "camera"), (3.0, None)):
-        node.file.changed_s, node.file.content = changed_s, SimpleNamespace(camera=camera)
+        node.file.changed_s, node.file.content = changed_s, Settings(camera=camera)
         node._follow_file()
         node._follow_file()
     assert node.file.loads == 2
@@ -102,13 +99,27 @@ def test_a_calibration_that_is_written_meanwhile_counts_at_once(node):
     assert node.lines == [("info", "camera.yaml has changed, and counts from now on")]
 
 
+def test_what_counts_only_when_track_starts_again_is_named(node):
+    changes = {"controls": DeviceControls(gain=3)}, {"layout": TagLayout(height_m=0.08)}, {"delay_s": 0.1}
+    for number, change in enumerate(changes):
+        node._settings, node.file.changed_s, node.file.content = (
+            Settings(),
+            2.0 + number,
+            Settings(camera="camera", **change),
+        )
+        node._follow_file()
+    waits = "; exposure_s, gain, focus and the height of pictures from the next start on"
+    told = "camera.yaml has changed, and counts from now on"
+    assert node.lines == [("info", told + waits), ("info", told + waits), ("info", told)]
+
+
 def test_a_camera_file_that_cannot_be_read_is_told_of_once(node):
     node.file.changed_s, node.file.content = 2.0, LocalizationError("camera.yaml, line 3: no number")
     for _ in range(3):
         node._follow_file()
-    assert node.file.loads == 1 and (node._settings, node._tracker) == ("old settings", "old tracker")
+    assert node.file.loads == 1 and (node._settings, node._tracker) == (Settings(), "old tracker")
     assert node.lines == [("err", "camera.yaml, line 3: no number; the calibration before it counts")]
-    node.file.changed_s, node.file.content = 3.0, SimpleNamespace(camera="camera")
+    node.file.changed_s, node.file.content = 3.0, Settings(camera="camera")
     node._follow_file()
     assert node._tracker[2] == "camera"
 

@@ -51,7 +51,6 @@ _FIELDS = {
 Command = Tuple[Any, Any, Any]
 """linear m/s and angular rad/s, each a number or an array (R,), and the memory for the next step."""
 
-
 _AHEAD = 16
 """Calls for which uniform numbers are drawn at once: streams are called by world, which takes longer than drawing."""
 

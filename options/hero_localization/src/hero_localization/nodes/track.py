@@ -157,12 +157,14 @@ class TrackNode:
             rospy.logerr(f"{error}; the calibration before it counts")
             return
         if settings.camera is not None:
-            if self._process is not None and settings[:3] != self._settings[:3]:  # of another detector
+            before, self._settings = self._settings, settings
+            if self._process is not None and settings[:3] != before[:3]:  # of another detector
                 self._process.close()
                 self._process = None
-            self._settings = settings
             self._start_tracker(settings.camera)
-            rospy.loginfo(f"{self._path} has changed, and counts from now on")
+            waits = (settings.controls, settings.layout.height_m) != (before.controls, before.layout.height_m)
+            wait = "; exposure_s, gain, focus and the height of pictures from the next start on" if waits else ""
+            rospy.loginfo(f"{self._path} has changed, and counts from now on{wait}")
 
     def _take_frame(self, tracker: Tracker, frame: Frame) -> None:
         height_px, width_px = frame.gray.shape

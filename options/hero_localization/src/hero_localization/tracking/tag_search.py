@@ -83,7 +83,6 @@ STILL = np.zeros(2)
 NARROW_S = 0.08
 """After a longer gap, a window for this time is tried first: on a busy machine large ones would make gaps longer."""
 
-
 AnyDetector = Union[TagDetector, TemplateDetector]
 
 

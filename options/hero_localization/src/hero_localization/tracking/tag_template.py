@@ -53,7 +53,6 @@ _EDGES = [(turn * math.pi / 12.0, float(place)) for turn in range(12) for place 
 """Directions of shadows, rad, and places of their edges along these, cells."""
 EDGE_CELLS = 0.5
 
-
 SIDE = CELLS + 2
 """Cells along a side of the print with its white margin."""
 

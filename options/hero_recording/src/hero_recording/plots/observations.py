@@ -26,7 +26,6 @@ KINDS = ("odometry", "ground_truth", "pose", "velocity_command", "position_comma
 CUBE, CYLINDER = 1, 3
 """Types of visualization_msgs/Marker that walls and round obstacles are drawn with."""
 
-
 MAX_VALUE = 1e6
 
 

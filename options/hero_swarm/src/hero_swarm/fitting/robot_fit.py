@@ -25,7 +25,6 @@ MAX_DEVIATION = 0.15
 SLIP = 0.02
 """Cannot be told from rolling less far: the usual one; what is lost by it, wheels roll farther."""
 
-
 _SLIP_MEAN = float(np.sqrt(2.0 / np.pi))
 """Mean share of travel that is lost, by the sd that `slip` is."""
 

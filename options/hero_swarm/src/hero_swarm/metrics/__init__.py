@@ -39,7 +39,6 @@ UNITS = {"consensus_error": "m", "dispersion": "m", "nearest_neighbor": "m", "ob
 FALLING = ("collisions", "consensus_error", "dispersion", "dispersion_ratio", "fatness", "object_distance")
 """Metrics for which less is better: a bound without <= or >= is an upper one; it is a lower one for all others."""
 
-
 CHANCE = {"rotation": 0.78, "wall_following": 0.3, "order": 0.39, "cluster_fraction": 0.95}
 """Metrics that one in twenty random controllers reaches: wheel_genome with 100 random numbers each, 9 and 20 robots in
 1.71 m x 1.42 m, friction as drawn, last 30 of 120 s; the higher one (drawn once, script/bench swarm --only chance)."""
