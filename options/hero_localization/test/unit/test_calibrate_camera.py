@@ -188,12 +188,13 @@ class Board:
         ([], 99, 1, [20, 21, 22, 23, 24, 25]),
     ],
 )
-def test_views_are_taken_until_the_lens_is_known(options, enough, status, calibrated, tmp_path, monkeypatch):
+def test_views_are_taken_until_the_lens_is_known(options, enough, status, calibrated, tmp_path, monkeypatch, capsys):
     board, path = Board(enough, monkeypatch), str(tmp_path / "camera.yaml")
     parsed = calibrate_camera.parse_options(["lens", "--file", path, *options])
     assert calibrate_lens.calibrate_lens_by_board(parsed, board, SimpleNamespace(now_s=0.0)) == status
     assert board.calibrated == calibrated
     assert settings.load(path).lens.width_px == 2
+    assert "error 0.10 px rms, focal length known to 0.10 %" in capsys.readouterr().out
 
 
 def test_views_are_still_and_away_from_others(tmp_path, monkeypatch):

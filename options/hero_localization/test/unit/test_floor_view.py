@@ -81,6 +81,15 @@ def test_the_box_ends_at_the_middle_of_the_last_pixel():
     assert (left_m, low_m, right_m, high_m) == pytest.approx((x_m.min(), y_m.min(), x_m.max(), y_m.max()), abs=1e-9)
 
 
+def test_the_box_holds_edges_that_a_lens_bends_outwards():
+    camera = hang_camera(0.0, 0.0)
+    camera = camera._replace(lens=camera.lens._replace(distortion=np.array((0.15, 0.0, 0.0, 0.0, 0.0))))
+    middles = np.array(((960.0, 0.0), (960.0, 1079.0), (0.0, 540.0), (1919.0, 540.0)))
+    x_m, y_m = camera.intersect(middles, HEIGHT_M).T
+    box_m = FloorView(camera, HEIGHT_M).box_m
+    assert box_m == pytest.approx((x_m.min(), y_m.min(), x_m.max(), y_m.max()), abs=0.003)
+
+
 def test_a_camera_sees_three_of_its_heights_to_each_side():
     low_m, high_m = np.array(FloorView(hang_camera(1.3, 0.0), HEIGHT_M).box_m).reshape(2, 2)
     reach_m = np.maximum(np.abs(low_m - (0.1, -0.2)), np.abs(high_m - (0.1, -0.2)))

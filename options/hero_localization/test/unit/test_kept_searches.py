@@ -13,7 +13,7 @@ from hero_localization.mapping.occupancy_grid import OccupancyGrid
 from hero_localization.simulated_camera.view import CameraOptions
 from hero_localization.tracking import tag_template
 from hero_localization.tracking.tag_pose import TagCorners, find_smallest_side, fit_squares
-from hero_localization.tracking.tag_search import TagSearch
+from hero_localization.tracking.tag_search import TagSearch, _list_tiles
 from hero_localization.tracking.tracker import ImageQuality
 from hero_node import Pose
 
@@ -228,3 +228,10 @@ def test_samples_of_a_print_lie_in_its_cells_row_by_row():
         np.testing.assert_array_equal(places[0, :, 0], axis)
         np.testing.assert_array_equal(places[:, 3, 1], axis)
         assert (places[4] == places[4, :1] * (0, 1) + places[0] * (1, 0)).all()
+
+
+def test_tiles_of_a_large_image_are_whole_pixels_and_overlap_more():
+    tiles = _list_tiles(3840, 2160)
+    assert len(tiles) == 48 and tiles[0] == (0, 0, 710, 590) and tiles[-1] == (3360, 1800, 3840, 2160)
+    assert all(type(edge) is int for tile in tiles for edge in tile)
+    assert _list_tiles(1920, 1080)[0] == (0, 0, 576, 456)

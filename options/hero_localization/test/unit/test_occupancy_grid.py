@@ -126,6 +126,8 @@ def test_a_robot_beyond_the_map_or_at_its_rim_does_no_harm(pose):
 def test_bounds_without_an_area_are_refused(bounds_m):
     with pytest.raises(ValueError, match="bounds"):
         OccupancyGrid(bounds_m)
+    with pytest.raises(ValueError, match="bounds"):
+        OccupancyGrid((0.0, 0.0, 1.0, 1.0), 0.0)
 
 
 CENTER = Pose(0.005, 0.005, 0.0)
