@@ -21,7 +21,8 @@ class Publisher:
         tcp_nodelay: bool = ...,
         latch: bool = ...,
         headers: Optional[Any] = ...,
-        queue_size: Optional[int] = ...,
+        *,
+        queue_size: Optional[int],  # without one, publish() waits for the slowest subscriber
     ) -> None: ...
     def publish(self, *args: Any, **kwds: Any) -> None: ...
     def get_num_connections(self) -> int: ...

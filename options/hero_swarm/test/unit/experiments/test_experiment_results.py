@@ -293,8 +293,8 @@ def test_the_folder_says_what_made_it(tmp_path):
 
 @pytest.mark.slow
 def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, capsys):
-    pages = []
-    monkeypatch.setattr(report, "draw_page", lambda *arguments: pages.append(arguments) or "<html>")
+    pages, draw = [], report.draw_page
+    monkeypatch.setattr(report, "draw_page", lambda *arguments: pages.append(arguments) or draw(*arguments))
     path = tmp_path / "both"
     folder, _ = open_folder(path)
     folder.write_batch(RUNS[:4])
@@ -312,6 +312,7 @@ def test_a_report_of_each_kind_of_runs_has_its_own_files(tmp_path, monkeypatch, 
     assert line.get_xdata().tolist() == [0.0, 1.0, 2.0] and line.get_ydata().tolist() == [1.5, 5.5, 9.5]
     assert text == FILE and about["code"] == "c0de"
     assert "dispersion" in of_robots and "dispersion_over_time" not in of_robots
+    assert ["<h2>Over time" in (path / f"report{kind}.html").read_text() for kind in ("", "_robots")] == [True, False]
     assert "report_robots.html" in capsys.readouterr().out
     figures, of_robots = (set(os.listdir(str(path / name))) for name in ("figures", "figures_robots"))
     assert of_robots < figures and figures - of_robots >= {"dispersion_over_time.svg", "dispersion_over_time.pdf"}
