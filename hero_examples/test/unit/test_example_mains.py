@@ -13,7 +13,7 @@ from hero_sim.stepped.swarm import StepWorld
 pytest.importorskip("rospy", reason="the programs import rospy")
 from geometry_msgs.msg import Point, Pose, PoseArray
 
-from hero_examples.driving import random_walk, teleop_joy
+from hero_examples.driving import go_to_goal, joy_driver, measure_delay, random_walk, teleop, teleop_joy
 from hero_examples.swarm import explore, follow, led_show, swarm_go_to
 
 DARK = (0.0, 0.0, 0.0)
@@ -112,3 +112,37 @@ def test_a_joystick_stops_by_a_button_of_its_own(monkeypatch, swarm, name):
     with pytest.raises(ProgramError, match="~stop_button is 1, the same as ~" + name):
         run()
     assert run.asked == []
+
+
+@pytest.mark.parametrize(
+    ("module", "limits"),
+    [
+        (go_to_goal, "tolerance_m 0.01 0.002..1, timeout_s 120 1..3600"),
+        (joy_driver, "deadzone 0.05 0..0.9, autorepeat_rate 20 1..100"),
+        (measure_delay, "turns 10 1..1000"),
+        (random_walk, "linear_m_s 0.1 0..0.2, angular_rad_s 1.5 0.1..4, seed -1 -1..2147483648"),
+        (teleop, "linear_m_s 0.1 0.02..0.2, angular_rad_s 1.5 0.25..4"),
+        (
+            teleop_joy,
+            "linear_m_s 0.15 0.02..0.2, angular_rad_s 2 0.25..8, linear_axis 1 0..63, angular_axis 0 0..63,"
+            " enable_button 4 0..63, stop_button 1 0..63, next_button 5 0..63",
+        ),
+        (explore, "idle_s 10 1..3600, seed -1 -1..2147483648"),
+        (follow, "gap_m 0.15 0.1..2, linear_m_s 0.15 0.01..0.2"),
+        (led_show, "period_s 4 0.5..60, brightness 1 0..1"),
+        (swarm_go_to, "linear_m_s 0.08 0.01..0.2, tolerance_m 0.01 0.005..0.1, timeout_s 120 1..3600"),
+    ],
+)
+def test_numbers_of_each_program_have_these_defaults_and_limits(monkeypatch, swarm, module, limits):
+    """Many are in the README, too; those of rare use are only here."""
+    run, found = Run(monkeypatch, module, swarm), []
+
+    def read_parameters(declared):
+        found.extend((name, own) for name, own in declared.items() if getattr(own, "limits", None))
+        raise ProgramError("was asked")
+
+    monkeypatch.setattr(module, "read_parameters", read_parameters)
+    with pytest.raises(ProgramError, match="was asked"):
+        run()
+    texts = ("%s %g %.10g..%.10g" % (name, own.default, *own.limits) for name, own in found)
+    assert ", ".join(texts) == limits
