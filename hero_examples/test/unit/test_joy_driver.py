@@ -1,8 +1,8 @@
 """Reading a joystick: records as the kernel sends them, and a device that is not there, or goes."""
 
+import itertools
 import os
 import struct
-from types import SimpleNamespace
 from unittest import mock
 
 import pytest
@@ -54,17 +54,24 @@ def test_what_is_neither_axis_nor_button_is_left_out(joy):
 
 
 class Stage:
-    """A program that reads the named pipe at path, in place of a device; sent: the axes of each message."""
+    """A program that reads the named pipe at path, in place of a device.
+
+    sent: the axes of each message; stamps_s: when they were sent, as they say.
+    """
 
     def __init__(self, monkeypatch, path):
-        self.path, self.sent, self.ends = str(path), [], []
+        self.path, self.sent, self.stamps_s, self.ends = str(path), [], [], []
         os.mkfifo(self.path)
         self.kernel = os.open(self.path, os.O_RDWR)
-        publisher = SimpleNamespace(publish=lambda joy: self.sent.append(list(joy.axes)))
-        monkeypatch.setattr(joy_driver.rospy, "Publisher", lambda topic, kind, queue_size: publisher)
-        monkeypatch.setattr(joy_driver.rospy.Time, "now", joy_driver.rospy.Time)
+        now_s = itertools.count(100)
+        monkeypatch.setattr(joy_driver.rospy, "Publisher", lambda topic, kind, queue_size: self)
+        monkeypatch.setattr(joy_driver.rospy.Time, "now", lambda: joy_driver.rospy.Time(next(now_s)))
         self.program = mock.create_autospec(Program, instance=True, running=True)
         self.program.wait_readable.side_effect = self.wait
+
+    def publish(self, joy):
+        self.sent.append(list(joy.axes))
+        self.stamps_s.append(joy.header.stamp.to_sec())
 
     def wait(self, fds, timeout_s):
         """Take the next of what happens."""
@@ -82,7 +89,7 @@ class Stage:
 def test_a_device_is_published_at_each_change_and_again_without_one(monkeypatch, tmp_path):
     stage = Stage(monkeypatch, tmp_path / "js0")
     stage.run(lambda: os.write(stage.kernel, pack((AXIS, 0, -32767))), lambda: False, stage.stop)
-    assert stage.sent == [[1.0]] * 3
+    assert stage.sent == [[1.0]] * 3 and stage.stamps_s == [100.0, 101.0, 102.0]
     os.close(stage.kernel)
 
 
