@@ -276,6 +276,20 @@ def test_a_burst_counts_for_two_of_the_four_stops():
         assert (stop.state is StopState.AT_REST) == is_at_rest
 
 
+def test_wheels_that_turn_again_after_rest_have_their_time_before_a_burst():
+    stop, wheels = make_progress()
+    for _ in range(4):
+        stop.note_sent(False, 0.0)
+    rest(wheels, REST_READINGS)
+    stop.is_due(True, 0.0)
+    turn(wheels, 24)
+    stop.is_due(True, 50.0)
+    assert stop.state is StopState.MOVING and not stop.needs_burst(False, 50.0)
+    stop.is_due(True, 50.1)
+    turn(wheels, 24)
+    assert stop.needs_burst(False, 51.0)
+
+
 def test_wheels_that_turned_though_at_rest_rest_again_after_29_readings():
     stop, wheels = make_progress()
     for _ in range(4):
