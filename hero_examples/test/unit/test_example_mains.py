@@ -1,5 +1,7 @@
 """Programs of the examples that are ended as by Ctrl-C, or end by themselves: exit status, lights, robots at rest."""
 
+import re
+import sys
 from contextlib import nullcontext
 
 import pytest
@@ -13,6 +15,7 @@ from hero_sim.stepped.swarm import StepWorld
 pytest.importorskip("rospy", reason="the programs import rospy")
 from geometry_msgs.msg import Point, Pose, PoseArray
 
+from hero_examples import stock_names
 from hero_examples.driving import go_to_goal, joy_driver, measure_delay, random_walk, teleop, teleop_joy
 from hero_examples.swarm import explore, follow, led_show, swarm_go_to
 
@@ -146,3 +149,17 @@ def test_numbers_of_each_program_have_these_defaults_and_limits(monkeypatch, swa
         run()
     texts = ("%s %g %.10g..%.10g" % (name, own.default, *own.limits) for name, own in found)
     assert ", ".join(texts) == limits
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("random_walk2", "rosrun hero_examples random_walk"),
+        ("hero_demo", "rosrun hero_examples swarm_go_to"),
+        ("tag2pose", "roslaunch hero_localization localization.launch"),
+    ],
+)
+def test_programs_of_the_stock_packages_name_what_does_the_same_here(monkeypatch, old, new):
+    monkeypatch.setattr(sys, "argv", [f"/ws/devel/lib/hero_examples/{old}.py"])
+    with pytest.raises(ProgramError, match=re.escape(f"here it is: {new} (docs/migration.md)")):
+        stock_names.main()
