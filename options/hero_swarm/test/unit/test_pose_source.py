@@ -109,7 +109,7 @@ def test_other_robots_are_looked_for_every_second_but_for_refused_ones(topics, m
     assert others.read().tolist() == [[2.0, 0.0, MODELS["hero"].body_radius_m]] and others.describe_missing() == ""
     join(0, 1, 3)
     clock[0] = 10.99
-    assert others.read().shape == (1, 3)
+    assert others.read().shape == (1, 3) and drivers.read.call_count == 1
     clock[0] = 11.0
     others.read()
     tell_truth(topics, 3, 0.1)
