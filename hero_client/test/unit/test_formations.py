@@ -9,7 +9,7 @@ import pytest
 
 from hero_client.apps.formations import assign_goals, place_formation
 from hero_node.files import EntryError
-from hero_test.bad_yaml import make_bad_yaml
+from hero_test.checks.bad_yaml import make_bad_yaml
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import sys
 import textwrap
 
 from hero_driver.config import PARAMETERS
-from hero_test.parameter_list import make_list, write_default
+from hero_test.checks.parameter_list import make_list, write_default
 
 GROUPS = {
     "Connections": ("host", "port", "allow"),

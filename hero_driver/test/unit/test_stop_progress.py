@@ -189,6 +189,17 @@ def rest(wheels, readings):
         wheels.read_ticks(wheels._left_ticks, 0.0)
 
 
+def come_to_rest():
+    """Return a stop that wheels have confirmed at 0.0, after four, and these."""
+    stop, wheels = make_progress()
+    for _ in range(4):
+        stop.note_sent(False, 0.0)
+    rest(wheels, REST_READINGS)
+    stop.is_due(True, 0.0)
+    assert stop.state is StopState.AT_REST
+    return stop, wheels
+
+
 @pytest.mark.parametrize(
     ("elapsed_s", "was_burst", "interval_s"),
     [
@@ -277,11 +288,7 @@ def test_a_burst_counts_for_two_of_the_four_stops():
 
 
 def test_wheels_that_turn_again_after_rest_have_their_time_before_a_burst():
-    stop, wheels = make_progress()
-    for _ in range(4):
-        stop.note_sent(False, 0.0)
-    rest(wheels, REST_READINGS)
-    stop.is_due(True, 0.0)
+    stop, wheels = come_to_rest()
     turn(wheels, 24)
     stop.is_due(True, 50.0)
     assert stop.state is StopState.MOVING and not stop.needs_burst(False, 50.0)
@@ -291,12 +298,7 @@ def test_wheels_that_turn_again_after_rest_have_their_time_before_a_burst():
 
 
 def test_wheels_that_turned_though_at_rest_rest_again_after_29_readings():
-    stop, wheels = make_progress()
-    for _ in range(4):
-        stop.note_sent(False, 0.0)
-    rest(wheels, REST_READINGS)
-    stop.is_due(True, 0.0)
-    assert stop.state is StopState.AT_REST
+    stop, wheels = come_to_rest()
     turn(wheels, 2)
     assert stop.is_due(True, 50.0), "at once"
     assert stop.state is StopState.MOVING

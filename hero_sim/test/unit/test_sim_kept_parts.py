@@ -19,7 +19,7 @@ from hero_sim.world.pushing.shapes import Disc, Polygon, PushedBody
 from hero_sim.world.robot_errors import describe_errors, draw_errors
 from hero_sim.world.wheel_loops import draw_normal_at, find_place
 from hero_sim.world.world import World
-from hero_test.kept_results import Digest
+from hero_test.checks.kept_results import Digest
 
 
 def test_headings_and_random_numbers_are_those_that_they_were():

@@ -8,7 +8,7 @@ import pytest
 from hero_client import GoalError
 from hero_sim.stepped.swarm import StepSwarm
 from hero_sim.stepped.topics import StepTopics
-from hero_test.kept_results import Digest
+from hero_test.checks.kept_results import Digest
 
 
 def run_program(swarm, digest):

@@ -14,7 +14,7 @@ from hero_sim.world.arena import Arena, build_rectangle, outline
 from hero_sim.world.pushing.shapes import Disc, Polygon, PushedBody
 from hero_sim.world.robot_errors import RobotErrors, draw_errors
 from hero_sim.world.world import World
-from hero_test.kept_results import Digest
+from hero_test.checks.kept_results import Digest
 
 # -- robots in process ---------------------------------------------------------------------------------------
 

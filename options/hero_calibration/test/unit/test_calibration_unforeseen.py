@@ -11,28 +11,7 @@ from hero_calibration.procedures import motors, placement, wheels
 from hero_calibration.robots import ros_probe
 from hero_node import Pose
 from hero_node.files import KeptCalibration
-
-
-class UnforeseenError(Exception):
-    """Stands for a fault of the program."""
-
-
-def fail(*_, **__):
-    raise UnforeseenError
-
-
-def fail_once():
-    """Return a function that fails, and then answers: what asks again is not to wait for ever."""
-    answers = iter(["12 -5"])
-    state = SimpleNamespace(has_failed=False)
-
-    def answer(_question):
-        if not state.has_failed:
-            state.has_failed = True
-            raise UnforeseenError
-        return next(answers)
-
-    return answer
+from hero_test.checks.unforeseen import UnforeseenError, fail, fail_once
 
 
 def calibrate(monkeypatch, folder):
@@ -81,7 +60,7 @@ def check_places(monkeypatch, _folder):
 
 def measure_by_tape(monkeypatch, _folder):
     monkeypatch.setattr(wheels, "_take_ticks", lambda *_: np.zeros((2, 2)))
-    wheels._ask_for_leg(fail_once(), 0.0, 1.0, wheels.TAPE_SD, FakeSession().probes[0])
+    wheels._ask_for_leg(fail_once("12 -5"), 0.0, 1.0, wheels.TAPE_SD, FakeSession().probes[0])
 
 
 def write(monkeypatch, _folder):

@@ -7,11 +7,11 @@ import numpy as np
 from hero_localization.filter.pose_hypothesis import StampedPose
 from hero_localization.filter.swarm_localizer import SwarmLocalizer
 from hero_node import Pose, transform_pose, wrap_angle
-from hero_test.kept_results import check_figures
+from hero_test.checks.kept_results import check_figures
 
 STEP_S = 0.002
 TURNED = Pose(0.3, -0.2, 2.5)
-"""Of the robot's odometry in map."""
+"""Pose of the robot's odometry in map."""
 LEFT = "/track/measured_poses (/track)"
 RIGHT = "/track/measured_poses (/track_2)"
 

@@ -18,7 +18,7 @@ from hero_localization.tracking import tag_template
 from hero_localization.tracking.camera_shift import CameraShift
 from hero_localization.tracking.tag_pose import TagCorners, fit_squares, list_corners
 from hero_node import Pose, transform_pose
-from hero_test.kept_results import check_figures
+from hero_test.checks.kept_results import check_figures
 
 CAMERA = CameraOptions().geometry
 
@@ -85,7 +85,7 @@ SOUGHT = """
 
 
 def test_prints_are_sought_farther_away_as_they_were():
-    """From places and sizes that are far off: whether they are found, and what the first rounds make of them."""
+    """From places and sizes that are far off: whether they are found, and the first iterations."""
     rows = []
     for index, (tag_id, to_image) in enumerate(PRINTS):
         image, template = (

@@ -8,7 +8,7 @@ pytest.importorskip("cv2")
 from hero_localization.simulated_camera.renderer import CameraRenderer
 from hero_localization.simulated_camera.view import CameraOptions, PrintedTag
 from hero_sim.world.arena import build_rectangle
-from hero_test.kept_results import check_figures
+from hero_test.checks.kept_results import check_figures
 
 OPTIONS = CameraOptions(
     width_px=320,

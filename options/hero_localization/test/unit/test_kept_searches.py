@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hero_test.kept_results import check_figures
+from hero_test.checks.kept_results import check_figures
 
 pytest.importorskip("cv2")
 

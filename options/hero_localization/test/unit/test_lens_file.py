@@ -4,7 +4,7 @@ import pytest
 
 from hero_localization.calibration.lens_calibration import load_lens
 from hero_localization.errors import CalibrationError
-from hero_test.bad_yaml import make_bad_yaml
+from hero_test.checks.bad_yaml import make_bad_yaml
 
 STOCK_LENS = """image_width: 640
 image_height: 480

@@ -7,7 +7,7 @@ import pytest
 from hero_localization.filter import pose_filter, pose_sources, source_clocks, swarm_localizer
 from hero_localization.nodes import localize, map_arena, track
 from hero_localization.prints.print_tags import ROBOT_DIAMETER_MM
-from hero_test.parameter_list import make_list
+from hero_test.checks.parameter_list import make_list
 
 README = (Path(__file__).resolve().parents[2] / "README.md").read_text(encoding="utf-8")
 

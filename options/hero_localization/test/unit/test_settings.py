@@ -16,7 +16,7 @@ from hero_localization.tracking import settings
 from hero_localization.tracking.detectors import DEFAULT_BACKEND
 from hero_localization.tracking.tag_pose import TagLayout
 from hero_node import Pose
-from hero_test.bad_yaml import make_bad_yaml
+from hero_test.checks.bad_yaml import make_bad_yaml
 
 MATRIX = (1390.0, 0.0, 950.0, 0.0, 1391.0, 550.0, 0.0, 0.0, 1.0)
 LENS = Intrinsics.from_camera_info(1920, 1080, MATRIX, "plumb_bob", (-0.1, 0.02, 0.0, 0.0))

@@ -15,28 +15,7 @@ from hero_monitor.control.programs import ChildProcess, Programs
 from hero_monitor.fleet_feed import feed
 from hero_monitor.fleet_feed.page_state import PageState
 from hero_monitor.serving import access, client_limits, invitation, server
-
-
-class UnforeseenError(Exception):
-    """Stands for a fault of the program."""
-
-
-def fail(*_, **__):
-    raise UnforeseenError
-
-
-def fail_once(answers=(0,)):
-    """Return a function that fails, and answers from then on: what asks again is not to wait for ever."""
-    left = iter(answers)
-    state = SimpleNamespace(has_failed=False)
-
-    def answer(*_):
-        if not state.has_failed:
-            state.has_failed = True
-            raise UnforeseenError
-        return next(left)
-
-    return answer
+from hero_test.checks.unforeseen import UnforeseenError, fail, fail_once
 
 
 def run_child(monkeypatch, _folder):
@@ -48,7 +27,7 @@ def run_child(monkeypatch, _folder):
 
 
 def wait_for_child(monkeypatch, _folder):
-    ChildProcess("record")._wait_for(SimpleNamespace(wait=fail_once()))
+    ChildProcess("record")._wait_for(SimpleNamespace(wait=fail_once(0)))
 
 
 def beat(monkeypatch, _folder):

@@ -8,14 +8,7 @@ from synthetic_bag import write_bag
 from hero_recording import disk_guard, export, record, step_recorder
 from hero_recording.bags import repair
 from hero_recording.record import Recording
-
-
-class UnforeseenError(Exception):
-    """Stands for a fault of the program."""
-
-
-def fail(*_, **__):
-    raise UnforeseenError
+from hero_test.checks.unforeseen import UnforeseenError, fail
 
 
 def watch_disk(monkeypatch, folder):

@@ -1,6 +1,6 @@
 """Commands of each behavior in a varied state: results of experiments must not change without a word in CHANGELOG.rst.
 
-See hero_test.kept_results.
+See hero_test.checks.kept_results.
 """
 
 import zlib
@@ -16,7 +16,7 @@ from hero_swarm.behavior import Random, act, decide, sense
 from hero_swarm.behaviors import find_behavior, list_names
 from hero_swarm.behaviors.machine import make_machine
 from hero_swarm.machines.modules import draw_dot, follow, stack
-from hero_test.kept_results import check_sums
+from hero_test.checks.kept_results import check_sums
 
 WORLDS, ROBOTS, STEPS = 2, 6, 5
 

@@ -1,6 +1,6 @@
 """Safety filter, trials, sensors, metrics and learners on varied cases: their results must not change without a word.
 
-See hero_test.kept_results.
+See hero_test.checks.kept_results.
 """
 
 import math
@@ -21,7 +21,7 @@ from hero_swarm.learning.vector_env import SwarmVectorEnv
 from hero_swarm.metrics.own import State, measure_metric
 from hero_swarm.safety import FENCE, OFF, ROBOTS, SafetyFilter
 from hero_swarm.trial import Trial, scatter_objects
-from hero_test.kept_results import check_sums
+from hero_test.checks.kept_results import check_sums
 
 FENCE_M = np.array((-0.5, -0.4, 0.45, 0.35))
 

@@ -1,6 +1,6 @@
 """Fits of robots on short recordings: what they find must not change without a word in CHANGELOG.rst.
 
-See hero_test.kept_results.
+See hero_test.checks.kept_results.
 """
 
 from unittest.mock import create_autospec
@@ -21,7 +21,7 @@ from hero_swarm.fitting.recording import (
     sample_times,
 )
 from hero_swarm.fitting.robot_fit import Fit, describe_fit, fit_robot
-from hero_test.kept_results import check_sums
+from hero_test.checks.kept_results import check_sums
 from hero_test.nonempty import nonempty
 
 PERIOD_S = 0.05

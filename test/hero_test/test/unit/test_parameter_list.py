@@ -1,7 +1,7 @@
 """Documents list what programs declare."""
 
 from hero_node.parameters import choice, flag, number, robot_ids, string, whole_number
-from hero_test.parameter_list import make_list
+from hero_test.checks.parameter_list import make_list
 
 DECLARED = {
     "rate_hz": number(10.0, 1.0, 30.0, "Hz", "of updates"),

@@ -1,6 +1,6 @@
 """Methods of design and their candidates: what they find must not change without a word in CHANGELOG.rst.
 
-See hero_test.kept_results.
+See hero_test.checks.kept_results.
 """
 
 import io
@@ -17,7 +17,7 @@ from hero_swarm.design.kinds import Machines, Networks, Numbers
 from hero_swarm.design.mission import read_mission
 from hero_swarm.design.search import CHOICE, REAL, WHOLE, Genes, adapt, evolve, find_worse, race
 from hero_swarm.machines.modules import LIMITS
-from hero_test.kept_results import check_sums
+from hero_test.checks.kept_results import check_sums
 
 GENES = Genes.of([(-2.0, 2.0, REAL), (0, 4, CHOICE), (0.5, 1.0, REAL), (1, 10, WHOLE), (0, 3, CHOICE)])
 

@@ -1,0 +1,1 @@
+"""What several test files check in the same way. Knows no ROS."""
